@@ -13,7 +13,6 @@ bends towards low speeds. This example computes the steady response with the tee
 import tomllib
 from pathlib import Path
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from exugear import Choice, Gearbox, Project, SpeedRange, SteadySettings
@@ -107,8 +106,8 @@ responses = {
 figure = Figure(figsize=(9.0, 3.4), layout="constrained")
 panels = figure.subplots(1, 2)
 for name, response in responses.items():
-    speed = response["speed"] * 30.0 / np.pi
-    first = response["amplitude"].sel(signal="overall_dte").isel(line=1)
+    speed = response["speed_rpm"]
+    first = response["amplitude"].sel(signal="overall_dte", line="spur")
     panels[0].plot(speed, 1e6 * first, ".-", label=name)
 panels[1].plot(speed, 100.0 * response["apart_share"].isel(mesh_wave=0), ".-", color="C1")
 panels[0].set_ylabel("transmission error, first harmonic / um")

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from exugear.results.spectra.orders import order_lines
     from exugear.results.spectra.run_spectra import run_waterfall
     from exugear.steady.settings import SpeedRange, SteadySettings
-    from exugear.steady.steady_response import steady_response
+    from exugear.steady.steady_file import steady_response
     from exugear.studies.dataset import load_study
     from exugear.studies.study import Study
     from exugear.studies.sweep import sweep
@@ -63,7 +63,7 @@ _HOMES = {
     "run_waterfall": "exugear.results.spectra.run_spectra",
     "simulate": "exugear.transient.runup",
     "static_state": "exugear.dynamics.statics",
-    "steady_response": "exugear.steady.steady_response",
+    "steady_response": "exugear.steady.steady_file",
     "sweep": "exugear.studies.sweep",
     "template": "exugear.gearbox.templates.kinds",
     "to_case": "exugear.exchange.rexs.to_case.conversion",

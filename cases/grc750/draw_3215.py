@@ -105,10 +105,9 @@ def draw_waterfalls(project: Project, gearbox: Gearbox, inertias: str, path: Pat
         for panel, variant in zip(panels, ("rigid", "bushing"), strict=True):
             choice = Choice(variant, inertias=inertias)
             response = steady_response(gearbox, choice, project.stiffness(), settings=settings)
-            names = [own.name for own in response.signals]
-            lines = np.abs(response.solved.amplitude[:, 1:, names.index("overall_dte")])
-            speed = np.abs(response.solved.speed)[:, None] + 0.0 * lines
-            frequency = speed * response.lines.orders[1:] / (2.0 * np.pi)
+            lines = response["amplitude"].sel(signal="overall_dte").drop_sel(line="mean").to_numpy()
+            speed = np.abs(response["speed"].to_numpy())[:, None] + 0.0 * lines
+            frequency = speed * response["order"].to_numpy()[1:] / (2.0 * np.pi)
             level = 20.0 * np.log10(np.maximum(lines, 1e-15) / 1e-6)
             shown = np.flatnonzero((frequency <= HIGHEST_HZ) & (level > LOWEST_DB))
             shown = shown[np.argsort(level.ravel()[shown])]

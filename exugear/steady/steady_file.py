@@ -10,16 +10,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.bodies.elastic_body import ElasticBody
+from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
 from exugear.dynamics.statics import beside_unsolved_states
 from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.operating_range import operating_range
+from exugear.gearbox.parts import RPM
 from exugear.gearbox.versions import STEADY
 from exugear.results.folder import modes_path
 from exugear.steady.campbell.campbell import LAYOUT
 from exugear.steady.mean_system.signals import carried_seats
-from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.peaks import line_name
+from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
 from exugear.steady.steady_response import Solved, SteadyResponse, response_of
+from exugear.tooth_mesh.law import MeshData
 from fe_ste.tools.sealed import Layout, load_dataset
 from fe_ste.tools.stores.store import Store
 
@@ -178,7 +184,68 @@ def load_response(path: str | Path) -> xr.Dataset:
     Traceback (most recent call last):
     fe_ste.tools.files.FileError: nowhere/steady-parametric.nc: no such file
     """
-    return load_dataset(Path(path), _LAYOUT)
+    return with_names(load_dataset(Path(path), _LAYOUT))
+
+
+def with_names(data: xr.Dataset) -> xr.Dataset:
+    """Add what follows from other arrays: names of the lines, and the speed of the overall input in rpm."""
+    bases = tuple(str(name) for name in data["base"].to_numpy())
+    names = [line_name(tuple(int(n) for n in multiples), bases) for multiples in data["index"].to_numpy()]
+    speed = ("point", data["speed"].to_numpy() / RPM, {"units": "rpm", "long_name": "speed of the overall input"})
+    return data.assign_coords(line=np.array(names, dtype=object), speed_rpm=speed)
+
+
+def steady_response(
+    gearbox: Gearbox,
+    choice: Choice,
+    stiffness: Mapping[str, MeshData],
+    bodies: Mapping[str, ElasticBody] | None = None,
+    settings: SteadySettings | None = None,
+) -> xr.Dataset:
+    """Steady response of a gearbox variant under its static load, over speeds of the overall input.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    choice : Choice
+        Variant, mesh law and inertia set.
+    stiffness : mapping of pair name to (n,) array
+        Mesh stiffness F_bt / STE over the cycle, N/m.
+    bodies : mapping of body name to ElasticBody, optional
+        Reduced elastic bodies, which the variant `flexible` needs.
+    settings : SteadySettings, optional
+        Speeds and level; those that the first load case passes, and `parametric`, by default.
+
+    Returns
+    -------
+    Dataset
+        Labelled as that of `load_response`.
+
+    Raises
+    ------
+    SteadyError
+        What cannot be treated, and why.
+    BalanceError
+        The static load has no equilibrium.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from exugear import Choice, Gearbox, SpeedRange
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
+    >>> mean = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> stiffness = {name: value * shape for name, value in mean.items()}
+    >>> settings = SteadySettings(SpeedRange.from_text("10:20:3"), at_resonances=False)
+    >>> response = steady_response(gearbox, Choice("rigid"), stiffness, settings=settings)
+    >>> response["amplitude"].sel(signal="overall_dte", line="2 x high_speed").sizes
+    Frozen({'point': 3})
+    >>> response["speed_rpm"].to_numpy().round(1)
+    array([10., 15., 20.])
+    """
+    assembly = assemble(gearbox, choice, stiffness, bodies)
+    response = response_of(assembly, settings or SteadySettings(usual_speeds(gearbox)))
+    return with_names(to_dataset(response))
 
 
 def stored_or_computed(
@@ -204,8 +271,8 @@ def stored_or_computed(
         )
         store.write_dataset(to_dataset(response))
         points.discard()
-        stored = load_response(path)
-    return stored
+        stored = load_dataset(path, _LAYOUT)
+    return with_names(stored)
 
 
 def settings_of(attributes: Mapping[str, Any]) -> SteadySettings:

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.dynamics.assemble import assemble
 from exugear.dynamics.assembly import Assembly
-from exugear.gearbox.choice import Choice
-from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.operating_range import operating_range
 from exugear.gearbox.parts import RPM
 from exugear.steady.campbell.campbell import Campbell, campbell_of, modes_over_speed
@@ -30,8 +26,7 @@ from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import Response, dissipated_and_given, signals
-from exugear.steady.settings import SteadySettings, check_law, check_speeds, usual_speeds
-from exugear.tooth_mesh.law import MeshData
+from exugear.steady.settings import SteadySettings, check_law, check_speeds
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.tools.threads import one_dense_thread
@@ -197,50 +192,6 @@ SLOWEST_BRANCH = 0.01
 LONGEST_REMARK = 300
 """Letters of a remark."""
 Kept = Callable[[Solved], None]
-
-
-def steady_response(
-    gearbox: Gearbox,
-    choice: Choice,
-    stiffness: Mapping[str, MeshData],
-    bodies: Mapping[str, ElasticBody] | None = None,
-    settings: SteadySettings | None = None,
-) -> SteadyResponse:
-    """Steady response of a gearbox variant under its static load, over speeds of the overall input.
-
-    Parameters
-    ----------
-    gearbox : Gearbox
-    choice : Choice
-        Variant, mesh law and inertia set.
-    stiffness : mapping of pair name to (n,) array
-        Mesh stiffness F_bt / STE over the cycle, N/m.
-    bodies : mapping of body name to ElasticBody, optional
-        Reduced elastic bodies, which the variant `flexible` needs.
-    settings : SteadySettings, optional
-        Speeds and level; those that the first load case passes, and `parametric`, by default.
-
-    Raises
-    ------
-    SteadyError
-        What cannot be treated, and why.
-    BalanceError
-        The static load has no equilibrium.
-
-    Examples
-    --------
-    >>> from exugear.steady.settings import SpeedRange
-    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
-    >>> mean = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
-    >>> stiffness = {name: value * shape for name, value in mean.items()}
-    >>> settings = SteadySettings(SpeedRange.from_text("10:20:3"), at_resonances=False)
-    >>> response = steady_response(gearbox, Choice("rigid"), stiffness, settings=settings)
-    >>> response.amplitude("overall_dte", (0, 1, 0)).shape
-    (3,)
-    """
-    assembly = assemble(gearbox, choice, stiffness, bodies)
-    return response_of(assembly, settings or SteadySettings(usual_speeds(gearbox)))
 
 
 @one_dense_thread()

@@ -36,6 +36,10 @@ def test_a_file_gives_back_the_response_with_units_and_origin(assembly, tmp_path
     assert str(data["units"][0].item()) == "m"
     line = int(np.argmin(abs(data["order"].to_numpy() - 99.0)))
     known = response.amplitude("overall_dte", (1, 0, 0))
+    assert data["line"].to_numpy()[[0, line]].tolist() == ["mean", "sun_planet"]
+    np.testing.assert_allclose(data["speed_rpm"], data["speed"] * 30.0 / np.pi, rtol=1e-12)
+    by_name = data["amplitude"].sel(line="sun_planet", signal="overall_dte")
+    np.testing.assert_array_equal(by_name, data["amplitude"][:, line, 0])
     stored = data["amplitude"][:, line, 0] * np.exp(1j * data["phase"][:, line, 0])
     # Single precision.
     np.testing.assert_allclose(stored, known, rtol=1e-6, atol=1e-6 * abs(known).max())
