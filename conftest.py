@@ -9,6 +9,8 @@ import shutil
 import tempfile
 from typing import Any
 
+import pytest
+
 # Processes that work side by side are started by this one and share its folder.
 if "PYTEST_XDIST_WORKER" not in os.environ:
     KEPT = os.environ["EXUGEAR_FLANKS"] = tempfile.mkdtemp(prefix="exugear-tests-")
@@ -19,6 +21,18 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
         """At the end of this process, not of its forks."""
         if os.getpid() == OWNER:
             shutil.rmtree(KEPT, ignore_errors=True)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of a test marked `sample` the first set of parameters stays quick, the others are validation."""
+    seen = set()
+    for item in items:
+        if item.get_closest_marker("sample") is not None:
+            name = item.nodeid.partition("[")[0]
+            if name in seen:
+                item.add_marker("validation")
+            seen.add(name)
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

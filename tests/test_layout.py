@@ -185,6 +185,7 @@ def test_help_loads_no_heavy_library():
     assert "Usage" in left_unloaded(["--help"], heavy)
 
 
+@pytest.mark.validation
 def test_compiled_run_loads_only_what_it_uses(tmp_path):
     run = ["run", "cases/grc750/gearbox.toml", "--variant", "rigid", "--mesh-law", "iso6336", "--duration", "0.01"]
     drawing = ("exudyn", "matplotlib", "pyvista")
@@ -201,6 +202,7 @@ def test_compiled_run_loads_only_what_it_uses(tmp_path):
     assert "0.01 s simulated" in left_unloaded([*run, "--out", str(tmp_path)], heavy)
 
 
+@pytest.mark.validation
 def test_no_module_but_one_names_a_variant_as_text():
     """A new variant is a row of one table; `rigid` is the name of a mesh law, too."""
     names = {"rigid", "bushing", "flexible", "jointed"}

@@ -28,6 +28,7 @@ def test_tests_that_send_signals_ask_for_those_of_a_terminal(file):
     assert file == Path(__file__) or 'usefixtures("terminal_signals")' in file.read_text(encoding="utf-8")
 
 
+@pytest.mark.validation
 def test_claims_about_signals_hold_where_they_are_ignored():
     """Those that need neither tables nor runs."""
     folder = TESTS / "exugear" / "cli" / "test_processes.py"

@@ -79,6 +79,7 @@ def test_modes_that_are_there_are_taken_to_the_bit_and_those_of_another_input_ar
     assert np.array_equal(project.modes().frequency, first.frequency)
 
 
+@pytest.mark.validation
 def test_its_run_is_that_of_the_command_line(project: Project, case: Path, tmp_path: Path) -> None:
     run = project.run(duration=0.02)
     assert isinstance(run, Run) and run.complete and run.path == project.run_path

@@ -91,6 +91,7 @@ def frequencies(mass: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(scipy.linalg.eigh(stiffness, mass, eigvals_only=True), 0.0)) / (2 * np.pi)
 
 
+@pytest.mark.validation
 def test_the_shaft_alone_bends_free_as_a_timoshenko_beam(model: ShaftModel) -> None:
     # Behind the flange, with mild steps; reached are 0.05 and 0.2 %, for a beam takes shoulders as carrying at once.
     sections = model.sections[2:]
@@ -102,6 +103,7 @@ def test_the_shaft_alone_bends_free_as_a_timoshenko_beam(model: ShaftModel) -> N
     assert shaft.summary.free_interface_frequencies["bending"][:2] == pytest.approx(expected, rel=4e-3)
 
 
+@pytest.mark.validation
 def test_the_rotor_on_its_bearings_nods_as_on_a_beam(model: ShaftModel, reduced: ReducedBody) -> None:
     # Main bearing as a spring, shrink disc clamped. The flange dishes under the hub's tube, which a beam does not: 3 %.
     places = {seat.name: seat.z for seat in model.seats}
@@ -146,6 +148,7 @@ def test_the_shaft_winds_up_as_its_sections_say(reduced: ReducedBody, model: Sha
     assert 1 / wound == pytest.approx(estimate, rel=0.15)
 
 
+@pytest.mark.validation
 def test_the_rotor_turns_against_the_gearbox_as_two_inertias(flexible: Assembly, model: ShaftModel) -> None:
     modes = modes_of(flexible)
     rotor = flexible.gearbox.body("main_shaft").axial

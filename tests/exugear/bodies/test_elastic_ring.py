@@ -67,6 +67,7 @@ def turned(assembly: Assembly, angle: float) -> tuple[np.ndarray, np.ndarray]:
     return q, start.v + 1e-2 * random.normal(size=assembly.size)
 
 
+@pytest.mark.validation
 def test_every_ring_mesh_has_a_seat_that_travels_with_the_carrier(ringed: Assembly) -> None:
     seats = ringed.travelling
     assert seats.first.tolist() == [ringed.size, ringed.size + 6, ringed.size + 12]

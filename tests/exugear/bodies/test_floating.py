@@ -169,6 +169,7 @@ def trajectories(
     return np.array([q for q, _ in found]), np.array([dte for _, dte in found])
 
 
+@pytest.mark.validation
 def test_a_gearbox_runs_alike_in_both_frames(floating: Assembly) -> None:
     # 4000 rpm, equal steps. Asked: 0.2 % of the largest motion. What is left is of second order in tilts of 1.5e-4 rad:
     # forces across a tilted shaft push along it, which the frame that does not turn leaves out.
@@ -234,6 +235,7 @@ def test_all_that_acts_on_a_floating_body_acts_as_in_the_other_frame(gearbox: Ge
     assert abs(ends[0][motor] - ends[1][motor]) < 2e-3 * abs(moved[motor])
 
 
+@pytest.mark.validation
 def test_spins_go_on_through_whole_turns(floating: Assembly) -> None:
     found, _ = trajectories(floating, 160, 1e-4)  # 16 ms at 420 rad/s: once around
     turned = found[:, floating.spin["shaft"]]
@@ -241,6 +243,7 @@ def test_spins_go_on_through_whole_turns(floating: Assembly) -> None:
     assert np.diff(turned) == pytest.approx(np.full(160, SPEED * 1e-4), rel=0.05)
 
 
+@pytest.mark.validation
 def test_a_run_goes_on_from_its_own_state(floating: Assembly) -> None:
     # What a resumed run starts from is the assembly's state; generalized-alpha forgets its accelerations, which
     # disturbs the motion by less than a thousandth.
@@ -272,6 +275,7 @@ def test_the_compiled_solver_leaves_floating_frames_to_exudyn(
         simulated(gearbox, Choice("flexible", load_case="steady"), stiffness, tmp_path, solver="compiled")
 
 
+@pytest.mark.validation
 def test_a_run_keeps_its_account_of_energy(gearbox: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     finished = simulated(
         gearbox, Choice("flexible", load_case="run_up"), stiffness, tmp_path, duration=0.004, step=1e-5, sample_rate=2e4

@@ -66,6 +66,7 @@ def spinning(assembly: Assembly, angle: float = 0.7) -> tuple[np.ndarray, np.nda
     return q + turned, v
 
 
+@pytest.mark.validation
 def test_stiffer_shafts_tend_to_the_variant_bushing(grc: Gearbox, stiffness: dict) -> None:
     # Masses are the rigid bodies' by construction; what is left of the difference falls as one over the stiffness.
     held = grc.varied(STATED_LOADS)
@@ -220,6 +221,7 @@ def test_the_compiled_solver_follows_exudyn(flexible: Assembly) -> None:
     assert error.max() < 1e-5
 
 
+@pytest.mark.validation
 def test_reductions_are_kept_in_a_folder(grc: Gearbox, tmp_path: Path) -> None:
     kept = reduced_bodies(grc, "assemblies", tmp_path)
     assert sorted(file.name.split("-")[0] for file in tmp_path.iterdir()) == sorted(SHAFTS)
@@ -255,6 +257,7 @@ def test_damping_of_shafts_is_a_key_of_the_case(grc: Gearbox, stiffness: dict) -
     assert not linear.damping["lss_body"].any()
 
 
+@pytest.mark.validation
 def test_modes_on_rigid_shafts_are_found_again_on_stiff_ones(grc: Gearbox, stiffness: dict) -> None:
     rigid = eigenmodes(grc, Choice("bushing"), stiffness)
     moduli = {f"bodies.{name}.shape.material.youngs_modulus_GPa": 206e3 for name in SHAFTS}
@@ -291,6 +294,7 @@ def test_the_rigid_part_of_a_rigid_motion_is_that_of_the_centre(flexible: Assemb
         assert found[list(flexible.coordinates[name])] == pytest.approx(np.arange(1.0, 7.0), rel=1e-9)
 
 
+@pytest.mark.validation
 def test_a_scene_shows_every_shaft_with_its_gears(flexible: Assembly, tmp_path: Path) -> None:
     modes = modes_of(flexible)
     bending = next(n for n, name in enumerate(modes.names) if name.startswith("ims bending"))
@@ -311,6 +315,7 @@ def test_a_variant_without_elastic_bodies_has_no_such_scene(grc: Gearbox, stiffn
         elastic_scene(assemble(grc, Choice("bushing"), stiffness), np.zeros(43))
 
 
+@pytest.mark.validation
 def test_a_torque_in_the_plane_of_a_bearing_acts_on_its_seat(grc: Gearbox, stiffness: dict) -> None:
     """Two seats of no width in one place would move alike; the torque winds the shaft up as it does a micrometre on."""
     place = grc.content["bearings"]["hss_a"]["z_mm"]

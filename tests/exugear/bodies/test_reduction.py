@@ -265,6 +265,7 @@ def test_a_reduction_is_kept_and_found_again(stepped, tmp_path):
         assert np.array_equal(one.surface.strain, two.surface.strain)
 
 
+@pytest.mark.validation
 def test_a_damaged_file_is_computed_again_with_a_word(tmp_path, caplog):
     first = load_or_reduce_shaft(STEPPED, tmp_path)
     file = next(tmp_path.iterdir())

@@ -230,6 +230,7 @@ BooleanDifference{ Volume{plate}; Delete; }{ Volume{bores()}; Delete; }
 """
 
 
+@pytest.mark.validation
 @needs_gmsh
 def test_a_script_step_and_its_mesh_are_the_same_body(tmp_path: Path) -> None:
     # STEP is the same geometry, whose edges gmsh may take up in another order; the mesh is the script's own.

@@ -132,6 +132,7 @@ def test_gyroscopic_matrices_of_solid_and_turned_shaft_agree(body, turned):
     assert rigid.T @ body.gyroscopic @ rigid == pytest.approx(expected, abs=1e-10 * body.rigid_inertia.axial)
 
 
+@pytest.mark.validation
 def test_reduced_vibrations_are_those_of_the_whole_model(model):
     # Free ones up to the band are exact, on bearings, which no kept vibration has seen, up to half of it.
     body = reduce_solid(replace(model, blanks={}, band=4500.0))
@@ -223,6 +224,7 @@ signal.raise_signal(signal.SIGTERM)
     assert outcome.stdout.strip() == "heard", outcome.stderr
 
 
+@pytest.mark.validation
 @needs_gmsh
 def test_tetrahedra_and_hexahedra_of_a_tube_agree():
     # Finer meshes of either kind move the first three frequencies by less than 0.1 %.
@@ -371,6 +373,7 @@ def faces_of(path: Path) -> tuple[float, np.ndarray, np.ndarray]:
         gmsh.finalize()
 
 
+@pytest.mark.sample
 @needs_gmsh
 @pytest.mark.parametrize("name", ["carrier", "ring_rim", "housing"])
 def test_step_files_of_the_grc_are_those_of_their_scripts(name, tmp_path):

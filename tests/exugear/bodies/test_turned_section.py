@@ -114,6 +114,7 @@ def test_seats_see_rigid_motions_as_they_are(motion, width):
     assert h.seats @ h.rigid == pytest.approx(np.array(expected), abs=1e-12)
 
 
+@pytest.mark.validation
 def test_graded_shoulders_converge():
     # The re-entrant corners set the error: standard grading against twice as many lines.
     seats: list[SeatBand] = []
@@ -125,6 +126,7 @@ def test_graded_shoulders_converge():
         assert np.all(ratio < 1.0015)
 
 
+@pytest.mark.validation
 def test_solid_elements_on_the_same_lines_vibrate_alike():
     # Second method: 27-node hexahedra around the same half-section. Twelve of them around the axis hold a
     # circle to 4e-5 of its radius and cos(phi) to 1e-4.

@@ -95,6 +95,7 @@ def unloaded_frequencies(gearbox: Gearbox, stiffness: dict) -> np.ndarray:
     return modes_of(assembled(gearbox, Choice("flexible"), stiffness), preload=False).frequency[1:60]
 
 
+@pytest.mark.validation
 def test_a_stiff_carrier_is_the_rigid_one(grc_shafts: Gearbox, carrying: Gearbox, stiffness: dict) -> None:
     # Second method: the shafts elastic, the carrier a rigid body, which it becomes as one over its stiffness.
     limit = {"elasticity.limit_Hz": 1e6}  # no masses are added to slow anything down
@@ -110,6 +111,7 @@ def test_a_stiff_carrier_is_the_rigid_one(grc_shafts: Gearbox, carrying: Gearbox
     assert gaps[1] == pytest.approx(gaps[0] / 10, rel=0.2)
 
 
+@pytest.mark.validation
 def test_compiled_accelerations_are_those_of_the_plain_kernels(
     carrying: Gearbox, flexible: Assembly, stiffness: dict
 ) -> None:
@@ -130,6 +132,7 @@ def test_signals_and_energies_are_those_of_the_plain_kernels(flexible: Assembly)
     assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("keys", [{}, HEAVY])
 def test_the_account_of_energy_of_a_run_closes(carrying: Gearbox, stiffness: dict, keys: dict) -> None:
     # 20 ms at 46 rpm; powers by Simpson's rule over the steps, whose error is far below.
@@ -167,6 +170,7 @@ def test_matrices_of_exudyn_are_those_of_the_assembly(flexible: Assembly, loaded
         assert np.abs(found - expected).max() < (1e-5 if loaded else 1e-7) * np.abs(expected).max()
 
 
+@pytest.mark.validation
 def test_the_compiled_solver_follows_exudyn(flexible: Assembly) -> None:
     start = accelerating_start(flexible, LOAD, -4.8)
     q, v = np.empty((2, 501, flexible.size))

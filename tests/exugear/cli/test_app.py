@@ -196,6 +196,7 @@ def computed(tmp_path_factory):
     return case, folder / "out", exugear("ste", case, "--positions", 8, "--out", folder / "out", "--json")
 
 
+@pytest.mark.validation
 def test_ste_writes_a_table_and_its_pictures_and_names_them(computed):
     _, out, outcome = computed
     assert outcome.exit_code == 0, outcome.stderr
@@ -237,6 +238,7 @@ def test_a_damaged_table_is_computed_again(spur_case, tmp_path):
     assert "spur.nc" in request.replaces
 
 
+@pytest.mark.validation
 def test_another_process_draws_the_same_curves(computed, tmp_path, monkeypatch):
     case, out, _ = computed
     shutil.copytree(out / "tables", tmp_path / "tables")
@@ -266,6 +268,7 @@ def test_ste_with_bad_options_writes_nothing(spur_case, tmp_path, options, said)
     assert not out.exists()
 
 
+@pytest.mark.validation
 def test_the_nonlinear_method_writes_a_table_of_its_own_and_goes_on_from_it(spur_case, tmp_path, monkeypatch):
     mesh = ContactMesh(layers=3, contact_elements=3, growth=1.0, thickness=4, fillet=2, root=1, rim=3, far_flank=4)
     coarse = functools.partial(NonlinearInput, settings=NonlinearSettings(teeth=3, mesh=mesh))
@@ -315,6 +318,7 @@ def test_positions_that_are_not_solved_are_reported_and_end_with_code_1(computed
     assert "7/8" in outcome.stdout
 
 
+@pytest.mark.validation
 @pytest.mark.usefixtures("terminal_signals")
 def test_ctrl_c_ends_with_130_and_leaves_no_half_written_table(spur_case, tmp_path):
     out = tmp_path / "out"

@@ -47,6 +47,7 @@ def non_linear(case: Path) -> Path:
     return case
 
 
+@pytest.mark.validation
 def test_bearings_prints_a_table_and_writes_the_same_figures(case: Path) -> None:
     out = case.parent / "out"
     printed = exugear("bearings", case, "--out", out)
@@ -60,6 +61,7 @@ def test_bearings_prints_a_table_and_writes_the_same_figures(case: Path) -> None
     assert len(written["input_hash"]) == 64
 
 
+@pytest.mark.validation
 def test_a_given_rating_replaces_the_estimated_one(case: Path) -> None:
     section, ratings = "[bearings.ball.catalogue]\n", "dynamic_rating_kN = 14.0\nstatic_rating_kN = 7.8\n"
     rated = rewritten(case, (section, section + ratings))
@@ -96,6 +98,7 @@ def test_a_load_beyond_the_static_rating_is_told(case: Path) -> None:
     )
 
 
+@pytest.mark.validation
 def test_what_holds_no_axial_load_fails_with_the_bearings_named(case: Path) -> None:
     loose = rewritten(case, ('holds_towards = "-z"', 'holds_towards = "+z"'))
     failed = exugear("bearings", loose, "--out", case.parent / "out")
@@ -113,6 +116,7 @@ def test_bearings_refuses_what_has_none(case: Path, options: list[str], words: s
     assert not (case.parent / "out").exists()
 
 
+@pytest.mark.validation
 def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
     """By the compiled solver, cages turning: energy closes, and the files say what the bearings follow."""
     out = case.parent / "out"
@@ -130,6 +134,7 @@ def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
     assert np.all(force[len(force) // 2 :].mean(axis=0) > 100.0)
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize(
     "place", ["exugear.report.findings.variations.vary_parameter", "exugear.report.findings.context.assemble"]
 )

@@ -65,6 +65,7 @@ def test_a_variant_is_refused_at_once_and_the_one_meant_is_named():
         Variant.offered("jointed")
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 @pytest.mark.parametrize("solver", ["compiled", "exudyn"])
 def test_run_writes_results_and_sums_them_up(case, variant, solver):
@@ -83,6 +84,7 @@ def test_run_writes_results_and_sums_them_up(case, variant, solver):
     assert abs(summary["energy_not_accounted_for"]) < 1e-3
 
 
+@pytest.mark.validation
 def test_a_floating_frame_asks_for_exudyn_before_anything_is_computed(tmp_path):
     case = tmp_path / "case.toml"
     case.write_text(FLOATING_CASE, encoding="utf-8")
@@ -130,6 +132,7 @@ def test_modes_are_those_of_the_closed_form(case):
     assert Path(summary["picture"]).is_file()
 
 
+@pytest.mark.validation
 def test_missing_tables_are_computed_first_and_kept_for_the_next_verb(case, tmp_path):
     out = tmp_path / "out"
     first = exugear("modes", case, "--variant", "rigid", "--out", out)
@@ -185,6 +188,7 @@ def test_a_run_that_fails_ends_with_code_1(case, monkeypatch):
     assert "Failed: the state is not finite" in outcome.stderr
 
 
+@pytest.mark.validation
 @pytest.mark.usefixtures("terminal_signals")
 def test_ctrl_c_keeps_the_run_and_resume_ends_it_as_if_nothing_had_been(case, monkeypatch):
     def interrupted(*arguments, progress, **options):
@@ -233,6 +237,7 @@ def test_report_of_a_folder_without_results_is_bad_input(tmp_path, name):
     assert not (tmp_path / name / "report.html").exists()
 
 
+@pytest.mark.validation
 def test_report_says_where_it_is_and_where_the_time_went(case):
     for variant in ("rigid", "bushing"):
         assert iso("modes", case, "--variant", variant).exit_code == 0

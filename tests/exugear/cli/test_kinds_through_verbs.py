@@ -22,8 +22,6 @@ from ..spur_case import COARSE_INPUT
 
 GUIDE = Path(__file__).parents[3] / "docs" / "reference" / "gear_trains.md"
 HEAD = "| Kind | Tables | Modes | Runs | Steady response | Report |"
-QUICK = ("planetary, carrier held", "differential")
-"""Kinds that every run of the tests takes through all verbs; the others take two minutes."""
 
 
 def exugear(*arguments: object) -> Any:
@@ -41,9 +39,8 @@ def test_the_table_of_kinds_has_a_row_for_each() -> None:
     assert list(told()) == list(KINDS)
 
 
-@pytest.mark.parametrize(
-    "kind", [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.validation) for kind in KINDS]
-)
+@pytest.mark.validation
+@pytest.mark.parametrize("kind", KINDS)
 def test_each_kind_goes_through_all_verbs_or_check_says_why_not(kind: str, tmp_path: Path, monkeypatch) -> None:
     content = KINDS[kind]()
     case, folder = tmp_path / "gearbox.toml", tmp_path / "results"

@@ -57,6 +57,7 @@ def test_the_routes_offered_are_those_of_the_library():
     assert tuple(route.value for route in MeshRoute) == get_args(system.MeshRoute)
 
 
+@pytest.mark.validation
 def test_both_routes_give_the_same_run_and_each_file_says_which_it_was(case, tmp_path):
     runs = {}
     for route in MeshRoute:
@@ -70,6 +71,7 @@ def test_both_routes_give_the_same_run_and_each_file_says_which_it_was(case, tmp
     assert_same_run(*runs.values())
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("law", ["seed", "table"])
 def test_both_routes_give_the_same_run_of_a_whole_gearbox(grc, stiffness, tmp_path, law):
     """By the law whose force is not along its deflection, and by that which knows how gears stand."""
@@ -117,6 +119,7 @@ def test_a_stopped_run_does_not_go_on_by_the_other_route(case, tmp_path):
     assert "was run with mesh_route = element, not loads; start anew" in " ".join(outcome.stderr.split())
 
 
+@pytest.mark.validation
 def test_the_example_of_the_grc_finds_round_off_only(tmp_path):
     spec = importlib.util.spec_from_file_location("grc750_textbook_loads", GRC / "textbook_loads.py")
     example = importlib.util.module_from_spec(spec)

@@ -123,6 +123,7 @@ def test_the_case_behind_the_doubtful_ones_is_beyond_doubt():
     assert remarks(Gearbox.from_dict(shafted())) == ()
 
 
+@pytest.mark.validation
 @pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("name", DOUBTFUL)
 def test_every_verb_accepts_a_doubtful_case_with_the_same_remark(name, tmp_path):
@@ -139,6 +140,7 @@ def test_every_verb_accepts_a_doubtful_case_with_the_same_remark(name, tmp_path)
     assert Project(gearbox, folder).modes().frequency.size > 0
 
 
+@pytest.mark.sample
 @pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("name", DOUBTFUL)
 def test_a_study_accepts_a_doubtful_case(name, tmp_path):

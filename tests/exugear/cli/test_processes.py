@@ -151,6 +151,7 @@ def stopped_run(case, number, delay=None):
     return process.returncode, said, time.monotonic() - begin, folder / "run.partial"
 
 
+@pytest.mark.validation
 def test_a_run_that_is_terminated_keeps_what_it_reached(case):
     code, said, _, partial = stopped_run(case, signal.SIGTERM)
     assert code == 130, said
@@ -224,6 +225,7 @@ def close_standard_output():
 needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 
 
+@pytest.mark.validation
 @needs_full_device
 @pytest.mark.parametrize("arguments", [["check", CASE], ["check", CASE, "--json"], ["--version"], ["--help"]])
 def test_a_full_standard_output_is_a_sentence_and_code_1(arguments):
@@ -233,12 +235,14 @@ def test_a_full_standard_output_is_a_sentence_and_code_1(arguments):
     assert outcome.returncode == 1
 
 
+@pytest.mark.validation
 def test_a_closed_standard_output_is_a_sentence_and_code_1():
     outcome = outcome_into(None, "check", CASE, "--json", preexec_fn=close_standard_output)
     assert said(outcome) == "Failed: standard output: Bad file descriptor\n"
     assert outcome.returncode == 1
 
 
+@pytest.mark.validation
 def test_a_reader_that_has_read_enough_is_code_141_without_a_word():
     reader, writer = os.pipe()
     os.close(reader)
@@ -247,6 +251,7 @@ def test_a_reader_that_has_read_enough_is_code_141_without_a_word():
     assert (outcome.returncode, said(outcome)) == (141, "")
 
 
+@pytest.mark.validation
 @needs_full_device
 def test_what_cannot_be_said_on_standard_error_costs_nothing(case):
     """A verb with a progress bar and messages."""
@@ -259,6 +264,7 @@ def test_what_cannot_be_said_on_standard_error_costs_nothing(case):
         assert outcome_into(subprocess.PIPE, "check", "missing.toml", stderr=full).returncode == 2
 
 
+@pytest.mark.validation
 def test_no_result_is_lost_with_a_standard_output_that_cannot_be_written(case):
     """Nor does what is printed get into a file that was given the number of a closed stream."""
     out = case.parent / "out"
@@ -282,6 +288,7 @@ def test_what_the_library_logs_is_said_on_standard_error(capsys):
             logger.setLevel(logging.NOTSET)
 
 
+@pytest.mark.validation
 def test_what_is_compiled_is_told_before_it_is_and_ctrl_c_ends_it(tmp_path):
     """The first verb of an installation: nothing is left of a run that did not begin."""
     verb = ["run", str(CASE), "--variant", "rigid", "--mesh-law", "iso6336", "--duration", "0.01"]

@@ -37,6 +37,7 @@ def test_the_levels_offered_are_those_of_the_library():
     assert tuple(level.value for level in Level) == LEVELS
 
 
+@pytest.mark.validation
 def test_steady_writes_a_response_and_sums_it_up(case):
     outcome = steady(case, "--variant", "bushing", "--speeds", "500:8000:30", "--json")
     assert outcome.exit_code == 0, outcome.stderr
@@ -57,6 +58,7 @@ def test_steady_writes_a_response_and_sums_it_up(case):
         assert words in page, words
 
 
+@pytest.mark.validation
 def test_bearings_follow_their_elements_at_the_level_nonlinear(tmp_path):
     """The state, its report and what is said of it; other levels say that they do not."""
     case = tmp_path / "bearings.toml"
@@ -76,12 +78,14 @@ def test_bearings_follow_their_elements_at_the_level_nonlinear(tmp_path):
     assert report.exit_code == 0, report.stderr
 
 
+@pytest.mark.validation
 def test_the_range_of_the_load_case_is_the_usual_one(case):
     outcome = steady(case, "--variant", "rigid", "--level", "linear", "--json")
     assert outcome.exit_code == 0, outcome.stderr
     assert json.loads(outcome.stdout)["speeds"] >= 399
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("law", ["iso6336", "constant"])
 def test_a_law_without_a_wave_excites_nothing_and_says_so(case, law):
     outcome = steady(case, "--variant", "bushing", "--mesh-law", law, "--speeds", "500:8000:20", "--json")
@@ -92,6 +96,7 @@ def test_a_law_without_a_wave_excites_nothing_and_says_so(case, law):
     assert Path(summary["file"]).exists()
 
 
+@pytest.mark.validation
 def test_harmonics_are_told_and_may_be_asked_for(case):
     options = "--variant", "bushing", "--speeds", "1400:1500:5"
     usual = json.loads(steady(case, *options, "--json").stdout)
@@ -123,6 +128,7 @@ def test_what_cannot_be_answered_is_one_sentence_and_code_2(case, options, said)
     assert said in outcome.stderr
 
 
+@pytest.mark.validation
 def test_a_response_in_which_teeth_pull_says_where(case):
     """On ideal joints the spur pair's force swings beyond its static one at the resonance, and grows besides."""
     outcome = steady(case, "--variant", "rigid", "--speeds", "500:8000:30", "--json")
@@ -148,6 +154,7 @@ def test_an_unstable_response_ends_with_code_1_and_says_so(case, monkeypatch):
     assert "not to be trusted" in outcome.stderr
 
 
+@pytest.mark.validation
 def test_a_branch_that_is_not_whole_ends_with_code_1_and_says_where(case, monkeypatch):
     from exugear.project import Project
 

@@ -204,6 +204,7 @@ def test_inertia_sets_move_the_upper_modes(grc: Gearbox, stiffness: dict) -> Non
     assert "hss spin" in light.names[-1]
 
 
+@pytest.mark.validation
 def test_seed_law_flutters_on_soft_bearings_unless_damped(grc: Gearbox, stiffness: dict) -> None:
     """Its force has parts that its deflection does not see: the tangent is unsymmetric."""
     light = eigenmodes(grc, Choice("bushing", "seed"), stiffness)

@@ -89,6 +89,7 @@ def test_planet_bearings_of_the_grc_are_those_between_planets_and_carrier(grc, s
     assert np.array_equal(doubled.stiffness[others], base.connectors.stiffness[others])
 
 
+@pytest.mark.validation
 def test_modes_are_followed_through_a_crossing(grc, stiffness):
     # With less inertia the mode of the high-speed shaft rises through those of the planets, which stay.
     variation = vary_parameter(parameter(grc, "bushing", "axial inertia of hss", stiffness))

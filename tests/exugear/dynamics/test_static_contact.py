@@ -70,6 +70,7 @@ def around(state: StaticState) -> dict[str, tuple[float, float]]:
     return found
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("kind", ["grc", "relieved", "pair", "wind"])
 def test_static_state_is_that_of_the_law_of_whole_tables(kind: str) -> None:
     """External, internal, relieved and crowned pairs; the grid has the same finite elements and positions."""
@@ -127,6 +128,7 @@ def mirrored(gearbox: Gearbox) -> Gearbox:
     return gearbox.varied(changes)
 
 
+@pytest.mark.validation
 def test_a_mirrored_gearbox_stands_as_its_original() -> None:
     """Flank -1: its misalignment and load centre are those of flank +1 seen in the mirror."""
     state, other = solved("relieved"), mirrored(gearbox_of("relieved"))
@@ -176,6 +178,7 @@ def test_what_is_kept_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     assert input_hash(assemble(gearbox_of("grc"), before.choice, curves)) == input_hash(before)
 
 
+@pytest.mark.validation
 def test_where_contact_cannot_be_solved_teeth_bear_evenly_and_it_is_said(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

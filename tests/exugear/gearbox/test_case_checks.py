@@ -92,6 +92,7 @@ def test_meshes_carry_what_statics_say_under_any_load(case: Any, variant: str, c
     assert np.abs(found).sum() == pytest.approx(expected, rel=1e-3 if variant == "bushing" else 1e-6)
 
 
+@pytest.mark.validation
 def test_a_brake_that_is_locked_holds_the_train_as_its_shaft_would(case: Any) -> None:
     gearbox = case("grc", static_load__locked=["brake"])
     plain = case("grc")

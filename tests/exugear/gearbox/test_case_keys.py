@@ -116,6 +116,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
     assert not unread - FOR_PEOPLE - ELSEWHERE, sorted(unread - FOR_PEOPLE - ELSEWHERE)
 
 
+@pytest.mark.validation
 def test_every_key_of_pages_and_of_a_life_is_read_in_the_program() -> None:
     """A key counts as read where it is taken as an attribute, outside the models of the file."""
     root = Path(exugear.__file__).parent

@@ -92,6 +92,7 @@ def starts(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, di
     return folder / "mutant.toml", bases(folder)
 
 
+@pytest.mark.validation
 def test_the_cases_to_start_from_have_no_fault(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
     file, cases = starts
     for name, content in cases.items():
@@ -101,6 +102,7 @@ def test_the_cases_to_start_from_have_no_fault(starts: tuple[Path, dict[str, dic
         assert not json.loads(outcome.stdout)["warnings"]
 
 
+@pytest.mark.validation
 def test_damaged_files_are_refused_in_words_or_pass(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
     file, cases = starts
     passed = [survives_check(cases, seed, file) is not None for seed in range(30)]

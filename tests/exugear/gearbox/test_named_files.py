@@ -115,6 +115,7 @@ def test_check_says_that_a_script_wants_permission_and_does_not_run_it(scripted:
     assert not mark.exists()
 
 
+@pytest.mark.validation
 @needs_gmsh
 def test_a_permitted_script_runs_once_and_never_for_a_report(scripted: tuple[Path, Path], monkeypatch: Any) -> None:
     case, mark = scripted
@@ -245,6 +246,7 @@ def with_files(folder: Path, **files: str) -> Path:
 FLANK_KEY, SERIES_KEY = "gears.pinion.modification.topography", "load_cases.run_up.torque_series"
 
 
+@pytest.mark.sample
 @posix
 @pytest.mark.parametrize(("kind", "key"), [("flank", FLANK_KEY), ("series", SERIES_KEY)])
 def test_files_that_are_named_lie_below_the_gearbox_file_unless_permitted(tmp_path: Path, kind: str, key: str) -> None:

@@ -65,6 +65,7 @@ def test_a_cutter_of_an_external_gear_is_refused():
         Gearbox.from_dict(content, "case.toml")
 
 
+@pytest.mark.validation
 def test_check_passes_a_ring_with_its_cutter(tmp_path: Path):
     path = tmp_path / "case.toml"
     text = template("planetary")

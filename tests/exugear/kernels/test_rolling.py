@@ -133,6 +133,7 @@ def test_beyond_the_table_slices_are_summed(name: str) -> None:
         assert np.abs(found - expected).max() < 1e-4 * np.abs(expected).max()
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("name", ["logarithmic", "tapered", "balls", "angular contact balls"])
 def test_compiled_law_is_a_plain_sum_over_slices_or_balls(name: str) -> None:
     row = replace(ALL_ROWS[name], axial_position=0.01)

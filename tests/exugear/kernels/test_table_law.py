@@ -67,6 +67,7 @@ def cases(grc: Gearbox, tables: dict) -> Iterator[tuple[Assembly, np.ndarray, np
             yield assembly, *in_contact(assembly, 3, flank)
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("flank", [1, -1])
 def test_jacobian_equals_finite_differences(grc: Gearbox, tables: dict, variant: str, flank: int) -> None:
@@ -93,6 +94,7 @@ def test_jacobian_equals_finite_differences(grc: Gearbox, tables: dict, variant:
     assert np.abs(still - found_q).max() < 1e-6 * np.abs(still).max()
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("flank", [1, -1])
 def test_damping_is_a_time_times_the_tangent_along_all_that_moves(grc: Gearbox, flank: int) -> None:
     """Of teeth that resist tilting; of others the part of the tangent that pushes the wrong way does not damp."""
@@ -234,6 +236,7 @@ def asymmetric_surface(gearbox: Gearbox) -> SteSurface:
     return SteSurface.from_nodes([0.075], tilts, force, per_load * force, 1.0 / per_load * np.ones(3), slopes)
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize(("size", "limit"), [(4e-6, 1e-8), (2e-5, 1e-7)], ids=["in contact", "through loss of contact"])
 def test_no_energy_is_gained_on_a_closed_path_at_frozen_position(
     grc: Gearbox, tables: dict, size: float, limit: float
@@ -275,6 +278,7 @@ def test_misalignment_is_positive_where_it_opens_the_gap_at_the_plus_z_end(grc: 
     assert misalignment == pytest.approx(-(closing(0.1) - closing(0.0)) / 0.1, rel=1e-9)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_both_solvers_write_the_same_run(grc: Gearbox, tables: dict, tmp_path: Path, variant: str) -> None:
     one, two = (
@@ -295,6 +299,7 @@ def test_both_solvers_write_the_same_run(grc: Gearbox, tables: dict, tmp_path: P
     assert not one["outside_time"].any()
 
 
+@pytest.mark.validation
 def test_run_accounts_for_its_energy(grc: Gearbox, tables: dict, tmp_path: Path) -> None:
     run = simulate(grc, Choice("bushing", "table"), tables, tmp_path, duration=0.2)
     data = xr.load_dataset(run.path, engine="h5netcdf")
@@ -305,6 +310,7 @@ def test_run_accounts_for_its_energy(grc: Gearbox, tables: dict, tmp_path: Path)
     assert float(np.abs(residual).max()) < 1e-4 * float(np.abs(data.work_of_loads).max())
 
 
+@pytest.mark.validation
 def test_teeth_apart_and_tables_left_are_counted(grc: Gearbox, tables: dict, tmp_path: Path) -> None:
     """At a hundredth of the static load a torque that reverses for a moment takes the teeth apart."""
     unloaded = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 0.0, "hss": 0.0}})
@@ -324,6 +330,7 @@ def marked_at(surface: SteSurface, load: int) -> SteSurface:
     return replace(surface, guessed=guessed)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_a_run_beside_states_that_are_not_solved_says_so(
     grc: Gearbox, tables: dict, tmp_path: Path, variant: str
@@ -344,6 +351,7 @@ def test_a_run_beside_states_that_are_not_solved_says_so(
     assert np.array_equal(data["mesh_force"].to_numpy(), other["mesh_force"].to_numpy())  # a mark moves nothing
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("load", [3, 5])
 def test_modes_beside_states_that_are_not_solved_say_so(grc: Gearbox, tables: dict, load: int) -> None:
     """Pieces of load: the static one ends at the fourth load and lies before the sixth, at twice the static load."""
@@ -352,6 +360,7 @@ def test_modes_beside_states_that_are_not_solved_say_so(grc: Gearbox, tables: di
     assert found.to_dataset().attrs["beside_unsolved_states"] == ("high_speed" if load == 3 else "")
 
 
+@pytest.mark.validation
 def test_resumed_run_is_bitwise_the_whole_one(grc: Gearbox, tables: dict, tmp_path: Path) -> None:
     whole = simulate(grc, Choice("bushing", "table"), tables, tmp_path / "whole", duration=1.5)
 

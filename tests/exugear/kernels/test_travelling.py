@@ -162,6 +162,7 @@ def seen_at_rim(angle: float) -> np.ndarray:
     return np.hstack([turn, arm @ turn])
 
 
+@pytest.mark.validation
 def test_a_load_that_travels_around_a_round_ring_meets_the_same_compliance(
     seats: TravellingArrays, compliance: np.ndarray
 ) -> None:

@@ -271,6 +271,7 @@ def test_displacements_vibrate_as_mass_coriolis_and_stiffness_say(plate: Reduced
     assert errors[0] < 1e-4 < 3e-4 < errors[1]
 
 
+@pytest.mark.validation
 def test_a_shaft_moves_alike_in_its_own_frame_and_in_one_that_does_not_turn(shaft: SolidModel) -> None:
     # Kicked at one end and free, at 30 rad/s; bending is at 1080 Hz, so that what is left out, (Omega / omega)^2 of
     # its restoring force, is 2e-5, while the gyroscopic effect on the tilts is of order one.

@@ -92,6 +92,7 @@ CYCLE = 2.0 * np.pi * np.arange(50) / 50
 STIFFNESS = {"spur": 3e8 * (1.0 + 0.08 * np.cos(CYCLE) + 0.03 * np.sin(2 * CYCLE))}
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("speed", [2000.0, 3200.0])
 def test_a_run_at_constant_speed_and_the_steady_response_there_give_one_factor(tmp_path, speed):
     """Largest over mean force of a settled run and of the lines put together again, within 0.3 %."""

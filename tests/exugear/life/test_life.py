@@ -123,6 +123,7 @@ def lives(project: Project, stresses: dict[str, MeshCycleStress]) -> dict[str, A
     return {f"{one.gear} {one.flank}": one for one in rated}
 
 
+@pytest.mark.validation
 def test_life_of_a_spur_pair_as_a_user_meets_it(first):
     """Bearing loads and L10 in closed form, gears beside the standard; a second call finds what is kept."""
     data = read_life(first.life_path)
@@ -160,6 +161,7 @@ def killed_lives(first: Project, folder: Path, every: int) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.validation
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_life_killed_late_is_called_again_to_the_same_bits_and_leaves_no_partial_file(first, tmp_path):
     found = killed_lives(first, tmp_path, 19)
@@ -195,6 +197,7 @@ def test_safety_is_the_factor_on_stress_at_which_the_damage_is_one(tmp_path, str
         assert getattr(more, damage) == pytest.approx(1.0, rel=1e-3)
 
 
+@pytest.mark.validation
 def test_load_sharing_of_planets_is_told(grc):
     counted = checked_loads(grc.gearbox)
     life = compute_life(grc.assembly(), counted, {}, stated_factors(grc.gearbox, 1.05), "")
@@ -364,6 +367,7 @@ def hub_assembly() -> Assembly:
     return Project(gearbox, Path("nowhere"), Choice("bushing", "iso6336")).assembly()
 
 
+@pytest.mark.validation
 def test_loads_of_a_hub_are_held_by_main_bearing_and_carrier():
     """Forces in balance: what the hub pushes, main bearing and shrink disc take; and a direct solution agrees."""
     assembly, torque = hub_assembly(), np.array([240e3])
@@ -437,6 +441,7 @@ def test_planet_bearings_carry_the_couple_of_their_helix(grc, balance):
     assert counted.bearings["pl_a_1"] == pytest.approx(99.0 / 39.0)
 
 
+@pytest.mark.validation
 def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
     case = tmp_path / "gearbox.toml"
     (tmp_path / "loads.csv").write_text(TABLE)

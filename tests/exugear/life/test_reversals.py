@@ -39,6 +39,7 @@ def surfaces_of(gearbox: Gearbox, monkeypatch: pytest.MonkeyPatch) -> dict:
     return {name: table_case.surface_of(gearbox, name) for name in names}
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 @pytest.mark.parametrize("name", ["spur", "parallel", "planetary", "wind", "grc", "grc with weight"])
 def test_reversed_torques_of_any_size_find_their_balance(monkeypatch, name, variant):

@@ -45,6 +45,7 @@ def arrays(balance) -> list[np.ndarray]:
     return [array for part in parts for array in (part.values, part.by_hub)]
 
 
+@pytest.mark.validation
 def test_a_balance_that_was_killed_goes_on_with_the_same_bits(tmp_path):
     whole, partial = solved(tmp_path / "whole.npz"), tmp_path / "killed.npz"
     done = subprocess.run([sys.executable, "-c", KILLED, str(partial)], check=False)

@@ -48,6 +48,7 @@ def requests(folder: Path) -> list[TableRequest]:
     ]
 
 
+@pytest.mark.validation
 def test_tables_hold_the_static_misalignment_and_all_loads(tmp_path: Path) -> None:
     found = {one.name: one.wanted for one in stress_requests(assembly(), requests(tmp_path), loads(1.3), tmp_path)}
     for element, duty in zip(assembly().elements, mesh_duties(assembly()), strict=True):
@@ -77,6 +78,7 @@ def test_axes_of_the_file_and_gears_that_stand_straight_stay_as_they_are(tmp_pat
     assert stress_requests(rigid, straight, loads(1.0), tmp_path) == straight
 
 
+@pytest.mark.validation
 def test_the_load_along_the_face_is_that_of_contact_at_the_static_misalignment(tmp_path: Path) -> None:
     """K_Hbeta between the nodes of the table, against the contact that is solved where the gears stand."""
     (request,) = (

@@ -72,6 +72,7 @@ def planets_with(pin_of: int = 0) -> dict[str, FlankLife]:
     return {f"{one.gear} {one.family}": one for one in lives}
 
 
+@pytest.mark.validation
 def test_the_worst_of_all_planets_is_rated_and_told():
     """A pin 60 um out of place lowers the planets' safety whichever planet it belongs to, and by the same."""
     right = planets_with()["planet sun_planet"]
@@ -112,6 +113,7 @@ def test_the_worst_of_each_figure_is_told_of_flanks_that_are_alike():
     assert worst_of([one]).contact_holder == ""
 
 
+@pytest.mark.validation
 def test_load_sharing_has_the_loads_of_a_hub():
     """K_gamma is the largest of all forces, those under the moment of a hub among them, over the mean of torque."""
     assembly, torque = hub_assembly(), np.array([240e3])
@@ -173,6 +175,7 @@ def broken(tmp_path_factory) -> tuple[Path, Path]:
     return folder / "gearbox.toml", folder / "out"
 
 
+@pytest.mark.validation
 def test_infinite_damage_is_the_first_thing_told_with_the_stress_that_causes_it(broken):
     case, out = broken
     arguments = ["life", str(case), "--variant", "rigid", "--mesh-law", "iso6336", "--out", str(out)]
@@ -194,6 +197,7 @@ def test_infinite_damage_is_the_first_thing_told_with_the_stress_that_causes_it(
     assert any("S_H" in line for line in content["shortfalls"])
 
 
+@pytest.mark.validation
 def test_infinite_damage_is_in_report_and_picture(broken):
     case, out = broken
     report = write_report(out)
@@ -281,6 +285,7 @@ def rated_bearing(folder: Path, oil: dict[str, Any] | None) -> BearingLife:
     return one
 
 
+@pytest.mark.validation
 def test_modified_lives_have_oil_and_cleanliness(tmp_path):
     """At one load and speed L10m is a_ISO times L10; without what the oil is like there is none."""
     one = rated_bearing(tmp_path, OIL)

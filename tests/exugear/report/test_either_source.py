@@ -66,6 +66,7 @@ def data_of(page: Path) -> dict[str, Any]:
     return json.loads(found[1])
 
 
+@pytest.mark.validation
 def test_the_ranking_of_steady_responses_alone_is_that_of_the_largest_amplitudes_in_their_files(folder):
     """Second way: the arrays of the file, looked through for local maxima without any spectra."""
     report = write_report(folder)
@@ -106,6 +107,7 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
     assert "unsteady" not in page.partition('id="trust"')[0]
 
 
+@pytest.mark.validation
 def test_with_run_ups_beside_them_both_sources_can_be_chosen(folder, tmp_path):
     both = tmp_path / "both"
     shutil.copytree(folder, both)

@@ -110,6 +110,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
     return out, ended
 
 
+@pytest.mark.validation
 def test_every_verb_ends_well_and_prints_names_and_paths_as_they_are(results: tuple[Path, list[Any]]) -> None:
     out, ended = results
     for outcome in ended:

@@ -45,6 +45,7 @@ def test_a_report_knows_a_life_whose_stresses_come_from_tables_of_its_own(projec
     assert '<section id="life"' in report.path.read_text(encoding="utf-8")
 
 
+@pytest.mark.validation
 def test_a_report_tells_what_limits_the_life_and_leaves_out_what_does_not_fit(project):
     project.life()
     report = write_report(project.folder)

@@ -64,6 +64,7 @@ def gearbox(results) -> Gearbox:
     return kept_case(results)
 
 
+@pytest.mark.validation
 def test_the_page_stands_alone_and_names_its_assumptions(results):
     report = write_report(results, target=1000.0)
     page = report.path.read_text(encoding="utf-8")
@@ -87,6 +88,7 @@ def test_the_page_stands_alone_and_names_its_assumptions(results):
     assert report.left_out == ()
 
 
+@pytest.mark.validation
 def test_cards_and_checks_on_the_page_are_the_sentences_of_the_command_line(results):
     report = write_report(results, target=1000.0)
     page = html.unescape(report.path.read_text(encoding="utf-8"))
@@ -100,6 +102,7 @@ def test_cards_and_checks_on_the_page_are_the_sentences_of_the_command_line(resu
         assert line.split(": ", 1)[1].removesuffix(".") in page
 
 
+@pytest.mark.validation
 def test_an_executor_beside_changes_nothing_on_the_page(results, monkeypatch):
     """What another process works out comes back as it would be here, and can go from one process to another."""
     alone = write_report(results, target=1000.0).path.read_bytes()
@@ -120,6 +123,7 @@ def test_an_executor_beside_changes_nothing_on_the_page(results, monkeypatch):
     assert all(not isinstance(figures, str) for figures in models[Choice("bushing", LAW, "disc")].values())
 
 
+@pytest.mark.validation
 def test_flexible_runs_alone_are_reported_with_the_reductions_that_are_kept(results, tmp_path, monkeypatch):
     shutil.copytree(results / "tables", tmp_path / "tables")
     shaft = """
@@ -155,6 +159,7 @@ def input_hash_of(results, variant):
         return data.attrs["input_hash"]
 
 
+@pytest.mark.validation
 def test_resonances_of_the_runs_are_eigenfrequencies(results, gearbox):
     report = write_report(results, target=1000.0)
     stiffness = mesh_stiffness(gearbox, LAW, results)
@@ -164,6 +169,7 @@ def test_resonances_of_the_runs_are_eigenfrequencies(results, gearbox):
     assert re.search(rf"<td[^>]*>{rigid:.1f}</td>", page)
 
 
+@pytest.mark.validation
 def test_no_mode_near_is_said_in_words(results):
     statements = " ".join(write_report(results, target=9000.0).statements)
     assert "no mode within 5 % of 9000 Hz" in statements

@@ -52,6 +52,7 @@ def out(finished: Path, tmp_path: Path) -> Path:
     return Path(shutil.copytree(finished, tmp_path / "out"))
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize(("name", "load", "count"), [(MODES, load_modes, 200), (RUN, load_run, 100)])
 def test_no_damaged_result_is_read(out: Path, name: Path, load, count: int) -> None:
     path = out / name
@@ -61,6 +62,7 @@ def test_no_damaged_result_is_read(out: Path, name: Path, load, count: int) -> N
             load(path)
 
 
+@pytest.mark.validation
 def test_no_damaged_piece_is_gone_on_with(tmp_path: Path) -> None:
     (tmp_path / "spur.toml").write_text(SPUR_CASE, encoding="utf-8")
     folder = stopped_run(tmp_path / "spur.toml", tmp_path / "out")
@@ -71,6 +73,7 @@ def test_no_damaged_piece_is_gone_on_with(tmp_path: Path) -> None:
         assert load_run(folder).sizes["time"] < whole.sizes["time"]
 
 
+@pytest.mark.validation
 def test_a_report_leaves_damaged_files_out_and_names_them(out: Path) -> None:
     content = (out / MODES).read_bytes()
     for damaged in damages(content, 4):

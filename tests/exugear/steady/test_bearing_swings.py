@@ -58,6 +58,7 @@ def height(gearbox: Gearbox, share: float, level: str) -> tuple[float, xr.Datase
     return float(data["amplitude"].sel(signal="overall_dte")[:, 1].max()), data
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(("share", "told"), [(0.1, True), (0.005, False)])
 def test_a_peak_on_linear_bearings_is_too_high_where_that_is_told(share: float, told: bool) -> None:
     """Beside rows in time: 48 % too high where a bearing would come free, within 2 % where loads swing by a tenth."""

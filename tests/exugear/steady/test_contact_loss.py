@@ -83,6 +83,7 @@ def tough_pair(variant, **changes):
 UP = np.arange(0.7, 1.2, 0.04)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("name", list(TOUGH)[:4])
 def test_every_speed_through_a_resonance_with_contact_loss_has_a_state(name):
     """Upwards the pair jumps to the branch on which teeth part, downwards it stays there longer."""
@@ -120,6 +121,7 @@ def test_every_speed_of_a_sweep_has_a_state_or_says_that_its_motion_does_not_rep
 
 
 # Amplitudes to 1e-3 and lines to 2e-3 are asked for at resonances.
+@pytest.mark.sample
 @pytest.mark.parametrize(
     ("name", "share"),
     [
@@ -200,6 +202,7 @@ def test_a_response_that_goes_on_finds_the_states_that_it_would_have_found():
     np.testing.assert_array_equal(again.amplitude[0], whole.amplitude[0])
 
 
+@pytest.mark.validation
 def test_a_branch_turns_back_where_the_sweep_jumps():
     """The fold at the foot of the branch lies between the last speed of a sweep before its jump and the first after."""
     own = tough("reversed torque, on bearings")
@@ -249,6 +252,7 @@ def helical():
     return train_solver(gear_trains.pair(helix_deg=15.0), 0.3, 1e-6, 1e-6, 3)
 
 
+@pytest.mark.validation
 def test_a_helical_pair_stays_on_a_state_with_contact_loss():
     solver = helical()
     lines, amplitudes = stays(solver, np.arange(520.0, 499.0, -5.0), 400)
@@ -257,6 +261,7 @@ def test_a_helical_pair_stays_on_a_state_with_contact_loss():
     assert amplitudes < 5e-4
 
 
+@pytest.mark.validation
 def test_the_branch_of_a_helical_pair_turns_back_where_its_sweeps_jump():
     """Two folds, no stable state between them; the sweep up jumps at one, that down at the other, 0.5 rad/s apart."""
     solver = helical()
@@ -275,6 +280,7 @@ def test_the_branch_of_a_helical_pair_turns_back_where_its_sweeps_jump():
         assert min(speeds[jump : jump + 2]) - 0.05 < fold < max(speeds[jump : jump + 2]) + 0.05
 
 
+@pytest.mark.validation
 def test_a_branch_that_runs_out_of_points_says_where(monkeypatch):
     monkeypatch.setattr(gearbox_branches, "trace", functools.partial(trace, most=5))
     branch = follow_branch(helical(), 510.0, 485.0)

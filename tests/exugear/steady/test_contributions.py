@@ -30,6 +30,7 @@ def peak(gearset):
     return loudest_near(gearset, crossing.speed, 2.0 * crossing.damping, crossing.line), crossing.line
 
 
+@pytest.mark.validation
 def test_parts_by_mesh_add_up_to_the_line_of_the_linear_level(gearset, peak):
     speed, line = peak
     found = contributions(gearset, speed, line)
@@ -85,6 +86,7 @@ def test_the_derivative_by_a_bearing_is_that_of_a_gearbox_with_a_stiffer_one(gea
     assert derivative[family] == pytest.approx(slope(*amplitudes, STEP), rel=0.02, abs=0.02)
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("family", ["hss", "lss", "planet", "carrier"])
 def test_the_derivative_by_inertia_is_that_of_a_gearbox_with_a_heavier_body(grc, stiffness, gearset, peak, family):
     """Mass, both moments of inertia and with them the gyroscopic terms; the latter are left out of the derivative."""

@@ -86,6 +86,7 @@ def differences(response, truth):
     return found
 
 
+@pytest.mark.validation
 def test_the_loudest_peaks_are_those_of_a_dense_sweep(parallel):
     """Two stages between 300 and 900 rpm: the twenty loudest of each quantity, by fewer speeds than the sweep has."""
     speeds = SpeedRange(300.0 * RPM, 900.0 * RPM, 120)
@@ -111,6 +112,7 @@ def test_the_sixty_loudest_peaks_of_the_grc_are_those_of_a_dense_sweep(grc, stif
     assert np.count_nonzero(off["acceleration"] > 2e-3) <= 3
 
 
+@pytest.mark.validation
 def test_what_was_stopped_between_tops_goes_on_to_the_same_numbers(parallel):
     settings, kept, seen = SteadySettings(SpeedRange(30.0, 60.0, 20), harmonics=4), [], []
     whole = response_of(parallel, settings, progress=lambda done, total: seen.append(done)).solved
@@ -136,6 +138,7 @@ def spur(swing):
     return 4e8 * (1.0 + swing * edge)
 
 
+@pytest.mark.validation
 def test_harmonics_follow_from_the_stiffness_and_more_change_little(parallel):
     """A smooth mesh takes the fewest; one that swings in steps as many as leave 2e-2 of its compliance out."""
     smooth = gearset_of(parallel, np.array([30.0, 60.0]))

@@ -30,6 +30,7 @@ def data(response):
     return to_dataset(response)
 
 
+@pytest.mark.validation
 def test_a_cut_is_the_line_of_that_order(response, data):
     cut = steady_cut(data, PLANETARY)
     known = response.amplitude("overall_dte", (1, 0, 0))

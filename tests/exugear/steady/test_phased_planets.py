@@ -97,6 +97,7 @@ def test_damping_takes_the_power_that_planets_out_of_phase_give(gearset, level):
     assert given == pytest.approx(taken, rel=1e-4)
 
 
+@pytest.mark.validation
 def test_levels_agree_on_small_variations(four, stiffness):
     """A tenth of the variation leaves a hundredth of the difference between both."""
     differences = []

@@ -48,6 +48,7 @@ def loose_solver():
     return spur_solver(LOOSE, (20.0, 400.0))
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("gearbox", [PLAIN, LOOSE], ids=["without clearance", "with clearance"])
 def test_small_vibration_is_that_of_linear_bearings(gearbox):
     """What laws do beyond their tangents is of second order: a tenth of the vibration, a tenth of the difference."""
@@ -61,12 +62,14 @@ def test_small_vibration_is_that_of_linear_bearings(gearbox):
     assert apart_by[1] < 0.2 * apart_by[0]
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("speed", [60.0, 150.0])
 def test_a_spur_pair_on_rollers_and_balls_stays_on_its_steady_state(speed):
     """RK4 at 1/60 kHz; harmonics beyond the tenth and the parabola of the position leave 1e-4."""
     assert apart(spur_solver(PLAIN, (20.0, 400.0)), speed, 0.4, 1.0 / 60e3, 0.2)[0] < 3e-4
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize(("speed", "most"), [(80.0, 3e-4), (110.0, 2e-3), (220.0, 2e-3)])
 def test_a_spur_pair_with_clearances_stays_on_its_steady_state(loose_solver, speed, most):
     """At 110 and 220 rad/s it resonates: the response is twice and three times off that of linear bearings."""
@@ -75,6 +78,7 @@ def test_a_spur_pair_with_clearances_stays_on_its_steady_state(loose_solver, spe
     assert in_amplitude < 0.5 * most + 1e-4
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("speed", [60.0, 150.0])
 def test_teeth_by_their_table_and_bearings_by_their_elements_stay_on_their_steady_state(monkeypatch, speed):
     """As with linear bearings: 1e-3."""
@@ -129,6 +133,7 @@ def test_the_tangents_of_planets_bearings_are_those_of_differences(grc_rows, sti
     assert difference_of_tangents(solver, 11.0) < 1e-4
 
 
+@pytest.mark.validation
 def test_forces_of_bearings_are_those_of_their_law_on_the_motion(grc_rows, stiffness):
     """Lines of the signals, added up at some instants, against the assembly's own bearings in that state.
 
@@ -201,6 +206,7 @@ def test_what_varies_with_bearings_may_be_unstable(loose_solver):
     assert "half orders" in loose_solver.state.remark
 
 
+@pytest.mark.validation
 def test_the_file_says_which_bearings_followed_their_law(tmp_path):
     assembly, attributes = assemble(LOOSE, Choice("bushing"), varying(0.1)), {}
     for level in ("parametric", "nonlinear"):
@@ -212,6 +218,7 @@ def test_the_file_says_which_bearings_followed_their_law(tmp_path):
     assert attributes == {"parametric": "", "nonlinear": ", ".join(NAMES)}
 
 
+@pytest.mark.validation
 def test_a_branch_on_non_linear_bearings_passes_the_states_at_single_speeds():
     solver, single = (spur_solver(LOOSE, (100.0, 130.0)) for _ in range(2))
     branch = follow_branch(solver, 125.0, 118.0)

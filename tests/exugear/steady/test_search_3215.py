@@ -39,6 +39,7 @@ def between(search, grc, stiffness):
     return {kind: search.Between.of(given, {"kind": kind, **NEARLY_THE_FILE}) for kind in kinds}
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("kind", ["planet_bearings", "all_bearings"])
 def test_each_stiffness_found_makes_the_frequency_a_natural_one(search, grc, stiffness, between, kind):
     """By its matrices within what rounding to three digits leaves; by modes, damped and gyroscopic, within 2 %."""
@@ -83,6 +84,7 @@ def test_peaks_from_both_ends_of_the_range_are_those_of_the_gearbox_itself(
         assert np.abs(quick - exact).max() <= 2e-3 * exact.max(), name
 
 
+@pytest.mark.validation
 def test_a_set_changes_the_gearbox_as_it_says(search, grc, stiffness):
     own = {"kind": "all_bearings", **NEARLY_THE_FILE}
     changed = search.varied(grc, own, 2e9)
@@ -136,6 +138,7 @@ def few_sets(search, monkeypatch):
     return own
 
 
+@pytest.mark.validation
 def test_a_stopped_search_goes_on_and_ends_with_the_same_lines(search, grc, few_sets, tmp_path, capsys):
     project = Project(grc, tmp_path / "whole", Choice("bushing", "iso6336"))
     whole = search.search(project)
@@ -151,6 +154,7 @@ def test_a_stopped_search_goes_on_and_ends_with_the_same_lines(search, grc, few_
     assert (stopped.folder / "search-3215.jsonl").read_bytes() == b"".join(lines)
 
 
+@pytest.mark.validation
 def test_lines_of_another_input_are_not_taken(search, grc, few_sets, tmp_path, capsys):
     project = Project(grc, tmp_path, Choice("bushing", "iso6336"))
     other = {"input": "of another gearbox", "script": 1}

@@ -46,6 +46,7 @@ def test_a_file_gives_back_the_response_with_units_and_origin(assembly, tmp_path
     assert json.loads(data.attrs["settings"])["level"] == "parametric"
 
 
+@pytest.mark.validation
 def test_a_file_that_fits_is_taken_and_another_input_is_computed(assembly, tmp_path):
     path, asked = tmp_path / "steady.nc", []
     for _ in range(2):
@@ -67,6 +68,7 @@ def stopped(path, assembly):
     assert partial_path(path).exists() and not path.exists()
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("kept", ["whole", "cut", "of another input", "of 0.3.0"])
 def test_what_stopped_is_gone_on_with_if_it_fits_and_leaves_nothing_behind(assembly, tmp_path, kept):
     path, seen = tmp_path / "steady.nc", []

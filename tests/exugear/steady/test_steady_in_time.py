@@ -221,6 +221,7 @@ def test_planets_that_bear_alike_put_no_lines_beside_others():
     assert solver.state.averaged is None
 
 
+@pytest.mark.validation
 def test_planets_ahead_of_each_other_count_at_every_level(grc, stiffness):
     """Static spins put planets 1e-4 of a cycle ahead, which excites lateral modes: levels agree on what it does."""
     assembly, found = assemble(grc, Choice("bushing"), stiffness), {}
@@ -319,6 +320,7 @@ def test_the_tangents_of_the_balance_are_those_of_differences(law, spur_surface)
     assert np.linalg.norm(0.5 * (ahead - behind) - change) < (5e-5 if law == "table" else 1e-5) * np.linalg.norm(change)
 
 
+@pytest.mark.validation
 def test_the_position_that_moves_with_the_vibration_changes_little(grc, stiffness):
     """By a thousandth at most where the vibration is small, and never the balance of power."""
     assembly = assemble(grc, Choice("bushing"), stiffness)

@@ -39,6 +39,7 @@ def scaled(stiffness, share):
     return {name: values.mean() + share * (values - values.mean()) for name, values in stiffness.items()}
 
 
+@pytest.mark.validation
 def test_the_linear_level_is_the_first_order_of_the_parametric_one(grc, stiffness):
     """A tenth of the variation leaves a hundredth of the difference between both."""
     apart = []

@@ -63,6 +63,7 @@ def on_cluster(address, content, folder):
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
+@pytest.mark.validation
 def test_a_cluster_gives_the_same_bits_even_if_a_worker_is_killed(cluster, tmp_path):
     address, workers = cluster
     here = sweep(small_study(tmp_path), tmp_path / "here", processes(1))

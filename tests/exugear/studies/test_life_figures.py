@@ -77,6 +77,7 @@ def swept(tmp_path_factory):
     return folder, sweep(Study.from_dict(content(folder)), folder / "out", processes(1)).dataset
 
 
+@pytest.mark.validation
 def test_figures_of_a_life_are_what_the_verb_tells(swept):
     folder, data = swept
     project = Project.from_toml(folder / CASE, folder / "project", Choice("bushing", "iso6336"))
@@ -102,6 +103,7 @@ def test_figures_of_a_life_are_what_the_verb_tells(swept):
     assert float(first["short"]) == len(told["failures"]) + len(told["shortfalls"])
 
 
+@pytest.mark.validation
 def test_damage_without_end_is_infinite_in_file_journal_and_picture(swept):
     folder, data = swept
     stored = load_study(folder / "out" / "study.nc")
@@ -142,6 +144,7 @@ def test_a_dynamic_factor_of_a_run_is_that_of_each_point(swept):
     assert not list((folder / "out" / "work").glob("*"))
 
 
+@pytest.mark.validation
 def test_the_worst_planet_is_that_of_the_life(tmp_path):
     """A pin 60 um out of place: the same safeties and the same planet as the rating of flanks has them."""
     pins = {"pin": {"body": "planet_2", "tangential_um": 60.0}}
@@ -261,6 +264,7 @@ def test_points_belong_to_all_that_their_figures_read(tmp_path):
     assert found[0] != found[2] and found[1] == found[3]
 
 
+@pytest.mark.validation
 def test_json_of_the_verb_has_no_number_that_json_has_not(swept):
     folder, _ = swept
     (folder / "a.study.toml").write_text(toml_text({**content(folder), "case": CASE}), encoding="utf-8")

@@ -37,6 +37,7 @@ def searched(folder, *minimise, **settings):
     return Study.from_dict(content, figures=KNOWN)
 
 
+@pytest.mark.validation
 def test_a_search_finds_the_optimum_that_is_known(tmp_path):
     """Squared distances fall by four a halving: 1e-2 is within 0.1 of both optima, of ranges of 0.9 and 8."""
     data = optimise(searched(tmp_path, "low", generations=20), tmp_path / "out", HERE).dataset
@@ -46,6 +47,7 @@ def test_a_search_finds_the_optimum_that_is_known(tmp_path):
     assert data["on_front"].sum() == 1
 
 
+@pytest.mark.validation
 def test_the_front_of_two_figures_lies_between_their_optima(tmp_path):
     """Both distances fall until the point stands on the line between 0.3 and 0.7; the front's ends are the optima."""
     swept = optimise(searched(tmp_path, "low", "high", weightings=3), tmp_path / "out", HERE)
@@ -57,6 +59,7 @@ def test_the_front_of_two_figures_lies_between_their_optima(tmp_path):
     assert float(first["low"]) == pytest.approx(0.2**2 + 1.0) and np.isnan(float(first["seat"]))
 
 
+@pytest.mark.validation
 def test_a_search_that_is_begun_again_computes_nothing_twice(tmp_path):
     first = optimise(searched(tmp_path, "low"), tmp_path / "out", HERE)
     assert first.computed == first.dataset.sizes[EVALUATION]

@@ -27,6 +27,7 @@ def dataset(**variables):
     return xr.Dataset(made, {name: own for name, own in coordinates.items() if name in used}, {"title": "test"})
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize(
     "dimensions",
     [

@@ -65,6 +65,7 @@ def test_points_are_those_of_gearboxes_varied_one_by_one(here, home):
         np.testing.assert_array_equal(data["frequency"].sel(seat=seat).isel(bearing=1), elastic)
 
 
+@pytest.mark.validation
 def test_one_process_and_two_give_the_same_bits(here, home, tmp_path):
     two = sweep(small_study(home), tmp_path / "two", processes(2))
     xr.testing.assert_identical(figures_of(two.dataset), figures_of(here.dataset))
@@ -76,6 +77,7 @@ def test_any_executor_of_the_protocol_serves(here, home, tmp_path):
     xr.testing.assert_identical(figures_of(other.dataset), figures_of(here.dataset))
 
 
+@pytest.mark.validation
 def test_a_worker_that_is_killed_costs_nothing_but_time(here, home, tmp_path):
     killed = []
 
@@ -89,6 +91,7 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(here, home, tmp_path):
     xr.testing.assert_identical(figures_of(swept.dataset), figures_of(here.dataset))
 
 
+@pytest.mark.validation
 def test_a_study_whose_main_process_is_killed_computes_no_finished_point_again(here, home, tmp_path):
     program = f"""
 import sys
@@ -214,6 +217,7 @@ def test_a_line_that_was_cut_short_is_no_point(tmp_path):
     assert read_journals(tmp_path, {"a", "b"}) == {}
 
 
+@pytest.mark.validation
 def test_points_with_one_table_compute_it_once(tmp_path, monkeypatch):
     monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
     computed = []
@@ -242,6 +246,7 @@ def test_two_that_want_the_same_table_wait_for_one(tmp_path, monkeypatch):
     assert computed == [1] and hashes[0] == hashes[1]
 
 
+@pytest.mark.validation
 def test_memory_of_a_worker_does_not_grow_with_its_points(tmp_path):
     values = {"seat": {"path": "housing.factor", "range": {"first": 0.1, "last": 0.9, "count": 190}}}
     study = small_study(tmp_path, parameters=values)
@@ -250,6 +255,7 @@ def test_memory_of_a_worker_does_not_grow_with_its_points(tmp_path):
     assert memory[-1] - memory[60] < 20e6  # a gearbox that stayed behind would be 0.2 MB a point
 
 
+@pytest.mark.validation
 def test_a_run_that_was_stopped_is_gone_on_with(tmp_path, monkeypatch):
     from exugear.transient import recorder
 

@@ -82,6 +82,7 @@ def best(dataset, name):
     return kept.isel({EVALUATION: int(np.argmin(kept[name].to_numpy()))})
 
 
+@pytest.mark.validation
 def test_a_limit_holds_where_the_optimum_lies_beyond_it(tmp_path):
     """(x - 0.3)^2 has its least value at 0.3; with x at least 0.45 it is at the limit, 0.0225."""
     study = searched(tmp_path, ["failing", "place"], {"minimise": ["failing"], "limits": {"place": {"least": 0.45}}})
@@ -99,6 +100,7 @@ def test_a_figure_below_zero_is_made_small_all_the_same(tmp_path):
     assert float(best(data, "depth")["seat"]) == pytest.approx(0.6, abs=0.02)
 
 
+@pytest.mark.validation
 def test_limits_of_both_sides_and_of_the_figure_itself_hold(tmp_path):
     limits = {"place": {"least": 0.62, "most": 0.7}, "wall": {"most": 0.3}}
     data = optimise(
@@ -108,6 +110,7 @@ def test_limits_of_both_sides_and_of_the_figure_itself_hold(tmp_path):
     assert 0.62 <= float(found["place"]) < 0.625
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(("percent", "height", "seat"), [(95.0, (0.75 * 0.19) ** 2, 0.4525), (100.0, 0.15**2, 0.45)])
 def test_the_optimum_over_tolerances_stands_off_the_wall(tmp_path, percent, height, seat):
     """Made within 0.1, evenly: 95 of 100 draws lie in a piece of 0.19 of the 0.2, all in 0.2.
@@ -138,6 +141,7 @@ def heights(place):
     return np.where(place > 0.5, 9.0, 1.0) * (place - 0.5) ** 2
 
 
+@pytest.mark.validation
 def test_what_is_limited_below_counts_by_its_low_percentile(tmp_path):
     """Of x made within 0.1, 90 of 100 are above x - 0.08: at least 0.35 they are from x = 0.43 on."""
     study = searched(
@@ -154,6 +158,7 @@ def test_what_is_limited_below_counts_by_its_low_percentile(tmp_path):
     assert "10th percentile of place" in data["place_low"].attrs["long_name"]
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("figure", ["endless", "failing"])
 def test_draws_that_fail_or_have_no_end_are_worst(tmp_path, figure):
     """Above 0.6 less than 5 of 100 draws may lie: x + 0.09 stays below."""
@@ -191,6 +196,7 @@ def test_a_limit_of_what_has_no_end_is_far_beyond_or_kept():
     assert beyond(float("-inf"), "low", 0.0) > 0.0 and beyond(2.0, "high", 2.0) == 0.0
 
 
+@pytest.mark.validation
 def test_a_search_over_tolerances_that_is_begun_again_computes_nothing_twice(tmp_path):
     options = {"minimise": ["wall"], "generations": 2, "limits": {"wall": {"most": 0.1}}}
     made = {"tolerances": {"made": MADE}, "samples": 8}
@@ -258,6 +264,7 @@ def damped(folder, limits, **changes):
     return study_content(folder, parameters={"seat": SEAT}, figures=figures, optimise=search, **changes)
 
 
+@pytest.mark.validation
 def test_the_verb_tells_percentiles_limits_and_front(tmp_path):
     tolerances = {"made": {**MADE, "uniform": {"least": -0.01, "most": 0.01}}}
     outcome = verb(tmp_path, damped(tmp_path, {"frequency": {"least": 10.0}}, tolerances=tolerances, samples=4))

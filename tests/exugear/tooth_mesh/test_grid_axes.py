@@ -85,6 +85,7 @@ def _case(folder: Path, text: str) -> Path:
     return path
 
 
+@pytest.mark.validation
 def test_keys_of_the_file_are_taken_as_they_are_and_a_table_that_reaches_far_enough_serves(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

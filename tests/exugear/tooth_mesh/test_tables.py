@@ -46,6 +46,7 @@ def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(exugear.tooth_mesh.tables, "TableInput", COARSE_INPUT)
 
 
+@pytest.mark.validation
 def test_axes_are_those_of_the_file_and_the_static_state_lies_on_them_exactly(computed: tuple[Path, Path]) -> None:
     case, out = computed
     gearbox = Gearbox.from_toml(case)
@@ -88,6 +89,7 @@ def test_one_state_does_not_serve_where_a_grid_is_needed_nor_a_grid_with_other_a
     assert missing_tables(gearbox, tmp_path, grid=True)[0].wanted == wanted_table(gearbox, "spur", 8, grid=True)
 
 
+@pytest.mark.validation
 def test_law_table_runs_from_the_command_line_on_its_grid(computed: tuple[Path, Path], tmp_path: Path) -> None:
     case, out = computed
     arguments = ["--mesh-law", "table", "--variant", "bushing", "--json", "--out", str(out)]
@@ -236,6 +238,7 @@ def test_a_centre_distance_at_which_flanks_overlap_is_refused_with_its_key(tmp_p
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.validation
 def test_pictures_and_report_show_the_static_state_of_a_grid(computed: tuple[Path, Path]) -> None:
     _, out = computed
     assert (out / "pictures" / "ste.png").is_file()

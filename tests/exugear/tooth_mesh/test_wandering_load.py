@@ -30,12 +30,14 @@ def with_tables(content, folder):
     return gearbox
 
 
+@pytest.mark.validation
 def test_the_load_of_spur_teeth_stays_in_the_middle(tmp_path):
     (own,) = wandering_loads(with_tables(tomllib.loads(SPUR_CASE), tmp_path), tmp_path)
     assert own.amplitude < 1e-6
     assert own.over_error < 0.01
 
 
+@pytest.mark.validation
 def test_the_load_of_helical_teeth_moves_along_them_as_their_contact_has_it(tmp_path):
     """Moment over push by the line loads of the contact itself, summed along the face."""
     gearbox = with_tables(tomllib.loads(template("pair")), tmp_path)
@@ -49,6 +51,7 @@ def test_the_load_of_helical_teeth_moves_along_them_as_their_contact_has_it(tmp_
     assert own.over_error > 1.0
 
 
+@pytest.mark.validation
 def test_steady_says_that_the_moment_is_left_out_and_how_much_that_is(tmp_path):
     case = tmp_path / "pair.toml"
     case.write_text(template("pair"), encoding="utf-8")

@@ -112,6 +112,7 @@ def test_run_out_is_the_way_of_the_axis_along_the_line_of_action(grc: Gearbox, s
         assert one == pytest.approx(two, abs=1e-10)
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("law", ["line_of_action", "table"])
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_compiled_solver_and_tangent_know_the_errors(pitched: Gearbox, stiffness: dict, law: str, variant: str) -> None:
@@ -175,6 +176,7 @@ def test_planets_with_a_pin_out_of_place_share_as_by_hand(grc: Gearbox, stiffnes
     assert abs(offset) == pytest.approx(size, abs=spread + 1e-9)
 
 
+@pytest.mark.validation
 def test_bearings_carry_a_displaced_planet_along(grc: Gearbox, stiffness: dict) -> None:
     """Unloaded and out of mesh the planet stands where its pin is."""
     case = grc.varied({"pins": {"late": {"body": "planet_2", "tangential_um": 25.0}}})
@@ -191,6 +193,7 @@ def test_bearings_carry_a_displaced_planet_along(grc: Gearbox, stiffness: dict) 
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
 
 
+@pytest.mark.validation
 def test_exudyn_has_the_same_pins_and_errors(pitched: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     case = pitched.varied({"pins": {"late": {"body": "planet_2", "tangential_um": 25.0, "radial_um": -5.0}}})
     one, two = (
@@ -208,6 +211,7 @@ def test_exudyn_has_the_same_pins_and_errors(pitched: Gearbox, stiffness: dict, 
     assert np.ptp(shares) > 0.1 * shares.mean()
 
 
+@pytest.mark.validation
 def test_a_displaced_planet_gives_the_sidebands_of_its_orbit(grc: Gearbox, stiffness: dict) -> None:
     """Equally loaded planets hold the carrier's bearings still; one out of place leaves a force that turns with it."""
     case = grc.varied({"pins": {"late": {"body": "planet_1", "tangential_um": 25.0}}})

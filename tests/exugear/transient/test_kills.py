@@ -56,6 +56,7 @@ def kills(case: Path, out: Path, solver: str, every: int) -> dict:
     return json.loads(ended.stdout)
 
 
+@pytest.mark.validation
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_run_killed_at_some_writes_resumes_bitwise(case: Path, tmp_path: Path) -> None:
     found = kills(case, tmp_path / "out", "compiled", 23)
@@ -97,6 +98,7 @@ except OSError as error:
 """
 
 
+@pytest.mark.validation
 @pytest.mark.skipif(sys.platform == "win32", reason="needs limits of the operating system")
 @pytest.mark.parametrize(
     ("solver", "room", "unwritten"),
@@ -190,6 +192,7 @@ runup.simulate(gearbox, Choice("rigid", "iso6336", load_case="run_up"), stiffnes
 """
 
 
+@pytest.mark.validation
 def test_a_second_process_on_a_run_is_turned_away_and_changes_nothing(case: Path, tmp_path: Path) -> None:
     out, go = tmp_path / "out", tmp_path / "go"
     with python(SLOW, case, out, go) as first:

@@ -38,6 +38,7 @@ def balance_residual(data: xr.Dataset) -> float:
     return (2 * change["work_of_loads"] - sum(change.values())) / kinetic
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("variant", ["rigid", "bushing", "flexible"])
 @pytest.mark.parametrize("case", ["reference", "generating"])
 def test_work_of_the_loads_is_accounted_for(
@@ -51,6 +52,7 @@ def test_work_of_the_loads_is_accounted_for(
     assert float(data.input_speed[-1]) == pytest.approx(sense * 0.75 * 0.3, rel=2e-2)
 
 
+@pytest.mark.validation
 def test_seed_law_shows_its_non_conservative_work(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     # With the light damping of the case the law's unsymmetric tangent makes a bearing mode flutter.
     damped = grc.varied({"damping.bearing_time_s": 2.5e-5, "damping.mesh_time_s": 2.5e-5})
@@ -93,6 +95,7 @@ def test_joint_forces_of_the_rigid_variant_balance_the_torque(grc: Gearbox, stif
     assert float(np.abs(carrier[:2]).max()) < 1.0  # N; three equal planets pull evenly
 
 
+@pytest.mark.validation
 @pytest.mark.usefixtures("terminal_signals")
 def test_stopped_run_resumes_where_it_was(
     grc: Gearbox, stiffness: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -139,6 +142,7 @@ runup.simulate(gearbox, Choice("rigid"), stiffness, sys.argv[2], duration=0.05, 
 """
 
 
+@pytest.mark.validation
 def test_a_killed_run_can_be_read(grc: Gearbox, tmp_path: Path) -> None:
     ended = subprocess.run([sys.executable, "-c", KILLED, grc.source, str(tmp_path)], check=False)
     assert ended.returncode == -signal.SIGKILL

@@ -116,6 +116,7 @@ def test_a_good_run_is_trusted(tmp_path):
     assert (kept["trusted"], kept["verdict"]) == (1, "within all limits")
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("solver", ["compiled", "exudyn"])
 def test_parametric_instability_is_stopped_at_a_part_of_the_tooth_height(tmp_path, solver):
     gearbox = spur()
@@ -283,6 +284,7 @@ print("alive")
 """
 
 
+@pytest.mark.validation
 def test_angles_that_are_no_numbers_or_too_large_do_not_crash_the_process(grc):
     command = [sys.executable, "-c", DIVERGED, str(Path(__file__).parents[1]), grc.source]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=500, check=False)

@@ -107,6 +107,7 @@ def regular(flank: FlankCompliance, sense: int, cells: Cells, roll: Floats, axia
     return result
 
 
+@pytest.mark.sample
 def test_compliance_is_that_of_the_formulas_cell_by_cell(compliance: PairCompliance) -> None:
     """Series of far loads, sums over runs of cells, the lower triangle alone: 1e-12 of the largest entry."""
     cells, axial, flanks = cells_of(compliance, 0.3e-3), compliance.axial, compliance.flanks

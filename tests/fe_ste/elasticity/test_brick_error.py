@@ -18,6 +18,7 @@ RING = Gear(name="ring", teeth=60, normal_module=3e-3, face_width=20e-3, held_di
 MESH = MeshSettings(layers=6, flank=12, thickness=8)
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("gear", [SPUR, HELICAL, RING], ids=lambda gear: gear.name)
 def test_the_error_is_a_small_part_of_the_displacement_and_local(gear: Gear) -> None:
     mesh = sector_mesh(gear, MESH)

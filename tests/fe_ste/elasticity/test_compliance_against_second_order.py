@@ -40,6 +40,7 @@ def close(agreement: ModuleType, name: str, gear: int) -> None:
     assert ours == pytest.approx(high, rel=ASKED)
 
 
+@pytest.mark.validation
 def test_helical_pinion(agreement: ModuleType) -> None:
     close(agreement, "helical 0.2", 0)
 

@@ -38,6 +38,7 @@ def mesh() -> SectorMesh:
     return sector_mesh(HELICAL, MeshSettings())
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(("angle", "poissons_ratio"), [(67.5, 0.3), (82.0, 0.27), (107.5, 0.3)])
 def test_image_loads_make_a_wedge_of_a_half_space(wedge: ModuleType, angle: float, poissons_ratio: float) -> None:
     """At angles that were not fitted; seen 0.5 to 1.7 % rms of the mean."""
@@ -48,6 +49,7 @@ def test_image_loads_make_a_wedge_of_a_half_space(wedge: ModuleType, angle: floa
     assert np.sqrt(np.mean(missed**2)) < 0.03 * np.sqrt(np.mean((weight * added) ** 2))
 
 
+@pytest.mark.validation
 def test_the_wedge_of_180_degrees_adds_nothing_and_that_of_90_obeys_reciprocity(wedge: ModuleType) -> None:
     """A load of 1 at one place moves the other by 2 K_0: the half-space itself, to what elements miss."""
     places, displacement = wedge.face_displacement(np.linspace(0.0, -np.pi, 33), 0.3)

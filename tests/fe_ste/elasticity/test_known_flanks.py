@@ -75,6 +75,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return computed
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("open_teeth", [None, 5])
 @pytest.mark.parametrize("gear", [HELICAL, RING], ids=lambda gear: gear.name)
 def test_the_other_flank_is_the_same_one_turned(gear: Gear, open_teeth: int | None) -> None:
@@ -98,6 +99,7 @@ def test_a_kept_flank_is_the_computed_one(kept: Path, calls: list[str]) -> None:
     assert [flank.gear.name for flank in again] == ["helical", "same gear"]
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize(
     "other",
     [
@@ -123,6 +125,7 @@ def test_another_method_does_not_use_the_files(kept: Path, calls: list[str], mon
     assert len(calls) == 2
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "other file"])
 def test_a_damaged_file_is_computed_again(kept: Path, calls: list[str], damage: str) -> None:
     (first,) = known_flanks([(HELICAL, 1)], COARSE)
@@ -189,6 +192,7 @@ def test_files_used_least_lately_are_removed(kept: Path, monkeypatch: pytest.Mon
     assert paths[1] not in left
 
 
+@pytest.mark.validation
 def test_two_processes_may_write_one_file(kept: Path, calls: list[str]) -> None:
     """Both compute the same gear at once; whoever ends last leaves a whole file."""
     program = (

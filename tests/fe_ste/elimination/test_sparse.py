@@ -47,6 +47,7 @@ def test_both_back_ends_give_the_same_numbers():
     np.testing.assert_allclose(solutions[0], solutions[1], rtol=0, atol=1e-9 * np.abs(solutions[1]).max())
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_solution_satisfies_the_equations(backend):
     matrix = elastic_block()
@@ -58,6 +59,7 @@ def test_solution_satisfies_the_equations(backend):
     assert np.abs(residual).max() < 1e-10 * np.abs(loads).max()
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_sparse_dense_and_single_right_hand_sides_agree(backend):
     matrix = elastic_block()
@@ -71,6 +73,7 @@ def test_sparse_dense_and_single_right_hand_sides_agree(backend):
         )
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_the_inverse_read_out_is_symmetric(backend):
     matrix = elastic_block()
@@ -80,6 +83,7 @@ def test_the_inverse_read_out_is_symmetric(backend):
     np.testing.assert_allclose(compliance, compliance.T, rtol=0, atol=1e-11 * np.abs(compliance).max())
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_body_free_to_move_is_refused_with_its_number_of_unknowns(backend):
     matrix = elastic_block(clamped=False)
@@ -101,6 +105,7 @@ def test_an_empty_row_is_refused_with_its_number(backend):
         factorise(matrix, backend)
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_closed_factorisation_says_so(backend):
     factorisation = factorise(elastic_block(), backend)

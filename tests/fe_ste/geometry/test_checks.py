@@ -98,6 +98,7 @@ def test_grc_tips_clear_their_mates(any_grc_pair: GearPair) -> None:
     assert least_tip_gap(both.pinion, both.gear, both.centre_distance) > -FILLET_POLYGON
 
 
+@pytest.mark.validation
 def test_accepted_external_pairs_run_free_and_interfering_ones_collide() -> None:
     random = np.random.default_rng(1)
     verdicts = {"accepted": 0, "interferes": 0}
@@ -124,6 +125,7 @@ def test_accepted_external_pairs_run_free_and_interfering_ones_collide() -> None
     assert min(verdicts.values()) > 10, verdicts
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("addendum", [0.8, 0.9, 1.0])
 @pytest.mark.parametrize("teeth", [28, 40])
 def test_accepted_internal_pairs_run_free_and_tips_of_too_close_teeth_collide(addendum: float, teeth: int) -> None:

@@ -88,6 +88,7 @@ class RolledCutter:
         return removed
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("gear", RINGS, ids=lambda gear: f"z0 {gear.cutter.teeth}")
 def test_the_fillet_is_what_no_position_of_the_cutter_goes_beyond(gear: Gear) -> None:
     """On the tooth's side of the fillet nothing is cut at any position, on the other side all is at some."""

@@ -54,6 +54,7 @@ def brute_force_form_radius(gear: Gear) -> float:
     return float(radius[cut].max())
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize(("teeth", "tip_radius"), [(10, 0.38), (12, 0.25), (17, 0.25)])
 def test_undercut_ends_the_involute_where_no_position_of_the_rack_cuts_it(teeth: int, tip_radius: float) -> None:
     """All positions of the rack's tip tried one by one, without the law of gearing; steps of 1/1000 of a module."""

@@ -78,6 +78,7 @@ def shown() -> dict[str, object]:
     return {type(value).__name__: value for value in objects}
 
 
+@pytest.mark.validation
 def test_each_shows_itself_in_one_short_line(shown):
     lines = {name: repr(value) for name, value in shown.items()}
     assert {name: line for name, line in lines.items() if len(line) > LONGEST or "\n" in line} == {}

@@ -177,6 +177,7 @@ def test_a_cylinder_on_a_block_has_the_half_width_and_peak_of_hertz(block, finit
     assert hertz_peak(place, found.pressure) == pytest.approx(peak, rel=0.03)
 
 
+@pytest.mark.validation
 def test_two_spheres_have_the_radius_and_peak_of_hertz(block):
     # A quarter of two steel spheres by symmetry, the upper half as large again as the lower.
     radii, contact_radius, size = (40e-3, 60e-3), 1e-3, 12e-3

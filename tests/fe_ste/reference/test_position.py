@@ -28,6 +28,7 @@ def solved():
     return nonlinear_position(PAIR, TORQUE, 0.0, COARSE)
 
 
+@pytest.mark.validation
 def test_a_coarse_position_comes_near_the_finest_mesh(solved):
     # 161,880 unknowns, benchmarks/nonlinear: 31.720 um, itself some 0.5 to 1.5 % below its limit.
     assert solved.ste == pytest.approx(31.720e-6, rel=0.02)
@@ -58,6 +59,7 @@ def test_geometric_nonlinearity_adds_less_than_a_thousandth(solved):
     assert 0.0002 < solved.ste / small.ste - 1 < 0.0015
 
 
+@pytest.mark.validation
 def test_an_internal_helical_pair_turns_the_right_way(ring_planet):
     # Narrow gears, whose three teeth hold all contacts.
     narrow = GearPair(
@@ -73,6 +75,7 @@ def test_an_internal_helical_pair_turns_the_right_way(ring_planet):
     assert len([share for share in found.load_share.values() if share > 0.05]) >= 2
 
 
+@pytest.mark.validation
 def test_a_torque_too_large_names_position_load_step_and_iteration():
     mesh = ContactMesh(layers=3, contact_elements=2, growth=2.0, thickness=3, fillet=1, root=1, rim=3, far_flank=4)
     settings = NonlinearSettings(teeth=3, mesh=mesh, newton=NewtonSettings(most_iterations=3))

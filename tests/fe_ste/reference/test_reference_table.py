@@ -32,6 +32,7 @@ def path(tmp_path_factory):
     return path
 
 
+@pytest.mark.validation
 def test_a_table_says_what_it_is_and_names_its_units(path):
     table = NonlinearTable.open(path, WANTED)
     data = table.dataset
@@ -67,6 +68,7 @@ def test_no_damaged_table_is_used(path, tmp_path):
             NonlinearTable.open(copy, WANTED)
 
 
+@pytest.mark.validation
 def test_what_converged_before_a_stop_is_kept_and_taken_up_again(tmp_path):
     path, seen = tmp_path / "pair-nonlinear.nc", []
 
@@ -86,6 +88,7 @@ def test_what_converged_before_a_stop_is_kept_and_taken_up_again(tmp_path):
     assert (0, 3) in seen and seen[-1] == (3, 3)
 
 
+@pytest.mark.validation
 def test_a_position_that_fails_is_not_a_number_and_says_why():
     # Two iterations do not reach rounding.
     hurried = dataclasses.replace(SETTINGS, newton=NewtonSettings(most_iterations=2, force_tolerance=1e-13))

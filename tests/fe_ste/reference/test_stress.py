@@ -38,6 +38,7 @@ def fields():
     }
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize("method", ["non-linear", "superelement"])
 def test_pressure_and_equivalent_stress_are_those_of_hertz(fields, method):
     field = fields[method]
@@ -91,6 +92,7 @@ def can_render() -> bool:
     return True
 
 
+@pytest.mark.sample
 @pytest.mark.skipif(not can_render(), reason="no off-screen rendering here")
 @pytest.mark.parametrize("flank_of", [1, 2])
 def test_the_picture_shows_both_views_and_names_load_and_method(fields, tmp_path, flank_of):

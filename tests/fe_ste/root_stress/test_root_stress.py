@@ -46,6 +46,7 @@ def gauges():
     return root_gauges(pair.pinion, 1), root_gauges(pair.gear, 1)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(("member", "radius"), [(0, 37.72e-3), (0, 36.28e-3), (1, 55.95e-3), (1, 54.54e-3)])
 def test_root_stress_of_the_spur_reference_is_that_of_iso_6336_3(gauges, member, radius):
     """Within 6 %: the standard's tangent of 30 degrees is not where the stress is largest, and its Y_S is a fit."""
@@ -54,6 +55,7 @@ def test_root_stress_of_the_spur_reference_is_that_of_iso_6336_3(gauges, member,
     assert middle_stress(gauges[member], radius) == pytest.approx(form * correction, rel=0.06)
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(("member", "radius"), [(0, 37.72e-3), (1, 55.95e-3)])
 def test_root_stress_has_converged_with_the_mesh_of_the_fillet(gauges, member, radius):
     gear = (fzg_c().pinion, fzg_c().gear)[member]
@@ -86,6 +88,7 @@ def test_gauges_read_the_strains_of_a_uniform_deformation():
     assert read[:, 2] == pytest.approx(2.0 * np.einsum("lgi,ij,lgj->gl", along, strain, across), abs=1e-9)
 
 
+@pytest.mark.validation
 def test_a_flank_and_the_other_have_the_same_root_stress(gauges):
     """A gear turned by 180 degrees about the middle of a tooth is itself."""
     other = root_gauges(fzg_c().pinion, -1)

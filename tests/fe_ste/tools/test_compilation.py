@@ -59,6 +59,7 @@ def value(small: Path, **environment: str) -> tuple[str, str]:
     return printed("small.caller.value(1.0)", small.parent, **environment)
 
 
+@pytest.mark.validation
 def test_an_edited_callee_in_another_file_gives_the_new_number(small: Path) -> None:
     """And the number of before when the edit is taken back, without compiling."""
     before, said = value(small)
@@ -72,6 +73,7 @@ def test_an_edited_callee_in_another_file_gives_the_new_number(small: Path) -> N
     assert COMPILING not in said
 
 
+@pytest.mark.validation
 def test_the_contact_s_near_field_follows_its_half_space(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "fe_ste", tmp_path / "fe_ste", ignore=shutil.ignore_patterns("__pycache__"))
     expression = "fe_ste.contact.near_field.mean_inverse_distance(0.0, 0.0, 1e-4, 1e-4)"
@@ -89,6 +91,7 @@ def closed(small: Path) -> None:
     (small / "__pycache__").write_bytes(b"")
 
 
+@pytest.mark.validation
 def test_a_package_that_cannot_be_written_keeps_its_kernels_with_the_user(small: Path, tmp_path: Path) -> None:
     closed(small)
     cache = str(tmp_path / "cache")
@@ -98,6 +101,7 @@ def test_a_package_that_cannot_be_written_keeps_its_kernels_with_the_user(small:
         assert list((tmp_path / "cache" / "exugear" / "small").glob("kernels-*/*.nbc"))
 
 
+@pytest.mark.validation
 def test_without_a_home_kernels_are_kept_in_a_private_folder_for_temporary_files(small: Path, tmp_path: Path) -> None:
     closed(small)
     place = tmp_path / "temporary"
@@ -109,6 +113,7 @@ def test_without_a_home_kernels_are_kept_in_a_private_folder_for_temporary_files
     assert own.stat().st_mode & 0o077 == 0
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("trap", ["open folder", "link"])
 def test_no_machine_code_is_read_from_where_another_user_could_put_it(small: Path, tmp_path: Path, trap: str) -> None:
     """What lies in a cache is executed."""
@@ -124,6 +129,7 @@ def test_no_machine_code_is_read_from_where_another_user_could_put_it(small: Pat
     assert not list(tmp_path.rglob("*.nb?"))
 
 
+@pytest.mark.validation
 def test_a_damaged_cache_is_compiled_anew(small: Path) -> None:
     assert value(small)[0] == "3.0"
     for file in small.rglob("*.nb?"):
@@ -134,6 +140,7 @@ def test_a_damaged_cache_is_compiled_anew(small: Path) -> None:
         assert (COMPILING in said) is expected
 
 
+@pytest.mark.validation
 def test_a_full_disk_costs_the_cache_and_not_the_work(small: Path) -> None:
     program = "import small.caller; print(small.caller.value(1.0))"
     outcome = subprocess.run(
@@ -227,6 +234,7 @@ def ahead(small: Path, first: str = "", free: bool = True) -> str:
     return outcome.stdout.strip()
 
 
+@pytest.mark.validation
 def test_a_kernel_is_compiled_by_another_process_once(small: Path) -> None:
     assert ahead(small) == "3.0 [True] 1"
     assert ahead(small) == "3.0 [] 1"
@@ -236,5 +244,6 @@ def test_a_process_that_cannot_compile_ahead_leaves_it_to_the_first_call(small: 
     assert ahead(small, first=f"sys.executable = {shutil.which('false')!r}") == "3.0 [False] 0"
 
 
+@pytest.mark.validation
 def test_with_one_core_nothing_is_compiled_ahead(small: Path) -> None:
     assert ahead(small, free=False) == "3.0 [] 0"

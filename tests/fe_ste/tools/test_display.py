@@ -109,6 +109,7 @@ def stated_lines():
                     yield node.name, ast.literal_eval(keyword.value), members
 
 
+@pytest.mark.validation
 def test_stated_lines_name_attributes_that_their_classes_have():
     lines = list(stated_lines())
     assert len(lines) > 30

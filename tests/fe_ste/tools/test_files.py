@@ -127,6 +127,7 @@ for name, write in writers.items():
 """
 
 
+@pytest.mark.validation
 @pytest.mark.skipif(sys.platform == "win32", reason="needs limits of the operating system")
 def test_a_full_disk_is_an_error_with_the_name_and_leaves_nothing(tmp_path: Path) -> None:
     (tmp_path / "a.nc").write_bytes(b"old")

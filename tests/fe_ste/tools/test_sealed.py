@@ -158,6 +158,7 @@ for n in range(12):
 """
 
 
+@pytest.mark.validation
 def test_two_writers_of_one_file_and_a_reader_see_whole_files_only(tmp_path: Path) -> None:
     path = tmp_path / "a.nc"
     write_dataset(path, DATA)

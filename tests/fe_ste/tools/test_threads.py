@@ -128,6 +128,7 @@ def test_after_an_error_no_further_item_is_begun(two_cores: None) -> None:
     assert len(begun) <= 2
 
 
+@pytest.mark.validation
 def test_dense_products_let_go_of_the_lock(two_cores: None) -> None:
     """While a product of half a second runs, this thread goes on."""
     size = 3000

@@ -38,6 +38,7 @@ def cross_check() -> ModuleType:
 OPEN = 0.02
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("name", ["spur 0 coarse", "spur 0.5 coarse", "spur 0 fine", "spur 0.5 fine"])
 def test_superelement_is_within_two_per_cent_of_calculix_and_as_stored(cross_check: ModuleType, name: str):
     ours = cross_check.superelement(cross_check.CASES[name])["ste_um"]

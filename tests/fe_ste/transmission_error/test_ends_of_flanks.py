@@ -43,6 +43,7 @@ def check_sharing(pair: GearPair) -> None:
     assert -1 / 12 <= doubled - (pair.transverse_contact_ratio - 1.0) <= 0.2, (doubled, pair.transverse_contact_ratio)
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("teeth", [12, 17])
 def test_every_position_of_an_undercut_pinion_is_solved(teeth: int) -> None:
     pair = pair_of(wheel(teeth), wheel(60))
@@ -50,6 +51,7 @@ def test_every_position_of_an_undercut_pinion_is_solved(teeth: int) -> None:
     check_sharing(pair)
 
 
+@pytest.mark.validation
 def test_a_chamfered_tip_is_as_a_tip_of_its_form_diameter() -> None:
     """What stands above the flank carries nothing: the tooth is only a little stiffer for it."""
     gear = wheel(60)

@@ -158,6 +158,7 @@ def test_flanks_that_end_in_edges_count_nothing(spur: PairCompliance) -> None:
     assert kinematics.form_roll_1 == pytest.approx(pinion.root_form_roll_length / pinion.base_radius)
 
 
+@pytest.mark.validation
 def test_a_large_misalignment_presses_on_one_end_of_the_face_in_balance() -> None:
     """0.6 mm over the face of 491 mm, and three times the load: a wedge bears at its end, and comes to form circles.
 

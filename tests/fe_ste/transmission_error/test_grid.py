@@ -67,6 +67,7 @@ def grid(compliance: PairCompliance) -> xr.Dataset:
     return solve_grid(compliance, AXES)
 
 
+@pytest.mark.validation
 def test_every_state_equals_the_one_solved_alone(compliance: PairCompliance, grid: xr.Dataset) -> None:
     """Same cells and a problem with one solution: rounding is all that differs."""
     cosine = math.cos(PAIR.pinion.base_helix_angle)
@@ -137,6 +138,7 @@ def test_any_executor_gives_the_same_grid(compliance: PairCompliance, grid: xr.D
             same(solve_grid(compliance, AXES, executor=executor), grid)
 
 
+@pytest.mark.validation
 @pytest.mark.usefixtures("small_blocks")
 def test_processes_give_the_same_grid(compliance: PairCompliance, grid: xr.Dataset) -> None:
     seen = []
@@ -158,6 +160,7 @@ def stop_after(states: int) -> Callable[[int, int], None]:
     return progress
 
 
+@pytest.mark.validation
 @pytest.mark.usefixtures("small_blocks")
 def test_a_stopped_grid_keeps_what_is_finished_and_goes_on_from_there(
     compliance: PairCompliance, grid: xr.Dataset, tmp_path: Path
@@ -195,6 +198,7 @@ def test_finished_positions_of_another_input_or_in_a_damaged_file_are_not_taken_
     assert np.array_equal(empty.values["ste"], results.values["ste"])
 
 
+@pytest.mark.validation
 @pytest.mark.usefixtures("small_blocks")
 def test_lost_workers_are_reported_and_finished_positions_kept(compliance: PairCompliance, tmp_path: Path) -> None:
     """A process that is killed, as for want of memory."""

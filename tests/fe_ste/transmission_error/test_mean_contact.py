@@ -101,6 +101,7 @@ def test_stiffness_and_tangent_load_centre_are_slopes_by_force(contact: MeanCont
     assert contact.tangent_load_centre[0] == pytest.approx(centre, abs=2e-3 * PAIR.face_width)
 
 
+@pytest.mark.validation
 def test_few_positions_stand_for_the_whole_mesh_cycle(contact: MeanContact) -> None:
     whole = mean_contact(contact_input(TABLE, FORCE, TILT, PAIR.centre_distance, positions=40))
     assert contact.tilt_stiffness == pytest.approx(whole.tilt_stiffness, rel=2e-2)
@@ -233,6 +234,7 @@ def test_another_version_does_not_use_the_files(kept: Path, solved: list[str], m
     assert len(solved) == 2
 
 
+@pytest.mark.validation
 def test_damaged_files_are_solved_again(kept: Path, solved: list[str]) -> None:
     (first,) = known_contacts([WANTED])
     (path,) = kept.glob("contact-*.npz")

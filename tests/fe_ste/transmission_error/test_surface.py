@@ -108,6 +108,7 @@ def test_axis_that_does_not_increase_is_refused() -> None:
         SteSurface.from_nodes([0.1], [0.0], [0.0], np.ones((1, 1, 1, 1)), np.ones((1, 1, 1, 1)))
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("axes", ["all", "place alone", "load alone"])
 def test_a_guess_is_told_wherever_it_acts(axes: str) -> None:
     """A state and a guess at it make two surfaces: wherever these differ the interval is marked."""

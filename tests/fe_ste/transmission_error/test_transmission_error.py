@@ -116,6 +116,7 @@ def ripple(curve: xr.Dataset) -> float:
     return float(curve.ste.max() - curve.ste.min())
 
 
+@pytest.mark.sample
 def test_curve_is_periodic(compliance: PairCompliance) -> None:
     start, end = (contact_state(compliance, torque_of(compliance), pmc) for pmc in (0.0, 1.0))
     assert end.solution.approach == pytest.approx(start.solution.approach, rel=1e-8)

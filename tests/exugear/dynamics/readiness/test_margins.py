@@ -42,6 +42,7 @@ def at_form_circle(gearbox: Gearbox, torque: float = 100.0) -> int:
     return sum(reaches_form_circle(compliance.flanks, state.cells, state.solution.force) for state in states)
 
 
+@pytest.mark.validation
 def test_a_small_margin_foretells_contact_at_the_form_circle_and_the_proposal_mends_it() -> None:
     gearbox = spur(0.9)
     assert pair_margins(gearbox.pairs["helical"]).form[0] < 0.01

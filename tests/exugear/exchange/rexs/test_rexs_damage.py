@@ -102,6 +102,7 @@ def imports_or_is_refused_in_words(text):
     return True
 
 
+@pytest.mark.validation
 def test_damaged_files_are_refused_in_words_or_imported():
     outcomes = [imports_or_is_refused_in_words(damaged(seed)) for seed in range(60)]
     assert {True, False} == set(outcomes)  # the damage is neither too small nor too large to tell anything

@@ -58,6 +58,7 @@ def exported(tmp_path_factory):
     return of
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("name", IMPORTED)
 def test_a_file_with_results_gives_the_same_gearbox_as_without(name, exported):
     _, model = exported(name)
@@ -157,6 +158,7 @@ def test_bearings_of_planets_are_found_on_each_planet():
     assert len(origins.bearings["bearing_3"]) == 1
 
 
+@pytest.mark.validation
 def test_modes_bearings_and_tables_of_the_folder_are_in_the_file(tmp_path):
     path = tmp_path / "gearbox.toml"
     path.write_text(to_case(read_rexs(DATA / SEW), SEW, path).text, encoding="utf-8")

@@ -107,6 +107,7 @@ def test_a_run_reaches_the_speed_that_was_told(tmp_path):
     assert float(data.input_speed[-1]) == pytest.approx(loads.end_speed * float(data.time[-1]) / 0.5, rel=1e-9)
 
 
+@pytest.mark.validation
 def test_check_prints_torque_speed_and_flanks_of_each_load_case(grc):
     outcome = CliRunner().invoke(cli.app, ["check", grc.source, "--json"])
     assert outcome.exit_code == 0 and outcome.stderr == ""

@@ -46,6 +46,7 @@ def checks(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Path], dict[st
     return lambda case: json.loads(checked(case.read_text(encoding="utf-8"), folder))
 
 
+@pytest.mark.sample
 def test_a_new_file_has_neither_fault_nor_warning_and_both_variants(
     case: Path, checks: Callable[[Path], dict[str, Any]]
 ) -> None:
@@ -62,6 +63,7 @@ def test_the_run_up_ends_at_the_speed_that_the_file_says(case: Path, checks: Cal
     assert gearbox.load_cases["run_up"].duration >= 10.0
 
 
+@pytest.mark.validation
 def test_a_new_file_runs_and_has_modes_in_both_variants(case: Path) -> None:
     out = case.parent / "out"
     for variant in ("rigid", "bushing"):

@@ -132,6 +132,7 @@ def test_the_ring_is_no_second_way_to_roll():
     assert abs(loads.end_speed - loads.start_speed) < 1.0
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("solver", ["compiled", "exudyn"])
 def test_a_ring_on_a_torsion_spring_starts_a_run(tmp_path, solver):
     """It twists by its torque over its stiffness, and stays there."""

@@ -123,6 +123,7 @@ def test_the_loads_to_start_from_are_counted(case):
     assert files == {"site": 2, "stops": 2, "listed": 2, "packed": 1, "table": 1, "worst": 1}
 
 
+@pytest.mark.validation
 def test_damaged_keys_of_loads_are_refused_in_words_or_counted(case):
     found = keys_survive(case, range(24))
     assert 2 < sum(found) < 20  # else the mutants are no test of anything
@@ -159,6 +160,7 @@ def files_survive(case: Path, seeds: range) -> list[bool]:
     return found
 
 
+@pytest.mark.validation
 def test_damaged_files_of_many_are_refused_in_words_or_counted(case):
     found = files_survive(case, range(24))
     assert {True, False} == set(found)
@@ -210,6 +212,7 @@ def test_a_full_disk_is_a_sentence_and_what_was_there_stays(case):
         subprocess.run(["umount", str(disk)], check=True)
 
 
+@pytest.mark.validation
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_count_that_was_killed_is_done_again_to_the_same_bits(case):
     (case.parent / "known").mkdir()

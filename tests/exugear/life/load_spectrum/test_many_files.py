@@ -248,6 +248,7 @@ def test_steps_that_a_file_does_not_hold_are_refused_before_anything_is_allocate
     assert peak < 1e6
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("ending", ["outb", "csv"])
 def test_a_large_file_is_never_in_memory_as_a_whole(tmp_path, monkeypatch, ending):
     """24 MB of packed values (96 MB as numbers) and 10 MB of text, which were 14 and 42 times as much in memory."""

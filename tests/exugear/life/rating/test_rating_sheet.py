@@ -225,6 +225,7 @@ def test_loads_that_teeth_do_not_feel_are_left_out(tmp_path):
     assert found[2] == ()
 
 
+@pytest.mark.validation
 def test_finite_elements_stand_beside_the_nominal_load_where_a_table_is_there(tmp_path):
     """Root stress by gauges in the closed ring; see docs/loads_and_life.md for what lies between both."""
     content = spur(tmp_path, nominal_hours=5000.0)
@@ -238,6 +239,7 @@ def test_finite_elements_stand_beside_the_nominal_load_where_a_table_is_there(tm
     assert not (project.folder / "stress").exists(), "a check writes nothing"
 
 
+@pytest.mark.validation
 def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_life(tmp_path, monkeypatch):
     """As the life has them; a life of other loads is told as such, and the page's data has the same sheet."""
     monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
@@ -262,6 +264,7 @@ def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_li
     assert any("another input" in line for line in other.assumptions)
 
 
+@pytest.mark.validation
 def test_a_ring_is_rated_by_its_root_and_says_what_is_left_out():
     content = tomllib.loads(GRC.read_text("utf-8"))
     del content["loads"]

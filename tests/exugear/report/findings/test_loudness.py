@@ -90,6 +90,7 @@ def test_the_range_of_operation_is_stated_or_follows_from_the_rated_speed(grc):
         grc.varied({"operation.speed_range_rpm": [-30.0, 10.0]})
 
 
+@pytest.mark.validation
 def test_the_ranking_of_the_grc_is_of_its_speeds_of_operation_and_of_shafts(grc, stiffness):
     assembly = assemble(grc, Choice("bushing"), stiffness)
     data = to_dataset(response_of(assembly, SteadySettings(SpeedRange(-1.0, -3.0, 40), harmonics=4)))

@@ -14,6 +14,7 @@ from fe_ste.geometry.profile import tooth_profile
 CASE = FilePath(__file__).parents[4] / "cases" / "grc750" / "gearbox.toml"
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("number", range(8))
 def test_teeth_of_the_grc_mesh_without_overlap(number):
     gearbox = Gearbox.from_toml(CASE)

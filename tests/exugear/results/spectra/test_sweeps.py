@@ -26,6 +26,7 @@ def highest_share(severity):
     return np.max(np.hypot(run.y[0], run.y[1] / w)) * 2.0 * DAMPING * w * w
 
 
+@pytest.mark.validation
 @pytest.mark.parametrize(("severity", "low", "high"), [(0.1, 0.95, 1.02), (TOO_FAST, 0.88, 0.99), (20.0, 0.2, 0.5)])
 def test_a_sweep_builds_up_as_far_as_its_severity_says(severity, low, high):
     assert low < highest_share(severity) < high

@@ -96,6 +96,7 @@ def state_of(branch, point):
     return np.array([lines[0].real + 2.0 * lines[1:].real.sum(), speed])
 
 
+@pytest.mark.validation
 def test_a_fold_of_a_pair_with_backlash_is_that_of_shooting_in_time(branch):
     """Where the primary resonance with contact loss turns back, to 5e-4 of the frequency."""
     point, frequency = min(branch.folds, key=lambda fold: abs(fold[1] - 0.83))
@@ -122,6 +123,7 @@ def test_a_state_follows_changes_of_the_first_as_the_variational_equations_say()
     assert np.linalg.det(monodromy) == pytest.approx(np.exp(-4.0 * np.pi * DAMPING / frequency), rel=1e-7)
 
 
+@pytest.mark.validation
 def test_stability_changes_at_the_folds_and_nowhere_else(branch):
     """Floquet exponents in every point of the branch, which passes eight folds."""
     samples = 400

@@ -86,6 +86,7 @@ def assemblies(grc: Gearbox, stiffness: dict) -> Iterator[Assembly]:
     yield assemble(heavy, Choice("bushing"), stiffness)
 
 
+@pytest.mark.validation
 def test_accelerations_are_those_of_the_plain_kernels(grc: Gearbox, stiffness: dict) -> None:
     for assembly in assemblies(grc, stiffness):
         if assembly.mesh_law == "rigid":
@@ -106,6 +107,7 @@ def test_gears_that_only_roll_accelerate_together(grc: Gearbox) -> None:
     assert found == pytest.approx(free @ weights, rel=1e-12)
 
 
+@pytest.mark.validation
 def test_signals_and_energies_are_those_of_the_plain_kernels(grc: Gearbox, stiffness: dict) -> None:
     for assembly in assemblies(grc, stiffness):
         states = [disturbed(assembly, angle) for angle in (0.0, 0.7)]
@@ -256,6 +258,7 @@ def opened(path: Path) -> xr.Dataset:
     return load_run(path)
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_repeated_runs_are_bitwise_equal(grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str) -> None:
     one, two = (
@@ -265,6 +268,7 @@ def test_repeated_runs_are_bitwise_equal(grc: Gearbox, stiffness: dict, tmp_path
     assert one.identical(two)
 
 
+@pytest.mark.validation
 @pytest.mark.usefixtures("terminal_signals")
 def test_resumed_run_is_bitwise_the_whole_one(
     grc: Gearbox, stiffness: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -345,6 +349,7 @@ def test_unstable_step_is_refused(grc: Gearbox, stiffness: dict, tmp_path: Path)
         simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.03, step=5e-4, sample_rate=2e3)
 
 
+@pytest.mark.validation
 def test_what_it_cannot_take_is_refused_with_the_way_out(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     assert unsupported_reason(assemble(grc, Choice("bushing"), stiffness)) == ""
     with pytest.raises(RunError, match="jointed keeps ideal joints as constraints.*use --solver exudyn"):
@@ -355,6 +360,7 @@ def test_what_it_cannot_take_is_refused_with_the_way_out(grc: Gearbox, stiffness
     assert "Exudyn" in opened(run.path).attrs["solver"]
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("case", ["speed_driven", "reference"])
 def test_both_solvers_write_the_same_run(grc: Gearbox, stiffness: dict, tmp_path: Path, case: str) -> None:
     one, two = (

@@ -135,6 +135,7 @@ def twist_frequency(motion: np.ndarray, step: float) -> float:
     return float(found_frequencies(twist, 10 * step, 2)[1])
 
 
+@pytest.mark.validation
 def test_floating_frame_and_frame_that_does_not_turn_agree(rotor):
     # Second formulation in another program, same modes. Tolerances as asked of the two formulations; what remains is
     # generalized-alpha's period error, (omega step)^2 / 12 = 1e-5 to 5e-5 here.
@@ -157,6 +158,7 @@ def test_floating_frame_and_frame_that_does_not_turn_agree(rotor):
         assert np.abs(lines - frequency).min() < 1e-3 * abs(frequency)
 
 
+@pytest.mark.validation
 def test_a_blank_is_as_heavy_and_gyroscopic_as_in_the_frame_that_does_not_turn(rotor):
     # A ring five times the disc that it sits on; without its polar inertia in the gyroscopic matrix tilts of its
     # seat are more than a tenth off. Initial motion and tolerance as above.
@@ -178,6 +180,7 @@ def rotor_gyroscopic(rotor: Rotor, model: SolidModel) -> np.ndarray:
     return rotor.modes.T @ gyroscopic_matrix(model, rotor.reduced) @ rotor.modes
 
 
+@pytest.mark.sample
 @pytest.mark.parametrize("speed", [0.4 * SPEED, SPEED])
 def test_added_stiffness_follows_the_speed_and_exudyn_still_lacks_it(rotor, speed):
     # A guard: should a release of Exudyn bring the centrifugal tension, the second half fails and the term must go.
@@ -229,6 +232,7 @@ def test_the_added_stiffness_follows_a_run_up(rotor):
     assert 5e-3 < wrong[0.0] < 3e-2
 
 
+@pytest.mark.validation
 def test_exudyn_is_still_wrong_on_tait_bryan_angles(rotor):
     # A guard: with a release that mends it, the unwrapped angle of that node would be worth having.
     steps, step = 750, 4e-5
@@ -241,6 +245,7 @@ def test_exudyn_is_still_wrong_on_tait_bryan_angles(rotor):
     assert error["tait_bryan"] > 2e-2  # 0.10 with Exudyn 1.13.6
 
 
+@pytest.mark.validation
 def test_a_body_in_its_own_turning_frame_agrees_with_the_floating_frame():
     # Second formulation for carriers: a bar of 20 x 40 mm that turns slowly on two bearings. Centrifugal terms, left
     # out, are (speed / frequency)^2 = 5e-5; without the Coriolis matrix the motion is a tenth wrong.
