@@ -172,13 +172,13 @@ class Project(Displayed):
             at_rest = static_state(assemble(self.gearbox, choice, mesh_stiffness(self.gearbox, choice.mesh_law)))
         except (VariantError, BalanceError, MeshError, BearingError):
             return {}
-        found: dict[str, list[tuple[float, float]]] = {}
+        axes: dict[str, list[tuple[float, float]]] = {}
         places = zip(self.gearbox.meshes, at_rest.misalignment, at_rest.centre_distance, strict=True)
         for mesh, misalignment, distance in places:
             place = (abs(misalignment) * mesh.pair.face_width, abs(distance - mesh.centre_distance))
-            found.setdefault(mesh.pair.name, []).append(place)
+            axes.setdefault(mesh.pair.name, []).append(place)
         pairs = self.gearbox.gear_pairs
-        return {name: axes_reaching(pairs[name], *np.max(where, axis=0)) for name, where in found.items()}
+        return {name: axes_reaching(pairs[name], *np.max(where, axis=0)) for name, where in axes.items()}
 
     def tables(
         self,
@@ -259,7 +259,8 @@ class Project(Displayed):
 
     def modes(self) -> Modes:
         """Eigenmodes at the static load, written to `modes_path`; those that are there and fit are taken."""
-        assembly, choice = self.assembly(), self.choice
+        assembly = self.assembly()
+        choice = self.choice
         modes = kept_modes(self.modes_path, assembly)
         if modes is None:
             self.keep_case()
@@ -284,7 +285,8 @@ class Project(Displayed):
         from exugear.steady.steady_file import stored_or_computed
 
         settings = settings or SteadySettings(usual_speeds(self.gearbox))
-        assembly, choice = self.assembly(), self.choice
+        assembly = self.assembly()
+        choice = self.choice
         self.keep_case()
         with time_noted(self.folder, f"steady, {choice.variant}, {choice.inertias}, {choice.mesh_law}"):
             return stored_or_computed(self.steady_path(settings), assembly, settings, progress)
@@ -298,7 +300,8 @@ class Project(Displayed):
     def duties(self) -> tuple[tuple[BearingDuty, ...], tuple[MeshDuty, ...]]:
         """Find what catalogue bearings and meshes bear at the static load, written to `bearings_path`."""
         assembly = self.assembly()
-        duties, meshes = bearing_duties(assembly), mesh_duties(assembly)
+        duties = bearing_duties(assembly)
+        meshes = mesh_duties(assembly)
         self.keep_case()
         write_duties(self.bearings_path, duties, meshes, input_hash(assembly))
         return duties, meshes
@@ -341,7 +344,9 @@ class Project(Displayed):
         from exugear.life.verdict import check_reach
 
         counted = checked_loads(self.gearbox, progress)
-        check_reach(self.gearbox, counted, {one.name: max(one.wanted.torque) for one in self.life_tables()})
+        check_reach(
+            self.gearbox, counted, {life_table.name: max(life_table.wanted.torque) for life_table in self.life_tables()}
+        )
         return counted
 
     def life(
@@ -464,7 +469,8 @@ class Project(Displayed):
         from exugear.life.life import life_hash, rating_of
         from exugear.life.life_file import stored_life
 
-        assembly, rating = self.assembly(), rating_of(self.gearbox)
+        assembly = self.assembly()
+        rating = rating_of(self.gearbox)
         tables = {request.name: request.wanted.hash for request in self.stress_tables(counted)}
         return stored_life(
             self.life_path, life_hash(assembly, counted, tables, source_hash(assembly, rating, self.folder))
@@ -482,7 +488,8 @@ class Project(Displayed):
 
         Results are written to `run_directory` while it goes on.
         """
-        stiffness, bodies = self.stiffness(), self.bodies()
+        stiffness = self.stiffness()
+        bodies = self.bodies()
         self.keep_case()
         return simulate(self.gearbox, self.choice, stiffness, self.folder, bodies=bodies, **options)
 

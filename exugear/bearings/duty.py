@@ -137,7 +137,7 @@ def ratings_of(section: CatalogueSection) -> Ratings:
     if known is not None:
         both = 1.0 if section.arrangement == "single" else 2.0
         computed = known.dynamic * both ** (7.0 / 9.0 if section.type.endswith("_roller") else 0.7), known.static * both
-    elif any(one.key in INSIDE for one in estimates(section)):
+    elif any(estimate.key in INSIDE for estimate in estimates(section)):
         dynamic_margin, static_margin = margins(section)
         computed = computed[0] / dynamic_margin, computed[1] / static_margin
     dynamic, static = (own if stated is None else 1e3 * stated for own, stated in zip(computed, given, strict=True))
@@ -155,14 +155,17 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
     reaction : (6,) array, optional
         For a bearing whose load the file states: what the statics find, N and N m.
     """
-    bearing, rows, section = point.bearing, point.rows, point.bearing.catalogue
+    bearing = point.bearing
+    rows = point.rows
+    section = point.bearing.catalogue
     assert section is not None
     ratings = ratings_of(section)
     states = [
         bearing_state(row_contacts(rows, angle), point.displacement)
         for angle in cage_angles(rows, point.first_roller_angle)
     ]
-    radial, axial = point.radial_load, float(point.load[2])
+    radial = point.radial_load
+    axial = float(point.load[2])
     equivalent = equivalent_load(rows, section.type, radial, abs(axial), ratings.static)
     return BearingDuty(
         name=bearing.name,
@@ -207,7 +210,8 @@ def _largest_load(state: BearingState) -> float:
 
 
 def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -> list[str]:
-    section, rows = point.bearing.catalogue, point.rows
+    section = point.bearing.catalogue
+    rows = point.rows
     assert section is not None
     remarks = []
     if point.is_unloaded:
@@ -252,10 +256,12 @@ def estimate_effects(point: OperatingPoint) -> tuple[Sensitivity, ...]:
 
 
 def _radial_stiffness(section: CatalogueSection, point: OperatingPoint) -> float:
-    force, tilt = point.load[:3], point.displacement[3:5]
+    force = point.load[:3]
+    tilt = point.displacement[3:5]
     if point.is_unloaded:
         least = LEAST_LOAD * basic_dynamic_rating(point.rows, section.type)
-        force, tilt = np.array(holding_force(point.rows, least, point.direction)), np.zeros(2)
+        force = np.array(holding_force(point.rows, least, point.direction))
+        tilt = np.zeros(2)
     try:
         rows = catalogue_rows(section)
         displacement = equilibrium(BearingOfRows(rows), force, tilt=tilt).displacement

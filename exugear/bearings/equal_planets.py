@@ -26,11 +26,11 @@ SPACING = 1e-6
 
 def planet_families(bodies: Iterable[Body]) -> list[list[Body]]:
     """Find the sets of planets: those of one family on one carrier that turns."""
-    found: dict[tuple[str, str], list[Body]] = {}
+    families: dict[tuple[str, str], list[Body]] = {}
     for body in bodies:
         if body.carrier is not None:
-            found.setdefault((body.carrier, body.family), []).append(body)
-    return list(found.values())
+            families.setdefault((body.carrier, body.family), []).append(body)
+    return list(families.values())
 
 
 def equally_spaced(planets: Sequence[Body]) -> bool:
@@ -80,8 +80,10 @@ def with_equal_planets(connectors: ConnectorArrays, sets: Iterable[PlanetSupport
     stiffness, damping, phase = (
         values.copy() for values in (connectors.stiffness, connectors.damping, connectors.rolling.phase)
     )
-    strain, load = connectors.point_strain.copy(), connectors.point_load.copy()
-    with_rows, largest = np.diff(connectors.rolling.first) > 0, 0.0
+    strain = connectors.point_strain.copy()
+    load = connectors.point_load.copy()
+    with_rows = np.diff(connectors.rolling.first) > 0
+    largest = 0.0
     for own, angles in sets:
         if with_rows[own].all() and not connectors.rolling.cage_ratio[own].any():
             phase[own] = angles + _mean_angle(phase[own] - angles)
@@ -97,7 +99,9 @@ def with_equal_planets(connectors: ConnectorArrays, sets: Iterable[PlanetSupport
     equal = connectors._replace(
         stiffness=stiffness, damping=damping, point_strain=strain, point_load=load, rolling=rolling
     )
-    return (equal, largest) if largest or with_rows.any() else (connectors, 0.0)
+    if largest or with_rows.any():
+        return (equal, largest)
+    return (connectors, 0.0)
 
 
 def _spread(matrices: Floats) -> float:
@@ -114,7 +118,8 @@ def _mean_angle(angles: Floats) -> float:
 
 def _turn(angle: float) -> Floats:
     """Matrix (6, 6) that turns displacements and tilts about z by an angle (rad)."""
-    c, s = math.cos(angle), math.sin(angle)
+    c = math.cos(angle)
+    s = math.sin(angle)
     turn = np.eye(6)
     turn[:2, :2] = turn[3:5, 3:5] = [[c, -s], [s, c]]
     return turn

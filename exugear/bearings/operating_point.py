@@ -60,7 +60,8 @@ class OperatingPoint(Displayed):
     load_stands_still: bool = True
 
     def _line(self) -> str:
-        radial, axial = 1e-3 * self.radial_load, 1e-3 * float(self.load[2])
+        radial = 1e-3 * self.radial_load
+        axial = 1e-3 * float(self.load[2])
         return f" of {self.bearing.name!r}: {radial:.4g} kN radially, {axial:.4g} kN axially"
 
     @property

@@ -18,7 +18,8 @@ def unsupported(gearbox: Gearbox, variant: str) -> str:
     >>> unsupported(gearbox, "bushing"), unsupported(gearbox.varied({"bearings": {}}), "bushing")
     ('', 'the gearbox file has no [bearings]')
     """
-    chosen, elastic = Variant.of(variant), elastic_names(gearbox)
+    chosen = Variant.of(variant)
+    elastic = elastic_names(gearbox)
     if not chosen.on_bearings:
         held = {joint.body for joint in gearbox.joints}
         missing = [b.name for b in gearbox.bodies() if not (b.fixed or b.spin_only or b.name in held)]
@@ -55,7 +56,8 @@ def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:
 
     A fixed body that is rigid is the ground itself, and so needs no mount.
     """
-    elastic, bodies = elastic_names(gearbox), {body.name: body for body in gearbox.bodies()}
+    elastic = elastic_names(gearbox)
+    bodies = {body.name: body for body in gearbox.bodies()}
     if not any(bodies[name].fixed for name in elastic):
         return ()
     return tuple(mount for mount in gearbox.mounts if mount.body in elastic or not bodies[mount.body].fixed)

@@ -34,9 +34,11 @@ from fe_ste.tools.stores.store import Store
 def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> FloatingBody:
     """Modes of a solid in its own frame, and its integrals; from its reduced matrices if they are at hand."""
     reduced = matrices or reduce_matrices(model)
-    solid, component = reduced.solid, reduced.component
+    solid = reduced.solid
+    component = reduced.component
     values, vectors = scipy.linalg.eigh(component.stiffness, component.mass)
-    values, by_mode = values[ELASTIC], vectors[:, ELASTIC]
+    values = values[ELASTIC]
+    by_mode = vectors[:, ELASTIC]
     modes = component.component_modes @ by_mode
     node_mass = np.asarray(solid.scalar_mass.sum(axis=0)).ravel()
     rings = [(n, model.blanks[seat.name]) for n, seat in enumerate(model.seats) if seat.name in model.blanks]
@@ -52,7 +54,8 @@ def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> Fl
     tension = modes.T @ (in_each_direction(solid.convection_square) @ modes)
     convection = modes.T @ (in_each_direction(solid.convection) @ modes)
     for n, ring in rings:
-        moved, turns = by_mode[6 * n : 6 * n + 3], by_mode[6 * n + 3 : 6 * n + 6]
+        moved = by_mode[6 * n : 6 * n + 3]
+        turns = by_mode[6 * n + 3 : 6 * n + 6]
         field = np.zeros((3, 4, count))  # of 1, x, y, z from the seat's centre
         field[:, 0, 0], field[:, 1:, 0] = places[n] - centre, np.eye(3)
         field[:, 0, 1:] = moved
@@ -88,7 +91,8 @@ def with_inertia(body: FloatingBody, wanted: RigidInertia) -> FloatingBody:
     """
     offset = np.array(wanted.centre) - body.centre
     square = np.diag([wanted.axial / 2, wanted.axial / 2, wanted.transverse - wanted.axial / 2])
-    second_moments, first_moments = body.second_moments.copy(), body.first_moments.copy()
+    second_moments = body.second_moments.copy()
+    first_moments = body.first_moments.copy()
     second_moments[:, :, 0, 0] = square + wanted.mass * np.outer(offset, offset)
     first_moments[:, 0] = wanted.mass * offset
     return replace(body, mass=wanted.mass, second_moments=second_moments, first_moments=first_moments)

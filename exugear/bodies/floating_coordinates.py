@@ -120,7 +120,8 @@ class FloatingCoordinates:
             No such state: tilts or deformations are not small.
         """
         near = float(coordinates[SPIN])
-        q, rest = np.zeros(self.count), np.zeros(self.count)
+        q = np.zeros(self.count)
+        rest = np.zeros(self.count)
         q[EULER] = [math.cos(near / 2.0) - 1.0, 0.0, 0.0, math.sin(near / 2.0)]
         for _ in range(MOST_NEWTON_STEPS):
             state = self.motion(q, rest, near)

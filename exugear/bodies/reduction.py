@@ -125,7 +125,8 @@ def constraint_and_inertia_relief_modes(
 
     with factorise(scipy.sparse.csr_array(stiffness + scipy.sparse.diags_array(springs)), backend) as held:
         deflections = held.solve(np.hstack([seats.T, mass @ rigid]))
-    by_force, by_acceleration = deflections[:, : len(seats)], deflections[:, len(seats) :]
+    by_force = deflections[:, : len(seats)]
+    by_acceleration = deflections[:, len(seats) :]
     moved = seats @ rigid
     count, motions = moved.shape
     # Compliances and rigid motions differ by ten powers of ten: both unknowns are scaled to one.
@@ -187,13 +188,15 @@ def _lanczos_sweep(
     mass: SparseMatrix, shifted: Factorisation, known: Floats, start: Floats, shift: float, band: float
 ) -> tuple[Floats, Floats]:
     """Frequencies (Hz) up to the first beyond the band, and shapes, of what is orthogonal to the known ones."""
-    basis, images = [*known.T], [*(mass @ known).T]
+    basis = [*known.T]
+    images = [*(mass @ known).T]
     count = len(basis)
     diagonal: list[float] = []
     beside: list[float] = []
     vector = start
     while len(diagonal) < MOST_LANCZOS_STEPS:
-        before, image = np.array(basis), np.array(images)
+        before = np.array(basis)
+        image = np.array(images)
         for _ in range(2):  # once leaves round-off of the first pass
             vector = vector - before.T @ (image @ vector)
         vector_image = mass @ vector
@@ -215,13 +218,16 @@ def _converged(diagonal: list[float], beside: list[float], shift: float, band: f
     """Frequencies (Hz) up to the first beyond the band, and their weights (steps, f), once all are at round-off."""
     matrix = np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1)
     values, vectors = np.linalg.eigh(matrix)
-    values, vectors = values[::-1], vectors[:, ::-1]
+    values = values[::-1]
+    vectors = vectors[:, ::-1]
     frequencies = np.sqrt(np.maximum(1.0 / np.maximum(values, 1e-300) - shift, 0.0)) / (2.0 * np.pi)
     needed = int(np.count_nonzero(frequencies < band)) + 1
     if needed > len(values):
         return None
     residual = beside[-1] * np.abs(vectors[-1, :needed]) / values[:needed]
-    return (frequencies[:needed], vectors[:, :needed]) if residual.max() < LANCZOS_TOLERANCE else None
+    if residual.max() < LANCZOS_TOLERANCE:
+        return (frequencies[:needed], vectors[:, :needed])
+    return None
 
 
 def _uncoupled(mass: SparseMatrix, stiffness: SparseMatrix, inner: Floats) -> Floats:

@@ -20,7 +20,8 @@ def skew(vectors: Floats) -> Floats:
 
 def euler_rotation(parameters: Floats) -> tuple[Floats, Floats]:
     """Rotation matrix (3, 3) of Euler parameters (4,), and matrix (3, 4) from their rates to the angular velocity."""
-    scalar, vector = parameters[0], parameters[1:]
+    scalar = parameters[0]
+    vector = parameters[1:]
     cross = skew(vector)
     rates = np.empty((3, 4))
     rates[:, 0], rates[:, 1:] = -2.0 * vector, 2.0 * (scalar * IDENTITY + cross)
@@ -33,7 +34,10 @@ def tilts_and_spin(turns: Floats, near: float) -> tuple[Floats, Floats]:
     b = np.arcsin(np.clip(turns[:, 0, 2], -1.0, 1.0))
     c = np.arctan2(-turns[:, 0, 1], turns[:, 0, 0])
     c += 2.0 * np.pi * np.round((near - c) / (2.0 * np.pi))
-    ca, sa, cb, sb = np.cos(a), np.sin(a), np.cos(b), np.sin(b)
+    ca = np.cos(a)
+    sa = np.sin(a)
+    cb = np.cos(b)
+    sb = np.sin(b)
     rates = np.zeros((len(turns), 3, 3))
     rates[:, 0, 0] = 1.0
     rates[:, 0, 1], rates[:, 0, 2] = sa * sb / cb, -ca * sb / cb

@@ -105,7 +105,9 @@ class SolidModel:
     @property
     def elements(self) -> Any:
         """The mesh itself, read from its file if it is in one."""
-        return self.mesh.mesh if isinstance(self.mesh, SolidFile) else self.mesh
+        if isinstance(self.mesh, SolidFile):
+            return self.mesh.mesh
+        return self.mesh
 
 
 @dataclass(frozen=True)
@@ -174,7 +176,8 @@ def reduce_solid(model: SolidModel, backend: Backend | None = None) -> ReducedBo
 def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
     """Reduced body from a solid's matrices; errors as `reduce_solid`."""
     began = time.perf_counter()
-    component, size = reduced.component, reduced.component.component_modes.shape[1]
+    component = reduced.component
+    size = reduced.component.component_modes.shape[1]
     mass, mass_scaled = selective_mass_scaling(component.mass, component.stiffness, model.limit)
     spin = np.zeros(size)
     for number, seat in enumerate(model.seats if model.frame != "ground" else ()):
@@ -217,7 +220,8 @@ def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
     ReductionError
         Frame "nonrotating" for a body that a quarter turn changes.
     """
-    modes, size = reduced.component.component_modes, reduced.component.component_modes.shape[1]
+    modes = reduced.component.component_modes
+    size = reduced.component.component_modes.shape[1]
     matrix = np.zeros((size, size))
     if model.frame == "nonrotating":
         _check_revolution(model, reduced.component)
@@ -269,7 +273,8 @@ def _check_revolution(model: SolidModel, component: ReducedComponent) -> None:
 
 def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
     """Boundary of the mesh with displacement, and strain in the middle of the element below, per coordinate."""
-    mesh, modes = reduced.solid.mesh, reduced.component.component_modes
+    mesh = reduced.solid.mesh
+    modes = reduced.component.component_modes
     facets = np.asarray(mesh.boundary_facets())
     corners = ordered_corners(mesh, facets)
     nodes, faces = np.unique(corners, return_inverse=True)
@@ -284,7 +289,8 @@ def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
         gradient += by_node[function][:, :, None, :] * slope.T[:, None, :, None]
     strain = [gradient[:, i, i] for i in range(3)]
     strain += [gradient[:, i, j] + gradient[:, j, i] for i, j in ((0, 2), (0, 1), (1, 2))]
-    modulus, ratio = model.material.youngs_modulus, model.material.poissons_ratio
+    modulus = model.material.youngs_modulus
+    ratio = model.material.poissons_ratio
     shear = modulus / (2.0 * (1.0 + ratio))
     elasticity = np.diag([2.0 * shear] * 3 + [shear] * 3)
     elasticity[:3, :3] += modulus * ratio / ((1.0 + ratio) * (1.0 - 2.0 * ratio))

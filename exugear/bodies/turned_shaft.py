@@ -164,7 +164,8 @@ class _Layout:
         seat_starts = 6 * np.arange(seats)
         used = 6 * seats
         bending = sizes["bending"] - 2 * seats
-        torsion, stretching = sizes["torsion"] - seats, sizes["stretching"] - seats
+        torsion = sizes["torsion"] - seats
+        stretching = sizes["stretching"] - seats
 
         def following(count: int) -> Integers:
             """Take the next modal coordinates."""
@@ -223,13 +224,15 @@ def _surface(
     points = np.stack(
         [np.outer(np.cos(angle), outline.r), np.outer(np.sin(angle), outline.r), np.outer(angle * 0 + 1, outline.z)], 2
     )
-    count, edges = len(outline.r), len(outline.edges)
+    count = len(outline.r)
+    edges = len(outline.edges)
     around = (np.arange(ANGLES)[:, None] + np.array([0, 1])) % ANGLES * count
     corners = [around[:, :1] + outline.edges[:, 0], around[:, :1] + outline.edges[:, 1]]
     corners += [around[:, 1:] + outline.edges[:, 1], around[:, 1:] + outline.edges[:, 0]]
     displacement = np.zeros((ANGLES, count, 3, layout.size), dtype=np.float32)
     strain = np.zeros((ANGLES, edges, 6, layout.size), dtype=np.float32)
-    c, s = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
+    c = np.cos(angle)[:, None, None]
+    s = np.sin(angle)[:, None, None]
     for harmonic, component in components.items():
         moved = shaft.displacement(harmonic, outline.nodes, component.component_modes)
         strained = shaft.strain_at_edges(harmonic, outline.elements, component.component_modes)
@@ -253,5 +256,8 @@ def _around(harmonic: HarmonicName, angle: Floats) -> tuple[Floats, Floats]:
     if harmonic != "bending":
         return np.ones((len(angle), 3)), np.ones((len(angle), 6))
     face = angle + np.pi / ANGLES
-    c, s, cf, sf = np.cos(angle), np.sin(angle), np.cos(face), np.sin(face)
+    c = np.cos(angle)
+    s = np.sin(angle)
+    cf = np.cos(face)
+    sf = np.sin(face)
     return np.stack([c, s, c], 1), np.stack([cf, cf, cf, cf, sf, sf], 1)

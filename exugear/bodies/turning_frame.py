@@ -74,7 +74,8 @@ class TurningBody:
     def rotated(self, vector: Floats, angle: float) -> Floats:
         """Turn the vectors of the seats in (n, ...) by an angle (rad) about z."""
         out = np.array(vector, dtype=np.float64)
-        c, s = math.cos(angle), math.sin(angle)
+        c = math.cos(angle)
+        s = math.sin(angle)
         for x, y in self._planar_coordinates:
             out[x], out[y] = c * vector[x] - s * vector[y], s * vector[x] + c * vector[y]
         return out
@@ -100,7 +101,8 @@ class TurningBody:
 
     def forces(self, q: Floats, v: Floats) -> Floats:
         """Generalized forces of elasticity, damping and weight, (n,)."""
-        angle, speed = self.angle(q), self.angle(v)
+        angle = self.angle(q)
+        speed = self.angle(v)
         displacements = self.to_body_frame(q)
         around = self.quarter_turned(displacements)
         rates = self.rotated(v, -angle) - speed * (self.reduced.spin + around)
@@ -114,7 +116,8 @@ class TurningBody:
 
     def apparent_forces(self, v: Floats, angle: float) -> Floats:
         """Coriolis and centrifugal forces in the frame, Omega h - (w . h) s, (n,)."""
-        speed, w = self.angle(v), self.rotated(v, -angle)
+        speed = self.angle(v)
+        w = self.rotated(v, -angle)
         apparent = speed * self.centrifugal - self.coriolis @ (w - speed * self.reduced.spin)
         # What is taken from the frame's angle leaves no power to them.
         return np.asarray(speed * apparent - (w @ apparent) * self.angle_weights)

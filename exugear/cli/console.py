@@ -65,7 +65,9 @@ def shortened(line: str) -> str:
     'xxxx must be shorter'
     """
     half = (LONGEST_LINE - 3) // 2
-    return line if len(line) <= LONGEST_LINE else f"{line[:half]}...{line[-half:]}"
+    if len(line) <= LONGEST_LINE:
+        return line
+    return f"{line[:half]}...{line[-half:]}"
 
 
 def say(line: str) -> None:
@@ -107,7 +109,9 @@ def counted(lines: list[str]) -> list[str]:
     >>> len(shown), shown[-1]
     (25, 'and 26 more')
     """
-    return lines if len(lines) <= MOST_LINES else [*lines[: MOST_LINES - 1], f"and {len(lines) - MOST_LINES + 1} more"]
+    if len(lines) <= MOST_LINES:
+        return lines
+    return [*lines[: MOST_LINES - 1], f"and {len(lines) - MOST_LINES + 1} more"]
 
 
 class _Description(ProgressColumn):

@@ -117,7 +117,9 @@ def exit_codes() -> Iterator[None]:
 
 def _of_a_file(error: OSError) -> str:
     """File and reason; what the program says of a file by itself names it already."""
-    return f"{error.filename}: {error.strerror}" if error.filename and error.strerror else str(error)
+    if error.filename and error.strerror:
+        return f"{error.filename}: {error.strerror}"
+    return str(error)
 
 
 def end_with(what: str, reason: object, code: int) -> NoReturn:
@@ -132,10 +134,10 @@ def model_errors() -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        told = _told_to_the_user(error)
-        if told is None:
+        user = _told_to_the_user(error)
+        if user is None:
             raise
-        raise told from error
+        raise user from error
 
 
 def _told_to_the_user(error: Exception) -> Exception | None:

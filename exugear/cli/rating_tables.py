@@ -24,7 +24,7 @@ def tell_rating(sheet: RatingSheet) -> None:
     say(f"Rating by {sheet.edition}, method B; {sheet.load}")
     for title, flanks in _meshes(sheet):
         print_table(title, [*_rows(flanks)], ("factor",))
-        for line in dict.fromkeys(line for one in flanks for line in _told(one)):
+        for line in dict.fromkeys(line for flank in flanks for line in _told(flank)):
             note(line, style="yellow")
     for line in sheet.assumptions:
         note(line)
@@ -35,9 +35,9 @@ def tell_rating(sheet: RatingSheet) -> None:
 def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
     """Gears that mesh, under one sense of load, and a title for them."""
     found: dict[tuple[str, int], list[FlankSheet]] = {}
-    for one in sheet.flanks:
-        sense = 1 if one.standard["torque"] > 0.0 else -1
-        found.setdefault((one.family, sense), []).append(one)
+    for flank in sheet.flanks:
+        sense = 1 if flank.standard["torque"] > 0.0 else -1
+        found.setdefault((flank.family, sense), []).append(flank)
     for (family, sense), flanks in found.items():
         yield family if sense > 0 else f"{family}, reversed", flanks
 
@@ -45,7 +45,7 @@ def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
 def _rows(flanks: list[FlankSheet]) -> Iterator[dict[str, str]]:
     for name in (name for block in _BLOCKS.values() for name in block):
         yield _row(name, name, flanks, lambda one: one.standard)
-    if any(one.finite_elements for one in flanks):
+    if any(flank.finite_elements for flank in flanks):
         for name in FINITE_ELEMENTS:
             yield _row(name, f"{name}, finite elements", flanks, lambda one: one.finite_elements)
 
@@ -54,7 +54,7 @@ def _row(
     name: str, words: str, flanks: list[FlankSheet], figures: Callable[[FlankSheet], Mapping[str, float]]
 ) -> dict[str, str]:
     scale, unit = UNITS.get(name, (1.0, ""))
-    values = {f"{one.gear} {one.flank}": scale * figures(one).get(name, math.nan) for one in flanks}
+    values = {f"{flank.gear} {flank.flank}": scale * figures(flank).get(name, math.nan) for flank in flanks}
     form = ".4g" if name == "N_L" else _DIGITS.get(unit, ".3f")
     return {"factor": f"{words}, {unit}" if unit else words} | {
         label: "-" if math.isnan(value) else "infinite" if math.isinf(value) else format(value, form)
@@ -62,6 +62,6 @@ def _row(
     }
 
 
-def _told(one: FlankSheet) -> Iterator[str]:
-    yield from (f"{one.family}: {name} {reason}" for name, reason in one.lacking.items())
-    yield from (f"{one.gear} in {one.family}: {remark}" for remark in one.remarks)
+def _told(sheet: FlankSheet) -> Iterator[str]:
+    yield from (f"{sheet.family}: {name} {reason}" for name, reason in sheet.lacking.items())
+    yield from (f"{sheet.gear} in {sheet.family}: {remark}" for remark in sheet.remarks)

@@ -68,7 +68,8 @@ class WatchedProject(Project):
         self, requests: Sequence[TableRequest], progress: Callable[[int, int], None] | None = None
     ) -> dict[str, MeshTable]:
         """Table of each request; those that are missing share one row."""
-        total, before = sum(request.work for request in requests if not request.stored), 0
+        total = sum(request.work for request in requests if not request.stored)
+        before = 0
         tables = {}
         with self.bars.row() as row:
             for request in requests:
@@ -100,7 +101,8 @@ class WatchedProject(Project):
             modes = super().modes()
         for name, body in modes.assembly.elastic_bodies.items():
             figures = body.reduced.summary
-            unknowns, took = sum(figures.unknowns.values()), figures.seconds
+            unknowns = sum(figures.unknowns.values())
+            took = figures.seconds
             note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
         return modes
 

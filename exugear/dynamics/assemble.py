@@ -77,7 +77,9 @@ def assemble(
     >>> assemble(gearbox, Choice("rigid"), stiffness).size
     8
     """
-    variant, law, inertias = choice.variant, choice.mesh_law, choice.inertia_set(gearbox)
+    variant = choice.variant
+    law = choice.mesh_law
+    inertias = choice.inertia_set(gearbox)
     elastic = elastic_names(gearbox) if variant.is_elastic else ()
     moving = [body for body in gearbox.bodies(inertias) if not body.fixed or body.name in elastic]
     lacking = unsupported(gearbox, variant)
@@ -90,7 +92,8 @@ def assemble(
     rigid = [body for body in moving if body.name not in flexible]
     six = [body for body in rigid if not (variant.spins_only or body.spin_only)]
     alone = [body for body in rigid if body not in six]
-    coordinates, nodes = _coordinates(six, alone), {body.name: node_position(body) for body in moving}
+    coordinates = _coordinates(six, alone)
+    nodes = {body.name: node_position(body) for body in moving}
     size = 6 * len(six) + len(alone)
     for name, shaft in flexible.items():
         size = _take_seats(name, shaft, size, coordinates, nodes)
@@ -197,9 +200,11 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
     ground has no spin speed, and no gyroscopic forces.
     """
     blocks: list[NDArray[np.int64]] = []
-    turning, partner = [], []
+    turning = []
+    partner = []
     parts: dict[str, list[Floats]] = {"stiffness": [], "mass": [], "inverse": [], "gyroscopic": []}
-    spin, momentum = [], []
+    spin = []
+    momentum = []
     begin = size - sum(body.reduced.size for body in flexible.values())
     for flexible_body in flexible.values():
         body = flexible_body.reduced
@@ -309,7 +314,9 @@ def _connectors(
 ) -> ConnectorArrays:
     if not supports:
         return no_connectors()
-    starts, local, places = [], [], []
+    starts = []
+    local = []
+    places = []
     for bearing in supports:
         keys = [_attached(coordinates, body, bearing.name) for body in (bearing.on, bearing.body)]
         at = [np.zeros(3) if key is None else nodes[key] for key in keys]
@@ -336,4 +343,6 @@ def _attached(coordinates: Mapping[str, tuple[int, ...]], body: str, item: str |
     key = seat_key(body, item or "")
     if key in coordinates:
         return key
-    return body if body in coordinates else None
+    if body in coordinates:
+        return body
+    return None

@@ -140,11 +140,12 @@ class Assembly(Displayed):
     @cached_property
     def elastic_slices(self) -> dict[str, slice]:
         """Coordinates of each elastic body."""
-        begin, found = self.size - sum(shaft.reduced.size for shaft in self.elastic_bodies.values()), {}
+        begin = self.size - sum(shaft.reduced.size for shaft in self.elastic_bodies.values())
+        slices = {}
         for name, shaft in self.elastic_bodies.items():
-            found[name] = slice(begin, begin + shaft.reduced.size)
+            slices[name] = slice(begin, begin + shaft.reduced.size)
             begin += shaft.reduced.size
-        return found
+        return slices
 
     @property
     def floating(self) -> dict[str, FloatingBody]:
@@ -154,7 +155,8 @@ class Assembly(Displayed):
     @cached_property
     def turning(self) -> dict[str, TurningBody]:
         """Elastic bodies in their own turning frame."""
-        time, gravity = self.gearbox.case.damping.body_time_s, self.gearbox.case.gravity.acceleration_m_per_s2
+        time = self.gearbox.case.damping.body_time_s
+        gravity = self.gearbox.case.gravity.acceleration_m_per_s2
         return {
             name: TurningBody(body.reduced, time, gravity)
             for name, body in self.elastic_bodies.items()
@@ -203,7 +205,8 @@ class Assembly(Displayed):
         connectors = self.connectors
         if not self.has_rows:
             return self
-        of_rows, time = factor * self._of_rows, connectors.rolling.time[:, None, None]
+        of_rows = factor * self._of_rows
+        time = connectors.rolling.time[:, None, None]
         linear = connectors._replace(
             stiffness=connectors.stiffness + of_rows,
             damping=connectors.damping + time * of_rows,
@@ -214,7 +217,9 @@ class Assembly(Displayed):
     def eased(self, share: float) -> Assembly:
         """Let a share of the stiffness of non-linear bearings act beside their rows."""
         stiffness = self.connectors.stiffness + share * self._of_rows
-        return replace(self, connectors=self.connectors._replace(stiffness=stiffness)) if self.has_rows else self
+        if self.has_rows:
+            return replace(self, connectors=self.connectors._replace(stiffness=stiffness))
+        return self
 
     def rigid_part(self, vector: Floats) -> Floats:
         """Copy of a vector of coordinates in which a shaft's main seat has the mean motion of the whole shaft.
@@ -222,18 +227,20 @@ class Assembly(Displayed):
         It is that of the body's centre of mass, as `coordinates` of a rigid body are.
         """
         out = vector.copy()
-        for name, place in self.elastic_slices.items():
+        for name, elastic_slice in self.elastic_slices.items():
             body = self.elastic_bodies[name].reduced
             motions = body.rigid_motions(body.rigid_inertia.centre)
             carried = motions.T @ body.mass
-            out[list(self.coordinates[name])] = np.linalg.solve(carried @ motions, carried @ vector[place])
+            out[list(self.coordinates[name])] = np.linalg.solve(carried @ motions, carried @ vector[elastic_slice])
         return out
 
     @cached_property
     def housing_factor(self) -> float:
         """Factor on bearings' stiffness that stands for their seats: 1 where an elastic housing has these itself."""
         replaced = self.variant.is_elastic and all(support.factor == 1.0 for support in self.supports)
-        return 1.0 if replaced else self.gearbox.case.housing.factor
+        if replaced:
+            return 1.0
+        return self.gearbox.case.housing.factor
 
     @cached_property
     def bearing_laws(self) -> str:
@@ -245,7 +252,7 @@ class Assembly(Displayed):
             for support in self.supports
             if support.name in held
         }
-        return "; ".join(f"{name}: {words}" for name, words in laws.items())
+        return "; ".join(f"{name}: {law}" for name, law in laws.items())
 
     @cached_property
     def spin(self) -> dict[str, int]:
@@ -305,8 +312,8 @@ class Assembly(Displayed):
         if self.elastic_bodies:
             add_elastic_forces(q, v, self.elastic, scratch_for(self.elastic), f)
         for name, body in self.turning.items():
-            place = self.elastic_slices[name]
-            f[place] += body.forces(q[place], v[place])
+            elastic_slice = self.elastic_slices[name]
+            f[elastic_slice] += body.forces(q[elastic_slice], v[elastic_slice])
         return f
 
     @cached_property
@@ -317,11 +324,11 @@ class Assembly(Displayed):
         for body in self.bodies:
             if self.has_six(body):
                 f[list(self.coordinates[body.name][:3])] = body.mass * acceleration
-        for name, place in self.elastic_slices.items():
+        for name, elastic_slice in self.elastic_slices.items():
             if name in self.turning:
                 continue
             reduced = self.elastic_bodies[name].reduced
-            f[place] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].position)[:, :3] @ acceleration
+            f[elastic_slice] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].position)[:, :3] @ acceleration
         return f
 
     def torque_vector(self, torques: Mapping[str, float]) -> Floats:
@@ -341,8 +348,8 @@ class Assembly(Displayed):
         if self.elastic_bodies:
             set_elastic_accelerations(forces, self.elastic, scratch_for(self.elastic), out)
         for name, body in self.turning.items():
-            place = self.elastic_slices[name]
-            out[place] = body.accelerations(q[place], v[place], forces[place])
+            elastic_slice = self.elastic_slices[name]
+            out[elastic_slice] = body.accelerations(q[elastic_slice], v[elastic_slice], forces[elastic_slice])
         return out
 
     def with_travelling(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -350,7 +357,9 @@ class Assembly(Displayed):
         if not self.travelling.first.size:
             return q, v
         x, u = follow(np.atleast_2d(q), np.atleast_2d(v), self.travelling)
-        return (x, u) if q.ndim > 1 else (x[0], u[0])
+        if q.ndim > 1:
+            return (x, u)
+        return (x[0], u[0])
 
     def mesh_forces(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
         """Generalized forces of meshes, shape (size,), N and N m."""
@@ -367,7 +376,8 @@ class Assembly(Displayed):
         """Differentiate the forces of the meshes, or others, to q and to v, each (size, size)."""
         meshes = self.meshes if meshes is None else meshes
         x, u = self.with_travelling(q, v)
-        jq, jv = np.zeros((x.size, x.size)), np.zeros((x.size, x.size))
+        jq = np.zeros((x.size, x.size))
+        jv = np.zeros((x.size, x.size))
         add_mesh_jacobian(x, u, meshes, jq, jv)
         if not self.travelling.first.size:
             return jq, jv
@@ -384,25 +394,25 @@ class Assembly(Displayed):
             values = [self.inertia.mass[n]] * 3 + [self.inertia.transverse[n]] * 2 + [self.inertia.axial[n]]
             m[range(o, o + 6), range(o, o + 6)] = values
         m[self.inertia.spin, self.inertia.spin] = self.inertia.spin_inertia
-        for name, place in self.elastic_slices.items():
-            m[place, place] = self.elastic_bodies[name].reduced.mass
+        for name, elastic_slice in self.elastic_slices.items():
+            m[elastic_slice, elastic_slice] = self.elastic_bodies[name].reduced.mass
         return m
 
     def mass_at(self, q: Floats) -> Floats:
         """Mass matrix at coordinates q and zero tilts, (size, size)."""
         m = self.mass_matrix.copy()
         for name, body in self.turning.items():
-            place = self.elastic_slices[name]
-            m[place, place] = body.mass_matrix(q[place])
+            elastic_slice = self.elastic_slices[name]
+            m[elastic_slice, elastic_slice] = body.mass_matrix(q[elastic_slice])
         return m
 
     def rolling_velocity(self, q: Floats, speeds: Mapping[str, float]) -> Floats:
         """Velocities when the train rolls at the given spins and the planets orbit with their carriers."""
         v = np.zeros(self.size)
-        for name, place in self.elastic_slices.items():
-            v[place] = speeds.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
+        for name, elastic_slice in self.elastic_slices.items():
+            v[elastic_slice] = speeds.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
             if name in self.turning:
-                v[place] = self.turning[name].rolling_velocity(q[place], speeds[name])
+                v[elastic_slice] = self.turning[name].rolling_velocity(q[elastic_slice], speeds[name])
         for body in self.bodies:
             if body.fixed:
                 continue
@@ -416,17 +426,18 @@ class Assembly(Displayed):
     def rolling_acceleration(self, q: Floats, speeds: Mapping[str, float], rates: Mapping[str, float]) -> Floats:
         """Accelerations of a train that rolls at given spins and spin rates, planets' orbit included."""
         a = np.zeros(self.size)
-        for name, place in self.elastic_slices.items():
-            a[place] = rates.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
+        for name, elastic_slice in self.elastic_slices.items():
+            a[elastic_slice] = rates.get(name, 0.0) * self.elastic_bodies[name].reduced.spin
             if name in self.turning:
-                a[place] = self.turning[name].rolling_acceleration(q[place], speeds[name], rates[name])
+                a[elastic_slice] = self.turning[name].rolling_acceleration(q[elastic_slice], speeds[name], rates[name])
         for body in self.bodies:
             if body.fixed:
                 continue
             a[self.spin[body.name]] = rates[body.name]
             if self.has_six(body) and body.carrier is not None:
                 x, y = self._from_carrier_axis(body, q)
-                o, w = self.coordinates[body.name][0], speeds[body.carrier]
+                o = self.coordinates[body.name][0]
+                w = speeds[body.carrier]
                 a[o : o + 2] = rates[body.carrier] * np.array([-y, x]) - w**2 * np.array([x, y])
         return a
 
@@ -463,17 +474,23 @@ class Assembly(Displayed):
         """Generalized forces that the accelerations a need, shape (size,): the inverse of `accelerations`."""
         f = np.zeros(self.size)
         for n, o in enumerate(self.inertia.body):
-            mass, jt, ja = self.inertia.mass[n], self.inertia.transverse[n], self.inertia.axial[n]
-            sb, cb = math.sin(q[o + 4]), math.cos(q[o + 4])
-            da, db = v[o + 3], v[o + 4]
+            mass = self.inertia.mass[n]
+            jt = self.inertia.transverse[n]
+            ja = self.inertia.axial[n]
+            sb = math.sin(q[o + 4])
+            cb = math.cos(q[o + 4])
+            da = v[o + 3]
+            db = v[o + 4]
             p = ja * (v[o + 5] + da * sb)
             f[o : o + 3] = mass * a[o : o + 3]
             f[o + 5] = ja * (a[o + 5] + a[o + 3] * sb + da * db * cb)
             f[o + 3] = jt * cb**2 * a[o + 3] + f[o + 5] * sb + p * db * cb - 2.0 * jt * da * db * sb * cb
             f[o + 4] = jt * a[o + 4] + jt * da**2 * sb * cb - p * da * cb
         f[self.inertia.spin] = self.inertia.spin_inertia * a[self.inertia.spin]
-        for name, place in self.elastic_slices.items():
-            f[place] = self.elastic_bodies[name].reduced.mass @ a[place]
+        for name, elastic_slice in self.elastic_slices.items():
+            f[elastic_slice] = self.elastic_bodies[name].reduced.mass @ a[elastic_slice]
             if name in self.turning:
-                f[place] = self.turning[name].inertia_forces(q[place], v[place], a[place])
+                f[elastic_slice] = self.turning[name].inertia_forces(
+                    q[elastic_slice], v[elastic_slice], a[elastic_slice]
+                )
         return f

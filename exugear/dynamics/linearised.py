@@ -59,7 +59,8 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
     for n, name in enumerate(assembly.mesh_names):
         jq, jv = assembly.mesh_jacobians(q, rest, averaged.one(n))
         stiffness[name], damping[name] = -jq, -jv
-    steps, number = _connector_steps(assembly), np.arange(len(assembly.connector_names))
+    steps = _connector_steps(assembly)
+    number = np.arange(len(assembly.connector_names))
     for n, name in enumerate(assembly.connector_names):
         stiffness[name], damping[name] = np.zeros((assembly.size,) * 2), np.zeros((assembly.size,) * 2)
         add_connector_tangents(q, steps * (number == n), assembly.connectors, stiffness[name], damping[name])
@@ -85,8 +86,10 @@ def tangent_stiffness(assembly: Assembly, q: Floats, meshes: MeshArrays) -> Floa
 
     The sum over the elements of `linearise`, where no single one is asked for: a tenth of its time with elastic bodies.
     """
-    size, rest = assembly.size, np.zeros(assembly.size)
-    stiffness, damping = -assembly.mesh_jacobians(q, rest, meshes)[0], np.zeros((size, size))
+    size = assembly.size
+    rest = np.zeros(assembly.size)
+    stiffness = -assembly.mesh_jacobians(q, rest, meshes)[0]
+    damping = np.zeros((size, size))
     add_connector_tangents(q, _connector_steps(assembly), assembly.connectors, stiffness, damping)
     for i, (first, second) in enumerate(assembly.springs.coordinates):
         for one, other in ((first, second), (second, first)):
@@ -96,7 +99,9 @@ def tangent_stiffness(assembly: Assembly, q: Floats, meshes: MeshArrays) -> Floa
         if name not in assembly.turning:
             stiffness[of_body, of_body] += assembly.elastic_bodies[name].reduced.stiffness
             continue
-        body, place, still = assembly.turning[name], q[of_body], rest[of_body]
+        body = assembly.turning[name]
+        place = q[of_body]
+        still = rest[of_body]
         steps = DIFFERENCE_STEP * np.eye(len(place))
         columns = [body.forces(place - e, still) - body.forces(place + e, still) for e in steps]
         stiffness[of_body, of_body] += np.array(columns).T / (2.0 * DIFFERENCE_STEP)

@@ -55,7 +55,8 @@ class Loading:
         for name, torque in self.varying.items():
             f[assembly.spin[name]] += torque(t)
         if self.drive is not None:
-            i, drive = assembly.spin[self.drive.body], self.drive
+            i = assembly.spin[self.drive.body]
+            drive = self.drive
             f[i] += drive.stiffness * (drive.angle(t) - q[i]) + drive.damping * (drive.speed(t) - v[i])
         return f
 

@@ -112,7 +112,8 @@ def at_static_load(assembly: Assembly) -> Assembly:
 
 def _with_contacts(assembly: Assembly) -> tuple[Assembly, Floats | None]:
     """Let teeth bear as finite elements have it where gears stand at rest; with the last state of the search."""
-    near, even = None, assembly
+    near = None
+    even = assembly
     for _ in range(CONTACT_STEPS if contact_places(assembly, np.zeros(assembly.size)) else 0):
         near, _laws = _loaded_state(assembly, near)
         assembly = even.with_contacts(static_contacts(contact_places(assembly, near)))
@@ -134,7 +135,8 @@ def contact_places(assembly: Assembly, q: Floats) -> dict[str, MeshPlace]:
     equal = {planet.name for planets in _equal(assembly) for planet in planets}
     places = {}
     for number, element in enumerate(assembly.elements):
-        mesh, tilts = element.mesh, assembly.meshes.coordinates[number, [TILT, BODY_SIZE + TILT]]
+        mesh = element.mesh
+        tilts = assembly.meshes.coordinates[number, [TILT, BODY_SIZE + TILT]]
         if element.computed_from is None or (tilts < 0).all():
             continue
         distance, misalignment = positions[number]
@@ -171,7 +173,8 @@ def _balance(
     assembly: Assembly, laws: Sequence[SupportLaw], about: Floats | None = None, near: Floats | None = None
 ) -> Floats:
     """Coordinates under the static load, of the train rolled to `about`, from a state that is near it."""
-    load, meshes = assembly.gearbox.case.static_load, assembly.mean_meshes
+    load = assembly.gearbox.case.static_load
+    meshes = assembly.mean_meshes
     try:
         return locked_equilibrium(assembly, load.torques_N_m, assembly.gearbox.locked, meshes, about, near=near)
     except BalanceError as error:
@@ -213,7 +216,8 @@ def _point(support: Bearing, bodies: dict[str, Body], law: SupportLaw, strain: F
     if rows != law.rows:  # its seat yields, and it has clearance
         force = bearing_load(row_contacts(law.rows, law.phase), displacement)[:3]
         if force.any():
-            tilt, angle = displacement[3:5], law.phase
+            tilt = displacement[3:5]
+            angle = law.phase
             displacement = equilibrium(BearingOfRows(rows), force, tilt=tilt, first_roller_angle=angle).displacement
     return operating_point(support, displacement, load_stands_still(support, bodies), law.phase)
 
@@ -253,7 +257,8 @@ def _in_motion(
     assembly: Assembly, laws: Sequence[SupportLaw], here: _State, over_turns: dict[str, list[_State]]
 ) -> tuple[ConnectorArrays, float]:
     """Connectors with the laws that last in motion, and how far bearings of equal planets were apart in stiffness."""
-    bodies, time = _bodies(assembly), assembly.gearbox.case.damping.bearing_time_s
+    bodies = _bodies(assembly)
+    time = assembly.gearbox.case.damping.bearing_time_s
     all_around = [state for states in over_turns.values() for state in states] or [here]
     equal = {planet.name for planets in _equal(assembly) for planet in planets}
     found = []
@@ -286,7 +291,8 @@ def _equal_supports(assembly: Assembly) -> list[PlanetSupports]:
     """Catalogue bearings of equal planets."""
     found = []
     for planets in _equal(assembly):
-        names, angles = [planet.name for planet in planets], np.array([planet.orbit_angle for planet in planets])
+        names = [planet.name for planet in planets]
+        angles = np.array([planet.orbit_angle for planet in planets])
         found += planet_supports(assembly.supports, names, angles)
     return [own for own in found if all(is_catalogued(assembly.supports[n]) for n in own.numbers)]
 

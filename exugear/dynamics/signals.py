@@ -364,10 +364,12 @@ class SignalLayout:
 
     @cached_property
     def _slices(self) -> dict[str, slice]:
-        slices, end = {}, 0
+        slices = {}
+        end = 0
         for signal in self.signals:
             if signal.is_sampled and signal.filled_by:
-                start, end = end, end + math.prod(self.shape(signal))
+                start = end
+                end = end + math.prod(self.shape(signal))
                 slices[signal.name] = slice(start, end)
         return slices
 
@@ -462,6 +464,9 @@ def energy_residual(data: xr.Dataset | Mapping[str, Floats]) -> float:
     """
     change = {term: float(data[term][-1] - data[term][0]) for term in BALANCE_TERMS}
     explained = sum(value for term, value in change.items() if term != "work_of_loads")
-    kinetic, last = change["kinetic_energy"], float(data["kinetic_energy"][-1])
+    kinetic = change["kinetic_energy"]
+    last = float(data["kinetic_energy"][-1])
     scale = kinetic if abs(kinetic) > STEADY_CHANGE * last else last
-    return (change["work_of_loads"] - explained) / scale if scale else math.nan
+    if scale:
+        return (change["work_of_loads"] - explained) / scale
+    return math.nan

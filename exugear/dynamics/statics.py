@@ -100,7 +100,10 @@ def _newton(
     sums of spring forces, and rounding of places near 1 m is what these cannot resolve: under a small load that is
     more of it than under a large one, and no step can make it less.
     """
-    x, solution, best, rounded = start, start, np.inf, False
+    x = start
+    solution = start
+    best = np.inf
+    rounded = False
     if not x.size:
         return x
     rounding = np.zeros_like(x)
@@ -111,7 +114,9 @@ def _newton(
             break
         stalled = error > 0.5 * best
         if error < best:
-            solution, best, rounded = x, error, bool(np.all(np.abs(r) <= rounding))
+            solution = x
+            best = error
+            rounded = bool(np.all(np.abs(r) <= rounding))
         small = best < LARGEST_RESIDUAL or rounded
         if error == 0.0 or (stalled and small):
             return solution
@@ -121,11 +126,13 @@ def _newton(
         if step is None:
             raise BalanceError(f"{what}: the stiffness matrix is singular; a body may move without resistance")
         # Rollers that touch and part bend the residual: a whole step may lead away from the balance.
-        share, ahead = 1.0, residual(x + step)
+        share = 1.0
+        ahead = residual(x + step)
         while not small and share > SHORTEST_STEP and not _size(ahead, scale) < error:
             share *= 0.5
             ahead = residual(x + share * step)
-        x, r = x + share * step, ahead
+        x = x + share * step
+        r = ahead
     raise BalanceError(f"{what}: no balance found, the residual stays at {best:.2e} of the load")
 
 
@@ -178,7 +185,8 @@ def locked_equilibrium(
     held = [assembly.spin[name] for name in _held(assembly, torques, locked)]
     free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
     applied = assembly.torque_vector(torques) + (0.0 if other_loads is None else other_loads)
-    rest, loads = np.zeros(assembly.size), np.append(applied, assembly.weight)
+    rest = np.zeros(assembly.size)
+    loads = np.append(applied, assembly.weight)
     origin = rest if about is None else about
 
     def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None, beside: _Beside | None = None) -> Floats:
@@ -193,7 +201,8 @@ def locked_equilibrium(
             return np.asarray(-free.T @ stiffness @ free)
 
         def search(share: float) -> Floats:
-            held, scale = assembly.eased(share), np.full(start.size, _load_scale(loads))
+            held = assembly.eased(share)
+            scale = np.full(start.size, _load_scale(loads))
             return _newton(residual, partial(derivative, held), start, scale, "static state")
 
         *shares, last = HOLDING_SHARES if assembly.has_rows else HOLDING_SHARES[:1]
@@ -286,7 +295,8 @@ def static_state(assembly: Assembly) -> StaticState:
     >>> bool((state.mesh_force > 0.0).all())
     True
     """
-    gearbox, resting = assembly.gearbox, assembly.at_rest
+    gearbox = assembly.gearbox
+    resting = assembly.at_rest
     torques = gearbox.case.static_load.torques_N_m
     return StaticState(resting, locked_equilibrium(resting, torques, gearbox.locked, resting.mean_meshes))
 
@@ -310,8 +320,10 @@ def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str
     BalanceError
         The locked bodies leave the train free to roll, and the torques would make it.
     """
-    gearbox, held = assembly.gearbox, list(locked)
-    rolling, row = gearbox.train.kinematic_modes, gearbox.spinning.index
+    gearbox = assembly.gearbox
+    held = list(locked)
+    rolling = gearbox.train.kinematic_modes
+    row = gearbox.spinning.index
     free = rolling @ scipy.linalg.null_space(rolling[[row(name) for name in held]]) if held else rolling
     applied = np.array([torques.get(name, 0.0) for name in gearbox.spinning])
     if free.size and np.abs(free.T @ applied).max() > 1e-9 * np.abs(applied).max():
@@ -407,7 +419,8 @@ def accelerating_start(
     if driven is not None:
         direction[assembly.spin[driven[0]]] = 1.0
     size = _load_scale(applied)
-    motions, modes = assembly.motions, train.kinematic_modes
+    motions = assembly.motions
+    modes = train.kinematic_modes
     # Unknown: deflections, the acceleration in each way to roll, and the torque of a drive.
     unknown = motions.shape[1] + modes.shape[1]
 
@@ -431,7 +444,8 @@ def accelerating_start(
             stiffness = tangent_stiffness(assembly, split(x)[0], assembly.meshes if meshes is None else meshes)
             if beside is not None:
                 stiffness = stiffness + beside.stiffness(assembly, split(x)[0])
-            matrix, bends = np.zeros((x.size, x.size)), motions.shape[1]
+            matrix = np.zeros((x.size, x.size))
+            bends = motions.shape[1]
             matrix[:bends, :bends] = -motions.T @ stiffness @ motions
             matrix[bends : bends + len(pinned), :bends] = size * motions[pinned]
             # The residual is linear in the last unknowns, accelerations and a torque: no step is too long for them.

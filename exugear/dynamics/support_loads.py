@@ -64,7 +64,8 @@ class _Places:
         """Vector (3,) fixed to a body that turns in its place, in global axes (samples, 3)."""
         gearbox = self.assembly.gearbox
         angle = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0).get(frame or "", 0.0) * self.turned
-        cosine, sine = np.cos(angle), np.sin(angle)
+        cosine = np.cos(angle)
+        sine = np.sin(angle)
         x, y, z = vector
         return np.stack([cosine * x - sine * y, sine * x + cosine * y, np.full_like(angle, z)], axis=-1)
 
@@ -82,14 +83,16 @@ def _joint_moments(assembly: Assembly, run: Mapping[str, Floats]) -> Floats:
 
     Summed up about the origin of the global axes: a planet hands its load on to the joint of its carrier.
     """
-    joints, force = assembly.gearbox.joints, np.asarray(run["support_force"], dtype=np.float64).swapaxes(0, 1)
+    joints = assembly.gearbox.joints
+    force = np.asarray(run["support_force"], dtype=np.float64).swapaxes(0, 1)
     number = {joint.body: n for n, joint in enumerate(joints)}
     speed = np.asarray(run["input_speed"], dtype=np.float64)
     steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(run["time"])
     places = _Places(assembly, np.append(0.0, np.cumsum(steps)))
     # What a joint takes of its own body: the file's force less what planets hand on; it acts at the node but for the
     # moments of meshes about that.
-    own, moments = force.copy(), np.zeros_like(force)
+    own = force.copy()
+    moments = np.zeros_like(force)
     for joint in joints:
         if joint.on in number:
             own[number[joint.on]] -= force[number[joint.body]]

@@ -21,7 +21,9 @@ def inertia_sets(origin: Origin) -> tuple[str, ...]:
     """
     moving = [section for section in origin.enabled.values() if not section.fixed]
     named = next((section.inertia for section in moving if section.inertia), None)
-    return tuple(named or (origin.case.default_inertias,)) if moving else ()
+    if moving:
+        return tuple(named or (origin.case.default_inertias,))
+    return ()
 
 
 def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
@@ -131,7 +133,8 @@ def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
 def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
     """Body of a gear in the middle of its face at z (m) on a shaft: a tube up to its reference circle."""
     reference = 1e-3 * gear.teeth * gear.normal_module_mm / math.cos(math.radians(gear.helix_angle_deg))
-    width, held = 1e-3 * gear.face_width_mm, 1e-3 * gear.held_diameter_mm
+    width = 1e-3 * gear.face_width_mm
+    held = 1e-3 * gear.held_diameter_mm
     under = [one.outer for one in shaft if one.start < z + 0.5 * width and one.start + one.length > z - 0.5 * width]
     inner, outer = (reference, held) if gear.internal else (min(max([held, *under]), reference), reference)
     density = gear.material.density_kg_per_m3
@@ -144,7 +147,8 @@ def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
     if section.axis_position_mm is not None:
         x, y = section.axis_position_mm
         return x * 1e-3, y * 1e-3
-    carrier, radius = section.carrier, section.orbit_radius_mm
+    carrier = section.carrier
+    radius = section.orbit_radius_mm
     if carrier is None or radius is None:
         raise origin.fault(f"bodies.{family}: give axis_position_mm or the keys of a planet")
     if not origin.are_enabled(f"bodies.{family}.carrier", carrier):

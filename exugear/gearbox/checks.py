@@ -288,7 +288,8 @@ def _faults_of_assembly(
 
 def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
     """(teeth of the planet's wheel, teeth of its mate, the latter negative unless internal)."""
-    pinion, gear = mesh.pair.pinion, mesh.pair.gear
+    pinion = mesh.pair.pinion
+    gear = mesh.pair.gear
     if mesh.pinion == planet:
         return pinion.teeth, gear.teeth if gear.internal else -gear.teeth
     return gear.teeth, -pinion.teeth
@@ -327,7 +328,8 @@ def faults_of_torsion(
     """Tell torsion that takes two paths: couplings in a loop, and bearings between bodies that both turn."""
     paths: dict[str, dict[str, list[str]]] = {name: {name: []} for name in spinning}
     for coupling in couplings:
-        from_first, from_second = paths[coupling.first], paths[coupling.second]
+        from_first = paths[coupling.first]
+        from_second = paths[coupling.second]
         if coupling.second in from_first:
             yield (
                 f"couplings {', '.join([*from_first[coupling.second], coupling.name])} form a loop: {coupling.first} "
@@ -353,7 +355,8 @@ def faults_of_supports(case: CaseFile) -> Iterator[str]:
     for table, sections in (("bearings", case.bearings), ("mounts", case.mounts)):
         for name, section in sections.items():
             key = f"{table}.{name}"
-            stiffness, damping = section.stiffness, section.damping
+            stiffness = section.stiffness
+            damping = section.damping
             catalogue = isinstance(section, BearingSection) and section.catalogue is not None
             if stiffness is not None:
                 yield from _faults_of_matrix(f"{key}.stiffness", stiffness)
@@ -369,7 +372,8 @@ def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[s
     names = [name for name, bearing in bearings.items() if bearing.catalogue is not None]
     for place, first in enumerate(names):
         for second in names[place + 1 :]:
-            one, other = bearings[first], bearings[second]
+            one = bearings[first]
+            other = bearings[second]
             distance = abs(one.z_mm - other.z_mm)
             half = 0.5 * sum(bearing.catalogue.width_mm for bearing in (one, other) if bearing.catalogue)
             if (one.body, one.on) == (other.body, other.on) and distance < 0.5 * half:

@@ -173,7 +173,8 @@ def thinning_range(section: GearSection) -> tuple[float, float]:
     allowances = section.tooth_thickness
     if allowances is None:
         return section.tooth_thinning_mm * 1e-3, section.tooth_thinning_mm * 1e-3
-    upper, lower = allowances.upper_allowance_um, allowances.lower_allowance_um
+    upper = allowances.upper_allowance_um
+    lower = allowances.lower_allowance_um
     if lower is None:
         lower = upper - (allowances.tolerance_um or 0.0)
     transverse = -1e-6 / math.cos(math.radians(section.helix_angle_deg))
@@ -274,7 +275,8 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
                 raise origin.fault(
                     f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; gears are {', '.join(gears)}"
                 )
-        first, second = gears[section.pinion], gears[section.gear]
+        first = gears[section.pinion]
+        second = gears[section.gear]
         if _is_turned_over(first, second):
             first, second = second, first
         return origin.guarded(
@@ -315,7 +317,8 @@ def pair_specs(
     """
     specs = {}
     for name, pair in pairs.items():
-        section, forces = sections[name], mesh_forces.get(name, [])
+        section = sections[name]
+        forces = mesh_forces.get(name, [])
         force = sum(abs(force) for force in forces) / len(forces) if forces else 0.0
         specs[name] = PairSpec(
             name=name,
@@ -348,7 +351,9 @@ def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
             )
         return tuple(values.tolist())
 
-    return part_of_each(of_section, {name: one for name, one in origin.case.pairs.items() if one.stiffness is not None})
+    return part_of_each(
+        of_section, {name: pair for name, pair in origin.case.pairs.items() if pair.stiffness is not None}
+    )
 
 
 def _over_cycle(section: MeshStiffnessSection) -> Floats:
@@ -391,19 +396,23 @@ def _meshes_of_section(
     origin: Origin, family: str, section: MeshSection, pair: GearPair, bodies: Mapping[str, Body]
 ) -> Iterator[Mesh]:
     key = f"meshes.{family}"
-    ends, stated_deg = (section.pinion_body, section.gear_body), section.position_angle_deg
+    ends = (section.pinion_body, section.gear_body)
+    stated_deg = section.position_angle_deg
     if pair.pinion.name != origin.case.pairs[section.pair].pinion:
-        ends, stated_deg = ends[::-1], None if stated_deg is None else stated_deg + 180.0
+        ends = ends[::-1]
+        stated_deg = None if stated_deg is None else stated_deg + 180.0
     instances = origin.instances(key, *ends)
     phases = section.phase if isinstance(section.phase, tuple) else (section.phase,) * len(instances)
     if len(phases) != len(instances):
         raise origin.fault(f"{key}.phase = {list(phases)}: {len(instances)} meshes need {len(instances)} phases")
     for (suffix, pinion_name, gear_name), phase in zip(instances, phases, strict=True):
-        pinion_body, gear_body = bodies[pinion_name], bodies[gear_name]
+        pinion_body = bodies[pinion_name]
+        gear_body = bodies[gear_name]
         frame = section.frame or pinion_body.carrier or gear_body.carrier or GROUND
         if frame != GROUND and frame not in bodies:
             raise origin.fault(f"{key}.frame = {frame!r}: no such body; use a carrier's name or ground")
-        dx, dy = gear_body.axis[0] - pinion_body.axis[0], gear_body.axis[1] - pinion_body.axis[1]
+        dx = gear_body.axis[0] - pinion_body.axis[0]
+        dy = gear_body.axis[1] - pinion_body.axis[1]
         angle = math.atan2(dy, dx)
         _check_angle(origin, key, stated_deg, angle)
         z = _middle_of_faces(origin, key, pair, pinion_body, gear_body)
@@ -433,7 +442,8 @@ def _check_angle(origin: Origin, key: str, stated_deg: float | None, angle: floa
 
 def _middle_of_faces(origin: Origin, key: str, pair: GearPair, pinion_body: Body, gear_body: Body) -> float:
     """Middle of the overlap of the two faces, m."""
-    low, high = -math.inf, math.inf
+    low = -math.inf
+    high = math.inf
     for body, gear in ((pinion_body, pair.pinion), (gear_body, pair.gear)):
         if gear.name not in body.wheels:
             raise origin.fault(

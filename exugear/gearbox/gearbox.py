@@ -170,7 +170,7 @@ class Gearbox(Displayed):
             None is given, or two.
         """
         sections = (self.case.lubricant, self.case.rating)
-        found = [one.viscosity_40_mm2_per_s for one in sections if one is not None]
+        found = [section.viscosity_40_mm2_per_s for section in sections if section is not None]
         given = [value for value in found if value is not None]
         if len(given) != 1:
             what = "is given twice; leave that of [rating] out" if given else "this key is missing"
@@ -358,12 +358,12 @@ class Gearbox(Displayed):
         """
         ends = (self.case.overall.input, self.case.overall.output)
         return {
-            own.body: Tie(own.on, own.body)
-            for own in self.bearings
-            if stiffness_matrix(own.stiffness)[5, 5]
-            and own.body in self.spinning
-            and own.body not in ends
-            and own.on not in self.spinning
+            bearing.body: Tie(bearing.on, bearing.body)
+            for bearing in self.bearings
+            if stiffness_matrix(bearing.stiffness)[5, 5]
+            and bearing.body in self.spinning
+            and bearing.body not in ends
+            and bearing.on not in self.spinning
         }
 
     @property
@@ -375,7 +375,9 @@ class Gearbox(Displayed):
     def output_radius(self) -> float:
         """Base radius of the overall output gear, m; 1 m for a rotor without gears."""
         name = self.case.overall.output_gear
-        return 1.0 if name is None else self.gears[name].base_radius
+        if name is None:
+            return 1.0
+        return self.gears[name].base_radius
 
     def start_speeds(self, case: LoadCase) -> dict[str, float]:
         """Spins of all bodies at the start of a load case, rad/s.
@@ -424,7 +426,8 @@ class Gearbox(Displayed):
         CaseError
             The gears cannot run at one of them.
         """
-        static, offsets = self.gear_pairs[pair], self.ste.centre_distance_offsets_um or ()
+        static = self.gear_pairs[pair]
+        offsets = self.ste.centre_distance_offsets_um or ()
         distances = tuple(static.centre_distance + 1e-6 * offset for offset in offsets)
         for offset, distance in zip(offsets, distances, strict=True):
             key = f"ste.centre_distance_offsets_um: {offset:g}"
@@ -438,7 +441,7 @@ ALONE = ("bodies", "masses", "gears", "stiffness", "supports", "modifications", 
 
 def _checks_of_entries(gearbox: Gearbox) -> tuple[checks.Check, ...]:
     """List the checks of what could be read of a file with faults of writing."""
-    return tuple(one for one in _checks_of_parts(gearbox) if one.name in ALONE)
+    return tuple(check for check in _checks_of_parts(gearbox) if check.name in ALONE)
 
 
 def _checks_of(gearbox: Gearbox) -> tuple[checks.Check, ...]:
@@ -447,7 +450,8 @@ def _checks_of(gearbox: Gearbox) -> tuple[checks.Check, ...]:
 
 
 def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
-    case, refuse = gearbox.case, partial(_refuse, gearbox)
+    case = gearbox.case
+    refuse = partial(_refuse, gearbox)
     yield checks.Check("bodies", lambda: refuse(checks.faults_of_bodies(case)))
     yield checks.Check("masses", lambda: refuse(checks.faults_of_mass_properties(case)))
     yield checks.Check("gears", lambda: gearbox.gears)
@@ -558,4 +562,6 @@ def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling]
 def _copied(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _copied(entry) for key, entry in value.items()}
-    return list(value) if isinstance(value, list) else value
+    if isinstance(value, list):
+        return list(value)
+    return value

@@ -82,8 +82,10 @@ class Origin(Displayed):
 
     def instances(self, key: str, family: str, other_family: str) -> list[tuple[str, str, str]]:
         """(suffix, body, other body) for each planet; sets meet single bodies or equal sets."""
-        suffixes, other_suffixes = self.suffixes(family), self.suffixes(other_family)
-        single, other_single = suffixes == [""], other_suffixes == [""]
+        suffixes = self.suffixes(family)
+        other_suffixes = self.suffixes(other_family)
+        single = suffixes == [""]
+        other_single = other_suffixes == [""]
         if not single and not other_single and len(suffixes) != len(other_suffixes):
             raise self.fault(f"{key}: {family!r} and {other_family!r} are planet sets of different size")
         return [

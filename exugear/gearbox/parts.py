@@ -80,7 +80,9 @@ class Body(Displayed, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 abo
             return f"planet on {self.carrier}"
         if self.planet_of is not None:
             return f"planet on {self.planet_of}, which is held"
-        return "spin only" if self.spin_only else "turning"
+        if self.spin_only:
+            return "spin only"
+        return "turning"
 
 
 @dataclass(frozen=True)
@@ -161,7 +163,9 @@ class Bearing(Displayed):
         """Where its stiffness comes from."""
         if self.catalogue is None:
             return "stiffness given"
-        return "from catalogue" if self.stiffness is None else "from catalogue and stiffness given"
+        if self.stiffness is None:
+            return "from catalogue"
+        return "from catalogue and stiffness given"
 
 
 @dataclass(frozen=True)
@@ -225,7 +229,8 @@ class Mesh(Displayed):
     phase: float | None
 
     def _line(self) -> str:
-        pinion, gear = self.pair.pinion, self.pair.gear
+        pinion = self.pair.pinion
+        gear = self.pair.gear
         return (
             f" {self.name!r}: {pinion.name} ({pinion.teeth} teeth) on {self.pinion} with "
             f"{gear.name} ({gear.teeth} teeth) on {self.gear}"
@@ -361,7 +366,8 @@ class PairSpec(Displayed):
     stiffness: tuple[float, ...] = ()
 
     def _line(self) -> str:
-        pinion, gear = self.pair.pinion, self.pair.gear
+        pinion = self.pair.pinion
+        gear = self.pair.gear
         return (
             f" {self.name!r}: {pinion.teeth} and {gear.teeth} teeth, "
             f"{self.static_torque:g} N m on gear 1, flank {self.flank:+d}"
@@ -388,7 +394,8 @@ def stiffness_matrix(section: StiffnessSection | None) -> Floats:
         return np.zeros((6, 6))
     if section.matrix is not None:
         return np.array(section.matrix, dtype=np.float64)
-    radial, tilt = section.radial_N_per_m, section.tilt_N_m_per_rad
+    radial = section.radial_N_per_m
+    tilt = section.tilt_N_m_per_rad
     return np.diag([radial, radial, section.axial_N_per_m, tilt, tilt, section.torsion_N_m_per_rad])
 
 

@@ -140,20 +140,23 @@ def readable(content: Mapping[str, Any]) -> CaseFile:
             if not isinstance(content[table], Mapping):
                 lost[table].add("")  # whatever was meant there
         pairs = found["pairs"].items()
-        known, carriers = set(found["gears"]), set(found["bodies"])
+        known = set(found["gears"])
+        carriers = set(found["bodies"])
         found["pairs"] = {name: one for name, one in pairs if not lost["gears"] or {one.pinion, one.gear} <= known}
-        broken = [one for name, one in written["pairs"].items() if name in lost["pairs"] and isinstance(one, Mapping)]
+        broken = [
+            pair for name, pair in written["pairs"].items() if name in lost["pairs"] and isinstance(pair, Mapping)
+        ]
         mates = {str(one.get(end)) for one in broken for end in ("pinion", "gear")}
         found["gears"] = {
-            name: one
-            for name, one in found["gears"].items()
-            if name not in mates or not (one.profile_shift_from_centre_distance or one.fitted_tip)
+            name: gear
+            for name, gear in found["gears"].items()
+            if name not in mates or not (gear.profile_shift_from_centre_distance or gear.fitted_tip)
         }
         found["bodies"] = {
-            name: one
-            for name, one in found["bodies"].items()
-            if (not lost["gears"] or set(one.wheels_z_mm) <= known)
-            and (not lost["bodies"] or one.carrier is None or one.carrier in carriers)
+            name: body
+            for name, body in found["bodies"].items()
+            if (not lost["gears"] or set(body.wheels_z_mm) <= known)
+            and (not lost["bodies"] or body.carrier is None or body.carrier in carriers)
         }
     return CaseFile.model_construct(None, **found)
 
@@ -165,7 +168,8 @@ _JUDGED = ("gears", "pairs", "bodies", "bearings", "mounts")
 def _valid_entries(content: Mapping[str, Any], table: str) -> dict[str, Any]:
     """Entries of a table that are valid by themselves."""
     model = _inner(_inner(CaseFile, table), "")
-    entries, found = content.get(table, {}), {}
+    entries = content.get(table, {})
+    found = {}
     for name, entry in entries.items() if isinstance(entries, Mapping) else ():
         with suppress(ValidationError):
             found[name] = model.model_validate(entry)
@@ -215,14 +219,18 @@ def _remedy(fault: Any) -> str:
     if fault["type"] == "extra_forbidden":
         near = _nearest(fault["loc"])
         known = ", ".join(_known_keys(fault["loc"]))
-        return f"unknown key; did you mean {near!r}?" if near else f"unknown key; known keys are {known}"
+        if near:
+            return f"unknown key; did you mean {near!r}?"
+        return f"unknown key; known keys are {known}"
     if fault["type"] in _TYPES:
         return _TYPES[fault["type"]]
     if fault["type"] in ("too_long", "too_short"):
         limit = fault["ctx"].get("max_length", fault["ctx"].get("min_length"))
         return f"must have {'at most' if fault['type'] == 'too_long' else 'at least'} {limit} entries"
     if fault["type"] == "string_pattern_mismatch":
-        return _NO_CONTROL if "x7f" in fault["ctx"]["pattern"] else _A_NAME
+        if "x7f" in fault["ctx"]["pattern"]:
+            return _NO_CONTROL
+        return _A_NAME
     text = str(fault["msg"]).removeprefix("Value error, ")
     return text[:1].lower() + text[1:]
 
@@ -243,7 +251,9 @@ def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...
 
 def _key(part: int | str) -> str:
     """Part of a dotted key, in quotes where TOML wants them."""
-    return str(part) if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)) else shortened(part)
+    if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)):
+        return str(part)
+    return shortened(part)
 
 
 def shortened(value: Any, longest: int = 60) -> str:
@@ -262,13 +272,17 @@ def shortened(value: Any, longest: int = 60) -> str:
         text = "a table"
     else:
         text = repr(value[: longest + 1] if isinstance(value, str) else value)
-    return text if len(text) <= longest else text[: longest - 1] + "…"
+    if len(text) <= longest:
+        return text
+    return text[: longest - 1] + "…"
 
 
 def _nearest(location: tuple[int | str, ...]) -> str:
     """Known key that an unknown one resembles; empty for none."""
     near = difflib.get_close_matches(str(location[-1])[:100], _known_keys(location), n=1)
-    return near[0] if near else ""
+    if near:
+        return near[0]
+    return ""
 
 
 def _known_keys(location: tuple[int | str, ...]) -> list[str]:
@@ -276,7 +290,9 @@ def _known_keys(location: tuple[int | str, ...]) -> list[str]:
     section: Any = CaseFile
     for part in location[:-1]:
         section = _inner(section, part)
-    return list(section.model_fields) if isinstance(section, type) and issubclass(section, BaseModel) else []
+    if isinstance(section, type) and issubclass(section, BaseModel):
+        return list(section.model_fields)
+    return []
 
 
 def _inner(section: Any, part: int | str) -> Any:
@@ -286,6 +302,8 @@ def _inner(section: Any, part: int | str) -> Any:
         section = field.annotation if field else None
         candidates = [section, *getattr(section, "__args__", ())]
         models = [c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)]
-        return models[0] if models and getattr(section, "__origin__", None) not in (dict, tuple) else section
+        if models and getattr(section, "__origin__", None) not in (dict, tuple):
+            return models[0]
+        return section
     arguments = getattr(section, "__args__", ())
     return next((kind for kind in reversed(arguments) if kind is not Ellipsis), None)

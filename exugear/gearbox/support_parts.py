@@ -42,7 +42,7 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
 
 def _usual_joints(origin: Origin) -> Iterator[tuple[str, JointSection]]:
     for name, section in origin.enabled.items():
-        held = [one.z_mm for one in origin.case.bearings.values() if one.body == name]
+        held = [bearing.z_mm for bearing in origin.case.bearings.values() if bearing.body == name]
         places = held or list(section.wheels_z_mm.values())
         if places and not section.fixed and not section.spin_only:
             place = sum(places) / len(places)

@@ -43,12 +43,18 @@ def accelerations(q: Floats, v: Floats, inertia: InertiaArrays, f: Floats, out: 
         J_t b'' = Q_b - J_t a'^2 sin b cos b + p a' cos b,   spin'' = Q_spin / J_a - a'' sin b - a' b' cos b
     """
     for n in range(inertia.body.size):
-        o, jt, ja = inertia.body[n], inertia.transverse[n], inertia.axial[n]
+        o = inertia.body[n]
+        jt = inertia.transverse[n]
+        ja = inertia.axial[n]
         for i in range(3):
             out[o + i] = f[o + i] / inertia.mass[n]
-        a, b, spin = o + TILT, o + TILT + 1, o + SPIN
-        sb, cb = math.sin(q[b]), math.cos(q[b])
-        da, db = v[a], v[b]
+        a = o + TILT
+        b = o + TILT + 1
+        spin = o + SPIN
+        sb = math.sin(q[b])
+        cb = math.cos(q[b])
+        da = v[a]
+        db = v[b]
         p = ja * (v[spin] + da * sb)
         # The first tilt's equation contains spin'': it is eliminated with the spin's own equation, solved last.
         out[a] = (f[a] - f[spin] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
@@ -65,7 +71,8 @@ def kinetic_energies(q: Floats, v: Floats, inertia: InertiaArrays, out: Floats) 
         o = inertia.body[n]
         square = v[o] ** 2 + v[o + 1] ** 2 + v[o + 2] ** 2
         # Angular velocity across the axis, and about it: spin' + a' sin b.
-        sb, cb = math.sin(q[o + TILT + 1]), math.cos(q[o + TILT + 1])
+        sb = math.sin(q[o + TILT + 1])
+        cb = math.cos(q[o + TILT + 1])
         tilting = (v[o + TILT] * cb) ** 2 + v[o + TILT + 1] ** 2
         spin = v[o + SPIN] + v[o + TILT] * sb
         out[n] = 0.5 * (inertia.mass[n] * square + inertia.transverse[n] * tilting + inertia.axial[n] * spin**2)

@@ -47,7 +47,8 @@ class ActingLoads:
 
     def worst(self, sense: int) -> tuple[Floats, Floats]:
         """Torques of one sign, points among them, and the loads of a hub beside them."""
-        torque, hub = self.torques, np.concatenate([self.points.other, self.worst_hub])
+        torque = self.torques
+        hub = np.concatenate([self.points.other, self.worst_hub])
         own = torque * sense > 0.0
         return torque[own], hub[own]
 
@@ -58,14 +59,16 @@ class ActingLoads:
 
 def acting_loads(counted: CountedLoads) -> ActingLoads:
     """Gather what acts of counted loads."""
-    found = counted.distribution
-    extremes = [one for one in counted.sources if one.kind == "extreme"]
-    ends = np.array([found.upper.max(), found.upper.min()])
+    distribution = counted.distribution
+    extremes = [source for source in counted.sources if source.kind == "extreme"]
+    ends = np.array([distribution.upper.max(), distribution.upper.min()])
     return ActingLoads(
         points=counted.points,
-        worst_torque=np.concatenate([ends, *(one.torque for one in extremes)]),
-        worst_hub=np.concatenate([np.zeros((2, counted.points.other.shape[1])), *(one.hub_loads for one in extremes)]),
-        bins=len(found.hours),
-        slowest=min(one.slowest for one in counted.sources),
-        fastest=max(one.fastest for one in counted.sources),
+        worst_torque=np.concatenate([ends, *(extreme.torque for extreme in extremes)]),
+        worst_hub=np.concatenate(
+            [np.zeros((2, counted.points.other.shape[1])), *(extreme.hub_loads for extreme in extremes)]
+        ),
+        bins=len(distribution.hours),
+        slowest=min(source.slowest for source in counted.sources),
+        fastest=max(source.fastest for source in counted.sources),
     )

@@ -151,11 +151,11 @@ def beyond_tables(
     for name, stress in stresses.items():
         if len(stress.misalignment) < 2:
             continue
-        own = [number for number, mesh in enumerate(gearbox.meshes) if mesh.pair.name == name]
+        meshes = [number for number, mesh in enumerate(gearbox.meshes) if mesh.pair.name == name]
         width = gearbox.gear_pairs[name].face_width
-        reached = float(np.abs(tilts[..., own]).max())
+        reached = float(np.abs(tilts[..., meshes]).max())
         low, high = stress.misalignment[[0, -1]]
-        if tilts[..., own].min() < low or tilts[..., own].max() > high:
+        if tilts[..., meshes].min() < low or tilts[..., meshes].max() > high:
             yield (
                 f"{name}: its misalignment reaches {1e6 * reached * width:.3g} um over the face, its table has "
                 f"{1e6 * low * width:.3g} to {1e6 * high * width:.3g}: stresses beyond are those at the end; widen "
@@ -195,7 +195,7 @@ def flank_lives(
                 case = _Case(gearbox, rating, tooth, pair, balance, stresses[pair.name], dynamic[tooth.family], sense)
                 one = case.life(acting)
                 lives.setdefault((one.gear, one.family, one.flank), []).append(one)
-    return tuple(worst_of(own) for own in lives.values())
+    return tuple(worst_of(life) for life in lives.values())
 
 
 LEAST_COUNTS = ("compression", "contact_limit", "root_limit")
@@ -208,7 +208,7 @@ def worst_of(lives: Sequence[FlankLife]) -> FlankLife:
     root = max(lives, key=lambda one: (np.nan_to_num(one.root_damage, posinf=np.inf), one.root_stress))
     worst: dict[str, Any] = {}
     for name in (one.name for one in fields(FlankLife) if one.type == "float"):
-        values = np.array([getattr(one, name) for one in lives])
+        values = np.array([getattr(life, name) for life in lives])
         least = name.endswith(("_safety", "_static")) or name in LEAST_COUNTS
         worst[name] = float(values.min() if least else values.max())
     return replace(
@@ -235,7 +235,9 @@ class _Case:
     sense: int
 
     def life(self, acting: ActingLoads) -> FlankLife:
-        tooth, stress, points = self.tooth, self.stress, acting.points
+        tooth = self.tooth
+        stress = self.stress
+        points = acting.points
         worn = np.sign(points.torque) == self.sense
         speed = points.speed[worn]
         hertz, root, _ = self._stresses(points.torque[worn], points.other[worn], self.dynamic.at(speed))
@@ -287,7 +289,8 @@ class _Case:
         """Contact stress, root stress and root compression of each mesh, (loads, angles, meshes), Pa."""
         torque, tilt = self._loads(torques, hub)
         torque = torque * dynamic[:, None, None]
-        stress, member = self.stress, self.tooth.member
+        stress = self.stress
+        member = self.tooth.member
         return (
             stress.at(stress.hertz, 0.5, torque, tilt),
             stress.at(stress.root, 1.0, torque, tilt)[..., member],
@@ -373,7 +376,8 @@ def root_factors(strength: StrengthSection, pair: GearPair, member: int) -> tupl
     """Y_delta_rel_T, Y_R_rel_T and Y_X of a gear; the product that the file states in the place of the first."""
     if strength.root_roughness_Rz_um is None:
         return strength.root_factor or 1.0, 1.0, 1.0
-    hardening, notch = hardening_of(strength), root_stress_factors(pair, member).notch
+    hardening = hardening_of(strength)
+    notch = root_stress_factors(pair, member).notch
     return (
         notch_factor(notch, hardening),
         surface_factor(1e-6 * strength.root_roughness_Rz_um),

@@ -107,7 +107,8 @@ def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> Counted
     CaseError
         Loads that cannot be used, or strengths that do not fit the gears.
     """
-    rating, _ = rating_of(gearbox), gearbox.viscosity_40
+    rating = rating_of(gearbox)
+    _ = gearbox.viscosity_40
     counted = count_loads(gearbox, progress)
     if rating.dynamic_factor_run is not None and rating.dynamic_factor_run not in gearbox.load_cases:
         known = ", ".join(gearbox.load_cases) or "none"
@@ -135,7 +136,7 @@ def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, st
         "loads": case.get("loads"),
         "rating": case.get("rating"),
         "lubricant": case.get("lubricant"),
-        "files": {one.name: one.digest for one in counted.sources},
+        "files": {source.name: source.digest for source in counted.sources},
         "tables": dict(tables),
         "run": run,
     }
@@ -174,7 +175,8 @@ def compute_life(
     BalanceError
         A static state that is not held.
     """
-    gearbox, rating = assembly.gearbox, rating_of(assembly.gearbox)
+    gearbox = assembly.gearbox
+    rating = rating_of(assembly.gearbox)
     acting = acting_loads(counted)
     balance = static_balance(
         assembly, counted.body, acting.torques, rating.carrier_angles, progress, 0.5 * acting.hub_sizes, store
@@ -221,7 +223,8 @@ def _hub_in_words(counted: CountedLoads) -> str:
 
 
 def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, MeshCycleStress]) -> list[str]:
-    gearbox, lines = assembly.gearbox, []
+    gearbox = assembly.gearbox
+    lines = []
     rated = rating_of(gearbox).gears
     for gear in dict.fromkeys(one.gear for one in counted.teeth):
         if gear not in rated:
@@ -245,7 +248,8 @@ def _assumptions(
     dynamic: Mapping[str, DynamicFactor],
     oil: LubricantSection | None,
 ) -> list[str]:
-    count, turns = len(balance.torque), len(balance.angle)
+    count = len(balance.torque)
+    turns = len(balance.angle)
     lines = [
         _hub_in_words(counted),
         f"static balance at {count} torque{'s' * (count > 1)} and {turns} angle{'s' * (turns > 1)} of the carrier, "
@@ -254,7 +258,7 @@ def _assumptions(
         "face and transverse load factors are in the stresses of the contact of finite elements"
         + (
             ""
-            if any(len(one.misalignment) > 1 for one in stresses.values())
+            if any(len(stress.misalignment) > 1 for stress in stresses.values())
             else ", of gears that stand aligned: tables with axes (--grid) have their misalignment"
         ),
         f"S_H of {rating.least_S_H:g}, S_F of {rating.least_S_F:g} and S_0 of {rating.least_S_0:g} are asked for",
@@ -290,8 +294,10 @@ def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor
         return f"K_v = {rating.dynamic_factor:g} on all meshes as stated"
     values = ", ".join(f"{name} {one.largest(acting.slowest, acting.fastest):.3f}" for name, one in dynamic.items())
     first = next(iter(dynamic.values()))
-    lowest, highest = acting.slowest / RPM, acting.fastest / RPM
-    slow, fast = first.speed[0] / RPM, first.speed[-1] / RPM
+    lowest = acting.slowest / RPM
+    highest = acting.fastest / RPM
+    slow = first.speed[0] / RPM
+    fast = first.speed[-1] / RPM
     inside = slow <= lowest * (1.0 + WITHIN) and highest <= fast * (1.0 + WITHIN)
     beyond = "" if inside else "; beyond its speeds that of its end is taken"
     return (

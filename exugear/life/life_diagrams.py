@@ -33,7 +33,7 @@ def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
     path : path-like, optional
         Where to write the picture.
     """
-    shown = [one for one in limits(data) if one[2] > LEAST_DAMAGE][:SHOWN]
+    shown = [limit for limit in limits(data) if limit[2] > LEAST_DAMAGE][:SHOWN]
     with drawing_style():
         figure = new_figure(8.5, max(2.2, 0.8 + 0.24 * len(shown)))
         bars, matrix = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.3))
@@ -69,8 +69,8 @@ def damage_matrix(data: xr.Dataset, parts: list[tuple[str, str, float]]) -> tupl
     rows = []
     for part, kind, damage in parts:
         name, _, by_bin = DAMAGES[kind]
-        place = data[name].to_numpy().tolist().index(part)
-        values = data[f"{name}_{by_bin}"].to_numpy()[place][order]
+        index = data[name].to_numpy().tolist().index(part)
+        values = data[f"{name}_{by_bin}"].to_numpy()[index][order]
         endless = np.isinf(values)
         rows.append(endless / endless.sum() if endless.any() else values / damage)
     middles = 0.5 * (torque[order][1:] + torque[order][:-1])

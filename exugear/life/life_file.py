@@ -69,34 +69,35 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
     """Labelled arrays with units, what `write_life` writes."""
     import xarray as xr
 
-    found = life.counted.distribution
+    distribution = life.counted.distribution
     variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
-        "torque": (("bin",), found.torques(life.counted.bin_value), {"units": "N m"}),
-        "hours": (("bin",), found.hours, {"units": "h"}),
-        "revolutions": (("bin",), found.revolutions, {"units": "1"}),
-        "speed": (("bin",), found.speed, {"units": "rad/s"}),
+        "torque": (("bin",), distribution.torques(life.counted.bin_value), {"units": "N m"}),
+        "hours": (("bin",), distribution.hours, {"units": "h"}),
+        "revolutions": (("bin",), distribution.revolutions, {"units": "1"}),
+        "speed": (("bin",), distribution.speed, {"units": "rad/s"}),
         "load_sharing": (("family",), np.array([*life.load_sharing.values()]), {"units": "1"}),
     }
     for name in FLANK_NUMBERS:
-        values = np.array([getattr(one, name) for one in life.flanks], dtype=np.float64)
+        values = np.array([getattr(flank, name) for flank in life.flanks], dtype=np.float64)
         variables[f"flank_{name}"] = (("flank",), values, {"units": FLANK_UNITS.get(name, "1")})
     for name in BEARING_NUMBERS:
-        values = np.array([getattr(one, name) for one in life.bearings], dtype=np.float64)
+        values = np.array([getattr(bearing, name) for bearing in life.bearings], dtype=np.float64)
         variables[f"bearing_{name}"] = (("bearing",), values, {"units": BEARING_UNITS.get(name, "1")})
-    count, none = len(found.hours), {"units": "1", "long_name": "parts of the damage by bin of torque"}
+    count = len(distribution.hours)
+    none = {"units": "1", "long_name": "parts of the damage by bin of torque"}
     parts = {"flank": life.flanks, "bearing": life.bearings}
     for name, _, by_bin in DAMAGES.values():
-        values = np.array([getattr(one, by_bin) for one in parts[name]], dtype=np.float64).reshape(-1, count)
+        values = np.array([getattr(part, by_bin) for part in parts[name]], dtype=np.float64).reshape(-1, count)
         variables[f"{name}_{by_bin}"] = ((name, "bin"), values, none)
     for name in FLANK_WORDS:
-        words = np.array([getattr(one, name) for one in life.flanks], dtype=object)
+        words = np.array([getattr(flank, name) for flank in life.flanks], dtype=object)
         variables[f"flank_{name}"] = (("flank",), words, {})
     for name in ("dynamic", "static"):
-        values = np.array([getattr(one.ratings, name) for one in life.bearings], dtype=np.float64)
+        values = np.array([getattr(bearing.ratings, name) for bearing in life.bearings], dtype=np.float64)
         variables[f"bearing_{name}_rating"] = (("bearing",), values, {"units": "N"})
     coordinates = {
-        "flank": np.array([flank_label(one) for one in life.flanks], dtype=object),
-        "bearing": np.array([one.name for one in life.bearings], dtype=object),
+        "flank": np.array([flank_label(flank) for flank in life.flanks], dtype=object),
+        "bearing": np.array([bearing.name for bearing in life.bearings], dtype=object),
         "family": np.array([*life.load_sharing], dtype=object),
     }
     attributes = {
@@ -109,16 +110,16 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         "life_years": life.counted.life_years,
         "sources": json.dumps(life.counted.source_rows()),
         **{name: json.dumps(getattr(life, name)) for name in LISTS},
-        "bearing_remarks": json.dumps({one.name: one.remarks for one in life.bearings if one.remarks}),
+        "bearing_remarks": json.dumps({bearing.name: bearing.remarks for bearing in life.bearings if bearing.remarks}),
         "input_hash": life.input_hash,
         "method_version": LIFE,
     }
     return xr.Dataset(variables, coordinates, attributes)
 
 
-def flank_label(one: FlankLife) -> str:
+def flank_label(life: FlankLife) -> str:
     """Gear, flank and family of meshes in one text."""
-    return f"{one.gear} {one.flank} {one.family}"
+    return f"{life.gear} {life.flank} {life.family}"
 
 
 def stored_life(path: Path, input_hash: str) -> xr.Dataset | None:
@@ -182,7 +183,9 @@ def summary(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def _number(value: float) -> float | str:
-    return INFINITE if math.isinf(value) else value
+    if math.isinf(value):
+        return INFINITE
+    return value
 
 
 def _entries(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator[Mapping[str, Any]]:

@@ -61,7 +61,7 @@ def pair_stresses(
             known[gear, side] = root_gauges(gear, side)
         return known[gear, side]
 
-    found = {}
+    stresses = {}
     for request in requests:
         if request.stored is None:
             continue
@@ -78,8 +78,8 @@ def pair_stresses(
             kept = mesh_cycle_stress(pair, request.stored.dataset, both)
             if keep:
                 store.write_dataset(_to_dataset(kept, request.name))
-        found[request.name] = kept
-    return found
+        stresses[request.name] = kept
+    return stresses
 
 
 def _to_dataset(stress: MeshCycleStress, pair: str) -> xr.Dataset:

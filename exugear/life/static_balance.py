@@ -122,7 +122,9 @@ class StaticBalance(Displayed, line=": {torque!n} torques, {angle!n} angles, lin
         forces = np.abs(self.at(self.mesh_force, torque, hub)[..., own]).max(axis=(1, 2))
         worst = int(forces.argmax())
         mean = float(np.abs(self.at(self.mesh_force, torque[[worst]])[..., own]).mean())
-        return float(forces[worst]) / mean if mean else 1.0
+        if mean:
+            return float(forces[worst]) / mean
+        return 1.0
 
 
 class States(NamedTuple):
@@ -201,8 +203,10 @@ def static_balance(
         Loads of a hub on a body that has no place in space.
     """
     assembly = assembly.at_rest
-    linear, sizes = is_linear(assembly), np.zeros(5) if hub is None else hub
-    solved, turns = _torques(torques, linear), _angles(assembly, angles)
+    linear = is_linear(assembly)
+    sizes = np.zeros(5) if hub is None else hub
+    solved = _torques(torques, linear)
+    turns = _angles(assembly, angles)
     wrenches = _wrenches(assembly, body, sizes)
     found: list[States] = []
     for number, turn in enumerate(turns):
@@ -244,7 +248,7 @@ def _at_angle(
         known = before[math.copysign(1.0, torque)]  # the other flanks of a torque of the other sign tell nothing
         q = _at_rest(assembly, body, torque, about, None, _ahead(known, torque))
         alone = States.of(assembly, q)
-        beside = (None if one is None else _at_rest(assembly, body, torque, about, one, q) for one in wrenches)
+        beside = (None if wrench is None else _at_rest(assembly, body, torque, about, wrench, q) for wrench in wrenches)
         rows[t] = [alone, *(alone if one is None else States.of(assembly, one) for one in beside)]
         known.append((torque, q))
     return States(*(np.array([[one[key] for one in row] for row in rows]) for key in range(len(States._fields))))
@@ -253,7 +257,9 @@ def _at_angle(
 def _ahead(known: Sequence[tuple[float, Floats]], torque: float) -> Floats | None:
     """Coordinates from which the search under a torque begins: straight through the last two states, or the last."""
     if len(known) < 2:
-        return known[-1][1] if known else None
+        if known:
+            return known[-1][1]
+        return None
     (first, one), (second, other) = known[-2:]
     return np.asarray(other + (other - one) * (torque - second) / (second - first))
 
@@ -273,14 +279,14 @@ def _at_rest(
 
 def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]:
     """Generalized forces (size,) of each load of a hub by itself, None for those of no size."""
-    places = assembly.coordinates[body][: len(hub)]
-    if hub.any() and min(places) < 0:
+    coordinate = assembly.coordinates[body][: len(hub)]
+    if hub.any() and min(coordinate) < 0:
         raise VariantError(
             f"loads on {body}: has no place in space in the variant {assembly.variant}, so no forces or moments of a "
             "hub act on it; name a body on bearings, or take the variant bushing or flexible"
         )
     found: list[Floats | None] = []
-    for place, size in zip(places, hub, strict=True):
+    for place, size in zip(coordinate, hub, strict=True):
         wrench = np.zeros(assembly.size)
         wrench[place] = size
         found.append(wrench if size else None)
@@ -307,7 +313,8 @@ def is_linear(assembly: Assembly) -> bool:
 
 
 def _torques(torques: Floats, linear: bool) -> Floats:
-    high, low = float(np.max(torques, initial=0.0)), float(np.min(torques, initial=0.0))
+    high = float(np.max(torques, initial=0.0))
+    low = float(np.min(torques, initial=0.0))
     if linear:
         return np.array([high if high >= -low else low])
     shares = np.array(TORQUE_SHARES)
@@ -339,7 +346,8 @@ def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
     turned = np.empty_like(loads)
     for number, support in enumerate(assembly.supports):
         angle = float(q[assembly.spin[support.on]]) if support.on in assembly.spin else 0.0
-        cosine, sine = math.cos(angle), math.sin(angle)
+        cosine = math.cos(angle)
+        sine = math.sin(angle)
         back = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         turned[number] = np.sign(scales[number]) * np.concatenate([back @ loads[number, :3], back @ loads[number, 3:]])
     return turned, scales[:, None] * strains[:, 3:5]

@@ -55,7 +55,8 @@ def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], A
         try:
             data = read_life(path)
             assembly = assembled(Choice(*(str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias"))))
-            counted, source = checked_loads(gearbox), source_hash(assembly, rating_of(gearbox), folder)
+            counted = checked_loads(gearbox)
+            source = source_hash(assembly, rating_of(gearbox), folder)
             tables = {request.name: request.wanted.hash for request in life_requests(assembly, counted, folder)}
             digest = life_hash(assembly, counted, tables, source)
         except (FileError, CaseError, BalanceError, KeyError) as error:

@@ -38,7 +38,9 @@ def life_requests(assembly: Assembly, counted: CountedLoads, folder: Path) -> li
     """
     grid = LAWS[assembly.mesh_law].needs_axes
     requests = requested_tables(assembly.gearbox, folder, grid=grid)
-    return requests if grid else stress_requests(assembly, requests, counted, folder)
+    if grid:
+        return requests
+    return stress_requests(assembly, requests, counted, folder)
 
 
 def stress_requests(
@@ -79,14 +81,14 @@ def _misalignments(assembly: Assembly) -> dict[str, list[float]]:
     tilts: dict[str, list[float]] = {}
     if assembly.contacts.contacts:
         state = static_state(assembly)
-        for place in contact_places(state.assembly, state.q).values():
-            tilts.setdefault(place.table.pair.name, []).append(place.misalignment)
+        for contact_place in contact_places(state.assembly, state.q).values():
+            tilts.setdefault(contact_place.table.pair.name, []).append(contact_place.misalignment)
     return tilts
 
 
 def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, float]:
     """Largest torque of the loads over the static one by pair, at least 1."""
-    largest = max(float(abs(one.torque).max()) for one in counted.sources)
+    largest = max(float(abs(source.torque).max()) for source in counted.sources)
     found: dict[str, float] = {}
     for mesh in assembly.gearbox.meshes:
         static = assembly.gearbox.pairs[mesh.pair.name].static_torque
@@ -98,7 +100,8 @@ def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, float]:
 
 def _wider(request: TableRequest, tilts: Iterable[float], reach: float, folder: Path) -> TableRequest:
     """Ask for a pair's table over load and misalignment, and find it where it is kept."""
-    static, width = request.wanted, request.wanted.pair.face_width
+    static = request.wanted
+    width = request.wanted.pair.face_width
     highest = math.ceil(reach / REACH_STEP - 1e-6) * REACH_STEP
     shares = TORQUE_SHARES if highest <= 1.0 else (*TORQUE_SHARES, highest)
     openings = [ROOM * highest * tilt * width for tilt in tilts]

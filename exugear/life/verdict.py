@@ -43,8 +43,9 @@ def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, fl
     CaseError
         Loads above `LARGEST_REACH` times the largest torque of a table.
     """
-    largest = max(max(one.largest, -one.least) for one in counted.sources)
-    reach, name = 0.0, ""
+    largest = max(max(source.largest, -source.least) for source in counted.sources)
+    reach = 0.0
+    name = ""
     for mesh in gearbox.meshes:
         if mesh.pair.name in tables:
             torque = largest * counted.mesh_forces[mesh.family] * mesh.pair.pinion.base_radius
@@ -59,21 +60,21 @@ def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, fl
 
 def failures(flanks: Iterable[FlankLife]) -> Iterator[str]:
     """Tell which flanks and roots bear stresses that not one load cycle endures: their damage is infinite."""
-    for one in flanks:
+    for flank in flanks:
         for what, damage, worn, limit, holder in (
-            ("contact", one.contact_damage, one.contact_worn, one.contact_limit, one.contact_holder),
-            ("root", one.root_damage, one.root_worn, one.root_limit, one.root_holder),
+            ("contact", flank.contact_damage, flank.contact_worn, flank.contact_limit, flank.contact_holder),
+            ("root", flank.root_damage, flank.root_worn, flank.root_limit, flank.root_holder),
         ):
             if math.isinf(damage):
                 yield (
-                    f"{label(one, holder)}: infinite damage: a {what} stress of {1e-6 * worn:.4g} MPa is in its "
+                    f"{label(flank, holder)}: infinite damage: a {what} stress of {1e-6 * worn:.4g} MPa is in its "
                     f"loads, and it endures {1e-6 * limit:.4g} MPa not even for the first cycles of its S-N curve"
                 )
 
 
-def label(one: FlankLife, holder: str) -> str:
+def label(life: FlankLife, holder: str) -> str:
     """Gear, flank and family of meshes in one text, and the body where it is one of several."""
-    return f"{one.gear} {one.flank} {one.family}" + (f" ({holder})" if holder else "")
+    return f"{life.gear} {life.flank} {life.family}" + (f" ({holder})" if holder else "")
 
 
 def shortfalls(
@@ -90,18 +91,20 @@ def shortfalls(
     hours : float
         Of operation in the life.
     """
-    for one in flanks:
-        of_flank, of_root = (one.contact_safety, one.contact_static), (one.root_safety, one.root_static)
+    for flank in flanks:
+        of_flank = (flank.contact_safety, flank.contact_static)
+        of_root = (flank.root_safety, flank.root_static)
         for name, found, asked, holder in (
-            ("S_H", of_flank, rating.least_S_H, one.contact_holder),
-            ("S_F", of_root, rating.least_S_F, one.root_holder),
+            ("S_H", of_flank, rating.least_S_H, flank.contact_holder),
+            ("S_F", of_root, rating.least_S_F, flank.root_holder),
         ):
             least = min((value for value in found if not math.isnan(value)), default=math.inf)
             if least < asked:
-                yield f"{label(one, holder)}: {name} = {least:.3g}, {asked:g} is asked for"
-        if one.reach > UNTRUSTED_REACH:
+                yield f"{label(flank, holder)}: {name} = {least:.3g}, {asked:g} is asked for"
+        if flank.reach > UNTRUSTED_REACH:
             yield (
-                f"{label(one, one.contact_holder)}: its largest torque is {one.reach:.3g} times that of its table: "
+                f"{label(flank, flank.contact_holder)}: its largest torque is {flank.reach:.3g} times "
+                "that of its table: "
                 "these stresses are not to be trusted; raise static_load.torques_N_m, or give [ste] larger "
                 "torque_factors and grid = true"
             )
@@ -120,8 +123,8 @@ def shortfalls(
 def reaches(flanks: Iterable[FlankLife]) -> Iterator[str]:
     """Tell of pairs whose loads go beyond their tables."""
     largest: dict[str, float] = {}
-    for one in flanks:
-        largest[one.family] = max(one.reach, largest.get(one.family, 0.0))
+    for flank in flanks:
+        largest[flank.family] = max(flank.reach, largest.get(flank.family, 0.0))
     for family, reach in largest.items():
         if reach > TOLD_REACH:
             yield (
@@ -133,8 +136,8 @@ def reaches(flanks: Iterable[FlankLife]) -> Iterator[str]:
 def needs_of_relief(flanks: Iterable[FlankLife]) -> Iterator[str]:
     """Tell which pairs need relief of their tips: those that carry more than `LEAST_OUTSIDE` outside their path."""
     largest: dict[str, float] = {}
-    for one in flanks:
-        largest[one.family] = max(one.outside, largest.get(one.family, 0.0))
+    for flank in flanks:
+        largest[flank.family] = max(flank.outside, largest.get(flank.family, 0.0))
     for family, share in largest.items():
         if share > LEAST_OUTSIDE:
             yield (

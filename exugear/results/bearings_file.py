@@ -78,7 +78,9 @@ def read_duties(path: Path) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    if math.isfinite(value):
+        return value
+    return None
 
 
 def write_duties(path: Path, duties: Iterable[BearingDuty], meshes: Iterable[MeshDuty], input_hash: str) -> Path:

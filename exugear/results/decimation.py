@@ -21,7 +21,8 @@ AT_ONCE = 32
 @kernel
 def filter_one(rows: Floats, first: int, taps: Floats, source: int, target: int, out: Floats) -> None:
     """Add to eight columns of out (columns,), from `target` on, those of rows from `source` on, by taps (length, 8)."""
-    columns, length = rows.shape[1], taps.shape[0]
+    columns = rows.shape[1]
+    length = taps.shape[0]
     if columns < SIZE:
         for c in range(max(0, -source), columns):
             for k in range(length):
@@ -36,7 +37,10 @@ def filter_one(rows: Floats, first: int, taps: Floats, source: int, target: int,
 @kernel
 def filter_four(rows: Floats, first: int, factor: int, taps: Floats, source: int, target: int, out: Floats) -> None:
     """Do the same for four results side by side, because each addition waits for the one before."""
-    a, b, c, d = eight(out[0], target), eight(out[1], target), eight(out[2], target), eight(out[3], target)
+    a = eight(out[0], target)
+    b = eight(out[1], target)
+    c = eight(out[2], target)
+    d = eight(out[3], target)
     for k in range(first, first + taps.shape[0]):
         tap = eight(taps[k - first], 0)
         a = a + eight(rows[k], source) * tap
@@ -123,13 +127,16 @@ def _blocks(taps: Floats, before: int) -> tuple[Floats, Integers]:
     """Taps (blocks, length, 8) of eight columns each, none twice, and the places of `filter_rows`."""
     length, columns = taps.shape
     used = np.flatnonzero(taps.any(axis=0))
-    blocks, places, done = [], [], 0
+    blocks = []
+    places = []
+    done = 0
     for first in used:
         if first < done:
             continue
         start = max(0, min(int(first), columns - SIZE))
         block = np.zeros((length, SIZE))
-        begin, done = max(start, done), min(start + SIZE, columns)
+        begin = max(start, done)
+        done = min(start + SIZE, columns)
         block[:, begin - start : done - start] = taps[:, begin:done]
         blocks.append(block)
         places.append((start - before, start))
@@ -162,8 +169,9 @@ class Decimator:
         self.factor = factor
         chosen = plain_filter(factor, count) if by is None else by
         self.half = chosen.half
-        own, other = _blocks(chosen.own, 0), _blocks(chosen.other, chosen.before)
-        self._taps, self._places = (np.concatenate(both) for both in zip(own, other, strict=True))
+        blocks = _blocks(chosen.own, 0)
+        other = _blocks(chosen.other, chosen.before)
+        self._taps, self._places = (np.concatenate(both) for both in zip(blocks, other, strict=True))
         self.pending = np.zeros((0, count))
         self.pending_first = 0  # number of the raw row that `pending` starts with
 
@@ -180,7 +188,8 @@ class Decimator:
 
     def push(self, rows: Floats) -> tuple[int, Floats]:
         """Filter as far as the rows reach: number of the raw row of the first result, and the results."""
-        before, length = len(self.pending), 2 * self.half + 1
+        before = len(self.pending)
+        length = 2 * self.half + 1
         centre = self.pending_first + self.half
         centre += -centre % self.factor
         last = self.pending_first + before + len(rows) - 1 - self.half

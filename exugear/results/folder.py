@@ -63,7 +63,8 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
             raise ValueError("it was written by an earlier version")
         if kept["checksum"] != _checksum(kept):
             raise ValueError("it was changed since it was written")
-        content, source = kept["content"], kept["source"]
+        content = kept["content"]
+        source = kept["source"]
     # Whoever makes up a file with its checksum may write into it what he likes.
     except (FileError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise CaseError(f"{path}: cannot be used ({error}); run `exugear modes` into this folder again") from error

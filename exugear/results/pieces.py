@@ -210,7 +210,8 @@ class RunPieces:
     def last_checkpoint(self) -> Checkpoint:
         """Read the state that the last piece was left with."""
         last, _ = Piece.read(self.paths[-1])
-        arrays, attributes = last.arrays, last.attributes
+        arrays = last.arrays
+        attributes = last.attributes
         return Checkpoint(
             step=int(attributes["state_step"]),
             q=arrays["state_q"],
@@ -232,7 +233,8 @@ class RunPieces:
     def mark(self) -> None:
         """Write a piece without samples: it keeps what was noted since the last one."""
         nothing = np.zeros(0)
-        rows, lines = np.zeros((0, self._layout.count)), np.zeros((0, len(BALANCE_TERMS)))
+        rows = np.zeros((0, self._layout.count))
+        lines = np.zeros((0, len(BALANCE_TERMS)))
         self.append(nothing, rows, nothing, lines, self.last_checkpoint())
 
 

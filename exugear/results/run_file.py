@@ -166,8 +166,8 @@ def _define(file: h5netcdf.File, arrays: Mapping[str, NDArray[Any]]) -> None:
         shape = [file.dimensions[dimension].size for dimension in variable.dimensions]
         chunks = None if all(shape) else tuple(max(1, size) for size in shape)
         made = file.create_variable(name, variable.dimensions, variable.kind, chunks=chunks)
-        for key, words in variable.attributes.items():
-            made.attrs[key] = words
+        for key, attribute in variable.attributes.items():
+            made.attrs[key] = attribute
 
 
 def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset:
@@ -193,7 +193,9 @@ def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset
     """
     path = Path(path)
     wanted = None if names is None else list(names)
-    return _load_pieces(path, wanted) if path.is_dir() else load_dataset(path, _LAYOUT, wanted)
+    if path.is_dir():
+        return _load_pieces(path, wanted)
+    return load_dataset(path, _LAYOUT, wanted)
 
 
 def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
@@ -223,7 +225,9 @@ def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]],
 def _values(variable: h5netcdf.Variable) -> NDArray[Any]:
     """Values of a variable; texts as Python's."""
     values = np.asarray(variable[...])
-    return np.array([text.decode() for text in values], dtype=str) if values.dtype == object else values
+    if values.dtype == object:
+        return np.array([text.decode() for text in values], dtype=str)
+    return values
 
 
 def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
@@ -244,4 +248,6 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
             values = np.concatenate(parts[name]) if growing else parts[name][-1]
             data[name] = (variable.dimensions, values, variable.attributes)
     _LAYOUT.check(data, folder)
-    return data if wanted is None else data[wanted]
+    if wanted is None:
+        return data
+    return data[wanted]

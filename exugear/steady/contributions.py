@@ -60,7 +60,8 @@ def contributions(gearset: Gearset, speed: float, line: int) -> Contributions:
     line : int
         Place in the line set, of one base alone: combinations are no sum over meshes.
     """
-    frequency, row = abs(speed) * float(gearset.lines.orders[line]), gearset.row_of_overall(speed)
+    frequency = abs(speed) * float(gearset.lines.orders[line])
+    row = gearset.row_of_overall(speed)
     forces, loads = _excitation(gearset, speed, line)
     dynamic = gearset.system.dynamic(speed, frequency)
     # One solution from either side: what the signal sees of any load, and what moves under these loads.
@@ -131,17 +132,20 @@ def _derivatives(
     A change dD of the dynamic stiffness D changes the signal by -(row D^-1) dD (D^-1 loads). Damping goes with the
     stiffness.
     """
-    system, frame = gearset.system, gearset.system.frame
-    assembly, t = frame.assembly, frame.matrices(0.0)[0]
+    system = gearset.system
+    frame = gearset.system.frame
+    assembly = frame.assembly
+    t = frame.matrices(0.0)[0]
     q, _, _ = frame.state(0.0, speed, system.static_at(speed))
     elements = linearise(assembly, q, frame.mean_meshes)
-    adjoint, motion = t @ adjoint, t @ motion
+    adjoint = t @ adjoint
+    motion = t @ motion
     supports: dict[str, float] = {}
     for support in assembly.supports:
         forces = elements.stiffness[support.name] @ motion
         forces = forces + 1j * frequency * (elements.damping[support.name] @ motion)
-        own = _share(-complex(adjoint @ forces), total)
-        supports[support.family] = supports.get(support.family, 0.0) + own
+        share = _share(-complex(adjoint @ forces), total)
+        supports[support.family] = supports.get(support.family, 0.0) + share
     bodies: dict[str, float] = {}
     for body in assembly.bodies:
         place = assembly.elastic_slices.get(body.name)

@@ -85,8 +85,8 @@ class _Mode:
     def assurance(self, other: _Mode, mass: Floats, damping: Floats) -> float:
         """MAC of two modes, 1 for the same and 0 for different ones of the quadratic eigenvalue problem."""
 
-        def between(one: _Mode, two: _Mode) -> complex:
-            return complex(one.left @ (((one.value + two.value) * mass + damping) @ two.shape))
+        def between(mode: _Mode, two: _Mode) -> complex:
+            return complex(mode.left @ (((mode.value + two.value) * mass + damping) @ two.shape))
 
         own = between(self, self) * between(other, other)
         return abs(between(self, other) * between(other, self) / own)
@@ -106,7 +106,8 @@ def crossings(
     if not met:
         return ()
     peaks = np.array([_peak(gearset, tracks, mode, speed, forces[at]) for mode, at, speed in met])
-    shares, counted = _shares(peaks), _shares(peaks)
+    shares = _shares(peaks)
+    counted = _shares(peaks)
     if operation is not None:
         speeds = np.abs([speed for _, _, speed in met])
         inside = (speeds >= operation[0]) & (speeds <= operation[1])
@@ -120,7 +121,8 @@ def crossings(
         near = Crossing(speed, lines[at], mode, value.imag / 2.0 / np.pi, -value.real / abs(value), float(shares[n]))
         return _met(gearset.system, tracks, gearset.lines.orders, near)
 
-    low, high = tracks.speeds[0], tracks.speeds[-1]
+    low = tracks.speeds[0]
+    high = tracks.speeds[-1]
     return tuple(crossing for crossing in side_by_side(exact, strongest) if low <= crossing.speed <= high)
 
 
@@ -165,14 +167,14 @@ def missed_tops(
     if len(speeds) < NEIGHBOURS:
         return np.zeros(0)
     known = {} if known is None else known
-    found: list[float] = []
+    tops: list[float] = []
     inside = np.ones(len(speeds), dtype=bool)
     if operation is not None:
         inside = (np.abs(speeds) >= operation[0]) & (np.abs(speeds) <= operation[1])
     for quantity in quantities:
         sizes = quantity.sizes(amplitude[:, 1:])
-        places = sizes.argmax(axis=2)
-        highest = np.take_along_axis(sizes, places[..., None], axis=2)[..., 0]
+        argmax = sizes.argmax(axis=2)
+        highest = np.take_along_axis(sizes, argmax[..., None], axis=2)[..., 0]
         peaks = [
             (point, line) for line in range(highest.shape[1]) for point in standing_peaks(highest[:, line], LEAST_STAND)
         ]
@@ -182,18 +184,18 @@ def missed_tops(
             around = slice(max(point - NEIGHBOURS, 0), point + NEIGHBOURS + 1)
             if not smooth[around].all():
                 continue
-            place = int(places[point, line])
+            place = int(argmax[point, line])
             key = quantity.name, line, place, point - around.start, speeds[around].tobytes()
             if key not in known:
                 values = quantity.at(amplitude[around, line + 1], place)
                 known[key] = predicted_top(speeds[around], values, point - around.start)
             top, height = known[key]
             near = APART * (speeds[point + 1] - speeds[point - 1])
-            new = all(abs(top - other) > near for other in found)
+            new = all(abs(top - other) > near for other in tops)
             new &= bool((np.abs(speeds[around] - top) > COINCIDE * abs(top)).all())
             if new and height > (1.0 + GAIN) * highest[point, line]:
-                found.append(top)
-    return np.sort(np.array(found))
+                tops.append(top)
+    return np.sort(np.array(tops))
 
 
 def _looked_at(gearset: Gearset) -> list[int]:
@@ -210,7 +212,8 @@ def _passages(tracks: ModeTracks, orders: Floats) -> list[tuple[int, int, float]
         above = tracks.eigenvalues.imag - order * np.abs(speed)[:, None]
         passed = above[:-1] * above[1:] <= 0.0  # a comparison with NaN is false
         for step, mode in zip(*np.nonzero(passed), strict=True):
-            before, after = above[step, mode], above[step + 1, mode]
+            before = above[step, mode]
+            after = above[step + 1, mode]
             share = before / (before - after) if before != after else 0.0
             found.append((int(mode), at, float(speed[step] + share * (speed[step + 1] - speed[step]))))
     return found
@@ -229,7 +232,8 @@ def _peak(gearset: Gearset, tracks: ModeTracks, mode: int, speed: float, force: 
 
     Signals are the overall transmission error and the deflections of the meshes.
     """
-    own, ports = _followed(gearset.system, tracks, mode, speed), gearset.ports_at(speed)
+    own = _followed(gearset.system, tracks, mode, speed)
+    ports = gearset.ports_at(speed)
     rows = np.vstack([gearset.row_of_overall(speed)[None], ports.readings[:, DEFLECTION]])
     pushed = abs(own.left @ (gearset.loads(ports) @ force.ravel()))
     return np.asarray(np.abs(rows @ own.shape) * pushed / abs(own.value.real))
@@ -240,7 +244,8 @@ def _met(system: MeanSystem, tracks: ModeTracks, orders: Floats, near: Crossing)
 
     Ostrowski (1959); their error is cubed from one to the next, and the speed goes with them.
     """
-    order, at = float(orders[near.line]), near.speed
+    order = float(orders[near.line])
+    at = near.speed
     start = _followed(system, tracks, near.mode, at)
     own = _Mode(complex(start.value.real, order * abs(at)), start.shape, start.left)
     for _ in range(ROUNDS):
@@ -252,12 +257,13 @@ def _met(system: MeanSystem, tracks: ModeTracks, orders: Floats, near: Crossing)
     return replace(near, speed=at, frequency=own.value.imag / 2.0 / np.pi, damping=damping)
 
 
-def _improved(own: _Mode, mass: Floats, damping: Floats, stiffness: Floats) -> _Mode:
+def _improved(mode: _Mode, mass: Floats, damping: Floats, stiffness: Floats) -> _Mode:
     """Improve a mode by inverse iteration of its shapes and the Rayleigh quotient of both."""
-    slope = 2.0 * own.value * mass + damping
-    matrix = own.value**2 * mass + own.value * damping + stiffness
-    right: Complexes = np.linalg.solve(matrix, slope @ own.shape).astype(np.complex128)
-    left: Complexes = np.linalg.solve(matrix.T, slope.T @ own.left).astype(np.complex128)
-    right, left = right / np.linalg.norm(right), left / np.linalg.norm(left)
-    value = own.value - complex(left @ matrix @ right) / complex(left @ slope @ right)
+    slope = 2.0 * mode.value * mass + damping
+    matrix = mode.value**2 * mass + mode.value * damping + stiffness
+    right: Complexes = np.linalg.solve(matrix, slope @ mode.shape).astype(np.complex128)
+    left: Complexes = np.linalg.solve(matrix.T, slope.T @ mode.left).astype(np.complex128)
+    right = right / np.linalg.norm(right)
+    left = left / np.linalg.norm(left)
+    value = mode.value - complex(left @ matrix @ right) / complex(left @ slope @ right)
     return _Mode(value, right, left)

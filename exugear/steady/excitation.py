@@ -134,12 +134,15 @@ class Reach:
         `clear` asks that none of them is at its edge.
         """
         multiples = np.abs(lines.index[:, :bases])
-        alone, sums = np.count_nonzero(multiples, axis=1) == 1, multiples.sum(axis=1) + clear
-        harmonics, combinations = self.harmonics, self.combinations
+        alone = np.count_nonzero(multiples, axis=1) == 1
+        sums = multiples.sum(axis=1) + clear
+        harmonics = self.harmonics
+        combinations = self.combinations
         while sums[alone].max(initial=0) > harmonics:
             harmonics *= 2
         while sums[~alone].max(initial=0) > combinations:
-            sooner, later = combinations, range(combinations + 1, 2 * combinations + 1)
+            sooner = combinations
+            later = range(combinations + 1, 2 * combinations + 1)
             combinations = max((n for n in later if count_of_lines(bases, n) <= MOST_LINES), default=sooner)
             if combinations == sooner:
                 break
@@ -178,13 +181,14 @@ class Gearset:
         self.parting = LAWS[waves.assembly.mesh_law].loses_contact
         self.bearings: BearingWaves | None = None
         self._bearing_means: tuple[BearingMean, ...] = ()
-        ports, rows = [], []
+        ports = []
+        rows = []
         for speed in waves.system.speeds:
             ports.append(mesh_ports(waves, float(speed), self.parting))
             rows.append(signal_rows(waves.system, float(speed)))
         self._ports = _stacked(ports)
         self._rows = {
-            name: np.array([getattr(own, name) for own in rows]) for name in ("by_place", "by_rate", "by_acceleration")
+            name: np.array([getattr(row, name) for row in rows]) for name in ("by_place", "by_rate", "by_acceleration")
         }
         self._row_names = rows[0].names
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
@@ -202,10 +206,12 @@ class Gearset:
     @cached_property
     def with_bearings(self) -> Gearset:
         """The same with the laws of bearings that have rows of rolling elements; itself where none has."""
-        other, bearings = self._copied(), bearing_waves(self.waves)
+        other = self._copied()
+        bearings = bearing_waves(self.waves)
         if bearings is None:
             return self
-        ports, speeds = [], self.system.speeds
+        ports = []
+        speeds = self.system.speeds
         other.bearings = bearings
         other._bearing_means = tuple(bearings.at(float(speed)) for speed in speeds)
         for speed, mean in zip(speeds, other._bearing_means, strict=True):
@@ -229,7 +235,9 @@ class Gearset:
     @property
     def bearing_names(self) -> tuple[str, ...]:
         """Bearings whose laws are evaluated in time, planets' by their family, in the order of the laws."""
-        return () if self.bearings is None else self.bearings.names
+        if self.bearings is None:
+            return ()
+        return self.bearings.names
 
     @cached_property
     def bearing_signals(self) -> Integers:
@@ -238,7 +246,7 @@ class Gearset:
         if self.bearings is None:
             return np.zeros((0, len(axes)), dtype=np.int64)
         supports = [wave.connectors[wave.wave] for wave in self.bearings.waves]
-        first = [own.quantity for own in self.signal_names].index("support_force")
+        first = [signal_name.quantity for signal_name in self.signal_names].index("support_force")
         return np.asarray(first + len(axes) * np.array(supports)[:, None] + axes)
 
     def places(self, speed: float, positions: Floats, angles: Floats) -> MeshPlaces:
@@ -277,7 +285,8 @@ class Gearset:
 
     def with_lines(self, lines: LineSet, clear: bool) -> Gearset:
         """Copy with other lines, and a larger set that has them; `clear` as `Reach.around` has it."""
-        other, reach = self._copied(), self._usual.around(lines, len(self.waves.base_orders), clear)
+        other = self._copied()
+        reach = self._usual.around(lines, len(self.waves.base_orders), clear)
         other.lines = lines
         if not clear:
             other._least = 0
@@ -298,7 +307,8 @@ class Gearset:
 
     def with_harmonics(self, harmonics: int) -> Gearset:
         """Copy with the usual lines of other harmonics of each mesh frequency."""
-        other, combinations = self._copied(), self._usual.combinations
+        other = self._copied()
+        combinations = self._usual.combinations
         other.harmonics, other._least = 2 * harmonics, 0
         other._usual = other._reach = Reach(2 * harmonics, combinations)
         other.lines = _lines_within(self.waves, Reach(harmonics, combinations // 2))
@@ -308,7 +318,8 @@ class Gearset:
     @cached_property
     def finer(self) -> Gearset:
         """The same with twice the usual harmonics of each mesh frequency, and the usual combinations of several."""
-        other, usual = self._copied(), self._usual
+        other = self._copied()
+        usual = self._usual
         other.lines = _lines_within(self.waves, Reach(usual.harmonics, usual.combinations // 2))
         other._reach = Reach(2 * usual.harmonics, usual.combinations)
         other.larger = _lines_within(self.waves, other._reach)
@@ -328,19 +339,22 @@ class Gearset:
         Planets tilt unequally under load, and tables tell that: each that passes then puts lines beside all others.
         None where planets are not looked at one by one.
         """
-        waves, usual = self.waves, self._usual
+        waves = self.waves
+        usual = self._usual
         if not self.parting or self.bearings is not None:
             return None
         if (waves.carriers and not waves.passing) or not any(wave.wave for wave in waves.waves):
             return None
-        more, bases = waves.passing + 1, len(waves.base_orders)
+        more = waves.passing + 1
+        bases = len(waves.base_orders)
         if more not in self._one_by_one:
             travelling = mesh_waves(self.system, more)
             self._one_by_one[more] = Gearset(travelling, usual.harmonics // 2, usual.combinations // 2)
         other = self._one_by_one[more]._copied()
         slow = [own for _, own in other.waves.carriers]
         other._one_by_one, other._lattices, other._reach = self._one_by_one, self._lattices, self._reach
-        loud, whole = self.lines.part(strong).of_first(bases), self.larger.of_first(bases)
+        loud = self.lines.part(strong).of_first(bases)
+        whole = self.larger.of_first(bases)
         known = self.lines if waves.passing else beside(self.lines, slow, 0)
         other.lines = joined(known, beside(loud, slow, more))
         # Of products that lie farther off in both senses little is left.
@@ -380,7 +394,8 @@ class Gearset:
     @cached_property
     def cycle_curves(self) -> tuple[Complexes, Complexes]:
         """Fourier coefficients (m, harmonics + 1) of load over deflection (N/m), and of the exponents less one."""
-        waves, harmonics = self.waves, self.harmonics
+        waves = self.waves
+        harmonics = self.harmonics
         secant = waves.cycle_coefficients("secant", harmonics=harmonics)
         return secant, waves.cycle_coefficients("exponent", harmonics=harmonics)
 
@@ -402,7 +417,8 @@ class Gearset:
     @cached_property
     def cycle_moments(self) -> tuple[Complexes, Complexes, Complexes]:
         """Fourier coefficients (m, harmonics + 1) of that way times stiffness (N), pull (N m), and squared (N m)."""
-        waves, harmonics = self.waves, self.harmonics
+        waves = self.waves
+        harmonics = self.harmonics
         pulls = self.waves.loads[:, None] * waves.cycle_coefficients("exponent", "way", harmonics=harmonics)
         return (
             waves.cycle_coefficients("tangent", "way", harmonics=harmonics),
@@ -435,7 +451,8 @@ class Gearset:
     @cached_property
     def coupling(self) -> Coupling:
         """Products of all forces along a row with functions of the mesh cycles."""
-        forces, bases = self._ports["forces"].shape[2], self.lines.index.shape[1]
+        forces = self._ports["forces"].shape[2]
+        bases = self.lines.index.shape[1]
         return Coupling(self.lines, tuple(group_of(family, self.harmonics, forces, bases) for family in self._families))
 
     def coupled(self, spectra: Spectra, ports: MeshPorts, speed: float) -> list[Complexes]:
@@ -448,9 +465,11 @@ class Gearset:
 
         Tilts of bearings count by half of their pitch diameter.
         """
-        meshes, firsts = self.waves.assembly.meshes, [wave.first for wave in self.waves.waves]
+        meshes = self.waves.assembly.meshes
+        firsts = [wave.first for wave in self.waves.waves]
         pitch = np.abs(meshes.deflection[firsts, SPIN_1] / meshes.cycles[firsts])
-        found, count = np.ones(self._ports["static"].shape[1:]), len(firsts)
+        found = np.ones(self._ports["static"].shape[1:])
+        count = len(firsts)
         found[:count, POSITION] = pitch
         if self.wander:
             found[:count, MISALIGNMENT] = pitch
@@ -475,8 +494,10 @@ class Gearset:
 
     def at(self, speed: float) -> Interface:
         """Everything at one speed of the input (rad/s), which is not zero."""
-        system, ports = self.system, self.ports_at(speed)
-        frequencies, loads = abs(speed) * self.lines.orders, self.loads(ports)
+        system = self.system
+        ports = self.ports_at(speed)
+        frequencies = abs(speed) * self.lines.orders
+        loads = self.loads(ports)
         # Laws with fewer forces than others have none in their places.
         acting = np.flatnonzero(loads.any(axis=0))
         pencil = system.stiffness_at(speed), system.damping_at(speed)
@@ -484,9 +505,11 @@ class Gearset:
         moved = np.empty((len(frequencies), system.size, len(acting)), dtype=complex)
         moved[0] = found[:-1]
         system.fill_responses(pencil, frequencies[1:], loads[:, acting], moved[1:])
-        still, motion = found[-1], moved
+        still = found[-1]
+        motion = moved
         if len(acting) < loads.shape[1]:
-            still, motion = np.zeros(loads.shape[1]), np.zeros((len(frequencies), *loads.shape), dtype=complex)
+            still = np.zeros(loads.shape[1])
+            motion = np.zeros((len(frequencies), *loads.shape), dtype=complex)
             still[acting], motion[:, :, acting] = found[-1], moved
         shape = ports.forces.shape[:2]
         rows = {name: system.at(values, speed) for name, values in self._rows.items()}
@@ -520,4 +543,6 @@ def _lines_within(waves: MeshWaves, reach: Reach) -> LineSet:
     """Lines that reach so far; those that planets make that mesh out of phase stand beside them."""
     lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
     modulators = [own for _, own in waves.carriers]
-    return beside(lines, modulators, 0) if waves.passing else modulated(lines, modulators)
+    if waves.passing:
+        return beside(lines, modulators, 0)
+    return modulated(lines, modulators)

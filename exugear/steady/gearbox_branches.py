@@ -90,7 +90,8 @@ def follow_branch(
     lengths = gearset.lengths
 
     def residual(scaled: Complexes, speed: float) -> tuple[Complexes, Tangent]:
-        balance, readings = balance_at(speed), scaled / lengths
+        balance = balance_at(speed)
+        readings = scaled / lengths
         excess, tangent, _ = balance.forces(readings)
         return lengths * (readings - balance.static - balance.answer(excess)), tangent
 
@@ -113,16 +114,17 @@ def follow_branch(
     )
     readings = found.lines / lengths
     growth = [
-        growth_of_state(balance_at(float(speed)), own, gearset.bent)
-        for speed, own in zip(found.parameter, readings, strict=True)
+        growth_of_state(balance_at(float(speed)), reading, gearset.bent)
+        for speed, reading in zip(found.parameter, readings, strict=True)
     ]
     ended = "" if found.whole else _ended(found, last)
     return SteadyBranch(found.parameter, readings, np.array(growth), tuple(fold for _, fold in found.folds), ended)
 
 
-def _ended(found: Branch, last: float) -> str:
+def _ended(branch: Branch, last: float) -> str:
     """Say where a branch ended that has as many points as are allowed, and what it did there."""
-    p, turns = found.parameter, [n for n, _ in found.folds]
+    p = branch.parameter
+    turns = [n for n, _ in branch.folds]
     lately = sum(n > len(p) // 2 for n in turns)
     return (
         f"the branch ends at {p[-1] / RPM:.5g} rpm after {len(p)} points, before {last / RPM:.5g} rpm: its steps are "

@@ -74,7 +74,9 @@ class Balance:
     @cached_property
     def mean_force(self) -> Floats:
         """Forces (m, f) in the static state: those of the mean stiffness along the deflection, and of bearings."""
-        found, m, gearset = np.zeros(self.interface.ports.forces.shape[:2]), self.meshes, self.gearset
+        found = np.zeros(self.interface.ports.forces.shape[:2])
+        m = self.meshes
+        gearset = self.gearset
         found[:m, DEFLECTION] = gearset.waves.mean_stiffness * gearset.pressed(self.interface.ports.static)
         if self.interface.bearings is not None:
             found[m:, :COMPONENTS] = self.interface.bearings.load
@@ -106,7 +108,8 @@ class Balance:
         """
         if self.gearset.parting:
             return np.zeros((0, 0, 0))
-        positions, spectra = places.positions, self._cycle_spectra
+        positions = places.positions
+        spectra = self._cycle_spectra
         rate = 2j * np.pi * np.arange(spectra.shape[2])
         twice = np.where(np.arange(spectra.shape[2]) > 0, 2.0, 1.0)
         out = np.empty((spectra.shape[1], *positions.shape))
@@ -135,8 +138,10 @@ class Balance:
         """As `_stiffness` has it, on the samples of the lattice: each mesh follows the angle of one base."""
         if self.gearset.parting:
             return self._stiffness(self.places)
-        waves, positions = self.gearset.waves.waves, self.places.positions
-        forward, spectra = self.gearset.forward(self.interface.speed), self._cycle_spectra
+        waves = self.gearset.waves.waves
+        positions = self.places.positions
+        forward = self.gearset.forward(self.interface.speed)
+        spectra = self._cycle_spectra
         out = np.empty((spectra.shape[1], *positions.shape))
         for u, n in enumerate(self.places.means[: positions.shape[1]]):
             if u and n == self.places.means[u - 1] and positions[0, u] == positions[0, u - 1]:
@@ -149,7 +154,8 @@ class Balance:
 
     def _sample(self, readings: Floats, rates: Floats, places: MeshPlaces, stiffness: Floats) -> LawSamples:
         """Sample the laws in all places: readings and rates (s, u, r), stiffness (6, s, u); results (s, u, ...)."""
-        waves, meshes = self.gearset.waves, self.gearset.waves.assembly.meshes
+        waves = self.gearset.waves
+        meshes = self.gearset.waves.assembly.meshes
         found = []
         for u, n in enumerate(places.means):
             if n >= self.meshes:
@@ -168,13 +174,15 @@ class Balance:
         """Sample the law of a mesh along a row with readings (s, r), stiffness (3 q, s)."""
         load = float(self.gearset.waves.loads[wave])
         if self.gearset.wander:
-            own = readings[:, [DEFLECTION, MISALIGNMENT, POSITION]]
+            reading = readings[:, [DEFLECTION, MISALIGNMENT, POSITION]]
             if not self._curved:
-                return sample_wandering_line(stiffness, own)
+                return sample_wandering_line(stiffness, reading)
             # A straight line among curves is a curve of exponent one, through any load.
-            return sample_wandering_curve(stiffness, own, load or 1.0)
-        own = readings[:, [DEFLECTION, POSITION]]
-        return sample_curve(stiffness, own, load) if self._curved and load else sample_line(stiffness, own)
+            return sample_wandering_curve(stiffness, reading, load or 1.0)
+        reading = readings[:, [DEFLECTION, POSITION]]
+        if self._curved and load:
+            return sample_curve(stiffness, reading, load)
+        return sample_line(stiffness, reading)
 
     def _sample_bearing(self, wave: int, readings: Floats) -> LawSamples:
         """Sample the law of a bearing with readings (s, r), their last one none of it."""
@@ -197,7 +205,8 @@ class Balance:
         The last result is the whole forces (s, u, f) in time, in all places.
         """
         if not self._last or self._last[0][0] is not readings:
-            there, back = self.places.there, self.places.back
+            there = self.places.there
+            back = self.places.back
             values, rates = self._in_time(readings)
             sampled = self._sample(there @ values, there @ rates, self.places, self._on_lattice)
             excess = self.lattice.coefficients(back @ sampled.force) - self._mean_part(readings)
@@ -215,7 +224,8 @@ class Balance:
 
     def change(self, sampled: LawSamples, step: Complexes) -> Complexes:
         """Find how the forces (n, m, f) follow a small change (n, m, r) of the readings that were sampled."""
-        there, back = self.places.there, self.places.back
+        there = self.places.there
+        back = self.places.back
         moved, moving = self._in_time(step)
         found = np.einsum("sufr,sur->suf", sampled.slope, there @ moved)
         if self.gearset.parting:
@@ -224,7 +234,8 @@ class Balance:
 
     def averaged(self, sampled: LawSamples) -> Complexes:
         """Balance (n, m r, m r) of each line by itself, laws at their mean slopes over time: what couples no lines."""
-        there, back = self.places.there, self.places.back
+        there = self.places.there
+        back = self.places.back
         n, m, r = self.static.shape
         means = []
         for slopes in (sampled.slope, sampled.damping):
@@ -244,7 +255,8 @@ class Balance:
 
     def _less_mean(self, slopes: Floats, by_rates: bool) -> None:
         """Take from slopes (..., m, f, m, r) those that the mean system has."""
-        waves, at = self.gearset.waves, np.arange(self.meshes)
+        waves = self.gearset.waves
+        at = np.arange(self.meshes)
         if by_rates:
             # The damper of laws along a row is the same in the mean system; that of a table comes and goes.
             if self.gearset.parting:
@@ -268,7 +280,9 @@ class Balance:
         (samples, m f, 2 m r) array
             By the readings, then by their rates.
         """
-        there, back, means = self.places.there, self.places.back, self.places.means
+        there = self.places.there
+        back = self.places.back
+        means = self.places.means
         lines = self.lattice.lines
         alone = np.abs(np.delete(lines.index, base, axis=1)).sum(axis=1) == 0
         angles = np.zeros((samples, lines.index.shape[1]))
@@ -276,13 +290,15 @@ class Balance:
         places = self._places(angles)
         own = np.where(alone[:, None, None], readings, 0.0)
         rates = rates_of(self.gearset, self.interface, own)
-        values, moving = there @ lines.values(own, angles), there @ lines.values(rates, angles)
+        values = there @ lines.values(own, angles)
+        moving = there @ lines.values(rates, angles)
         along = self._sample(values, moving, places, self._stiffness(places))
         everywhere = self.forces(readings)[1].sampled
         varies = np.array([self._varies(n, base) for n in means])[:, None, None]
         parts = []
         for name in ("slope", "damping"):
-            own, mean = getattr(along, name), getattr(everywhere, name).mean(axis=0)
+            own = getattr(along, name)
+            mean = getattr(everywhere, name).mean(axis=0)
             found = np.where(varies, own, mean)
             # What vibrations of all bases leave of a bearing in the mean counts, and how it varies with this one.
             found[:, len(places.positions[0]) :] += (mean - own.mean(axis=0))[len(places.positions[0]) :]
@@ -297,22 +313,24 @@ class Balance:
 
     def _mean_slopes(self, change: Complexes) -> Complexes:
         """Find the forces (n, m, f) of the mean stiffness under changes of the readings (n, m, r)."""
-        waves, m = self.gearset.waves, self.meshes
+        waves = self.gearset.waves
+        m = self.meshes
         deflection = change[:, :m, DEFLECTION]
         found = np.zeros((len(change), *self.interface.ports.forces.shape[:2]), dtype=complex)
         found[:, :m, DEFLECTION] = waves.mean_stiffness * deflection
         if self.gearset.parting:
             found[:, :m, DEFLECTION] += waves.damping * rates_of(self.gearset, self.interface, deflection)
         if self.interface.bearings is not None:
-            slope, own = self.interface.bearings.slope, change[:, m:, :COMPONENTS]
+            slope = self.interface.bearings.slope
+            own = change[:, m:, :COMPONENTS]
             found[:, m:, :COMPONENTS] = np.tensordot(own, slope, axes=([1, 2], [2, 3]))
         return found
 
     def _mean_part(self, readings: Complexes) -> Complexes:
         """Find the forces (n, m, f) of the mean system under readings (n, m, r)."""
-        found = self._mean_slopes(readings - self.static)
-        found[0] += self.mean_force
-        return found
+        slopes = self._mean_slopes(readings - self.static)
+        slopes[0] += self.mean_force
+        return slopes
 
     def missing(self, readings: Complexes) -> Complexes:
         """Find what is missing to the balance (n, m, r)."""
@@ -361,7 +379,8 @@ class Tangent:
 
     def alone(self, right: Complexes) -> Complexes:
         """Solve for readings (n, m, r) that change what is missing by `right`, each line by itself."""
-        read, found = self.balance.read, right.reshape(len(right), -1).copy()
+        read = self.balance.read
+        found = right.reshape(len(right), -1).copy()
         found[:, read] = (self._inverse @ found[:, read, None])[..., 0]
         return found.reshape(right.shape)
 
@@ -392,7 +411,8 @@ def solve_balance(balance: Balance, readings: Complexes, enough: float = BALANCE
     `enough` is the residual over the size of the deflections that counts as balanced.
     """
     size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
-    lengths, products = balance.gearset.lengths, 0
+    lengths = balance.gearset.lengths
+    products = 0
     excess, tangent, _ = balance.forces(readings)
     missing = readings - balance.static - balance.answer(excess)
     error = float(np.linalg.norm(lengths * missing))
@@ -414,7 +434,8 @@ def solve_balance(balance: Balance, readings: Complexes, enough: float = BALANCE
             if new < error or share < SHORTEST:
                 break
             share *= 0.5
-        readings, error = ahead, new
+        readings = ahead
+        error = new
     raise HarmonicBalanceError(
         f"no steady state found at {balance.interface.speed:.5g} rad/s: the residual stays at {error / size:.1e} of "
         "the deflections"
@@ -423,16 +444,19 @@ def solve_balance(balance: Balance, readings: Complexes, enough: float = BALANCE
 
 def response_of_readings(balance: Balance, readings: Complexes, products: int = 0) -> Response:
     """Response of a steady state whose readings (n, m, r) are known."""
-    gearset, interface = balance.gearset, balance.interface
+    gearset = balance.gearset
+    interface = balance.interface
     excess, _, whole = balance.forces(readings)
-    waves, m = gearset.waves, balance.meshes
+    waves = gearset.waves
+    m = balance.meshes
     deflection = readings[:, :m, DEFLECTION]
     apart = np.zeros(m)
     if gearset.parting:
-        means, back = balance.places.means, balance.places.back
+        means = balance.places.means
+        back = balance.places.back
         force = balance.lattice.coefficients(back @ (whole[..., [FRONT]] - whole[..., [BACK]]))[:, :m, 0]
         free = np.mean((whole[..., FRONT] == 0.0) & (whole[..., BACK] == 0.0), axis=0)
-        apart = np.array([free[[own == n for own in means]].mean() if n in means else 0.0 for n in range(len(apart))])
+        apart = np.array([free[[mean == n for mean in means]].mean() if n in means else 0.0 for n in range(len(apart))])
     else:
         rates = rates_of(gearset, interface, deflection)
         force = excess[:, :m, 0] + waves.mean_stiffness * deflection + waves.damping * rates
@@ -443,7 +467,8 @@ def response_of_readings(balance: Balance, readings: Complexes, products: int = 
 
 def _free_shares(balance: Balance, whole: Floats) -> Floats:
     """Shares of time (b,) in which bearings have no force, which are whole (s, u, f) in all places; planets' mean."""
-    bearings, m = balance.gearset.bearings, balance.meshes
+    bearings = balance.gearset.bearings
+    m = balance.meshes
     if bearings is None:
         return np.zeros(0)
     laws = np.array([bearings.waves[n - m].law if n >= m else -1 for n in balance.places.means])

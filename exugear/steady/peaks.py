@@ -101,7 +101,8 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
     floor = least * values.max(initial=0.0)
     highest = [(point, line) for line, own in enumerate(values.T) for point in _tops(own) if own[point] >= floor]
     bases = tuple(str(name) for name in data["base"].to_numpy())
-    index, orders = data["index"].to_numpy(), data["order"].to_numpy()
+    index = data["index"].to_numpy()
+    orders = data["order"].to_numpy()
     found = [
         Peak(
             line=line_name(tuple(int(n) for n in index[line + 1]), bases),
@@ -161,7 +162,8 @@ def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: 
         Share of the peak below which a line is left out.
     """
     point, own = _place(data, peak)
-    index, bases = data["index"].to_numpy(), tuple(str(name) for name in data["base"].to_numpy())
+    index = data["index"].to_numpy()
+    bases = tuple(str(name) for name in data["base"].to_numpy())
     names = [str(name) for name in data["signal"].to_numpy()]
     values: Floats = data["amplitude"].to_numpy()[point, :, names.index(signal)].astype(np.float64)
     carrying = int(np.argmax(np.abs(index[own])))
@@ -237,7 +239,9 @@ def _place(data: xr.Dataset, peak: Peak) -> tuple[int, int]:
 
 
 def _signed(words: str) -> str:
-    return words if words.startswith("- ") else f"+ {words}"
+    if words.startswith("- "):
+        return words
+    return f"+ {words}"
 
 
 @dataclass(frozen=True)
@@ -337,7 +341,7 @@ def bearing_swings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
         As `exugear.steady.steady_file.load_response` reads it.
     """
     names = [str(name) for name in data["signal"].to_numpy()]
-    found = []
+    swings = []
     for bearing, static in json.loads(data.attrs["bearing_static_loads"]).items():
         signals = [f"support_force {bearing} {axis}" for axis in "xyz"]
         if not set(signals) <= set(names):
@@ -346,8 +350,8 @@ def bearing_swings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
         most = int(np.nanargmax(shares))
         if shares[most] >= STRAINED:
             count = int((shares >= STRAINED).sum())
-            found.append(BearingSwing(bearing, count, float(data["speed"][most]), float(shares[most])))
-    return tuple(sorted(found, key=lambda swing: -swing.share))
+            swings.append(BearingSwing(bearing, count, float(data["speed"][most]), float(shares[most])))
+    return tuple(sorted(swings, key=lambda swing: -swing.share))
 
 
 def _swinging(data: xr.Dataset, places: list[int], static: Floats) -> Floats:
@@ -397,7 +401,8 @@ def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -
     SteadyError
         The response has no such signal or order.
     """
-    names, orders = [str(name) for name in data["signal"].to_numpy()], data["order"].to_numpy()
+    names = [str(name) for name in data["signal"].to_numpy()]
+    orders = data["order"].to_numpy()
     if signal not in names:
         raise SteadyError(f"no signal {signal!r}; signals are {', '.join(names)}")
     place = line.place(orders)
@@ -412,13 +417,16 @@ def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -
 
 def damping_at(data: xr.Dataset, peak: Peak) -> float | None:
     """Damping of the mode that the line of a peak crosses there, None where none is known."""
-    orders, near = data["order"].to_numpy(), []
+    orders = data["order"].to_numpy()
+    near = []
     for crossing in json.loads(data.attrs["crossings"]):
         same = abs(orders[crossing["line"]] - peak.order) < SAME_ORDER * peak.order
         apart = abs(crossing["speed"] - peak.speed)
         if same and apart < SAME_SPEED * abs(peak.speed):
             near.append((apart, float(crossing["damping"])))
-    return min(near)[1] if near else None
+    if near:
+        return min(near)[1]
+    return None
 
 
 def compared_peaks(
@@ -438,7 +446,8 @@ def compared_peaks(
         How many.
     signal : str
     """
-    index, orders = data["index"].to_numpy(), data["order"].to_numpy()
+    index = data["index"].to_numpy()
+    orders = data["order"].to_numpy()
     alone = orders[np.count_nonzero(index, axis=1) == 1]
     found = [peak for peak in peaks(data, signal) if np.abs(alone - peak.order).min() < SAME_ORDER * peak.order][:most]
     cuts = {peak.order: cut(OrderLine(peak.line, peak.order)) for peak in found}

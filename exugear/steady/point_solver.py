@@ -101,7 +101,8 @@ class PartingState:
         """Return the state in the lines of another gearset, which are some of its own."""
         if gearset is self.gearset:
             return self
-        old, at = self.response, gearset.places_in(self.gearset)
+        old = self.response
+        at = gearset.places_in(self.gearset)
         response = replace(
             old,
             interface=interface or gearset.at(old.interface.speed),
@@ -172,7 +173,9 @@ class PointSolver:
     @property
     def branch_gearset(self) -> Gearset:
         """Gearset whose lines a branch has: twice the harmonics where teeth may part."""
-        return self.gearset.finer if self.gearset.bent else self.gearset
+        if self.gearset.bent:
+            return self.gearset.finer
+        return self.gearset
 
     def readings(self, speed: float) -> Complexes:
         """Find what the mesh laws read (n, m, r) at a speed of the input (rad/s), in the lines of a branch."""
@@ -185,12 +188,13 @@ class PointSolver:
 
     def response_to(self, readings: Complexes, speed: float) -> Response:
         """Response at a speed of the input (rad/s) where what the mesh laws read (n, m, r) is known, on a branch."""
-        gearset, interface = self.branch_gearset, self.gearset.at(speed)
+        gearset = self.branch_gearset
+        interface = self.gearset.at(speed)
         own = gearset.at(speed) if gearset is not self.gearset else interface
-        found = response_of_readings(Balance(gearset, own, gearset.lattice), readings)
+        response = response_of_readings(Balance(gearset, own, gearset.lattice), readings)
         if gearset is self.gearset:
-            return found
-        return PartingState(gearset, readings, found, np.nan).on(self.gearset, interface).response
+            return response
+        return PartingState(gearset, readings, response, np.nan).on(self.gearset, interface).response
 
     def _in_time(self, interface: Interface) -> Response:
         try:
@@ -203,7 +207,9 @@ class PointSolver:
 
     def _parting(self, speed: float) -> PartingState:
         """Find the state at a speed: that near the last one if it is stable, else where a run in time settles."""
-        last, found, reason = self._last_averaged, None, ""
+        last = self._last_averaged
+        found = None
+        reason = ""
         try:
             gearset, readings = _thinned(last, self.gearset) if last else (self.gearset, None)
             found = _refined(gearset, speed, readings)
@@ -231,7 +237,9 @@ class PointSolver:
     @property
     def _last_averaged(self) -> PartingState | None:
         """The last state with planets at their mean."""
-        return self.state.averaged or self.state if self.state else None
+        if self.state:
+            return self.state.averaged or self.state
+        return None
 
     def _settled(self, speed: float, unstable: PartingState | None, reason: str) -> PartingState:
         """Find the state to which a run in time settles that begins at the last one, or at an unstable one."""
@@ -268,7 +276,8 @@ class PointSolver:
 
 def _with_passing(state: PartingState) -> PartingState:
     """Look at planets one by one: a state with the lines that their passing puts beside others, where they count."""
-    found, speed = state, state.response.interface.speed
+    found = state
+    speed = state.response.interface.speed
     size = float(np.linalg.norm(state.readings[1:, :, DEFLECTION]))
     for _ in range(MOST_PASSED):
         gearset = found.gearset.passing(np.linalg.norm(found.readings[..., DEFLECTION], axis=1) > BESIDE * size)
@@ -323,13 +332,16 @@ def _near(gearset: Gearset, interface: Interface, leg: Leg) -> PartingState | No
     own = found.on(gearset)
     # Phases hang on the last of the damping, to which the drive of the run adds.
     difference = np.linalg.norm((np.abs(own.readings) - np.abs(readings))[1:, :, DEFLECTION])
-    return found if difference < NEAR * np.linalg.norm(readings[1:, :, DEFLECTION]) else None
+    if difference < NEAR * np.linalg.norm(readings[1:, :, DEFLECTION]):
+        return found
+    return None
 
 
 def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> PartingState:
     """Solve at a speed, from given readings or the static state, with those lines more that it lacks."""
     balance = Balance(gearset, gearset.at(speed), gearset.lattice)
-    readings, products = balance.static if start is None else start, 0
+    readings = balance.static if start is None else start
+    products = 0
     for _ in range(MOST_REFINED):
         readings, took = solve_balance(balance, readings, ROUGH)
         products += took
@@ -338,8 +350,10 @@ def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> Parting
             break
         # Kinks where something parts reach farther than any smooth law does.
         kinks = _parted(response_of_readings(balance, readings))
-        before, own = balance.gearset, balance.gearset.with_lines(joined(balance.gearset.lines, lacking), kinks)
-        balance, readings = Balance(own, own.at(speed), own.lattice), readings_in(before, readings, own)
+        before = balance.gearset
+        lines = balance.gearset.with_lines(joined(balance.gearset.lines, lacking), kinks)
+        balance = Balance(lines, lines.at(speed), lines.lattice)
+        readings = readings_in(before, readings, lines)
     readings, took = solve_balance(balance, readings)
     products += took
     response = response_of_readings(balance, readings, products)
@@ -357,7 +371,8 @@ def _parted(response: Response) -> bool:
 
 def _without_aliases(balance: Balance, readings: Complexes) -> tuple[Balance, Complexes, int]:
     """Solve on more samples until the balance holds on twice as many; with the products that it took."""
-    size, products = float(np.linalg.norm(readings[1:, :, DEFLECTION])), 0
+    size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
+    products = 0
     for _ in range(MOST_DENSER):
         denser = balance.gearset.denser
         ahead = Balance(denser, balance.interface, denser.lattice)
@@ -374,7 +389,8 @@ def _lacking(balance: Balance, readings: Complexes) -> LineSet | None:
 
     Their forces are those on the samples that the state has; what each line answers by itself is taken for its size.
     """
-    whole, size = balance.gearset.whole, float(np.linalg.norm(readings[1:, :, DEFLECTION]))
+    whole = balance.gearset.whole
+    size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
     ahead = Balance(whole, whole.at(balance.interface.speed), whole.lattice)
     start = readings_in(balance.gearset, readings, whole)
     excess, tangent, _ = ahead.forces(start)
@@ -382,7 +398,9 @@ def _lacking(balance: Balance, readings: Complexes) -> LineSet | None:
     new = np.linalg.norm(missing[..., DEFLECTION], axis=1)
     new[balance.gearset.places_in(whole)[0]] = 0.0
     wanted = largest(new, LEFT_OUT * size)
-    return whole.lines.part(wanted) if wanted.any() else None
+    if wanted.any():
+        return whole.lines.part(wanted)
+    return None
 
 
 def _thinned(state: PartingState, usual: Gearset) -> tuple[Gearset, Complexes]:

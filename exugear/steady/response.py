@@ -133,10 +133,12 @@ def parametric_response(gearset: Gearset, interface: Interface) -> Response:
     shape = len(gearset.lines.index), *interface.ports.forces.shape[:2]
     functions = _beyond_the_mean(gearset, interface)
     lengths = gearset.lengths[: shape[1], : shape[2]].ravel()
-    answers, coupling = lengths[:, None] * interface.along_forces, gearset.coupling
-    scaled = [own / _of_group(lengths, group) for own, group in zip(functions, coupling.groups, strict=True)]
+    answers = lengths[:, None] * interface.along_forces
+    coupling = gearset.coupling
+    scaled = [function / _of_group(lengths, group) for function, group in zip(functions, coupling.groups, strict=True)]
     parts = *flat(scaled), *flat([answers])
-    memory, octets = coupling.memory(), np.empty(2 * SIZE)
+    memory = coupling.memory()
+    octets = np.empty(2 * SIZE)
 
     def apply(readings: Complexes) -> Complexes:
         out = np.empty_like(readings)
@@ -155,10 +157,10 @@ def _beyond_the_mean(gearset: Gearset, interface: Interface) -> list[Complexes]:
     """Slopes of the forces along a row beyond those of the mean system, as `Gearset.coupled` has functions."""
     functions = gearset.coupled(gearset.cycle_tangents, interface.ports, interface.speed)
     forces = interface.ports.forces.shape[1]
-    for group, own in zip(gearset.coupling.groups, functions, strict=True):
+    for group, function in zip(gearset.coupling.groups, functions, strict=True):
         mean = np.flatnonzero(~group.harmonics.any(axis=1))[0]
         at = np.arange(DEFLECTION, group.size, forces)
-        own[mean, at, at] -= gearset.waves.mean_stiffness[(group.begin + at) // forces]
+        function[mean, at, at] -= gearset.waves.mean_stiffness[(group.begin + at) // forces]
     return functions
 
 
@@ -169,16 +171,17 @@ def _of_group(values: Floats, group: Group) -> Floats:
 
 def given_forces(gearset: Gearset, interface: Interface) -> Complexes:
     """Find the forces (n, m, f) of tangents without deflection beyond those of the mean system: of curves alone."""
-    waves, ports = gearset.waves, interface.ports
+    waves = gearset.waves
+    ports = interface.ports
     shape = len(gearset.lines.index), *ports.forces.shape[:2]
     if not (waves.loads.any() or gearset.wander):
         return np.zeros(shape, dtype=complex)
     spectra = {(DEFLECTION, DEFLECTION): -gearset.cycle_pulls}
     if gearset.wander:
         spectra[MISALIGNMENT, DEFLECTION] = gearset.cycle_moments[1] - gearset.cycle_moments_beyond
-    found = _products(gearset, spectra, ports, interface.speed, _everywhere(gearset, shape))
-    found[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
-    return found
+    products = _products(gearset, spectra, ports, interface.speed, _everywhere(gearset, shape))
+    products[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
+    return products
 
 
 def _answer(interface: Interface, excess: Complexes) -> Complexes:
@@ -216,7 +219,8 @@ def signals(gearset: Gearset, response: Response) -> Complexes:
     if gearset.bearings is not None:
         beyond = response.excess[:, len(gearset.waves.waves) :, : gearset.bearing_signals.shape[1]]
         of_motion[:, gearset.bearing_signals] -= beyond
-    levers, deflection = interface.ports.levers, response.deflection
+    levers = interface.ports.levers
+    deflection = response.deflection
     if levers.any():
         deflection = deflection + response.motion @ levers[:, :-1].T
         deflection[0] += levers[:, -1]
@@ -228,12 +232,16 @@ def dissipated_and_given(gearset: Gearset, response: Response) -> tuple[float, f
 
     Both are equal in a steady state.
     """
-    interface, motion = response.interface, response.motion
-    w, moving = interface.frequencies[1:, None], motion[1:]
-    damping, stiffness = gearset.system.damping_at(interface.speed), gearset.system.stiffness_at(interface.speed)
+    interface = response.interface
+    motion = response.motion
+    w = interface.frequencies[1:, None]
+    moving = motion[1:]
+    damping = gearset.system.damping_at(interface.speed)
+    stiffness = gearset.system.stiffness_at(interface.speed)
     rates = 1j * w * moving
     # A stiffness that is not symmetric takes power, too. Matrices are real: so are the products with both parts.
-    places, speeds = np.concatenate([moving.real, moving.imag]), np.concatenate([rates.real, rates.imag])
+    places = np.concatenate([moving.real, moving.imag])
+    speeds = np.concatenate([rates.real, rates.imag])
     taken = 2.0 * float(np.sum(speeds * (speeds @ damping.T + places @ stiffness.T)))
     ports = interface.ports
     along = np.tensordot(rates, ports.forces, axes=(1, 2)) * gearset.weights[:, None]

@@ -79,7 +79,9 @@ class SpeedRange:
         """
         parts = text.split(":")
         try:
-            first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
+            first = float(parts[0])
+            last = float(parts[1])
+            count = int(parts[2])
             if len(parts) != 3:
                 raise ValueError
         except (ValueError, IndexError):
@@ -105,7 +107,8 @@ def usual_speeds(gearbox: Gearbox) -> SpeedRange:
     for case in gearbox.load_cases.values():
         loads = summarise_loads(gearbox, case)
         if loads.fastest_speed > 0.0:
-            fastest, sense = max(fastest, loads.fastest_speed), loads.end_speed
+            fastest = max(fastest, loads.fastest_speed)
+            sense = loads.end_speed
             break
     if fastest == 0.0:
         raise SteadyError(

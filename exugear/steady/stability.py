@@ -52,11 +52,13 @@ def candidates(gearset: Gearset, low: float, high: float) -> tuple[Candidate, ..
     """Find combination resonances between two speeds (rad/s), the fastest growing first, to first order."""
     middle = 0.5 * (low + high)
     values, right, left = mean_modes(gearset.system, middle)
-    size, ports = gearset.system.size, gearset.ports_at(middle)
+    size = gearset.system.size
+    ports = gearset.ports_at(middle)
     felt = left[:, size:] @ np.linalg.solve(gearset.system.mass, gearset.loads(ports).astype(complex))
     felt = felt.reshape(len(felt), len(gearset.waves.waves), -1)
     seen = right[:, :size] @ np.moveaxis(ports.readings, (0, 1, 2), (2, 0, 1))
-    decay, frequency = -values.real, values.imag
+    decay = -values.real
+    frequency = values.imag
     slow = min(abs(low), abs(high))
     found = []
     for base, order in enumerate(gearset.waves.base_orders):
@@ -82,7 +84,7 @@ def candidates(gearset: Gearset, low: float, high: float) -> tuple[Candidate, ..
 
 def _between(felt: Complexes, tangents: Mapping[tuple[int, int], Complexes], seen: Complexes) -> Complexes:
     """Couple modes (k, k) by tangents (m,) of forces by readings; what they feel (k, m, f) and make seen (r, k, m)."""
-    parts = [(felt[..., force] * own) @ seen[read].T for (force, read), own in tangents.items()]
+    parts = [(felt[..., force] * tangent) @ seen[read].T for (force, read), tangent in tangents.items()]
     return np.asarray(np.sum(parts, axis=0))
 
 
@@ -100,9 +102,12 @@ def growth_at(balance: Balance, readings: Complexes, base: int, least: int = SMO
     least : int
         Kicks per period at least.
     """
-    gearset, interface = balance.gearset, balance.interface
-    system, ports = gearset.system, interface.ports
-    size, speed = system.size, interface.speed
+    gearset = balance.gearset
+    interface = balance.interface
+    system = gearset.system
+    ports = interface.ports
+    size = system.size
+    speed = interface.speed
     period = 2.0 * np.pi / (abs(speed) * float(gearset.waves.base_orders[base]))
     values = system.eigenvalues(speed)
     kicks = max(kicks_needed(float(np.abs(values).max()) / 2.0 / np.pi, period), least)
@@ -119,12 +124,16 @@ def growth_at(balance: Balance, readings: Complexes, base: int, least: int = SMO
     # Meshes of other bases do not vary: they belong to the constant part. Bearings do with all bases.
     own = np.ones(len(gearset.weights), dtype=bool)
     own[: len(gearset.waves.waves)] = [wave.base == base for wave in gearset.waves.waves]
-    pushed, read = np.repeat(own, ports.forces.shape[1]), np.tile(np.repeat(own, ports.readings.shape[1]), 2)
+    pushed = np.repeat(own, ports.forces.shape[1])
+    read = np.tile(np.repeat(own, ports.readings.shape[1]), 2)
     constant = np.vstack([np.eye(size, 2 * size, size), lower])
     constant -= pushes[:, ~pushed] @ varying[0][np.ix_(~pushed, ~read)] @ reads[~read]
     # Many slopes are zero: what nothing pushes along or reads costs nothing then.
-    pushed, read = pushed & varying.any(axis=(0, 2)), read & varying.any(axis=(0, 1))
-    varying, pushes, reads = varying[:, pushed][:, :, read], pushes[:, pushed], reads[read]
+    pushed = pushed & varying.any(axis=(0, 2))
+    read = read & varying.any(axis=(0, 1))
+    varying = varying[:, pushed][:, :, read]
+    pushes = pushes[:, pushed]
+    reads = reads[read]
     found, shapes = exponents(constant, pushes, reads, varying, period)
     # Free rolling neither grows nor decays but for what the losses change with the speed: it is known by its shape.
     assembly = gearset.waves.assembly

@@ -76,7 +76,8 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
     """Labelled arrays with units, what `stored_or_computed` writes."""
     import xarray as xr
 
-    solved, amplitude = response.solved, response.solved.amplitude
+    solved = response.solved
+    amplitude = response.solved.amplitude
     variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
         "speed": (("point",), solved.speed, {"units": "rad/s", "long_name": "speed of the overall input"}),
         "index": (("line", "base"), response.lines.index, {"units": "1", "long_name": "multiples of the bases"}),
@@ -91,7 +92,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
             np.angle(amplitude).astype(np.float32),
             {"units": "rad", "long_name": "against cos(order * angle of the input)"},
         ),
-        "units": (("signal",), np.array([own.units for own in response.signals], dtype=object), {}),
+        "units": (("signal",), np.array([signal.units for signal in response.signals], dtype=object), {}),
         "drive_torque": (("point",), solved.drive_torque, {"units": "N m"}),
         "energy_error": (("point",), solved.energy_error, {"units": "1"}),
         "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "fastest growth of a disturbance"}),
@@ -110,7 +111,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
     coordinates: dict[str, Any] = {
         "mesh_wave": np.array(response.wave_names, dtype=object),
         "base": np.array(response.base_names, dtype=object),
-        "signal": np.array([own.name for own in response.signals], dtype=object),
+        "signal": np.array([signal.name for signal in response.signals], dtype=object),
     }
     if response.bearing_names:
         coordinates["bearing"] = np.array(response.bearing_names, dtype=object)

@@ -177,8 +177,10 @@ class SteadyResponse(Displayed):
         place, mirrored = self.lines.find(np.array(line, dtype=np.int64))
         if place < 0:
             raise SteadyError(f"no line {line}; single bases go up to {self.settings.harmonics}")
-        found = self.solved.amplitude[:, int(place), names.index(signal)].astype(np.complex128)
-        return np.conj(found) if mirrored else found
+        index = self.solved.amplitude[:, int(place), names.index(signal)].astype(np.complex128)
+        if mirrored:
+            return np.conj(index)
+        return index
 
 
 CHECKED, MORE = 10, 1.5
@@ -274,7 +276,9 @@ def _of_mean_system(
 
 def _tracks(gearset: Gearset, speeds: Floats) -> ModeTracks:
     """Follow modes that a mesh or one of its harmonics may reach; of elastic bodies, those that their band holds."""
-    assembly, low, high = gearset.waves.assembly, float(speeds.min()), float(speeds.max())
+    assembly = gearset.waves.assembly
+    low = float(speeds.min())
+    high = float(speeds.max())
     highest = HARMONICS * float(gearset.waves.base_orders.max()) * float(np.abs(speeds).max()) / (2.0 * np.pi)
     if assembly.elastic_bodies:
         highest = min(highest, assembly.gearbox.case.elasticity.band_Hz)
@@ -307,7 +311,7 @@ def _with_tops(solver: PointSolver, settings: SteadySettings, solved: Solved, wo
 
     Each such state begins anew: it hangs on no other, so that what is stopped goes on to the same numbers.
     """
-    quantities = quantities_of([own.name for own in solver.gearset.signal_names])
+    quantities = quantities_of([signal_name.name for signal_name in solver.gearset.signal_names])
     operation = operating_range(solver.gearset.waves.assembly.gearbox)
     tops: KnownTops = {}
     for _ in range(ROUNDS):
@@ -357,13 +361,16 @@ def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: Sol
 
 def _tops_of(values: Floats) -> Integers:
     """Places of the peaks among values over speed; of a line without one, where it is loudest."""
-    found = standing_peaks(values)
-    return found if found.size else np.array([np.argmax(values)])
+    peaks = standing_peaks(values)
+    if peaks.size:
+        return peaks
+    return np.array([np.argmax(values)])
 
 
 def _continued(out: Solved, first: int, solver: Callable[[], PointSolver], work: _Work) -> Solved:
     """Solve all points from one on, but for those that are known."""
-    count, known = first, work.known
+    count = first
+    known = work.known
     if known is not None:
         count = max(first, _same_beginning(known.speed, out.speed))
         own = solver()
@@ -373,7 +380,8 @@ def _continued(out: Solved, first: int, solver: Callable[[], PointSolver], work:
                 own.response(float(out.speed[count - 1]))
         for field in fields(Solved):
             getattr(out, field.name)[first:count] = getattr(known, field.name)[first:count]
-    kept, done = time.monotonic(), count
+    kept = time.monotonic()
+    done = count
     try:
         for n in range(count, len(out.speed)):
             _solve_one(out, n, solver())
@@ -461,10 +469,14 @@ def _in_contact(known: Solved, count: int) -> int:
     """Count the known points up to the last at which all touches: states hang on those before, from there anew."""
     parted = known.apart[:count].any(axis=1) | known.free[:count].any(axis=1)
     touching = np.isfinite(known.drive_torque[:count]) & ~parted
-    return int(np.flatnonzero(touching)[-1]) + 1 if touching.any() else 0
+    if touching.any():
+        return int(np.flatnonzero(touching)[-1]) + 1
+    return 0
 
 
 def _same_beginning(known: Floats, speeds: Floats) -> int:
     """Count the points that are known already."""
     count = min(len(known), len(speeds))
-    return count if np.array_equal(known[:count], speeds[:count]) else 0
+    if np.array_equal(known[:count], speeds[:count]):
+        return count
+    return 0

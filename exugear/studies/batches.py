@@ -27,7 +27,8 @@ from fe_ste.tools.workers import StoppedError, stop_if_asked
 
 LONG = 1.0
 """Seconds of a point after which it is brought to the disk by itself."""
-SHARED_FOLDER, WORK_FOLDER = "shared", "work"
+SHARED_FOLDER = "shared"
+WORK_FOLDER = "work"
 SHOWN_VALUES, LONGEST_VALUE = 5, 200
 """Most parameters that the error of a point names, and most letters of each."""
 
@@ -85,7 +86,8 @@ def compute_batch(task: Task, batch: Sequence[Work]) -> list[Record]:
     OSError
         A finished point cannot be written.
     """
-    journal, records = _journal(task.folder), []
+    journal = _journal(task.folder)
+    records = []
     try:
         with threadpool_limits(1):
             for work in batch:
@@ -104,7 +106,8 @@ def compute_point(task: Task, work: Work) -> Record:
     """Compute one point; whatever goes wrong with it is part of its record."""
     start = time.perf_counter()
     values: dict[str, Any] = {}
-    error, doubts = "", []
+    error = ""
+    doubts = []
     folder = task.folder / WORK_FOLDER / work.point[:32]
     try:
         gearbox = _built(task, work)
@@ -115,7 +118,8 @@ def compute_point(task: Task, work: Work) -> Record:
     except StoppedError:
         raise
     except Exception as reason:  # one point must not end the others, whatever it is
-        values, error = {}, f"{type(reason).__name__}: {reason}"
+        values = {}
+        error = f"{type(reason).__name__}: {reason}"
     return Record(work.point, values, error, doubts, round(time.perf_counter() - start, 6), peak_memory())
 
 

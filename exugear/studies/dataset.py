@@ -51,17 +51,19 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
     variables: dict[str, Any] = {}
     labels: dict[str, list[str]] = {}
     for name, kept in study.figures.items():
-        own = kept.figure.dimension
-        if own:
+        dimension = kept.figure.dimension
+        if dimension:
             told = [label for _, record in done for label in record.values.get(name, {})]
-            labels[own] = list(dict.fromkeys([*labels.get(own, []), *told]))
+            labels[dimension] = list(dict.fromkeys([*labels.get(dimension, []), *told]))
     for name, kept in study.figures.items():
-        own = kept.figure.dimension
+        dimension = kept.figure.dimension
         attributes = {"units": kept.units, "long_name": kept.figure.description}
         attributes["options"] = json.dumps(dict(kept.options))
-        if own:
-            values = _filled((*sizes, len(labels[own])), done, lambda record, n=name, d=own: _row(record, n, labels[d]))
-            variables[name] = ((*dimensions, own), values, attributes)
+        if dimension:
+            values = _filled(
+                (*sizes, len(labels[dimension])), done, lambda record, n=name, d=dimension: _row(record, n, labels[d])
+            )
+            variables[name] = ((*dimensions, dimension), values, attributes)
         else:
             values = _filled(sizes, done, lambda record, n=name: number_of(record.values.get(n)))
             variables[name] = (dimensions, values, attributes)
@@ -72,7 +74,9 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
     }
     coordinates |= {name: (name, np.array(names, dtype=object)) for name, names in labels.items() if names}
     dataset = xr.Dataset(variables, coordinates, _attributes(study, at))
-    return with_slopes(dataset, study) if SIDE in design.shape else dataset
+    if SIDE in design.shape:
+        return with_slopes(dataset, study)
+    return dataset
 
 
 def _filled(shape: tuple[int, ...], done: list[tuple[tuple[int, ...], Record]], value: Any) -> Any:

@@ -78,7 +78,9 @@ def processes(workers: int | None = None) -> Opens:
         with Workers(count) as executor:
             yield Pool(executor, count)
 
-    return _here if count == 1 else opened
+    if count == 1:
+        return _here
+    return opened
 
 
 def dask_cluster(address: str) -> Opens:

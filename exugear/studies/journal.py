@@ -92,7 +92,11 @@ def told_in_json(value: float) -> float | str | None:
     """
     if math.isnan(value):
         return None
-    return value if math.isfinite(value) else INFINITE if value > 0.0 else f"-{INFINITE}"
+    if math.isfinite(value):
+        return value
+    if value > 0.0:
+        return INFINITE
+    return f"-{INFINITE}"
 
 
 def number_of(value: Any) -> float:
@@ -104,8 +108,12 @@ def number_of(value: Any) -> float:
     [2.0, inf, -inf, nan]
     """
     if isinstance(value, str):
-        return -math.inf if value.startswith("-") else math.inf
-    return math.nan if value is None else float(value)
+        if value.startswith("-"):
+            return -math.inf
+        return math.inf
+    if value is None:
+        return math.nan
+    return float(value)
 
 
 class Journal:
@@ -151,7 +159,7 @@ def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
     wanted : collection of str
         Hashes.
     """
-    found: dict[str, Record] = {}
+    journals: dict[str, Record] = {}
     for path in sorted((folder / FOLDER).glob(f"*{_END}")):
         try:
             with open_regular(path) as file:
@@ -162,7 +170,8 @@ def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
             match = _POINT.search(line)
             if match is None or match[1] not in wanted:
                 continue
-            before, record = found.get(match[1]), _record(line)
+            before = journals.get(match[1])
+            record = _record(line)
             if record is not None and (before is None or before.error):
-                found[record.point] = record
-    return found
+                journals[record.point] = record
+    return journals

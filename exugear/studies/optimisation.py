@@ -106,7 +106,7 @@ class _Evaluated:
     def _looked(self, row: Floats, changes: dict[str, Any]) -> Looked:
         tolerances = self.study.tolerances
         all_changes = [changes] if tolerances is None else tolerances.produced(self.study.gearbox, changes)
-        return Looked(row, tuple((self.study.hash_of(own), own) for own in all_changes))
+        return Looked(row, tuple((self.study.hash_of(all_change), all_change) for all_change in all_changes))
 
     def _seen(self, wanted: list[Looked]) -> list[Looked]:
         self.points |= {looked.key: looked for looked in wanted}
@@ -162,7 +162,8 @@ def optimise(
     ExecutorError, OSError
         As `exugear.studies.sweep.sweep`.
     """
-    wanted, folder = study.file.optimise, Path(folder)
+    wanted = study.file.optimise
+    folder = Path(folder)
     if wanted is None:
         raise OptimisationError("the study has no section [optimise]")
     with Kept(opens or processes()) as workers:
@@ -185,8 +186,8 @@ def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
     wanted = seen.study.file.optimise
     assert wanted is not None
     limits = [parameter.uniform for parameter in seen.study.file.parameters.values()]
-    low = np.array([own.least for own in limits if own is not None])
-    high = np.array([own.most for own in limits if own is not None])
+    low = np.array([limit.least for limit in limits if limit is not None])
+    high = np.array([limit.most for limit in limits if limit is not None])
     begin = low + shares("latin_hypercube", wanted.population, len(low), seed) * (high - low)
     known = _best(seen, weights, wanted.population // 4)
     begin[: len(known)] = known

@@ -87,12 +87,13 @@ def _pictures(dataset: xr.Dataset, minimised: tuple[str, ...]) -> Iterator[tuple
 
 def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
     """Draw a figure over parameters: along one, a curve for each value of another, a panel for each of all others."""
-    dimensions = [str(own) for own in values.dims if values.sizes[own] > 1] or [str(values.dims[-1])]
-    values = values.squeeze([own for own in values.dims if own not in dimensions])
-    numeric = [own for own in dimensions if _is_number(values, own)]
+    dimensions = [str(dim) for dim in values.dims if values.sizes[dim] > 1] or [str(values.dims[-1])]
+    values = values.squeeze([dim for dim in values.dims if dim not in dimensions])
+    numeric = [dimension for dimension in dimensions if _is_number(values, dimension)]
     along = SAMPLE if SAMPLE in dimensions else (numeric or dimensions[-1:])[0]
-    others = [own for own in dimensions if own != along]
-    panels, by = others[:-1], others[-1:]
+    others = [dimension for dimension in dimensions if dimension != along]
+    panels = others[:-1]
+    by = others[-1:]
     labels = _combinations(values, panels)[:MOST_PANELS]
     shape = (-1, values.sizes[by[0]] if by else 1, values.sizes[along])
     stacked = values.transpose(*panels, *by, along).to_numpy().reshape(shape)
@@ -125,15 +126,20 @@ def _finite(values: Floats) -> Floats:
 
 def _label(values: xr.DataArray) -> str:
     units = str(values.attrs.get("units", ""))
-    return f"{values.name} / {units}" if units not in ("", "1") else str(values.name)
+    if units not in ("", "1"):
+        return f"{values.name} / {units}"
+    return str(values.name)
 
 
 def _is_number(values: xr.DataArray, dimension: str) -> bool:
-    return bool(values[dimension].dtype.kind in "fi") if dimension in values.coords else False
+    if dimension in values.coords:
+        return bool(values[dimension].dtype.kind in "fi")
+    return False
 
 
 def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
-    x, rows = values[along].to_numpy().astype(np.float64), _finite(rows)
+    x = values[along].to_numpy().astype(np.float64)
+    rows = _finite(rows)
     shown = np.unique(np.linspace(0, len(labels) - 1, min(MOST_CURVES, len(labels))).round().astype(int))
     for place, n in enumerate(shown):
         style = "-" if place < len(COLOURS) else "--"
@@ -168,12 +174,13 @@ def _combinations(values: xr.DataArray, dimensions: list[str]) -> list[str]:
 
 
 def _draw_bars(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
-    words, rows = _combinations(values, [along]), _finite(rows)
+    combinations = _combinations(values, [along])
+    rows = _finite(rows)
     width = 0.8 / min(len(labels), MOST_CURVES)
     for n, (row, label) in enumerate(zip(rows[:MOST_CURVES], labels, strict=False)):
-        places = np.arange(len(words)) + (n - 0.5 * (min(len(labels), MOST_CURVES) - 1)) * width
+        places = np.arange(len(combinations)) + (n - 0.5 * (min(len(labels), MOST_CURVES) - 1)) * width
         axes.bar(places, row, width, color=COLOURS[n % len(COLOURS)], label=label)
-    axes.set_xticks(np.arange(len(words)), words)
+    axes.set_xticks(np.arange(len(combinations)), combinations)
     known = values.to_numpy()[np.isfinite(values.to_numpy())]
     if known.size and known.min() > 0.0 and known.max() / known.min() > WIDE:
         _logarithmic(axes, "y")
@@ -244,7 +251,8 @@ def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
         axes.plot(np.where(kept, np.nan, values), "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
         axes.legend()
     axes.plot(np.fmin.accumulate(np.where(kept, values, np.nan)), color=COLOURS[0])
-    low, high = float(np.nanmin(values)), float(np.nanquantile(values, 0.9))
+    low = float(np.nanmin(values))
+    high = float(np.nanquantile(values, 0.9))
     axes.set_ylim(top=high + 0.05 * max(abs(high), high - low))
     axes.set_xlabel(EVALUATION)
     axes.set_ylabel(_label(dataset[name]))

@@ -87,23 +87,30 @@ class Criteria:
 
     def percent(self, side: Side) -> float:
         """Percentile of a side."""
-        return self.percentile if side == "high" else 100.0 - self.percentile
+        if side == "high":
+            return self.percentile
+        return 100.0 - self.percentile
 
     def over_draws(self, values: Floats, side: Side) -> Floats:
         """Bring a figure (..., draws) into one value; a draw that failed counts as worst."""
         filled = np.where(np.isnan(values), np.inf if side == "high" else -np.inf, values)
-        return filled[..., 0] if filled.shape[-1] == 1 else percentile_of(filled, self.percent(side))
+        if filled.shape[-1] == 1:
+            return filled[..., 0]
+        return percentile_of(filled, self.percent(side))
 
     def minimised(self, figure: Figure, points: Sequence[Looked]) -> Floats:
         """Figures (points, figures) that are made small; infinite where a point failed."""
-        found = [[float(self.over_draws(figure(one, name), "high")) for name in self.figures] for one in points]
+        found = [[float(self.over_draws(figure(point, name), "high")) for name in self.figures] for point in points]
         return np.array(found).reshape(len(points), len(self.figures))
 
     def violations(self, figure: Figure, points: Sequence[Looked]) -> Floats:
         """How far points are beyond limits (points, limits), over the size of the limit; negative within."""
         found = [
-            [beyond(float(self.over_draws(figure(one, name), side)), side, limit) for name, side, limit in self.limits]
-            for one in points
+            [
+                beyond(float(self.over_draws(figure(point, name), side)), side, limit)
+                for name, side, limit in self.limits
+            ]
+            for point in points
         ]
         return np.array(found).reshape(len(points), len(self.limits))
 
@@ -170,7 +177,9 @@ def searched_dataset(
 
 def judged_name(study: Study, name: str, side: Side) -> str:
     """Variable of the dataset that points are judged by: the figure, or its percentile over the tolerances."""
-    return name if study.tolerances is None else f"{name}_{side}"
+    if study.tolerances is None:
+        return name
+    return f"{name}_{side}"
 
 
 def _judged(dataset: xr.Dataset, study: Study, criteria: Criteria, name: str, side: Side) -> xr.DataArray:
@@ -186,14 +195,15 @@ def _judged(dataset: xr.Dataset, study: Study, criteria: Criteria, name: str, si
 
 def _design(study: Study, points: Sequence[Looked]) -> Design:
     """Points over evaluations, and over the draws of tolerances."""
-    rows, tolerances = np.array([one.row for one in points]), study.tolerances
+    rows = np.array([point.row for point in points])
+    tolerances = study.tolerances
     axes = {EVALUATION: Axis((EVALUATION,), np.arange(len(points)))}
     for n, (name, parameter) in enumerate(study.file.parameters.items()):
         axes[name] = Axis((EVALUATION,), rows[:, n], units_of(parameter), ", ".join(parameter.targets))
     if tolerances is None:
-        flat = tuple(Point((n,), one.draws[0][1]) for n, one in enumerate(points))
+        flat = tuple(Point((n,), point.draws[0][1]) for n, point in enumerate(points))
         return Design({EVALUATION: len(points)}, axes, flat)
     count = len(tolerances.draws)
     axes |= {SAMPLE: Axis((SAMPLE,), np.arange(1, count + 1)), **tolerances.axes}
-    drawn = tuple(Point((n, m), own) for n, one in enumerate(points) for m, (_, own) in enumerate(one.draws))
+    drawn = tuple(Point((n, m), own) for n, point in enumerate(points) for m, (_, own) in enumerate(point.draws))
     return Design({EVALUATION: len(points), SAMPLE: count}, axes, drawn)

@@ -75,7 +75,11 @@ def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
     """Names that the dataset of a search over tolerances has for itself."""
     if not study.tolerances:
         return {}
-    taken = {f"{name}_path": f"the paths of tolerances.{name}" for name, one in study.tolerances.items() if one.paths}
+    taken = {
+        f"{name}_path": f"the paths of tolerances.{name}"
+        for name, tolerance in study.tolerances.items()
+        if tolerance.paths
+    }
     sides = {f"{name}_{side}": f"a percentile of figures.{name}" for name in study.figures for side in ("high", "low")}
     return {SAMPLE: "the draws", **taken, **sides}
 
@@ -99,7 +103,7 @@ def faults_of_paths(study: StudyFile) -> Iterator[str]:
     owners: list[tuple[str, str, str]] = []
     for table, name, parameter in (
         *(("parameters", name, own) for name, own in study.parameters.items()),
-        *(("tolerances", name, own) for name, own in study.tolerances.items()),
+        *(("tolerances", name, tolerance) for name, tolerance in study.tolerances.items()),
     ):
         paths = (parameter.path,) if parameter.path else tuple(parameter.paths or parameter.targets)
         for path in paths:
@@ -176,18 +180,19 @@ def faults_of_needs(study: StudyFile, kept: Mapping[str, KeptFigure], gearbox: G
 
 def faults_of_signals(kept: Mapping[str, KeptFigure], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
     """Tell signals and lines that neither runs nor steady responses of this gearbox have."""
-    tabled, jointed = choice.mesh_law == "table", choice.variant.spins_only
+    tabled = choice.mesh_law == "table"
+    jointed = choice.variant.spins_only
     of_runs = [one for one in signals_of(tabled, jointed) if one.stored and one.dimensions[0] == "time"]
     families = [mesh.family for mesh in gearbox.meshes]
     parts = {"mesh_dte": families, "mesh_force": families}
     if not jointed:
-        supports = [word for one in gearbox.bearings for word in (one.name, one.family)]
+        supports = [word for bearing in gearbox.bearings for word in (bearing.name, bearing.family)]
         parts |= {"support_force": supports, "seat_acceleration": supports}
     for name, figure in kept.items():
         signal = str(figure.options.get("signal", OVERALL))
         if figure.figure.needs == "run":
             single = figure.figure.dimension != ""
-            known = [one.name for one in of_runs if not single or len(one.dimensions) == 1]
+            known = [of_run.name for of_run in of_runs if not single or len(of_run.dimensions) == 1]
             if signal not in known:
                 yield f"figures.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
         elif figure.figure.needs == "steady":

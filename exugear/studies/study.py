@@ -158,7 +158,8 @@ class Study(Displayed):
     @cached_property
     def case_hash(self) -> str:
         """SHA-256 of all that every point depends on: the case with its files, choices, figures, versions."""
-        of_life, cases = _of_life(self.figures), self.gearbox.content.get("load_cases", {})
+        of_life = _of_life(self.figures)
+        cases = self.gearbox.content.get("load_cases", {})
         read = read_content(self.gearbox, of_life)
         run = None if self.gearbox.case.rating is None else self.gearbox.case.rating.dynamic_factor_run
         content = {

@@ -130,7 +130,8 @@ def sweep(
 
     def tell(record: Record) -> None:
         nonlocal known, failures
-        known, failures = known + 1, failures + bool(record.error)
+        known = known + 1
+        failures = failures + bool(record.error)
         if progress is not None:
             progress(known, failures, len(mine))
 

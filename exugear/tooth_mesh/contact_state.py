@@ -113,7 +113,7 @@ class ContactState:
         )
 
 
-def changed_over_cycle(known: Floats, found: Samples) -> Floats:
+def changed_over_cycle(known: Floats, samples: Samples) -> Floats:
     """Give what is known finely over the mesh cycle the changes that were found at some positions of it.
 
     Their difference has no more harmonics than these positions can tell apart, and no mean: finer harmonics stay those
@@ -139,9 +139,10 @@ def changed_over_cycle(known: Floats, found: Samples) -> Floats:
     >>> np.allclose(changed_over_cycle(fine, found), fine + np.cos(2 * cycle))
     True
     """
-    count, size = len(found), len(known)
+    count = len(samples)
+    size = len(known)
     there = np.interp(np.arange(count) / count, np.arange(size) / size, known, period=1.0)
-    spectrum = np.fft.rfft(np.array(found) - there) / count
+    spectrum = np.fft.rfft(np.array(samples) - there) / count
     spectrum[0] = 0.0
     spectrum[(count + 1) // 2 :] = 0.0
     return np.asarray(known + size * np.fft.irfft(spectrum, size))

@@ -108,7 +108,11 @@ class MeshElement:
         gears stand so askew that flanks touch long before or after their middles would, the deflection at mid-face is
         mostly that gap, and no measure of how teeth yield: the curve then begins at the gap.
         """
-        secant, tangent, ways, load, gap = self.stiffness, self.tangent, self.load_ways, self.load, 0.0
+        secant = self.stiffness
+        tangent = self.tangent
+        ways = self.load_ways
+        load = self.load
+        gap = 0.0
         if self.is_curved:
             straight = contact.force / contact.tangent_stiffness
             yielding = float(np.clip(contact.deflection, straight, STEEPEST * straight))
@@ -220,7 +224,8 @@ def mesh_elements(
         if mesh.pair.name not in stiffness:
             raise MeshError(f"mesh {mesh.name}: no stiffness for pair {mesh.pair.name!r}; compute its table")
         data = stiffness[mesh.pair.name]
-        flank, phase = flanks[mesh.name], phases[mesh.name]
+        flank = flanks[mesh.name]
+        phase = phases[mesh.name]
         ends = (_node(mesh.pinion, mesh.pair.pinion, bodies, nodes), _node(mesh.gear, mesh.pair.gear, bodies, nodes))
         known = contact.get(mesh.name) if contact and flank == usual[mesh.name] else None
         secant, tangent, load = _at_load(law, data, mesh, static[mesh.name])
@@ -272,7 +277,9 @@ def _at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple
 def _load_ways(law: Law, data: MeshData, flank: int, usual: int) -> Floats:
     """Ways of the load as `MeshElement.load_ways`; of the flank that a table is of, not of that behind."""
     # A flank -1 is that of the table turned about: the ends of the face change places.
-    return flank * law.load_ways(data) if flank == usual else np.zeros((2, 0))
+    if flank == usual:
+        return flank * law.load_ways(data)
+    return np.zeros((2, 0))
 
 
 def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:
@@ -287,7 +294,9 @@ def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection
 def _node(body: str, gear: Gear, bodies: Mapping[str, Body], nodes: Mapping[str, Floats] | None) -> Floats:
     """Position of the node that carries a gear of a body, m."""
     seat = None if nodes is None else nodes.get(seat_key(body, gear.name))
-    return node_position(bodies[body]) if seat is None else seat
+    if seat is None:
+        return node_position(bodies[body])
+    return seat
 
 
 def _gear_axes(mesh: Mesh, bodies: Mapping[str, Body]) -> Floats:

@@ -48,7 +48,8 @@ class GridAxes:
 def reaches(table: MeshTable, wanted: TableInput) -> bool:
     """Whether a table reaches far enough to serve in place of the one with axes that were laid for it."""
     for axis, nominal in (("misalignment", 0.0), ("centre_distance", wanted.pair.centre_distance)):
-        have, want = table.dataset[axis].to_numpy() - nominal, np.array(getattr(wanted, axis)) - nominal
+        have = table.dataset[axis].to_numpy() - nominal
+        want = np.array(getattr(wanted, axis)) - nominal
         if have.max() < NEEDED * want.max() or have.min() > NEEDED * want.min():
             return False
     return True

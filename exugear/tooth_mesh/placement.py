@@ -108,7 +108,9 @@ class ToothContact:
     def _pitch_point(self) -> float:
         """Polar angle of the pitch point about the wheel's axis."""
         angle = MeshGeometry.of(self.mesh).polar_angle
-        return angle + math.pi if self.number == 2 and not self._wheel_is_internal else angle
+        if self.number == 2 and not self._wheel_is_internal:
+            return angle + math.pi
+        return angle
 
 
 def loaded_flanks(gearbox: Gearbox, torques: Mapping[str, float] | None = None) -> dict[str, int]:

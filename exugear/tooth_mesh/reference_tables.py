@@ -91,7 +91,9 @@ def summarise_reference(request: ReferenceRequest, table: NonlinearTable) -> dic
 
     def figure(values: xr.DataArray) -> float | None:
         value = float(values)
-        return value if value == value else None
+        if value == value:
+            return value
+        return None
 
     return {
         "pair": request.name,

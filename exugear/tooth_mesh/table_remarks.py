@@ -21,7 +21,8 @@ def remarks_about_table(name: str, table: MeshTable) -> Iterator[str]:
             "in for them, and what comes near them says so"
         )
     shares = table.dataset[CUT_OFF].to_numpy()
-    cut, largest = int(np.count_nonzero(shares > 0.0)), float(np.nanmax(shares, initial=0.0))
+    cut = int(np.count_nonzero(shares > 0.0))
+    largest = float(np.nanmax(shares, initial=0.0))
     if cut:
         yield (
             f"{name}: in {cut} of {states} states contact passes a form circle and is cut off there; up to "
@@ -37,7 +38,8 @@ def doubts_about_table(name: str, table: MeshTable) -> Iterator[str]:
         yield from (f"{name}: {line}" for line in table.failures)
         return
     static = table.static_state
-    lost, positions = int(np.count_nonzero(~static["converged"].to_numpy().astype(bool))), static.sizes["pmc"]
+    lost = int(np.count_nonzero(~static["converged"].to_numpy().astype(bool)))
+    positions = static.sizes["pmc"]
     if lost > MOST_MISSING * positions:
         yield f"{name}: {lost} of {positions} positions of the static state are not solved"
     share = static_cut_off(table)

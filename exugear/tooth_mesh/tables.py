@@ -121,7 +121,8 @@ def requested_tables(
         if not gearbox.pairs[name].static_torque > 0.0 or name in gearbox.stated_stiffness:
             raise gearbox.fault(without_table(gearbox, [name]))
     grid = grid or gearbox.ste.grid
-    own, count = axes or {}, positions or gearbox.ste.positions
+    own = axes or {}
+    count = positions or gearbox.ste.positions
     wanted = {name: wanted_table(gearbox, name, count, grid, own.get(name)) for name in chosen}
     return [_request(gearbox, name, out, table, grid, own.get(name)) for name, table in wanted.items()]
 
@@ -183,13 +184,15 @@ def wanted_table(
     )
     if not grid:
         return static
-    ste, pair = gearbox.ste, spec.pair
+    ste = gearbox.ste
+    pair = spec.pair
     usual = axes or axes_reaching(pair)
     openings = usual.openings if ste.misalignment_um is None else tuple(1e-6 * um for um in ste.misalignment_um)
     return replace(
         static,
         torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in ste.torque_factors),
-        centre_distance=gearbox.table_distances(name) or tuple(pair.centre_distance + one for one in usual.offsets),
+        centre_distance=gearbox.table_distances(name)
+        or tuple(pair.centre_distance + offset for offset in usual.offsets),
         misalignment=tuple(opening / pair.face_width for opening in openings),
     )
 
@@ -259,7 +262,9 @@ def _holds(table: MeshTable, static: TableInput) -> bool:
 
 def _with_named_axes(gearbox: Gearbox, table: MeshTable, wanted: TableInput) -> bool:
     """Whether a table has the axes that the file names, and any values along those that it does not."""
-    ste, named, follow = gearbox.ste, wanted, []
+    ste = gearbox.ste
+    named = wanted
+    follow = []
     if ste.centre_distance_offsets_um is None:
         follow.append(_values(table, "centre_distance"))
         named = replace(named, centre_distance=follow[-1])
@@ -288,10 +293,10 @@ def missing_tables(
     axes : mapping of pair name to GridAxes, optional
         What axes must reach that the file does not name.
     """
-    found = tables_at_work(gearbox, out, grid, axes)
+    work = tables_at_work(gearbox, out, grid, axes)
     requests = []
     for name in _with_tables(gearbox, grid):
-        if name not in found:
+        if name not in work:
             requests += requested_tables(gearbox, out, [name], grid=grid, axes=axes)
     return requests
 
@@ -337,7 +342,9 @@ def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
 
     def figure(values: xr.DataArray) -> float | None:
         value = float(values)
-        return value if value == value else None
+        if value == value:
+            return value
+        return None
 
     return {
         "pair": request.name,

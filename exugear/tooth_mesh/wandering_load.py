@@ -60,14 +60,14 @@ def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[WanderingLoad, ...]
     folder : Path
         Results folder.
     """
-    found = []
+    loads = []
     for name, pair in {mesh.pair.name: mesh.pair for mesh in gearbox.meshes}.items():
         if name in gearbox.stated_stiffness:
             continue
         with suppress(TableError, GapError):  # no law along a row takes such a table
             point = complete_cycle(fitting_table(gearbox, name, folder).static_state)
-            found.append(_way(name, point, pair.face_width))
-    return tuple(sorted(found, key=lambda own: -own.over_error))
+            loads.append(_way(name, point, pair.face_width))
+    return tuple(sorted(loads, key=lambda own: -own.over_error))
 
 
 def _way(name: str, point: xr.Dataset, width: float) -> WanderingLoad:
@@ -83,4 +83,6 @@ def _way(name: str, point: xr.Dataset, width: float) -> WanderingLoad:
 
 def _first_harmonic(values: Floats) -> float:
     """Amplitude of the first harmonic of a cycle."""
-    return float(2.0 * np.abs(np.fft.rfft(values)[1]) / len(values)) if len(values) > 2 else 0.0
+    if len(values) > 2:
+        return float(2.0 * np.abs(np.fft.rfft(values)[1]) / len(values))
+    return 0.0

@@ -64,7 +64,8 @@ def check_disk(
     """
     total, key = _span(gearbox, case, duration)
     there = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.is_dir())
-    needed, free = total * sample_rate * sample_bytes, shutil.disk_usage(there).free
+    needed = total * sample_rate * sample_bytes
+    free = shutil.disk_usage(there).free
     if needed > free:
         raise CaseError(
             f"{key} = {total:g}: {total * sample_rate:.3g} samples take {1e-9 * needed:.3g} GB, and {there} has "

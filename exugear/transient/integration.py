@@ -29,7 +29,8 @@ def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: 
 
 def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
     """Let the compiled solver fill the recorder's buffer."""
-    state, step = start.state, plan.step
+    state = start.state
+    step = plan.step
     method = plan.integration.method
     system = CompiledSystem(plan.assembly, state.q, state.v, start.loads, step, method, state.past)
     done = state.step
@@ -49,7 +50,8 @@ def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, int
     from exugear.transient.exudyn_model.library import SolverFailure
     from exugear.transient.exudyn_model.system import ExudynSystem
 
-    state, step = start.state, plan.step
+    state = start.state
+    step = plan.step
     system = ExudynSystem(plan.assembly, state.q, state.v, start.loads.as_functions(), plan.mesh_route)
     follow = _StepFollower(plan, start, recorder, interruption)
     try:
@@ -70,7 +72,8 @@ class _StepFollower:
 
     def __call__(self, t: float, q: Floats, v: Floats) -> bool:
         """Hand a state over; False ends the run."""
-        recorder, due = self._recorder, self._next * self._step
+        recorder = self._recorder
+        due = self._next * self._step
         self._next += 1
         if not self._begun:
             self._begun = True

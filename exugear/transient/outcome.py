@@ -35,7 +35,9 @@ class Progress:
     @property
     def speed(self) -> float:
         """Simulated seconds per second of wall time."""
-        return self.simulated / self.wall if self.wall > 0.0 else 0.0
+        if self.wall > 0.0:
+            return self.simulated / self.wall
+        return 0.0
 
 
 class ProgressMeter:
@@ -63,7 +65,8 @@ class ProgressMeter:
         """Tell that the run has reached a simulated time, s."""
         if self._tell is None:
             return
-        wall, done = self.wall, now - self._begin
+        wall = self.wall
+        done = now - self._begin
         remaining = wall * (self._end - now) / done if done > 0.0 else math.inf
         self._tell(Progress(now, self._end, wall, remaining))
 
@@ -105,7 +108,9 @@ class Run(Displayed):
     def _state(self) -> str:
         if self.complete:
             return "complete"
-        return "stopped beyond a limit" if self.halted else "stopped"
+        if self.halted:
+            return "stopped beyond a limit"
+        return "stopped"
 
     def _line(self) -> str:
         trust = "trusted" if self.trusted else "not to be trusted"

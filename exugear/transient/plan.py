@@ -100,7 +100,8 @@ class RunPlan:
 
     def attributes(self) -> dict[str, Any]:
         """Attributes that the file of the run begins with."""
-        assembly, gearbox = self.assembly, self.assembly.gearbox
+        assembly = self.assembly
+        gearbox = self.assembly.gearbox
         return {
             "gearbox": gearbox.name,
             "variant": str(assembly.variant),

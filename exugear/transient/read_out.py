@@ -72,10 +72,12 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
     half = max(plain.half, TAPS_PER_FACTOR // 2)  # at a factor of 1 nothing else is filtered
     own = np.pad(plain.own, ((half - plain.half,) * 2, (0, 0)))
     rows = min(half, HALF)
-    low_pass, other = own[:, 0].copy(), np.zeros_like(own)
+    low_pass = own[:, 0].copy()
+    other = np.zeros_like(own)
     for lag in np.unique(lags[np.isfinite(lags)]):
         own[:, lags == lag] += _after(low_pass, _remedy(method, lag, rows))[:, None]
-    first, before = layout["mesh_force"].start, layout["mesh_force"].start - layout["mesh_dte"].start
+    first = layout["mesh_force"].start
+    before = layout["mesh_force"].start - layout["mesh_dte"].start
     for m in _meshes(assembly):
         element = assembly.elements[m]
         remedy = _remedy_of_force(method, element.tangent.mean(), element.damping / step, rows)
@@ -95,7 +97,8 @@ def _lags(assembly: Assembly, layout: SignalLayout, step: float) -> Floats:
         if name in layout:
             lags[layout[name].start + _meshes(assembly)] = 0.0
     connectors = assembly.with_linear_supports().connectors
-    stiffness, damping = connectors.stiffness, connectors.damping
+    stiffness = connectors.stiffness
+    damping = connectors.damping
     # The ratio where damping is in proportion to stiffness, and its mean where a file gives both.
     sizes = np.maximum((stiffness**2).sum(axis=(1, 2)), np.finfo(np.float64).tiny)
     times = np.maximum((stiffness * damping).sum(axis=(1, 2)) / sizes, 0.0)

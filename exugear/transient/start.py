@@ -61,7 +61,8 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     RunError
         There is nothing to resume, it was run with other choices, or was stopped for good.
     """
-    assembly, case = plan.assembly, plan.case
+    assembly = plan.assembly
+    case = plan.case
     gearbox = assembly.gearbox
     series = torque_series(gearbox, case)
     summary = summarise_loads(gearbox, case, assembly.inertias, plan.duration, series)

@@ -171,7 +171,8 @@ class Judge:
     def _see_energy(self, times: Floats, lines: Floats) -> None:
         start, scale = self.figures[ACCOUNT, [AT_START, SCALE]]
         if np.isnan(start):
-            start, scale = lines[0, KINETIC] + lines[0, ELASTIC], 0.0
+            start = lines[0, KINETIC] + lines[0, ELASTIC]
+            scale = 0.0
         left, scales = energy_left_over(lines, start, scale)
         self.figures[ACCOUNT, [AT_START, SCALE]] = start, scales[-1]
         self._keep(ENERGY, times, left[None], 0.0, np.ones(1), self.limits.energy_marked)
@@ -259,7 +260,8 @@ class Judge:
         largest, since, number = self.figures[DEFLECTION]
         limit = self.limits.deflection_marked
         if largest > limit:
-            height, mesh = float(self._heights[int(number)]), self._meshes[int(number)]
+            height = float(self._heights[int(number)])
+            mesh = self._meshes[int(number)]
             yield (
                 f"deflection: at t = {since:.4g} s the teeth of mesh {mesh}, {1e3 * height:.3g} mm "
                 f"high, give way by more than {_percent(limit)} of their height, where they would have broken; meshes "
@@ -295,7 +297,9 @@ def verdict_of(attributes: Mapping[str, Any]) -> str:
     >>> verdict_of({"trusted": 0, "verdict": "energy: ..."}), verdict_of({"trusted": 1}), verdict_of({})
     ('energy: ...', '', '')
     """
-    return "" if int(attributes.get("trusted", 1)) else str(attributes.get("verdict", "no reason is kept"))
+    if int(attributes.get("trusted", 1)):
+        return ""
+    return str(attributes.get("verdict", "no reason is kept"))
 
 
 def _percent(share: float) -> str:

@@ -55,8 +55,12 @@ def _lay_cells(
     Arc lengths u = r_b roll^2 / 2 run along the transverse involute of gear 1.
     """
     most = len(teeth) * len(axial) * count
-    tooth_of, slice_of = np.empty(most, np.int64), np.empty(most, np.int64)
-    middle, half, gap, gear_roll = np.empty(most), np.empty(most), np.empty(most), np.empty(most)
+    tooth_of = np.empty(most, np.int64)
+    slice_of = np.empty(most, np.int64)
+    middle = np.empty(most)
+    half = np.empty(most)
+    gap = np.empty(most)
+    gear_roll = np.empty(most)
     offset = np.empty(most)
     cut = np.zeros(most, np.bool_)
     edges = np.empty(count + 1)
@@ -143,7 +147,8 @@ class Cells(Displayed):
         return Cells(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
     def _line(self) -> str:
-        tooth_pairs, cut = np.unique(self.tooth), np.count_nonzero(self.cut)
+        tooth_pairs = np.unique(self.tooth)
+        cut = np.count_nonzero(self.cut)
         return f": {len(self.tooth)} on {len(tooth_pairs)} tooth pairs, {cut} cut by a tip edge"
 
 
@@ -151,6 +156,6 @@ def lay_cells(
     pair: FlankPair, rotation: float, teeth: Integers, axial: Floats, half_window: float, count: int
 ) -> Cells:
     """Lay the cells of all `teeth` around their contact lines at one rotation of gear 1."""
-    found = _lay_cells(pair, rotation, teeth, axial, half_window, count)
-    tooth, layer, middle, gear_roll, half, gap, cut, offset = found
+    cells = _lay_cells(pair, rotation, teeth, axial, half_window, count)
+    tooth, layer, middle, gear_roll, half, gap, cut, offset = cells
     return Cells(tooth, layer, np.sqrt(2.0 * middle / pair.base_radius_1), gear_roll, half, gap, cut, offset)

@@ -51,7 +51,8 @@ class ContactSolution(Displayed):
     iterations: int
 
     def _line(self) -> str:
-        loaded, approach = np.count_nonzero(self.force), 1e6 * self.approach
+        loaded = np.count_nonzero(self.force)
+        approach = 1e6 * self.approach
         return f": {loaded} of {len(self.force)} cells in contact, approach {approach:.4g} um"
 
 
@@ -99,7 +100,8 @@ def solve_complementarity(
     """
     active = guess & np.isfinite(gap)
     factor = None
-    fewest, patience = len(gap) + 1, 5
+    fewest = len(gap) + 1
+    patience = 5
     for iteration in range(1, max_iterations + 1):
         if not active.any():  # a load needs a cell: the nearest one
             active = gap == gap.min()
@@ -123,7 +125,8 @@ def solve_complementarity(
         # Block steps are fast but may cycle. After five without progress single steps go on, which cannot
         # (Judice and Pires): each takes the wrong cell of the highest number.
         if count < fewest:
-            fewest, patience = count, 5
+            fewest = count
+            patience = 5
         else:
             patience -= 1
         if patience > 0:
@@ -157,10 +160,13 @@ class _Factor:
 
     def solve(self, active: Booleans) -> tuple[Floats, Floats]:
         """Solve C unit = 1 and C closed = gap on `active`; zero on the other cells."""
-        gained, lost = np.flatnonzero(active & ~self._active), np.flatnonzero(self._active & ~active)
-        half, result = self._half, np.zeros((2, len(active)))
+        gained = np.flatnonzero(active & ~self._active)
+        lost = np.flatnonzero(self._active & ~active)
+        half = self._half
+        result = np.zeros((2, len(active)))
         if len(gained) + len(lost):
-            numbers, count = self._numbers, len(gained)
+            numbers = self._numbers
+            count = len(gained)
             border = np.zeros((count + len(lost), len(numbers)))
             _take(self._compliance, gained, numbers, border)
             # In the size of the other columns, or the equations of the border would lose digits.

@@ -55,7 +55,9 @@ def continued_involutes(kinematics: FlankPair, flanks: Flanks) -> FlankPair:
 
     Where a root is relieved the flank ends in an edge, and so does contact.
     """
-    return kinematics if flanks[0].gear.has_relieved_root else kinematics._replace(form_roll_1=0.0)
+    if flanks[0].gear.has_relieved_root:
+        return kinematics
+    return kinematics._replace(form_roll_1=0.0)
 
 
 def _flanks_with_fillets(flanks: Flanks, cells: Cells) -> list[tuple[FlankCompliance, Floats]]:
@@ -70,7 +72,9 @@ def _form_roll(flank: FlankCompliance) -> float:
 
 def _above(flank: FlankCompliance, roll: Floats) -> Floats:
     """Roll angles by which places on a gear are on its flank's side of the form circle."""
-    return (_form_roll(flank) - roll) if flank.gear.internal else (roll - _form_roll(flank))
+    if flank.gear.internal:
+        return _form_roll(flank) - roll
+    return roll - _form_roll(flank)
 
 
 def _parts_beyond(flanks: Flanks, cells: Cells) -> Floats:

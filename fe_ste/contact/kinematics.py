@@ -56,7 +56,9 @@ class FlankPair(NamedTuple):
 
         Where a flank ends in an edge, at a chamfer of the tip or at a relieved root, contact ends there as well.
         """
-        pinion, gear, working_angle = pair.pinion, pair.gear, pair.working_pressure_angle
+        pinion = pair.pinion
+        gear = pair.gear
+        working_angle = pair.working_pressure_angle
         return cls(
             base_radius_1=pinion.base_radius,
             base_radius_2=gear.base_radius,
@@ -137,7 +139,8 @@ def circle_limit(pair: FlankPair, radius: float, axial: float, tooth: int, rotat
 
     Of the tip circle it is the least that gear 2 reaches, of the circle that ends its flank at the root the largest.
     """
-    low, high = pair.form_roll_1, pair.tip_roll_1
+    low = pair.form_roll_1
+    high = pair.tip_roll_1
     if pair.kind * (_polar_on_gear_2(pair, low, axial, tooth, rotation)[0] - radius) <= 0.0:
         return low
     if pair.kind * (_polar_on_gear_2(pair, high, axial, tooth, rotation)[0] - radius) >= 0.0:

@@ -131,19 +131,26 @@ def _add_half_spaces(
     `fe_ste.elasticity.halfspace.wedge_images`. Distances along the contact
     line are common to two groups, and so is the series of the loads that are far.
     """
-    widest, widest_half = (groups[1:] - groups[:-1]).max(), half_across.max()
-    across, half, sums = np.empty(widest**2), np.empty(widest**2), np.empty(widest**2)
+    widest = (groups[1:] - groups[:-1]).max()
+    widest_half = half_across.max()
+    across = np.empty(widest**2)
+    half = np.empty(widest**2)
+    sums = np.empty(widest**2)
     series = np.empty((2, _TERMS))
     loads = 1 + images.shape[0] * images.shape[1] * images.shape[2]
-    along, strength, half_length = np.empty(loads), np.empty(loads), np.empty(loads)
+    along = np.empty(loads)
+    strength = np.empty(loads)
+    half_length = np.empty(loads)
     _stretch(half_length, half_along, images)
     for g in range(len(groups) - 1):
         for h in range(g + 1):
             if tooth[g] != tooth[h]:
                 continue  # a near field ends at its tooth; others feel it through the regular part
-            apart, together = axial[g] - axial[h], axial[g] + axial[h]
+            apart = axial[g] - axial[h]
+            together = axial[g] + axial[h]
             _place_loads(along, strength, apart, together, pair.base_helix_cosine, surface, ends, images)
-            count, square = 0, 0.0
+            count = 0
+            square = 0.0
             for i in range(groups[g], groups[g + 1]):
                 for j in range(groups[h], groups[h + 1]):
                     # Distance across the generators, see `fe_ste.elasticity.halfspace`.
@@ -198,7 +205,8 @@ def _place_loads(
     for body in range(len(images)):
         for end in range(2):
             face = (2.0 * end - 1.0) * ends[body]
-            read, loaded = 0.5 * (together + apart) - face, 0.5 * (together - apart) - face
+            read = 0.5 * (together + apart) - face
+            loaded = 0.5 * (together - apart) - face
             for image in images[body, end]:
                 square = image[1] * (read * read + loaded * loaded) + image[2] * read * loaded
                 along[load], strength[load] = math.sqrt(square) / cosine, image[0] * surface[body]
@@ -209,7 +217,8 @@ def _place_loads(
 def _add_series(series: Floats, strength: float, along: float, half_along: float) -> None:
     """Add a load's series in powers of the square of the distance across: row 1 goes with the half width's square."""
     inverse_square = 1.0 / (along * along)
-    scale, moment = strength * math.sqrt(inverse_square), half_along * half_along * inverse_square
+    scale = strength * math.sqrt(inverse_square)
+    moment = half_along * half_along * inverse_square
     for k in range(_TERMS):
         series[0, k] += scale * (_INVERSE[k] + moment * _MOMENT_ALONG[k])
         series[1, k] += scale * inverse_square * _MOMENT_ACROSS[k]
@@ -220,7 +229,9 @@ def _add_series(series: Floats, strength: float, along: float, half_along: float
 def _evaluate(sums: Floats, series: Floats, across: Floats, half: Floats, count: int) -> None:
     """Add the series to the first `count` sums."""
     for n in range(count):
-        square, value, moment = across[n] * across[n], series[0, _TERMS - 1], series[1, _TERMS - 1]
+        square = across[n] * across[n]
+        value = series[0, _TERMS - 1]
+        moment = series[1, _TERMS - 1]
         for k in range(1, _TERMS):
             value = value * square + series[0, _TERMS - 1 - k]
             moment = moment * square + series[1, _TERMS - 1 - k]

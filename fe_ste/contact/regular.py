@@ -24,7 +24,10 @@ if TYPE_CHECKING:
 
 #: Indices without a sign: one with a sign counts from the end if it is negative, which numba would ask at each use.
 Places: TypeAlias = NDArray[np.uintp]
-_ONE, _TWO, _THREE, _FOUR = np.uintp(1), np.uintp(2), np.uintp(3), np.uintp(4)
+_ONE = np.uintp(1)
+_TWO = np.uintp(2)
+_THREE = np.uintp(3)
+_FOUR = np.uintp(4)
 
 
 @dataclass(frozen=True)
@@ -69,8 +72,10 @@ class RegularCompliance(Displayed):
             Largest difference of tooth pairs in contact at once.
         """
         arc = flank.gear.base_radius * flank.roll**2 / 2.0
-        knots, axial_knots = cubic_knots(arc), cubic_knots(flank.axial)
-        along_profile, along_axis = cubic_coefficients(arc, knots), cubic_coefficients(flank.axial, axial_knots)
+        knots = cubic_knots(arc)
+        axial_knots = cubic_knots(flank.axial)
+        along_profile = cubic_coefficients(arc, knots)
+        along_axis = cubic_coefficients(flank.axial, axial_knots)
         keys: list[tuple[int, int]] = []
         number = np.full((len(teeth), len(teeth)), -1, dtype=np.int64)
         for row, read in enumerate(teeth):
@@ -101,7 +106,8 @@ class RegularCompliance(Displayed):
         arc = np.clip(self.base_radius * roll**2 / 2.0, self.knots[0], self.knots[-1])
         own = cells.tooth[groups[:-1]] - self.first_tooth, cells.layer[groups[:-1]], self.number
         tooth, layer, number = (places.astype(np.uintp) for places in own)
-        profile, width = _first_and_weights(arc, self.knots), _first_and_weights(axial, self.axial_knots)
+        profile = _first_and_weights(arc, self.knots)
+        width = _first_and_weights(axial, self.axial_knots)
         _add_regular(matrix, groups.astype(np.uintp), tooth, layer, *profile, *width, self.table, number)
 
     def _line(self) -> str:
@@ -117,7 +123,8 @@ def _first_and_weights(at: Floats, knots: Floats) -> tuple[Places, Floats]:
 
 def _coefficients(block: Floats, along_axis: Floats, along_profile: Floats) -> Floats:
     """Turn nodal values on the flank grid (f l, f l) into spline coefficients (f, l, l f)."""
-    profile, layers = len(along_profile), len(along_axis)
+    profile = len(along_profile)
+    layers = len(along_axis)
     read = np.kron(along_profile, along_axis)
     loaded = np.einsum("kl,pf->flkp", along_axis, along_profile).reshape(profile * layers, layers * profile)
     return np.asarray((read @ block @ loaded).reshape(profile, layers, layers * profile))
@@ -141,8 +148,10 @@ def _add_regular(
     The splines of a row's layer are summed for its slice, those of its profile for its cell, and what is left, a
     function of the loaded point, for each slice and at last for each cell of a tooth pair.
     """
-    splines, layers = table.shape[1], table.shape[2]
-    of_slice, of_cell = np.empty((splines, layers * splines)), np.empty((layers, splines))
+    splines = table.shape[1]
+    layers = table.shape[2]
+    of_slice = np.empty((splines, layers * splines))
+    of_cell = np.empty((layers, splines))
     loaded = np.empty(splines)
     for g in range(len(groups) - 1):
         own = first[groups[g] : groups[g + 1]]
@@ -172,7 +181,13 @@ def _add_regular(
 @summing_kernel
 def _sum_four(result: Floats, rows: Floats, first: np.uintp, weights: Floats) -> None:
     """Weighted sum of four rows that follow each other."""
-    row_0, row_1, row_2, row_3 = rows[first], rows[first + _ONE], rows[first + _TWO], rows[first + _THREE]
-    weight_0, weight_1, weight_2, weight_3 = weights[0], weights[1], weights[2], weights[3]
+    row_0 = rows[first]
+    row_1 = rows[first + _ONE]
+    row_2 = rows[first + _TWO]
+    row_3 = rows[first + _THREE]
+    weight_0 = weights[0]
+    weight_1 = weights[1]
+    weight_2 = weights[2]
+    weight_3 = weights[3]
     for q in range(len(result)):
         result[q] = weight_0 * row_0[q] + weight_1 * row_1[q] + weight_2 * row_2[q] + weight_3 * row_3[q]

@@ -98,7 +98,8 @@ def _solved(matrix: SparseMatrix, right: Floats) -> Floats:
 
 def flank_spacing(mesh: SectorMesh, side: int) -> FlankSpacing:
     """Return how the nodes of a flank of equal layers lie on a plane."""
-    gear, roll = mesh.gear, mesh.section.flank_roll
+    gear = mesh.gear
+    roll = mesh.section.flank_roll
     handed = side * (-1.0 if gear.internal else 1.0)
     shear = handed * np.tan(gear.base_helix_angle) * roll.mean()
     arc = gear.base_radius * roll**2 / 2.0
@@ -111,7 +112,8 @@ def flat_block(mesh: SectorMesh, side: int) -> tuple[Floats, Integers]:
 
     Along the profile there are `BLOCK_MARGIN` nodes more on either side of the flank's.
     """
-    gear, section = mesh.gear, mesh.section
+    gear = mesh.gear
+    section = mesh.section
     arc, layer, shear, cosine = flank_spacing(mesh, side)
     behind = section.between_flanks[::-side]
     behind = behind[: 1 + max(2, round(_DEPTH * (len(behind) - 1)))]
@@ -124,9 +126,11 @@ def flat_block(mesh: SectorMesh, side: int) -> tuple[Floats, Integers]:
     outward = (-1.0 if gear.internal else 1.0) * np.sin(angle) * radial + side * np.cos(angle) * tangential
     tangent = np.stack([outward[:, 1], -outward[:, 0]], axis=-1)
     tangent = tangent * np.sign(np.sum(tangent[0] * np.diff(section.points[behind[0]], axis=0)[0]))
-    across, inward = np.sum(offset * tangent, axis=-1), -np.sum(offset * outward, axis=-1)
+    across = np.sum(offset * tangent, axis=-1)
+    inward = -np.sum(offset * outward, axis=-1)
     ends = ((0, 0), (BLOCK_MARGIN, BLOCK_MARGIN))
-    across, inward = np.pad(across, ends, mode="edge"), np.pad(inward, ends, mode="edge")
+    across = np.pad(across, ends, mode="edge")
+    inward = np.pad(inward, ends, mode="edge")
     step = arc[1] - arc[0]
     beyond = step * np.arange(1, BLOCK_MARGIN + 1)
     arcs = np.concatenate([arc[0] - beyond[::-1], arc, arc[-1] + beyond])
@@ -148,7 +152,9 @@ def block_bricks(points: Floats, numbers: Integers) -> Integers:
     corners = [numbers[k : k + deep, i : i + along, j : j + layers].ravel() for k in (0, 1) for i, j in square]
     hexahedra = np.stack(corners, axis=-1)
     edges = points[hexahedra[0, [1, 3, 4]]] - points[hexahedra[0, 0]]
-    return hexahedra if np.linalg.det(edges) > 0.0 else hexahedra[:, [0, 3, 2, 1, 4, 7, 6, 5]]
+    if np.linalg.det(edges) > 0.0:
+        return hexahedra
+    return hexahedra[:, [0, 3, 2, 1, 4, 7, 6, 5]]
 
 
 def unknowns_of(nodes: Integers) -> Integers:
@@ -173,10 +179,12 @@ def _half_space(mesh: SectorMesh, side: int, places: Floats) -> Floats:
     arc, layer, shear, cosine = flank_spacing(mesh, side)
     material = mesh.gear.material
     gauss, weight = np.polynomial.legendre.leggauss(3)
-    step, within = arc[1] - arc[0], (gauss + 1.0) / 2.0
+    step = arc[1] - arc[0]
+    within = (gauss + 1.0) / 2.0
     parts = max(2, int(np.ceil(layer / step)))  # along the layer about as fine as along the profile
     along = ((np.arange(parts)[:, None] + within) / parts).ravel()
-    z, height = layer * np.concatenate([-along, along]), np.tile(np.tile(weight, parts) * (1.0 - along), 2)
+    z = layer * np.concatenate([-along, along])
+    height = np.tile(np.tile(weight, parts) * (1.0 - along), 2)
     # Loads by interval of the profile, point in it, and point along the layers; each has a part in two tents.
     shape = (len(arc) - 1, len(within), len(z))
     interval = np.repeat(np.arange(shape[0]), shape[1] * shape[2])

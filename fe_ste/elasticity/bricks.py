@@ -146,7 +146,8 @@ def gradient_products(gradients: Floats, volume: Floats, material: Material) -> 
     count, _, elements, points = gradients.shape
     flat = np.ascontiguousarray(gradients.transpose(2, 0, 1, 3)).reshape(elements, 3 * count, points)
     products = ((flat * volume[:, None, :]) @ flat.transpose(0, 2, 1)).reshape(elements, count, 3, count, 3)
-    modulus, ratio = material.youngs_modulus, material.poissons_ratio
+    modulus = material.youngs_modulus
+    ratio = material.poissons_ratio
     lame = modulus * ratio / ((1 + ratio) * (1 - 2 * ratio))
     shear = modulus / (2 * (1 + ratio))
     # B'DB of an isotropic solid: lambda div u div v + mu (grad u + grad u') : grad v.

@@ -134,7 +134,8 @@ def flank_functionals(mesh: SectorMesh, side: int) -> SparseMatrix:
 
 def flank_normals(mesh: SectorMesh, side: int) -> Floats:
     """Return the unit normals out of the material at the flank nodes, (f, l, 3)."""
-    gear, roll = mesh.gear, mesh.section.flank_roll
+    gear = mesh.gear
+    roll = mesh.section.flank_roll
     tip_sign = -1.0 if gear.internal else 1.0
     pressure_angle = np.arctan(roll)
     radius = gear.base_radius * np.sqrt(1.0 + roll**2)

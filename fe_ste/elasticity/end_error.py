@@ -26,10 +26,12 @@ END_LAYERS = 5
 _LAYERS = 8
 
 #: Rows of bricks behind those of the flat block, each this much deeper than the one before it: to no displacement.
-_DEEPER, _GROWTH = 6, 1.5
+_DEEPER = 6
+_GROWTH = 1.5
 
 #: Points of the integrals over a layer, and wave numbers on either side that the nodes cannot tell from one.
-_POINTS, _ALIASES = 12, 5
+_POINTS = 12
+_ALIASES = 5
 
 
 def end_errors(mesh: SectorMesh, side: int, images: Floats, incompatible_modes: bool = True) -> tuple[Floats, Floats]:
@@ -52,16 +54,17 @@ def end_errors(mesh: SectorMesh, side: int, images: Floats, incompatible_modes: 
         By nodes along the profile from the load to the place read, from -w + 1 to w - 1 with w = `WAVES`; by layer
         read and layer loaded, `END_LAYERS` each, counted from the end; m/N.
     """
-    loaded, middle = np.arange(END_LAYERS), END_LAYERS
+    loaded = np.arange(END_LAYERS)
+    middle = END_LAYERS
     inside = _Row(mesh, side, 1, 2 * END_LAYERS + 1, incompatible_modes)
     known = inside.error(np.array([middle]), None)[..., 0]
-    found = []
+    errors = []
     for end, of_end in zip((-1, 1), images, strict=True):
         error = _Row(mesh, side, end, _LAYERS, incompatible_modes).error(loaded, of_end)[:, :END_LAYERS]
         # Layers of the row inside run from the upper end downwards.
         error -= known[:, middle + end * (loaded[:, None] - loaded)]
-        found.append(_by_distance(error))
-    return found[0], found[1]
+        errors.append(_by_distance(error))
+    return errors[0], errors[1]
 
 
 def _wave_numbers() -> Floats:
@@ -85,7 +88,8 @@ class _Row:
         self._step = float(arc[1] - arc[0])
         points, numbers = flat_block(mesh, side)
         block = points.reshape(*numbers.shape, 3)[:, BLOCK_MARGIN + len(arc) // 2]
-        behind, across = block[:, block.shape[1] // 2], block[0, 1] - block[0, 0]
+        behind = block[:, block.shape[1] // 2]
+        across = block[0, 1] - block[0, 0]
         deeper = np.cumsum(_GROWTH ** np.arange(1, _DEEPER + 1))[:, None] * (behind[-1] - behind[-2])
         behind = np.concatenate([behind, behind[-1] + deeper])
         near = behind[:, None] - end * np.arange(layers)[:, None] * across
@@ -125,7 +129,8 @@ class _Row:
         places, shares = np.polynomial.legendre.leggauss(_POINTS)
         # The substitution gathers points at both ends, where the field of a layer's own load is a logarithm.
         s = (places + 1.0) / 2.0
-        within, shares = s**3 * (10.0 - 15.0 * s + 6.0 * s * s), 15.0 * shares * (s * (1.0 - s)) ** 2
+        within = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+        shares = 15.0 * shares * (s * (1.0 - s)) ** 2
         aliases = _wave_numbers()[:, None] + 2.0 * np.pi * np.arange(-_ALIASES, _ALIASES + 1)
         wave = (aliases / self._step)[:, :, None, None]
         tent = np.sinc(aliases / (2.0 * np.pi)) ** 2 / self._step

@@ -185,7 +185,8 @@ def _flank_compliance(
         lambda: flank_near_field(mesh, side, images, incompatible_modes),
     )
     if open_teeth is None:
-        faces, torque = sector.ring_faces(gear.teeth, min(tooth_reach, (gear.teeth - 2) // 2)), sector.ring_torque()
+        faces = sector.ring_faces(gear.teeth, min(tooth_reach, (gear.teeth - 2) // 2))
+        torque = sector.ring_torque()
     else:
         faces, torque = sector.open_faces(open_teeth)
     regular = {}
@@ -253,13 +254,17 @@ def flank_near_field(mesh: SectorMesh, side: int, images: Floats, incompatible_m
     ndarray (f l, f l)
         Normal displacement of the flank nodes per unit tent load, m/N.
     """
-    gear, material = mesh.gear, mesh.gear.material
-    roll, axial = mesh.section.flank_roll, mesh.axial_positions
-    lead, cosine = _flank_lead(gear, side), float(np.cos(gear.base_helix_angle))
+    gear = mesh.gear
+    material = mesh.gear.material
+    roll = mesh.section.flank_roll
+    axial = mesh.axial_positions
+    lead = _flank_lead(gear, side)
+    cosine = float(np.cos(gear.base_helix_angle))
     field = tent_integrals(roll, axial, gear.base_radius, lead, cosine, images)
     field *= (1 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus)
     by_node = field.reshape(len(roll), len(axial), len(roll), len(axial))
-    error, last = brick_error(mesh, side, incompatible_modes), len(axial) - 1
+    error = brick_error(mesh, side, incompatible_modes)
+    last = len(axial) - 1
     for loaded in range(last + 1):
         for read in range(max(0, loaded - ERROR_REACH), min(last, loaded + ERROR_REACH) + 1):
             by_node[:, read, :, loaded] += error[:, read - loaded + ERROR_REACH]
@@ -275,5 +280,6 @@ def flank_near_field(mesh: SectorMesh, side: int, images: Floats, incompatible_m
 
 def flank_images(gear: Gear, side: int) -> Floats:
     """Return the image loads (2, n, 3) behind both ends: a helical flank meets one under an acute angle."""
-    lean, ratio = side * gear.base_helix_angle, gear.material.poissons_ratio
+    lean = side * gear.base_helix_angle
+    ratio = gear.material.poissons_ratio
     return np.stack([wedge_images(np.pi / 2 + lean, ratio), wedge_images(np.pi / 2 - lean, ratio)])

@@ -33,7 +33,8 @@ _ROUNDING = 1e-9
 
 #: What the half turn does to the components of a vector.
 _HALF_TURN = np.array([1.0, -1.0, -1.0])
-EVEN, ODD = 1, -1
+EVEN = 1
+ODD = -1
 
 #: Section node -> its block, and its unknowns by those of the block; what is not here is a block of its own.
 _Maps: TypeAlias = dict[int, tuple[int, Floats]]
@@ -109,7 +110,8 @@ def _line_turn(layers: int) -> Floats:
 
 def _turn_basis(layers: int) -> tuple[Floats, Floats]:
     """Orthonormal vectors, one a column, that the half turn of a line keeps or reverses, and these signs."""
-    turn, front = _line_turn(layers), 3 * (layers // 2)
+    turn = _line_turn(layers)
+    front = 3 * (layers // 2)
     kept, reverse = ((np.eye(3 * layers) + sign * turn)[:, :front] * np.sqrt(0.5) for sign in (EVEN, ODD))
     middle = np.eye(3 * layers)[:, front : 3 * layers - front]
     basis = np.concatenate([kept, reverse, middle], axis=1)
@@ -197,11 +199,13 @@ class _Halving:
 
     def _maps(self, parity: int) -> _Maps:
         """Block, and the node's unknowns by those of the block, of all nodes that are no plain block of their own."""
-        section, layers = self._mesh.section, self._layers
+        section = self._mesh.section
+        layers = self._layers
         turn, (basis, signs) = _line_turn(layers), _turn_basis(layers)
         maps = {}
         half_pitch = self._mesh.gear.angular_pitch / 2
-        cosine, sine = np.cos(half_pitch), np.sin(half_pitch)
+        cosine = np.cos(half_pitch)
+        sine = np.sin(half_pitch)
         radial = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         for node in self._face.tolist():
             maps[node] = node, np.kron(np.eye(layers), radial) @ basis
@@ -225,15 +229,16 @@ class _Halving:
         return sizes
 
     def _planned(self, middles: Floats) -> Front:
-        maps, section = self._maps(EVEN), self._mesh.section
+        maps = self._maps(EVEN)
+        section = self._mesh.section
         block = np.arange(self._nodes)
         for node, (at, _) in maps.items():
             block[node] = at
         couplings = [np.array([block[node], self._nodes + 1 + group]) for node, group in self._pairs]
         cells = [*(block[np.unique(corners)] for corners in self._elements.corners), *couplings]
-        places = section.points[[node for node, _ in self._pairs]]
+        point = section.points[[node for node, _ in self._pairs]]
         kept = np.concatenate([self._face, np.arange(self._nodes, self._nodes + 1 + self._groups)])
-        return dissected(np.concatenate([middles, places]), cells, self._sizes(maps), kept, _LEAF_BLOCKS)
+        return dissected(np.concatenate([middles, point]), cells, self._sizes(maps), kept, _LEAF_BLOCKS)
 
     def _add_cells(self, maps: _Maps, sizes: Integers, matrix: Floats, cells: Integers, blocks: Integers) -> None:
         """Add the matrices of some cells over the unknowns of some blocks."""
@@ -259,8 +264,10 @@ class _Halving:
 
 def _mirror_images(mesh: SectorMesh) -> Integers:
     """Section node that each node of a section becomes by the half turn."""
-    points, axial = mesh.section.points, mesh.axial_positions
-    images, missed = np.empty(len(points), dtype=np.int64), np.abs(axial + axial[::-1]).max()
+    points = mesh.section.points
+    axial = mesh.axial_positions
+    images = np.empty(len(points), dtype=np.int64)
+    missed = np.abs(axial + axial[::-1]).max()
     for some in np.array_split(np.arange(len(points)), len(points) // 256 + 1):  # all at once would be a gigabyte
         away = np.abs(points[some, None] - points * [1.0, -1.0]).max(axis=-1)
         images[some] = away.argmin(axis=1)

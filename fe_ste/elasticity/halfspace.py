@@ -79,12 +79,14 @@ def interior_displacement(
     for n in range(len(places)):
         depth = places[n, 2]
         for m in range(len(loads)):
-            x, y = places[n, 0] - loads[m, 0], places[n, 1] - loads[m, 1]
+            x = places[n, 0] - loads[m, 0]
+            y = places[n, 1] - loads[m, 1]
             distance = math.sqrt(x * x + y * y + depth * depth)
             outward = depth / distance**3 - (1.0 - 2.0 * poissons_ratio) / (distance * (distance + depth))
             inward = depth * depth / distance**3 + 2.0 * (1.0 - poissons_ratio) / distance
             for k in range(2):
-                column, share = columns[m] + k, shares[m, k]
+                column = columns[m] + k
+                share = shares[m, k]
                 result[n, 0, column] += share * outward * x
                 result[n, 1, column] += share * outward * y
                 result[n, 2, column] += share * inward
@@ -122,7 +124,8 @@ def wedge_images(angle: float, poissons_ratio: float) -> Floats:
     beyond = np.clip((np.degrees(angle) - 90.0) / 35.0, -1.0, 1.0)
     ratio = np.clip((poissons_ratio - 0.3) / 0.05, -1.0, 1.0)
     found = (_WEDGE @ np.concatenate([beyond ** np.arange(5), ratio * beyond ** np.arange(3)])).reshape(2, 3)
-    strength, squares = np.exp(found[:, 0]), np.exp(found[:, 1])
+    strength = np.exp(found[:, 0])
+    squares = np.exp(found[:, 1])
     return np.stack([strength, squares, 2.0 * squares * found[:, 2]], axis=-1)
 
 
@@ -132,9 +135,12 @@ def _weighted_difference(x: float, high: float, low: float, to_high: float, to_l
     # asinh(h / |x|) = log((h + hypot(x, h)) / |x|). For a negative h the sum would cancel, but asinh is odd.
     if x == 0.0:
         return 0.0
-    above, below = abs(high) + to_high, abs(low) + to_low
+    above = abs(high) + to_high
+    below = abs(low) + to_low
     if (high < 0.0) == (low < 0.0):
-        return x * math.log(above / below) if high >= 0.0 else x * math.log(below / above)
+        if high >= 0.0:
+            return x * math.log(above / below)
+        return x * math.log(below / above)
     return x * math.log(above * below / (x * x))
 
 
@@ -161,10 +167,14 @@ def rectangle_integral(across: float, along: float, half_across: float, half_alo
     A. E. H. Love, Phil. Trans. R. Soc. A 228 (1929) 377-420; Johnson, Contact Mechanics, eq. (3.25).
     """
     # Johnson's four logarithms, joined in pairs: sides right and left by the height, top and bottom by the breadth.
-    right, left = across + half_across, across - half_across
-    top, bottom = along + half_along, along - half_along
-    right_top, right_bottom = math.hypot(right, top), math.hypot(right, bottom)
-    left_top, left_bottom = math.hypot(left, top), math.hypot(left, bottom)
+    right = across + half_across
+    left = across - half_across
+    top = along + half_along
+    bottom = along - half_along
+    right_top = math.hypot(right, top)
+    right_bottom = math.hypot(right, bottom)
+    left_top = math.hypot(left, top)
+    left_bottom = math.hypot(left, bottom)
     return (
         _weighted_difference(right, top, bottom, right_top, right_bottom)
         - _weighted_difference(left, top, bottom, left_top, left_bottom)
@@ -198,7 +208,8 @@ def tent_integrals(
     ndarray (f l, f l)
         Row: read-out node, column: load node, both numbered ``flank node * l + layer``, 1/m.
     """
-    n_roll, n_axial = len(roll), len(axial)
+    n_roll = len(roll)
+    n_axial = len(axial)
     result = np.zeros((n_roll * n_axial, n_roll * n_axial))
     weight_sum = np.zeros(n_roll * n_axial)
     metric = (base_radius, lead, base_helix_cosine)
@@ -222,7 +233,8 @@ def tent_integrals(
                             for k in range(4):
                                 result[read, columns[k]] += image[0] * corners[k]
             # Areas of the tents: r_b phi dphi dz, constant factors left out; exact for a tent times phi.
-            near, far = quad[0] / 3.0 + (quad[0] + quad[2]) / 6.0, quad[0] / 6.0 + (quad[0] + quad[2]) / 3.0
+            near = quad[0] / 3.0 + (quad[0] + quad[2]) / 6.0
+            far = quad[0] / 6.0 + (quad[0] + quad[2]) / 3.0
             for k in range(4):
                 weight_sum[columns[k]] += 0.5 * quad[2] * quad[3] * (near if k < 2 else far)
     return result / weight_sum
@@ -255,14 +267,17 @@ def _add_quadrilateral(
     while held > 0:
         held -= 1
         s, t, width, height = stack[held]
-        phi, z = roll + (s + width / 2) * roll_step, axial + (t + height / 2) * axial_step
+        phi = roll + (s + width / 2) * roll_step
+        z = axial + (t + height / 2) * axial_step
         across = base_radius * 0.5 * (place[0] + phi) * (place[0] - phi - lead * (place[1] - z))
         along = math.sqrt(squares * (own * own + (z - end) ** 2) + product * own * (z - end)) / cosine
-        breadth, length = abs(base_radius * phi * roll_step * width), stretch * axial_step * height / cosine
+        breadth = abs(base_radius * phi * roll_step * width)
+        length = stretch * axial_step * height / cosine
         if max(breadth, length) > 0.5 * math.hypot(across, along) and max(width, height) > _LEAST_PART:
             halves_roll = 1 if length > 2.0 * breadth else 2
             halves_axial = 1 if breadth > 2.0 * length else 2
-            width, height = width / halves_roll, height / halves_axial
+            width = width / halves_roll
+            height = height / halves_axial
             for k in range(halves_roll):
                 for m in range(halves_axial):
                     stack[held, 0], stack[held, 1] = s + k * width, t + m * height
@@ -271,8 +286,10 @@ def _add_quadrilateral(
             continue
         for k in range(3):
             for m in range(3):
-                p, q = s + _PLACES[k] * width, t + _PLACES[m] * height
-                phi, z = roll + p * roll_step, axial + q * axial_step
+                p = s + _PLACES[k] * width
+                q = t + _PLACES[m] * height
+                phi = roll + p * roll_step
+                z = axial + q * axial_step
                 across = base_radius * 0.5 * (place[0] + phi) * (place[0] - phi - lead * (place[1] - z))
                 square = (squares * (own * own + (z - end) ** 2) + product * own * (z - end)) / (cosine * cosine)
                 area = _SHARES[k] * _SHARES[m] * width * height * phi * roll_step * axial_step
@@ -335,7 +352,8 @@ def tent_means(nodes: Floats, places: Floats) -> Floats:
     knots = cubic_knots(places)
     splines = cubic_coefficients(places, knots)
     points, shares = np.polynomial.legendre.leggauss(4)
-    means, total = np.zeros((len(nodes), len(nodes))), np.zeros(len(nodes))
+    means = np.zeros((len(nodes), len(nodes)))
+    total = np.zeros(len(nodes))
     for left in range(len(nodes) - 1):
         within = (points + 1.0) / 2.0
         at = nodes[left] + within * (nodes[left + 1] - nodes[left])

@@ -155,7 +155,8 @@ class SectorMesh(Displayed, line=" of {gear.name!r}: {points!n} nodes, {hexahedr
     def points(self) -> Floats:
         """Node coordinates (n, 3), m."""
         layers = self.section.points if self.layer_points is None else self.layer_points
-        x, y = layers[..., 0], layers[..., 1]
+        x = layers[..., 0]
+        y = layers[..., 1]
         angle = self.twist_rate * self.axial_positions[:, None]
         turned_x = np.cos(angle) * x - np.sin(angle) * y
         turned_y = np.sin(angle) * x + np.cos(angle) * y
@@ -354,7 +355,8 @@ def _core_block(gear: Gear, plus_edge: Floats, across: Floats) -> Floats:
     step = np.hypot(*np.diff(plus_edge, axis=0).T)
     along = np.concatenate([[0.0], np.cumsum(step)]) / step.sum()
     bottom = minus_edge[0] + across[:, None] * (plus_edge[0] - minus_edge[0])
-    tip_radius, tip_angle = np.hypot(*plus_edge[-1]), np.arctan2(plus_edge[-1, 1], plus_edge[-1, 0])
+    tip_radius = np.hypot(*plus_edge[-1])
+    tip_angle = np.arctan2(plus_edge[-1, 1], plus_edge[-1, 0])
     angle = (2.0 * across - 1.0) * tip_angle
     top = tip_radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     return _coons(minus_edge, plus_edge, bottom, top, across, along)
@@ -390,7 +392,8 @@ def _coons(
 ) -> Floats:
     """Transfinite interpolation between four edges; result (across, along, 2)."""
     # Gordon and Hall, Int. J. Num. Meth. Eng. 7 (1973) 461-477: both pairs of edges less the corners, counted twice.
-    s, t = across[:, None, None], along[None, :, None]
+    s = across[:, None, None]
+    t = along[None, :, None]
     edges = (1 - s) * left + s * right + (1 - t) * bottom[:, None] + t * top[:, None]
     corners = (1 - s) * ((1 - t) * left[0] + t * left[-1]) + s * ((1 - t) * right[0] + t * right[-1])
     return np.asarray(edges - corners)
@@ -408,7 +411,9 @@ def _geometric(count: int, first: float) -> Floats:
     if first * count >= 1.0 or count == 1:
         return np.linspace(0.0, 1.0, count + 1)
 
-    powers, low, high = np.arange(count), 1.0, 50.0
+    powers = np.arange(count)
+    low = 1.0
+    high = 50.0
     while high - low > 4.0 * np.finfo(float).eps * high:  # scipy.optimize would take a quarter of a second to load
         middle = 0.5 * (low + high)
         low, high = (middle, high) if first * np.sum(middle**powers) < 1.0 else (low, middle)

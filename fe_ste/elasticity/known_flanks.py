@@ -99,7 +99,8 @@ def _key(gear: Gear, settings: MeshSettings, options: dict[str, Any]) -> str:
 @functools.cache
 def _method() -> str:
     """Digest of the sources that make the numbers: no version has to be kept in mind."""
-    digest, package = hashlib.sha256(), Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    package = Path(__file__).parents[1]
     for source in sorted(file for room in _ROOMS for file in (package / room).rglob("*.py")):
         content = source.read_bytes()
         digest.update(f"{source.relative_to(package)} {len(content)}\n".encode() + content)

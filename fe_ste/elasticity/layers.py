@@ -53,9 +53,9 @@ class LayeredElements:
         _, first, kinds = np.unique(
             np.round(steps / (_ROUNDING * mesh.gear.face_width)), return_index=True, return_inverse=True
         )
-        found = [_layer(mesh, quads, float(steps[at]), incompatible_modes) for at in first]
-        corners, above, _ = found[0]
-        stiffness = np.stack([matrices for *_, matrices in found])
+        layers = [_layer(mesh, quads, float(steps[at]), incompatible_modes) for at in first]
+        corners, above, _ = layers[0]
+        stiffness = np.stack([matrices for *_, matrices in layers])
         return cls(corners, above, kinds.ravel(), stiffness * share[:, None, None, None, None])
 
     def stack(self, elements: Integers) -> tuple[Integers, Floats]:

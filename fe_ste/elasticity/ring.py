@@ -61,7 +61,9 @@ def doubled(chain: Chain, signs: Floats) -> Chain:
     >>> doubled(spring, np.array([-1.0])).even.tolist()
     [[1.0]]
     """
-    own, across, ones = chain.own, chain.across, int(np.count_nonzero(signs > 0))
+    own = chain.own
+    across = chain.across
+    ones = int(np.count_nonzero(signs > 0))
 
     def half(parity: int) -> Floats:
         # The joined face lies in the middle of the new chain: an even deformation moves only what its turn keeps.
@@ -93,7 +95,8 @@ def enclosed(inner: Floats, outer: Chain, signs: Floats) -> tuple[Floats, Floats
 
 def _condensed(gone: Floats, coupling: Floats, kept: Floats) -> tuple[Floats, Floats, Floats]:
     """Schur complement of the unknowns that are gone, their Cholesky factor L, and the coupling times L^-T."""
-    size, count = len(kept), len(gone)
+    size = len(kept)
+    count = len(gone)
     front = np.empty((count + size, count + size), order="F")
     front[:count, :count], front[count:, :count], front[count:, count:] = gone, coupling, kept
     eliminate(front, count)
@@ -137,7 +140,8 @@ def ring_faces(sector: Chain, load: Chain, signs: Floats, teeth: int, reach: int
 
     def one_parity(parity: int) -> list[Floats]:
         at = 0 if parity > 0 else 1
-        stiffness, follows = rest[at], []
+        stiffness = rest[at]
+        follows = []
         for _ in range(reach):
             stiffness, factor, below = enclosed(stiffness, sector, signs)
             follows.append((factor, below))

@@ -103,7 +103,9 @@ class OpenSector(Displayed):
         return np.asarray(self.hexahedra[element[:, None], HEXAHEDRON_FACES[face]])
 
     def _line(self) -> str:
-        nodes, elements, faces = len(self.points), len(self.hexahedra), len(self.tooth)
+        nodes = len(self.points)
+        elements = len(self.hexahedra)
+        faces = len(self.tooth)
         return f": {nodes} nodes, {elements} hexahedra, {faces} contact faces"
 
 
@@ -120,11 +122,13 @@ class _Placement:
 
 
 def _placements(pair: GearPair, pmc: float) -> tuple[_Placement, _Placement]:
-    pinion, gear = pair.pinion, pair.gear
+    pinion = pair.pinion
+    gear = pair.gear
     pinion_placement = _Placement(
         0, pinion, 1, pmc * pinion.angular_pitch - pinion.half_angle(pair.pinion_working_radius), 1, 0.0
     )
-    half_angle, rolled = gear.half_angle(pair.gear_working_radius), pmc * gear.angular_pitch
+    half_angle = gear.half_angle(pair.gear_working_radius)
+    rolled = pmc * gear.angular_pitch
     if gear.internal:
         return pinion_placement, _Placement(1, gear, -1, rolled + half_angle, 1, -pair.centre_distance)
     return pinion_placement, _Placement(1, gear, 1, math.pi - rolled - half_angle, -1, pair.centre_distance)
@@ -186,7 +190,8 @@ def contact_line_rolls(pair: GearPair, tooth: int, pmc: float, axial: Floats) ->
     pinion = pair.pinion
     twist = math.tan(pinion.base_helix_angle) / pinion.base_radius
     roll = math.tan(pair.working_pressure_angle) + (pmc + tooth) * pinion.angular_pitch + twist * axial
-    tangent, length = pair.base_tangent_length, pinion.base_radius * roll
+    tangent = pair.base_tangent_length
+    length = pinion.base_radius * roll
     return roll, (tangent + length if pair.gear.internal else tangent - length) / pair.gear.base_radius
 
 
@@ -244,7 +249,8 @@ def _graded(count: int, first: float) -> Floats:
     """Fractions 0..1 that bound `count` elements that grow geometrically from `first`."""
     if first * count >= 1.0:
         return np.linspace(0.0, 1.0, count + 1)
-    low, high = 1.0, 1e3
+    low = 1.0
+    high = 1e3
     for _ in range(200):
         ratio = 0.5 * (low + high)
         if first * np.sum(ratio ** np.arange(count)) < 1.0:
@@ -261,7 +267,12 @@ def _joined(placement: _Placement, meshes: list[SectorMesh]) -> OpenSector:
     numbers = np.arange(len(meshes)) - len(meshes) // 2
     first_point = np.cumsum([0] + [len(mesh.points) for mesh in meshes])
     first_brick = np.cumsum([0] + [len(mesh.hexahedra) for mesh in meshes])
-    points, bricks, held, faces, tooth, brick_tooth = [], [], [], [], [], []
+    points = []
+    bricks = []
+    held = []
+    faces = []
+    tooth = []
+    brick_tooth = []
     for copy, (mesh, number) in enumerate(zip(meshes, numbers, strict=True)):
         points.append(_turned(mesh.points, placement.angle + number * gear.angular_pitch))
         bricks.append(mesh.hexahedra + first_point[copy])
@@ -291,7 +302,8 @@ def _joined(placement: _Placement, meshes: list[SectorMesh]) -> OpenSector:
 
 
 def _turned(points: Floats, angle: float) -> Floats:
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     return np.asarray(points @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]))
 
 

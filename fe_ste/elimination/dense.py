@@ -46,9 +46,10 @@ def add_product(target: Floats, left: Floats, right: Floats, factor: float = 1.0
     (rows, inner), columns = left.shape, len(right)
     if min(rows, columns, inner) == 0:
         return
-    scale, one = ctypes.byref(ctypes.c_double(factor)), ctypes.byref(ctypes.c_double(1.0))
+    scale = ctypes.byref(ctypes.c_double(factor))
+    byref = ctypes.byref(ctypes.c_double(1.0))
     sizes = _integer(rows), _integer(columns), _integer(inner)
-    _function("blas", "dgemm")(b"N", b"T", *sizes, scale, *_place(left), *_place(right), one, *_place(target))
+    _function("blas", "dgemm")(b"N", b"T", *sizes, scale, *_place(left), *_place(right), byref, *_place(target))
 
 
 def subtract_square(target: Floats, left: Floats) -> None:
@@ -56,8 +57,11 @@ def subtract_square(target: Floats, left: Floats) -> None:
     rows, inner = left.shape
     if min(rows, inner) == 0:
         return
-    minus, one = ctypes.byref(ctypes.c_double(-1.0)), ctypes.byref(ctypes.c_double(1.0))
-    _function("blas", "dsyrk")(b"L", b"N", _integer(rows), _integer(inner), minus, *_place(left), one, *_place(target))
+    minus = ctypes.byref(ctypes.c_double(-1.0))
+    byref = ctypes.byref(ctypes.c_double(1.0))
+    _function("blas", "dsyrk")(
+        b"L", b"N", _integer(rows), _integer(inner), minus, *_place(left), byref, *_place(target)
+    )
 
 
 def factorise_lower(matrix: Floats) -> None:
@@ -79,9 +83,9 @@ def _divide(rows: Floats, factor: Floats, transposed: bytes) -> None:
     """Multiply rows from the right by the inverse of a lower triangle, or of its transpose, in place."""
     if min(rows.shape) == 0:
         return
-    one = ctypes.byref(ctypes.c_double(1.0))
+    byref = ctypes.byref(ctypes.c_double(1.0))
     sizes = _integer(rows.shape[0]), _integer(rows.shape[1])
-    _function("blas", "dtrsm")(b"R", b"L", transposed, b"N", *sizes, one, *_place(factor), *_place(rows))
+    _function("blas", "dtrsm")(b"R", b"L", transposed, b"N", *sizes, byref, *_place(factor), *_place(rows))
 
 
 def eliminate(matrix: Floats, count: int) -> None:

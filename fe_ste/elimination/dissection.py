@@ -113,8 +113,10 @@ class _Plan:
         first = np.minimum.reduceat(rank[:, cell], starts, axis=1)[:, None]
         last = np.maximum.reduceat(rank[:, cell], starts, axis=1)[:, None]
         counts = np.clip(np.round(_FRACTIONS * len(cells)).astype(np.int64), 1, len(cells) - 1)
-        one, other = first < counts[:, None], last >= counts[:, None]
-        held, sizes = border[blocks], self._sizes[blocks]
+        one = first < counts[:, None]
+        other = last >= counts[:, None]
+        held = border[blocks]
+        sizes = self._sizes[blocks]
         between = one & other & ~held
         gone = between @ sizes
         work = _work(gone, sizes[held].sum())
@@ -140,7 +142,9 @@ def _sorted_borders(front: Front, place: Integers) -> Front:
 def parts_without(front: Front, blocks: Integers) -> list[Front]:
     """Return the largest parts of a dissection in which no cell couples any of some blocks."""
     found, untouched = _parts_without(front, set(blocks.tolist()))
-    return [front] if untouched else found
+    if untouched:
+        return [front]
+    return found
 
 
 def _parts_without(front: Front, blocks: set[int]) -> tuple[list[Front], bool]:
@@ -185,7 +189,8 @@ def schur_complement(
     if known and front in known:
         return known[front]
     blocks = np.concatenate([front.eliminated, front.border])
-    count, gone = int(sizes[blocks].sum()), int(sizes[front.eliminated].sum())
+    count = int(sizes[blocks].sum())
+    gone = int(sizes[front.eliminated].sum())
     parts = side_by_side(lambda child: schur_complement(child, sizes, add_cells, known), front.children)
     matrix = np.zeros((count, count), order="F")
     for child, part in zip(front.children, parts, strict=True):
@@ -213,5 +218,6 @@ def _runs(blocks: Integers, sizes: Integers, part_blocks: Integers) -> Iterator[
     edges = np.flatnonzero(np.diff(place) != 1) + 1
     for first, last in zip([0, *edges], [*edges, len(place)], strict=True):
         if last > first:
-            begin, length = start[place[first]], part_start[last] - part_start[first]
+            begin = start[place[first]]
+            length = part_start[last] - part_start[first]
             yield slice(part_start[first], part_start[last]), slice(begin, begin + length)

@@ -182,7 +182,9 @@ def available_backends() -> tuple[Backend, ...]:
     >>> "superlu" in available_backends()
     True
     """
-    return ("pardiso", "superlu") if importlib.util.find_spec("pypardiso") else ("superlu",)
+    if importlib.util.find_spec("pypardiso"):
+        return ("pardiso", "superlu")
+    return ("superlu",)
 
 
 def factorise(matrix: SparseMatrix, backend: Backend | None = None) -> Factorisation:

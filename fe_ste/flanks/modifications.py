@@ -138,7 +138,8 @@ class FlankModification(Displayed):
             If a relief starts outside the involute between form and tip circle.
         """
         roll_length = np.sqrt(np.maximum(radius**2 - gear.base_radius**2, 0.0))
-        form, tip = gear.root_form_roll_length, gear.tip_form_roll_length
+        form = gear.root_form_roll_length
+        tip = gear.tip_form_roll_length
         from_form = (roll_length - form) / (tip - form)
         along_face = z / gear.face_width
         gap = (
@@ -195,7 +196,9 @@ def _relief_gap(gear: Gear, key: str, relief: Relief, roll_length: Floats, end: 
 def _slope(amount: float, position: Floats) -> Floats:
     """Linear gap over positions 0 to 1 that is zero at one end: at 0, or at 1 for a negative amount."""
     within = np.clip(position, 0.0, 1.0)
-    return amount * within if amount >= 0.0 else -amount * (1.0 - within)
+    if amount >= 0.0:
+        return amount * within
+    return -amount * (1.0 - within)
 
 
 def radius_at_roll_length_from_tip(gear: Gear, roll_length: float) -> float:

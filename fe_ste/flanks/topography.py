@@ -136,7 +136,8 @@ class FlankTopography(Displayed):
         return np.asarray((1.0 - s) * low + s * high, dtype=np.float64)
 
     def _line(self) -> str:
-        radii, removed = value_range(self.radius, "mm", 1e3), value_range(self.removed, "um", 1e6)
+        radii = value_range(self.radius, "mm", 1e3)
+        removed = value_range(self.removed, "um", 1e6)
         return f": {len(self.radius)} x {len(self.axial)} points, radius {radii}, {removed} removed"
 
 

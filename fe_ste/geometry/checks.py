@@ -148,7 +148,8 @@ def _check_ranges(gear: UncheckedGear) -> None:
     if not _is_number(angle) or not least <= angle <= most:
         remedy = f"must lie between {_deg(least)} and {_deg(most)} (given in rad: {least:.4f} to {most:.4f})"
         raise _refuse_gear(gear, "normal_pressure_angle", f"{angle!r} rad", remedy)
-    angle, most = gear.helix_angle, LARGEST_HELIX_ANGLE
+    angle = gear.helix_angle
+    most = LARGEST_HELIX_ANGLE
     if not _is_number(angle) or abs(angle) > most:
         remedy = f"must lie within +-{_deg(most)} (given in rad: +-{most:.4f})"
         raise _refuse_gear(gear, "helix_angle", f"{angle!r} rad", remedy)
@@ -164,7 +165,8 @@ def _check_circles(gear: UncheckedGear) -> None:
         value = f"{gear.profile_shift:g} with tooth_thinning = {_mm(gear.tooth_thinning)}"
         remedy = f"leaves no {what} at the reference circle: values nearer to zero are needed"
         raise _refuse_gear(gear, "profile_shift", value, remedy)
-    tip, root = gear.tip_radius, gear.root_radius
+    tip = gear.tip_radius
+    root = gear.root_radius
     if min(tip, root) <= 0.0 or (tip - root) * gear.outward <= 0.0:
         word = "below" if gear.internal else "above"
         remedy = f"must lie {word} the root diameter of {_mm(2.0 * root)}, and both above zero"
@@ -175,7 +177,8 @@ def _check_generating_rack(gear: UncheckedGear) -> None:
     """Refuse a rounding that does not fit on the rack's tooth."""
     if gear.rack_tip_half_land >= -LENGTH_TOLERANCE * gear.normal_module:
         return
-    angle, radius = gear.normal_pressure_angle, gear.rack.tip_radius
+    angle = gear.normal_pressure_angle
+    radius = gear.rack.tip_radius
     growth = 1.0 / math.cos(angle) - math.tan(angle)
     largest = radius + gear.rack_tip_half_land / gear.normal_module / growth
     if largest < 0.0:
@@ -210,7 +213,8 @@ def _neck_thickness(gear: UncheckedGear) -> float:
 
 def _check_form_circles(gear: UncheckedGear) -> None:
     """Refuse form circles that are given beyond the flank, or that leave none."""
-    tolerance, out = LENGTH_TOLERANCE * gear.normal_module, gear.outward
+    tolerance = LENGTH_TOLERANCE * gear.normal_module
+    out = gear.outward
     if (gear.tip_form_radius - gear.tip_radius) * out > tolerance:
         word = "smaller" if gear.internal else "larger"
         remedy = f"must not be {word} than the tip diameter of {_mm(2.0 * gear.tip_radius)}"
@@ -252,7 +256,8 @@ def _check_cutter(gear: UncheckedGear, cutter: PinionCutter) -> None:
 
 def _check_cutter_tooth(gear: UncheckedGear, cutter: PinionCutter) -> None:
     """Refuse a cutter whose tip is below its involute or pointed, and a rounding that does not fit on it."""
-    cut, module = gear.cutter_tip_cut, gear.normal_module
+    cut = gear.cutter_tip_cut
+    module = gear.normal_module
     tip = 2.0 * cut.cutter_tip_radius
     key = "cutter.tip_diameter" if cutter.tip_diameter is not None else "root_diameter"
     value = _mm(tip) if cutter.tip_diameter is not None else _mm(2.0 * gear.root_radius)
@@ -275,7 +280,9 @@ def _check_flank_of_ring(gear: UncheckedGear) -> None:
 
 def _check_trimmed_tips(gear: UncheckedGear) -> None:
     """Refuse a cutter that takes something off the tips: below its involute, or beside the line of action."""
-    cut, tip, count = gear.cutter_tip_cut, gear.tip_radius, gear.cutter.teeth if gear.cutter else 0
+    cut = gear.cutter_tip_cut
+    tip = gear.tip_radius
+    count = gear.cutter.teeth if gear.cutter else 0
     if gear.tip_roll_length < cut.tangent_length:
         bound = 2.0 * math.hypot(gear.base_radius, cut.tangent_length)
         remedy = (
@@ -328,7 +335,8 @@ def _check_held_diameter(gear: UncheckedGear) -> None:
 
 
 def _check_teeth_of_mates(pair: UncheckedPair) -> None:
-    pinion, gear = pair.pinion, pair.gear
+    pinion = pair.pinion
+    gear = pair.gear
     if pinion.internal:
         remedy = "is an internal gear: the external gear of the pair must be the pinion"
         raise _refuse_pair(pair, "pinion", f"'{pinion.name}'", remedy)
@@ -339,7 +347,8 @@ def _check_teeth_of_mates(pair: UncheckedPair) -> None:
 
 
 def _check_common_face(pair: UncheckedPair) -> None:
-    width, most = pair.common_face_width, min(pair.pinion.face_width, pair.gear.face_width)
+    width = pair.common_face_width
+    most = min(pair.pinion.face_width, pair.gear.face_width)
     if width is None:
         return
     if not _is_number(width) or not 0.0 < width <= most + LENGTH_TOLERANCE * pair.pinion.normal_module:
@@ -350,7 +359,8 @@ def _check_common_face(pair: UncheckedPair) -> None:
 
 
 def _check_equal_rack(pair: UncheckedPair) -> None:
-    pinion, gear = pair.pinion, pair.gear
+    pinion = pair.pinion
+    gear = pair.gear
     if not math.isclose(pinion.normal_module, gear.normal_module, rel_tol=LENGTH_TOLERANCE):
         remedy = f"must equal that of '{pinion.name}', {_mm(pinion.normal_module)}"
         raise _refuse_pair(pair, f"normal_module of '{gear.name}'", _mm(gear.normal_module), remedy)
@@ -383,7 +393,8 @@ def _check_centre_distance(pair: UncheckedPair) -> None:
 
 
 def _check_backlash(pair: UncheckedPair) -> None:
-    backlash, limit = pair.circumferential_backlash, pair.backlash_free_centre_distance
+    backlash = pair.circumferential_backlash
+    limit = pair.backlash_free_centre_distance
     if backlash >= -LENGTH_TOLERANCE * pair.pinion.normal_module:
         return
     if limit <= abs(pair.gear.base_radius - pair.pinion.base_radius):
@@ -484,13 +495,16 @@ def _corner_gap(
     distance = pair.centre_distance
     # Origin on the tip's axis, x along the line of centres to the pitch point; x as the mate sees it is
     # to_mate * distance + turn * x.
-    to_mate, turn = (-1.0 if tip.internal else 1.0), -float(pair.gear.outward)
+    to_mate = -1.0 if tip.internal else 1.0
+    turn = -float(pair.gear.outward)
     cosine = to_mate * turn * (mate.form_radius**2 - distance**2 - radius**2) / (2.0 * distance * radius)
     if cosine >= 1.0:
         return math.inf
     corner = np.linspace(-1.0, 1.0, 1001) * math.acos(max(cosine, -1.0))
-    x, y = to_mate * distance + turn * radius * np.cos(corner), radius * np.sin(corner)
-    seen_radius, seen_angle = np.hypot(x, y), np.arctan2(y, x)
+    x = to_mate * distance + turn * radius * np.cos(corner)
+    y = radius * np.sin(corner)
+    seen_radius = np.hypot(x, y)
+    seen_angle = np.arctan2(y, x)
     # The flanks touch at the pitch point at rotation zero.
     rotation = corner - half_angle_of_corner + tip.half_angle(pair.working_radius(tip))
     mate_tooth = mate.half_angle(pair.working_radius(mate)) + rotation * tip.teeth / mate.teeth
@@ -526,7 +540,9 @@ def internal_tip_gap(pair: UncheckedPair) -> float:
     float
         Arc along the gear's tip circle, m; negative if the corners collide.
     """
-    pinion, gear, distance = pair.pinion, pair.gear, pair.centre_distance
+    pinion = pair.pinion
+    gear = pair.gear
+    distance = pair.centre_distance
     at_pinion = math.acos(
         (gear.tip_radius**2 - distance**2 - pinion.tip_radius**2) / (2.0 * distance * pinion.tip_radius)
     )

@@ -137,7 +137,8 @@ class CutterTipCut:
     @cached_property
     def largest_rounding(self) -> float:
         """Largest radius that fits on the cutter's tip, a full round, m; NaN where its tooth is pointed before it."""
-        low, high = 0.0, self.cutter_tip_radius - self.cutter_base_radius
+        low = 0.0
+        high = self.cutter_tip_radius - self.cutter_base_radius
         if replace(self, rounding=low).arc_centre_angle < 0.0:
             return math.nan
         while high - low > 1e-12 * self.cutter_tip_radius:
@@ -156,7 +157,8 @@ class CutterTipCut:
         parameter : array
             0 where the involute ends, to 1 at the root circle.
         """
-        flank, centre_angle = self._flank_normal, self.arc_centre_angle
+        flank = self._flank_normal
+        centre_angle = self.arc_centre_angle
         direction = flank + parameter * (centre_angle - flank)
         away = direction - centre_angle
         # Along the normal from the arc's centre to the cutter's pitch circle.
@@ -204,7 +206,8 @@ class CutterTipCut:
         most = math.acos(min(max(crossing, -1.0), 1.0))
         rotation = (np.linspace(-most, most, POSITIONS) - corner) / self.ratio
         seen = tip_radius * np.exp(1j * (corner + self.ratio * rotation)) - distance
-        radius, angle = np.abs(seen), np.angle(seen * np.exp(-1j * rotation))
+        radius = np.abs(seen)
+        angle = np.angle(seen * np.exp(-1j * rotation))
         near = (radius > self.cutter_base_radius) & (radius < self.cutter_tip_radius)
         if not near.any():
             return math.inf

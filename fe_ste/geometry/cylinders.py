@@ -62,13 +62,13 @@ def mass_properties(tubes: Iterable[Tube]) -> MassProperties:
 
 def together(bodies: Iterable[MassProperties]) -> MassProperties:
     """Mass properties of several bodies on one axis, as one."""
-    parts = [one for one in bodies if one.mass > 0.0]
-    mass = sum(one.mass for one in parts)
+    parts = [body for body in bodies if body.mass > 0.0]
+    mass = sum(part.mass for part in parts)
     if mass <= 0.0:
         return MassProperties(0.0, 0.0, 0.0, 0.0)
-    centre = sum(one.mass * one.centre for one in parts) / mass
-    transverse = sum(one.transverse + one.mass * (one.centre - centre) ** 2 for one in parts)
-    return MassProperties(mass, sum(one.axial for one in parts), transverse, centre)
+    centre = sum(part.mass * part.centre for part in parts) / mass
+    transverse = sum(part.transverse + part.mass * (part.centre - centre) ** 2 for part in parts)
+    return MassProperties(mass, sum(part.axial for part in parts), transverse, centre)
 
 
 def _of_one(tube: Tube) -> MassProperties:

@@ -55,7 +55,9 @@ def shift_beside(mate: UncheckedGear, gear: UncheckedGear, centre_distance: floa
         return None
     if gear.internal:
         return mate.profile_shift - total
-    return total + mate.profile_shift if mate.internal else total - mate.profile_shift
+    if mate.internal:
+        return total + mate.profile_shift
+    return total - mate.profile_shift
 
 
 def root_margin(pair: UncheckedPair, tip: UncheckedGear) -> float:

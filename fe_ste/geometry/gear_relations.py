@@ -100,14 +100,18 @@ class UncheckedGear:
     @property
     def outward(self) -> int:
         """Direction in which the teeth point: +1 away from the axis, -1 towards it."""
-        return -1 if self.internal else 1
+        if self.internal:
+            return -1
+        return 1
 
     @property
     def hand(self) -> Literal["right", "left", "spur"]:
         """Hand of the helix."""
         if self.helix_angle == 0.0:
             return "spur"
-        return "right" if self.helix_angle > 0.0 else "left"
+        if self.helix_angle > 0.0:
+            return "right"
+        return "left"
 
     @property
     def transverse_module(self) -> float:
@@ -219,7 +223,9 @@ class UncheckedGear:
     @property
     def tip_form_radius(self) -> float:
         """Radius at which a chamfer or rounding of the tip ends the flank (ISO 21771: d_Fa / 2), m."""
-        return self.tip_radius if self.tip_form_diameter is None else 0.5 * self.tip_form_diameter
+        if self.tip_form_diameter is None:
+            return self.tip_radius
+        return 0.5 * self.tip_form_diameter
 
     @property
     def root_form_radius(self) -> float:
@@ -276,7 +282,9 @@ class UncheckedGear:
     @property
     def fillet_start(self) -> float:
         """Parameter of `rack_tip_cut` at which the fillet of an external gear begins: above 0 on an undercut tooth."""
-        return self.rack_tip_cut.undercut_parameter if self.is_undercut else 0.0
+        if self.is_undercut:
+            return self.rack_tip_cut.undercut_parameter
+        return 0.0
 
     @cached_property
     def rack_tip_cut(self) -> RackTipCut:
@@ -365,7 +373,8 @@ class UncheckedGear:
 
         Thinner teeth are cut by a rack whose teeth are wider by as much; zero is a full-fillet rack.
         """
-        angle, rack = self.normal_pressure_angle, self.rack
+        angle = self.normal_pressure_angle
+        rack = self.rack
         taper = (self.dedendum_factor - rack.tip_radius) * math.tan(angle) + rack.tip_radius / math.cos(angle)
         widening = 0.5 * self.tooth_thinning * math.cos(self.helix_angle)
         return self.normal_module * (0.25 * math.pi - taper) + widening
@@ -393,4 +402,6 @@ class UncheckedGear:
             profile_angle = np.arccos(self.base_radius / np.asarray(radius, dtype=np.float64))
         fall = np.tan(profile_angle) - profile_angle - involute(self.transverse_pressure_angle)
         half_angle = self.reference_half_angle - self.outward * fall
-        return half_angle if isinstance(radius, np.ndarray) else float(half_angle)
+        if isinstance(radius, np.ndarray):
+            return half_angle
+        return float(half_angle)

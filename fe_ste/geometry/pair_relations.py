@@ -47,7 +47,8 @@ class UncheckedPair:
     @property
     def backlash_free_centre_distance(self) -> float:
         """Centre distance without backlash, m: the least of an external pair, the greatest of an internal."""
-        pinion, gear = self.pinion, self.gear
+        pinion = self.pinion
+        gear = self.gear
         thickness = pinion.teeth * pinion.reference_half_angle + gear.teeth * gear.reference_half_angle
         angle = pinion.transverse_pressure_angle
         value = involute(angle) + (thickness - math.pi) / self._signed_teeth_sum
@@ -157,6 +158,7 @@ class UncheckedPair:
     @property
     def circumferential_backlash(self) -> float:
         """Play between the back flanks along the working circles, transverse section, m."""
-        r_1, r_2 = self.pinion_working_radius, self.gear_working_radius
+        r_1 = self.pinion_working_radius
+        r_2 = self.gear_working_radius
         thickness = 2.0 * (r_1 * self.pinion.half_angle(r_1) + r_2 * self.gear.half_angle(r_2))
         return self.pinion.angular_pitch * r_1 - thickness

@@ -50,7 +50,8 @@ def cubic_values(places: Floats, knots: Floats) -> tuple[Integers, Floats]:
     for degree in range(1, _DEGREE + 1):
         carried = np.zeros(len(places))
         for number in range(degree):
-            above, below = knots[span + number + 1], knots[span + number + 1 - degree]
+            above = knots[span + number + 1]
+            below = knots[span + number + 1 - degree]
             part = values[number] / (above - below)
             values[number] = carried + (above - places) * part
             carried = (places - below) * part

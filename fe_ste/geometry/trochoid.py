@@ -66,7 +66,8 @@ class RackTipCut:
         travel = y * np.cos(slope) / (stretch * np.sin(slope)) - x
         # The rack's tooth cuts the space next to the tooth on the +x axis: its middle is at half a pitch.
         rotation = travel / self.reference_radius
-        height, side = self.reference_radius + y, x + travel
+        height = self.reference_radius + y
+        side = x + travel
         return np.hypot(side, height), self.half_pitch_angle + rotation - np.arctan2(side, height)
 
     @cached_property
@@ -79,8 +80,11 @@ class RackTipCut:
         parameter = np.linspace(0.0, 1.0, SAMPLES)
         inside = np.flatnonzero(self._enters(parameter))
         if inside.size == 0 or inside[0] == 0:
-            return float(parameter[inside[0]]) if inside.size else 0.0
-        low, high = parameter[inside[0] - 1], parameter[inside[0]]
+            if inside.size:
+                return float(parameter[inside[0]])
+            return 0.0
+        low = parameter[inside[0] - 1]
+        high = parameter[inside[0]]
         while high - low > 4.0 * np.finfo(float).eps:
             middle = 0.5 * (low + high)
             if self._enters(np.array([middle]))[0]:

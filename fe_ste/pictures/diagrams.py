@@ -156,13 +156,17 @@ class _Cycle:
     def middle(self) -> float:
         """Middle between the extremes of what converged."""
         shown = self.values[self.valid]
-        return 0.5 * float(shown.max() + shown.min()) if shown.size else 0.0
+        if shown.size:
+            return 0.5 * float(shown.max() + shown.min())
+        return 0.0
 
     @property
     def peak_to_peak(self) -> float:
         """Difference of the extremes of what converged."""
         shown = self.values[self.valid]
-        return float(np.ptp(shown)) if shown.size else 0.0
+        if shown.size:
+            return float(np.ptp(shown))
+        return 0.0
 
     @property
     def summary(self) -> str:
@@ -184,7 +188,8 @@ def _draw_cycle(panel: Axes, curve: _Cycle, colour: str, span: float) -> None:
     pmc = np.append(curve.pmc, curve.pmc[0] + 1.0)
     shown = np.where(curve.valid, curve.values, np.nan)
     panel.plot(pmc, np.append(shown, shown[0]), color=colour, marker="o", markersize=2.2)
-    lowest, highest = curve.middle - 0.5 * span, curve.middle + 0.5 * span
+    lowest = curve.middle - 0.5 * span
+    highest = curve.middle + 0.5 * span
     # What has not converged may be anything: keep its mark inside the panel.
     inside = np.clip(np.where(np.isfinite(curve.values), curve.values, curve.middle), lowest, highest)
     mark_not_converged(panel, curve.pmc[~curve.valid], inside[~curve.valid])
@@ -234,13 +239,15 @@ def plot_load_share(dataset: xr.Dataset, path: str | Path | None = None, title: 
     total = _cycle(cycle.assign(total=cycle["load_share"].sum("tooth")), "total", 100.0)
     share[:, ~total.valid] = np.nan
     carrying = np.nanmax(share, axis=1, initial=0.0) > 0.0
-    share, teeth = share[carrying], teeth[carrying]
+    share = share[carrying]
+    teeth = teeth[carrying]
     with drawing_style():
         figure = new_figure(7.2, 2.9)
         over_cycle, over_way = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.4))
         order = _order_along_way(share)
         for step, row in enumerate(order):
-            colour, shown = COLOURS[row % len(COLOURS)], _carried(share[row])
+            colour = COLOURS[row % len(COLOURS)]
+            shown = _carried(share[row])
             label = f"tooth pair {teeth[row]:+d}" if teeth[row] else "tooth pair 0"
             over_cycle.plot(total.pmc, shown, color=colour, marker="o", markersize=2.2, label=label)
             over_way.plot(total.pmc + step, shown, color=colour, marker="o", markersize=2.2)
@@ -263,8 +270,11 @@ def _carried(share: Floats) -> Floats:
 
 def _order_along_way(share: Floats) -> list[int]:
     """Order of the teeth in which the end of each one's cycle fits the beginning of the next one's."""
-    last, first = np.nan_to_num(share[:, -1]), np.nan_to_num(share[:, 0])
+    last = np.nan_to_num(share[:, -1])
+    first = np.nan_to_num(share[:, 0])
     ascending = float(np.abs(last[:-1] - first[1:]).sum())
     descending = float(np.abs(last[1:] - first[:-1]).sum())
     rows = list(range(share.shape[0]))
-    return rows if ascending <= descending else rows[::-1]
+    if ascending <= descending:
+        return rows
+    return rows[::-1]

@@ -128,14 +128,16 @@ class _LoadedFlank:
 
     @classmethod
     def of(cls, field: StressField, number: int) -> _LoadedFlank:
-        sector, nodes = field.sectors[number], field.nodes_of(number)
+        sector = field.sectors[number]
+        nodes = field.nodes_of(number)
         pressure = field.pressure[nodes]
         corners = sector.points[sector.facets]
         normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         load = pressure[sector.facets].mean(axis=1) * np.linalg.norm(normals, axis=1)
         tooth = max(np.unique(sector.tooth).tolist(), key=lambda each: float(load[sector.tooth == each].sum()))
         on_tooth = sector.tooth == tooth
-        facets, load = sector.facets[on_tooth], load[on_tooth]
+        facets = sector.facets[on_tooth]
+        load = load[on_tooth]
         normal = np.sum(load[:, None] * normals[on_tooth] / np.linalg.norm(normals[on_tooth], axis=1)[:, None], axis=0)
         normal[2] = 0.0
         normal /= np.linalg.norm(normal)

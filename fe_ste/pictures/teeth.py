@@ -273,7 +273,8 @@ def _teeth_of(
 
 
 def _turned(points: Floats, angle: float) -> Floats:
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     turned: Floats = points @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
     return turned
 

@@ -98,15 +98,18 @@ def _brick(
     mean_deformation = np.eye(3)
     if finite:
         mean_deformation += _gradient(motion, mean)
-    strains, stresses = np.empty((33, 6)), np.empty((33, 6))
-    rows, columns = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
+    strains = np.empty((33, 6))
+    stresses = np.empty((33, 6))
+    rows = (0, 1, 2, 0, 1, 2)
+    columns = (0, 1, 2, 1, 2, 0)
     for point in range(_POINTS):
         at_point = gradients[point * _FUNCTIONS : (point + 1) * _FUNCTIONS]
-        whole, deviation = _gradient(motion, at_point), _gradient(motion, at_point - mean)
+        gradient = _gradient(motion, at_point)
+        deviation = _gradient(motion, at_point - mean)
         # Newton's method must not step through an element turned inside out: from there it does not come back.
-        if finite and _determinant(whole + np.eye(3)) <= 0.0:
+        if finite and _determinant(gradient + np.eye(3)) <= 0.0:
             return False
-        stress = _stress(whole, deviation, lame, shear, finite)
+        stress = _stress(gradient, deviation, lame, shear, finite)
         volume = volumes[point]
         for i in range(_FUNCTIONS):
             for a in range(3):
@@ -114,7 +117,8 @@ def _brick(
                 # Row of B: derivative of the strain by displacement a of node i, F' grad N symmetrised, in Voigt's
                 # order with shears doubled. The internal force is the integral of B'S.
                 for k in range(6):
-                    b, c = rows[k], columns[k]
+                    b = rows[k]
+                    c = columns[k]
                     strain = mean_deformation[a, b] * at_point[i, c]
                     if finite:
                         strain += deviation[a, b] * mean[i, c]
@@ -196,7 +200,9 @@ def _all_bricks(
     recovery: Floats,
 ) -> int:
     """Condensed forces, stiffness and recovery of the modes of all bricks; the first inverted one, or -1."""
-    motion, element_force, matrix = np.empty((_FUNCTIONS, 3)), np.empty(33), np.empty((33, 33))
+    motion = np.empty((_FUNCTIONS, 3))
+    element_force = np.empty(33)
+    matrix = np.empty((33, 33))
     for element in range(len(nodes)):
         for corner in range(8):
             motion[corner] = displacement[nodes[element, corner]]
@@ -253,10 +259,11 @@ def _cauchy_stress(
         mean = _mean_gradients(gradients[element], volumes[element])
         for point in range(_POINTS):
             at_point = gradients[element, point * _FUNCTIONS : (point + 1) * _FUNCTIONS]
-            whole, deviation = _gradient(motion, at_point), _gradient(motion, at_point - mean)
-            stress = _stress(whole, deviation, lame[element], shear[element], finite)
+            gradient = _gradient(motion, at_point)
+            deviation = _gradient(motion, at_point - mean)
+            stress = _stress(gradient, deviation, lame[element], shear[element], finite)
             if finite:  # Cauchy stress F S F' / det F
-                deformation = whole + np.eye(3)
+                deformation = gradient + np.eye(3)
                 stress = deformation @ stress @ deformation.T / _determinant(deformation)
             result[element, point] = stress
     return result
@@ -381,7 +388,9 @@ class Bricks(Displayed):
         J. C. Simo, F. Armero, Int. J. Num. Meth. Eng. 33 (1992) 1413-1449: modes on the displacement gradient.
         """
         count = len(self.nodes)
-        force, stiffness, recovery = np.empty((count, 24)), np.empty((count, 24, 24)), np.empty((count, 9, 25))
+        force = np.empty((count, 24))
+        stiffness = np.empty((count, 24, 24))
+        recovery = np.empty((count, 9, 25))
         inverted = _all_bricks(
             displacement,
             modes,

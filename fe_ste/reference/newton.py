@@ -101,8 +101,11 @@ class _Numbering:
 
     def __post_init__(self) -> None:
         """Sort out which displacements are unknown, and where the entries of the bricks go."""
-        nodes, hub, size = self.model.bricks.nodes, self.model.hub, len(self.model.bricks.points)
-        bound, on_hub = self.model.held.copy(), np.zeros(size, dtype=np.bool_)
+        nodes = self.model.bricks.nodes
+        hub = self.model.hub
+        size = len(self.model.bricks.points)
+        bound = self.model.held.copy()
+        on_hub = np.zeros(size, dtype=np.bool_)
         if hub is not None:
             bound[hub.nodes] = True
             on_hub[hub.nodes] = True
@@ -142,7 +145,9 @@ class _Numbering:
     def reduced(self, forces: Floats, motion: Floats) -> Floats:
         """Gather the forces on the unknowns from nodal forces (n, 3)."""
         free = forces.ravel()[self.free]
-        return free if self.model.hub is None else np.append(free, float(np.sum(motion * forces)))
+        if self.model.hub is None:
+            return free
+        return np.append(free, float(np.sum(motion * forces)))
 
 
 @dataclass
@@ -185,8 +190,11 @@ class _Search:
 
     def hub_motion(self, hub_displacement: float) -> tuple[Floats, Floats, Floats]:
         """Displacement of the hub's nodes, and its first and second derivative by the hub's displacement, (n, 3)."""
-        hub, points = self.model.hub, self.model.bricks.points
-        displacement, slope, curvature = np.zeros_like(points), np.zeros_like(points), np.zeros_like(points)
+        hub = self.model.hub
+        points = self.model.bricks.points
+        displacement = np.zeros_like(points)
+        slope = np.zeros_like(points)
+        curvature = np.zeros_like(points)
         if hub is None:
             return displacement, slope, curvature
         x, y = (points[hub.nodes, :2] - hub.axis).T
@@ -195,7 +203,8 @@ class _Search:
             slope[hub.nodes, :2] = np.stack([-y, x], axis=1) / hub.lever
             return slope * hub_displacement, slope, curvature
         # A finite rotation: nodes move on circles, and the second derivative points to the axis.
-        cosine, sine = math.cos(angle), math.sin(angle)
+        cosine = math.cos(angle)
+        sine = math.sin(angle)
         turned = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
         displacement[hub.nodes, :2] = turned - np.stack([x, y], axis=1)
         slope[hub.nodes, :2] = np.stack([-turned[:, 1], turned[:, 0]], axis=1) / hub.lever
@@ -248,7 +257,9 @@ class _Search:
         bricks = self.model.bricks
         state = _State(np.zeros_like(bricks.points), bricks.modes_at_rest(), np.zeros(len(self.area)), 0.0)
         active = self._first_guess(1.0)
-        reached, step, number = 0.0, 1.0 / self.settings.load_steps, 1
+        reached = 0.0
+        step = 1.0 / self.settings.load_steps
+        number = 1
         while reached < 1.0 - 1e-12:
             load = min(reached + step, 1.0)
             try:
@@ -261,7 +272,8 @@ class _Search:
                 if reached == 0.0:
                     active = self._first_guess(step)
                 continue
-            reached, number = load, number + 1
+            reached = load
+            number = number + 1
         contact = self.evaluate(state, 1.0).contact
         force = self.contact_force(contact, state.pressure)
         on_node = np.linalg.norm(force[self.model.first.nodes], axis=1)
@@ -369,7 +381,9 @@ class _Search:
     ) -> tuple[_Evaluation, float]:
         """Shorten the step until it lessens what is out of balance, on the gaps taken as closed."""
         # Newton's step descends on the norm of what it linearises: halving finds a length that does, if there is one.
-        before, length, reason = self._merit(now, active), 1.0, ""
+        before = self._merit(now, active)
+        length = 1.0
+        reason = ""
         rounding = 0.1 * self.settings.force_tolerance * load * self.largest_load
         while length >= _LEAST_STEP_LENGTH:
             try:
@@ -426,8 +440,10 @@ def fixed_body_displacement(model: ContactModel) -> tuple[Floats, Floats]:
     FactorisationError
         If a rigid-body motion is left free.
     """
-    bricks, numbering = model.bricks, _Numbering(model)
-    displacement, modes = np.zeros_like(bricks.points), bricks.modes_at_rest()
+    bricks = model.bricks
+    numbering = _Numbering(model)
+    displacement = np.zeros_like(bricks.points)
+    modes = bricks.modes_at_rest()
     tangent = bricks.evaluate(displacement, modes)
     with factorise(numbering.matrix(tangent, displacement, 0.0)) as factor:
         displacement.ravel()[numbering.free] = factor.solve(numbering.reduced(model.forces, displacement))

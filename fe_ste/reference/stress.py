@@ -63,7 +63,9 @@ class StressField(Displayed):
     def nodes_of(self, number: int) -> slice:
         """Place of the nodes of gear 1 (`number` 0) or gear 2 (1) in the nodal values."""
         pinion_nodes = len(self.sectors[0].points)
-        return slice(pinion_nodes, None) if number else slice(0, pinion_nodes)
+        if number:
+            return slice(pinion_nodes, None)
+        return slice(0, pinion_nodes)
 
     def _line(self) -> str:
         return (
@@ -74,7 +76,8 @@ class StressField(Displayed):
 
 def stress_of_position(position: NonlinearPosition) -> StressField:
     """Stresses of a position of the reference analysis."""
-    equilibrium, model = position.equilibrium, position.model
+    equilibrium = position.equilibrium
+    model = position.model
     return StressField(
         pair=position.pair,
         torque=position.torque,
@@ -110,7 +113,8 @@ def stress_of_state(
     StressField
         Both hubs are held under the pressures; gear 2 is then turned until the flanks close in the mean over the load.
     """
-    pair, settings = compliance.pair, settings or NonlinearSettings()
+    pair = compliance.pair
+    settings = settings or NonlinearSettings()
     half_width = hertz_half_width(pair, state.normal_load / least_contact_length(pair))
     sectors = refined_sectors(pair, settings.mesh, settings.teeth, state.pmc, half_width)
     model = gear_model(pair, torque, sectors, finite_deformation=False)
@@ -186,17 +190,16 @@ def _on_surface(points: Floats, surface: Surface, load_points: Floats, loads: Fl
     # Facets are long and narrow: the nearest one is where the point lies within its two directions.
     _, neighbours = cKDTree(middle[:, :2]).query(load_points[:, :2], k=min(_CANDIDATES, len(middle)))
     candidates = np.asarray(neighbours, dtype=np.int64).reshape(len(load_points), -1)
-    along, across = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
+    along = corners[:, 1] - corners[:, 0]
+    across = corners[:, 3] - corners[:, 0]
     apart = load_points[:, None] - middle[candidates]
     # Coordinates along the two directions, which are not at right angles where the mesh follows a slanted line.
     along_product, across_product = (np.einsum("pka,pka->pk", apart, way[candidates]) for way in (along, across))
     along_square, across_square = (np.sum(way**2, axis=1)[candidates] for way in (along, across))
     mixed = np.sum(along * across, axis=1)[candidates]
     determinant = along_square * across_square - mixed**2
-    s, t = (
-        (across_square * along_product - mixed * across_product) / determinant,
-        (along_square * across_product - mixed * along_product) / determinant,
-    )
+    s = (across_square * along_product - mixed * across_product) / determinant
+    t = (along_square * across_product - mixed * along_product) / determinant
     # Facets of other teeth can lie under a point too, but far below it.
     below = np.abs(np.einsum("pka,pka->pk", apart, normals[candidates])) / np.sqrt(
         np.minimum(along_square, across_square)

@@ -225,8 +225,10 @@ class NonlinearTable(Displayed):
         return NonlinearTable(dataset)
 
     def _line(self) -> str:
-        solved, torque = int(self.dataset["converged"].sum()), value_range(self.dataset["torque"], "N m")
-        pair, positions = self.dataset.attrs["pair"], self.dataset.sizes["pmc"]
+        solved = int(self.dataset["converged"].sum())
+        torque = value_range(self.dataset["torque"], "N m")
+        pair = self.dataset.attrs["pair"]
+        positions = self.dataset.sizes["pmc"]
         return f" of {pair!r}: {solved} of {positions} positions solved, torque {torque}"
 
     def _table(self) -> TitledRows:
@@ -241,9 +243,11 @@ class NonlinearTable(Displayed):
 
 
 def _figures(position: NonlinearPosition) -> dict[str, float]:
-    equilibrium, model = position.equilibrium, position.model
+    equilibrium = position.equilibrium
+    model = position.model
     force = position.torque / position.pair.pinion.base_radius
-    inside, edge = equilibrium.pressure[equilibrium.facing], equilibrium.mean_pressure[~equilibrium.facing]
+    inside = equilibrium.pressure[equilibrium.facing]
+    edge = equilibrium.mean_pressure[~equilibrium.facing]
     stress = model.bricks.nodal_stress(equilibrium.displacement, equilibrium.modes)
     return {
         "ste": position.ste,
@@ -261,7 +265,8 @@ def _figures(position: NonlinearPosition) -> dict[str, float]:
 
 def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     """Table of the right shape with no position solved."""
-    names, shape = ("pmc", "torque"), (wanted.positions, 1)
+    names = ("pmc", "torque")
+    shape = (wanted.positions, 1)
     counts = ("unknowns", "iterations")
     teeth = np.arange(wanted.settings.teeth) - wanted.settings.teeth // 2
     floats = [name for name in _UNITS if name not in {*names, *counts, "tooth", "converged", "load_share"}]

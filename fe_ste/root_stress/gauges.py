@@ -48,7 +48,9 @@ def gauge_places(mesh: SectorMesh) -> GaugePlaces:
     section = mesh.section
     loose = _loose_edges(section.quads)
     corners = np.bincount(section.quads.ravel(), minlength=len(section.points))
-    edges, sides, depths = [], [], []
+    edges = []
+    sides = []
+    depths = []
     for side, flank in ((1, section.plus_flank), (-1, section.minus_flank)):
         cut = section.plus_cut if side > 0 else section.minus_cut
         chain = _chain(loose, int(flank[0 if not mesh.gear.internal else -1]), set(flank.tolist()), set(cut.tolist()))
@@ -77,7 +79,8 @@ def _loose_edges(quads: Integers) -> dict[int, list[int]]:
 
 def _chain(loose: dict[int, list[int]], start: int, flank: set[int], cut: set[int]) -> list[int]:
     """Nodes of the outline from the end of a flank, away from it, to the first node of a cut face."""
-    chain, before = [start], set(flank)
+    chain = [start]
+    before = set(flank)
     while chain[-1] not in cut:
         before.add(chain[-1])
         chain.append(next(node for node in loose[chain[-1]] if node not in before))
@@ -86,9 +89,11 @@ def _chain(loose: dict[int, list[int]], start: int, flank: set[int], cut: set[in
 
 def gauge_columns(mesh: SectorMesh, places: GaugePlaces) -> SparseMatrix:
     """Columns (3 nodes, g 3 layers) that read strains; those of one gauge and component follow each other by layer."""
-    layers, count = len(mesh.axial_positions), len(mesh.section.points)
+    layers = len(mesh.axial_positions)
+    count = len(mesh.section.points)
     points = mesh.points.reshape(layers, count, 3)
-    before, after = np.maximum(np.arange(layers) - 1, 0), np.minimum(np.arange(layers) + 1, layers - 1)
+    before = np.maximum(np.arange(layers) - 1, 0)
+    after = np.minimum(np.arange(layers) + 1, layers - 1)
     span = (mesh.axial_positions[after] - mesh.axial_positions[before])[:, None]
     matrix = scipy.sparse.lil_matrix((3 * layers * count, COMPONENTS * len(places.edges) * layers))
     for gauge, (first, second) in enumerate(places.edges.tolist()):

@@ -69,10 +69,13 @@ class MeshCycleStress(Displayed, line=": {torque!n} torques, {misalignment!n} mi
         scaled = values / (self.torque**power).reshape(-1, *(1,) * (values.ndim - 1))
         low, up = _place(self.torque, torque)
         left, right = _place(self.misalignment, misalignment)
-        last_torque, last_tilt = len(self.torque) - 1, len(self.misalignment) - 1
+        last_torque = len(self.torque) - 1
+        last_tilt = len(self.misalignment) - 1
         extra = (...,) + (None,) * (values.ndim - 2)
-        up, right = up[extra], right[extra]
-        next_low, next_left = np.minimum(low + 1, last_torque), np.minimum(left + 1, last_tilt)
+        up = up[extra]
+        right = right[extra]
+        next_low = np.minimum(low + 1, last_torque)
+        next_left = np.minimum(left + 1, last_tilt)
         lower = (1.0 - right) * scaled[low, left] + right * scaled[low, next_left]
         upper = (1.0 - right) * scaled[next_low, left] + right * scaled[next_low, next_left]
         return np.asarray(((1.0 - up) * lower + up * upper) * (torque**power)[extra])
@@ -141,7 +144,7 @@ def hertz_stress(pair: GearPair, line_load: Floats, path: Floats) -> Floats:
     Mechanics, equation 4.45).
     """
     gears = (pair.pinion, pair.gear)
-    give = sum((1.0 - one.material.poissons_ratio**2) / one.material.youngs_modulus for one in gears)
+    give = sum((1.0 - gear.material.poissons_ratio**2) / gear.material.youngs_modulus for gear in gears)
     other = _path_of_gear(pair, path)
     cosine = math.cos(pair.pinion.base_helix_angle)
     sign = -1.0 if pair.gear.internal else 1.0
@@ -162,7 +165,8 @@ def _path_of_gear(pair: GearPair, path: Floats) -> Floats:
 def _zones(pair: GearPair, path: Floats) -> tuple[Booleans, Booleans]:
     """Tell which places lie inside the path but for its margins, and which near the pitch point."""
     length = pair.path_end - pair.path_start
-    margin, reach = PATH_MARGIN * length, PITCH_ZONE * length
+    margin = PATH_MARGIN * length
+    reach = PITCH_ZONE * length
     inside = (path > pair.path_start + margin) & (path < pair.path_end - margin)
     return inside, np.abs(path - pair.path_pitch_point) < reach
 
@@ -199,7 +203,8 @@ def _clear_of_fillet(gauges: RootGauges, roll: Floats) -> Floats:
     Gauges beside a load read what it presses in, three times what it bends where a mate's tip edge digs in there. As
     far as the load is moved its lever grows: a little too much bending under loads that bend least.
     """
-    gear, flank = gauges.gear, gauges.roll
+    gear = gauges.gear
+    flank = gauges.roll
     step = (
         2.0 * CLEAR_OF_FILLET * gear.normal_module / gear.base_radius
     )  # the arc of an involute: base radius roll^2 / 2

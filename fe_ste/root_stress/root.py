@@ -99,7 +99,8 @@ def root_gauges(gear: Gear, side: int, settings: MeshSettings | None = None) -> 
     """
     mesh = sector_mesh(gear, settings)
     places = gauge_places(mesh)
-    flank, strains = -flank_functionals(mesh, side), gauge_columns(mesh, places)
+    flank = -flank_functionals(mesh, side)
+    strains = gauge_columns(mesh, places)
     count = flank.shape[1]
     with one_dense_thread():
         even, odd = sector_halves(mesh, [flank, strains], True)
@@ -108,18 +109,20 @@ def root_gauges(gear: Gear, side: int, settings: MeshSettings | None = None) -> 
         reach = min(REACH, (gear.teeth - 2) // 2)
         faces = ring_faces(Chain(even.stiffness, odd.stiffness), load, signs, gear.teeth, reach)
     fixed = 0.5 * (even.fixed_reading + odd.fixed_reading)[count:, :count]
-    found = {}
+    gauges = {}
     for read in range(-reach, reach + 1):
-        minus, plus = signs[:, None] * faces[read], faces[read + 1]
+        minus = signs[:, None] * faces[read]
+        plus = faces[read + 1]
         strain = even.face_reading[count:] @ (0.5 * (plus + minus)) + odd.face_reading[count:] @ (0.5 * (plus - minus))
         strain = strain + fixed if read == 0 else strain
-        found[read] = _stress(gear, strain.reshape(len(places.edges), COMPONENTS, -1, count))
-    return RootGauges(gear, side, places, mesh.section.flank_roll, mesh.axial_positions, found)
+        gauges[read] = _stress(gear, strain.reshape(len(places.edges), COMPONENTS, -1, count))
+    return RootGauges(gear, side, places, mesh.section.flank_roll, mesh.axial_positions, gauges)
 
 
 def _stress(gear: Gear, strain: Floats) -> Floats:
     """Plane stress of surface strains; the shear strain is the whole change of the angle."""
-    modulus, ratio = gear.material.youngs_modulus, gear.material.poissons_ratio
+    modulus = gear.material.youngs_modulus
+    ratio = gear.material.poissons_ratio
     stiff = modulus / (1.0 - ratio**2)
     return np.stack(
         [

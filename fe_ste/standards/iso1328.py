@@ -62,7 +62,9 @@ def tolerance(
         raise ValueError(f"deviation {deviation!r} is unknown; deviations are {', '.join(DEVIATIONS)}")
     if tolerance_class not in CLASSES:
         raise ValueError(f"class {tolerance_class}: ISO 1328-1 has classes {CLASSES[0]} to {CLASSES[-1]}")
-    d, m, b = 1e3 * reference_diameter, 1e3 * normal_module, 1e3 * face_width
+    d = 1e3 * reference_diameter
+    m = 1e3 * normal_module
+    b = 1e3 * face_width
     for name, value, least, most in (("diameter", d, 5, 15000), ("module", m, 0.5, 70), ("face width", b, 4, 1200)):
         if not least <= value <= most:
             raise ValueError(f"{name} {value:g} mm: ISO 1328-1 goes from {least} to {most} mm")

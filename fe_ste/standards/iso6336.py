@@ -146,8 +146,10 @@ def mesh_stiffness(
 
 def _flexibility(pair: GearPair) -> float:
     """q', flexibility of one pair of teeth per unit of face width, mm um/N."""
-    x_1, x_2 = pair.pinion.profile_shift, pair.gear.profile_shift
-    per_tooth_1, per_tooth_2 = 1.0 / _virtual_teeth(pair.pinion), 1.0 / _virtual_teeth(pair.gear)
+    x_1 = pair.pinion.profile_shift
+    x_2 = pair.gear.profile_shift
+    per_tooth_1 = 1.0 / _virtual_teeth(pair.pinion)
+    per_tooth_2 = 1.0 / _virtual_teeth(pair.gear)
     if pair.gear.internal:
         x_2 = per_tooth_2 = 0.0
     return (

@@ -192,7 +192,9 @@ def face_load_factor(line_load: float, stiffness: float, misalignment: float) ->
     (1.5, 4.0)
     """
     wedge = stiffness * misalignment / (2.0 * line_load)
-    return 1.0 + wedge if wedge <= 1.0 else 2.0 * math.sqrt(wedge)
+    if wedge <= 1.0:
+        return 1.0 + wedge
+    return 2.0 * math.sqrt(wedge)
 
 
 def transverse_load_factors(
@@ -212,7 +214,8 @@ def transverse_load_factors(
     contact_factor : float
         Z_eps, by which K_Halpha is limited.
     """
-    total, transverse = pair.total_contact_ratio, pair.transverse_contact_ratio
+    total = pair.total_contact_ratio
+    transverse = pair.transverse_contact_ratio
     wave = mesh_stiffness * max(deviation, 0.0) / line_load
     if total <= 2.0:
         factor = 0.5 * total * (0.9 + 0.4 * wave)

@@ -22,7 +22,8 @@ def tangential_force(gear: Gear, base_force: float) -> float:
 
 def zone_factor(pair: GearPair) -> float:
     """Z_H: curvature at the pitch point, and from the reference circle to the normal force."""
-    angle, transverse = pair.working_pressure_angle, pair.pinion.transverse_pressure_angle
+    angle = pair.working_pressure_angle
+    transverse = pair.pinion.transverse_pressure_angle
     lean = math.cos(pair.pinion.base_helix_angle)
     return math.sqrt(2.0 * lean * math.cos(angle) / (math.cos(transverse) ** 2 * math.sin(angle)))
 
@@ -30,13 +31,14 @@ def zone_factor(pair: GearPair) -> float:
 def elasticity_factor(pair: GearPair) -> float:
     """Z_E, the root of Pa: ``1 / sqrt(pi sum (1 - nu^2) / E)``."""
     gears = (pair.pinion, pair.gear)
-    give = sum((1.0 - one.material.poissons_ratio**2) / one.material.youngs_modulus for one in gears)
+    give = sum((1.0 - gear.material.poissons_ratio**2) / gear.material.youngs_modulus for gear in gears)
     return math.sqrt(1.0 / (math.pi * give))
 
 
 def contact_ratio_factor(pair: GearPair) -> float:
     """Z_eps of transverse and overlap ratio."""
-    transverse, overlap = pair.transverse_contact_ratio, pair.overlap_ratio
+    transverse = pair.transverse_contact_ratio
+    overlap = pair.overlap_ratio
     if overlap >= 1.0:
         return math.sqrt(1.0 / transverse)
     return math.sqrt((4.0 - transverse) / 3.0 * (1.0 - overlap) + overlap / transverse)
@@ -49,7 +51,8 @@ def helix_factor(gear: Gear) -> float:
 
 def single_contact_factors(pair: GearPair) -> tuple[float, float]:
     """Z_B and Z_D: from the pitch point to the inner points of single contact of gear 1 and gear 2."""
-    overlap, slope = pair.overlap_ratio, math.tan(pair.working_pressure_angle)
+    overlap = pair.overlap_ratio
+    slope = math.tan(pair.working_pressure_angle)
     if overlap >= 1.0:
         return 1.0, 1.0
     one, two = (
@@ -59,11 +62,11 @@ def single_contact_factors(pair: GearPair) -> tuple[float, float]:
     shared = pair.transverse_contact_ratio - 1.0
     at_one = (one - steps[0]) * (two - shared * steps[1])
     at_two = (two - steps[1]) * (one - shared * steps[0])
-    found = []
+    factors = []
     for curvature in (at_one, at_two):
         factor = slope / math.sqrt(abs(curvature))
-        found.append(max(factor - overlap * (factor - 1.0), 1.0))
-    return found[0], 1.0 if pair.gear.internal else found[1]
+        factors.append(max(factor - overlap * (factor - 1.0), 1.0))
+    return factors[0], 1.0 if pair.gear.internal else factors[1]
 
 
 def nominal_contact_stress(pair: GearPair, force: float) -> float:
@@ -75,7 +78,8 @@ def nominal_contact_stress(pair: GearPair, force: float) -> float:
     force : float
         F_t at the reference circle, N.
     """
-    diameter, ratio = 2.0 * pair.pinion.reference_radius, pair.gear.teeth / pair.pinion.teeth
+    diameter = 2.0 * pair.pinion.reference_radius
+    ratio = pair.gear.teeth / pair.pinion.teeth
     sign = -1.0 if pair.gear.internal else 1.0
     factors = zone_factor(pair) * elasticity_factor(pair) * contact_ratio_factor(pair) * helix_factor(pair.pinion)
     return factors * math.sqrt(force / (diameter * pair.face_width) * (ratio + sign) / ratio)

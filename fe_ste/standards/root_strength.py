@@ -44,7 +44,10 @@ def surface_factor(roughness: float) -> float:
     (0.957, 1.12)
     """
     height = 1e6 * roughness
-    return 1.12 if height < 1.0 else 1.674 - 0.529 * (height + 1.0) ** 0.1
+    if height < 1.0:
+        return 1.12
+    factor: float = 1.674 - 0.529 * (height + 1.0) ** 0.1
+    return factor
 
 
 def size_factor(normal_module: float, hardening: Hardening) -> float:
@@ -57,4 +60,8 @@ def size_factor(normal_module: float, hardening: Hardening) -> float:
     """
     start, slope, large, least = _SIZE[hardening]
     module = 1e3 * normal_module
-    return 1.0 if module <= 5.0 else least if module >= large else round(start - slope * module, 12)
+    if module <= 5.0:
+        return 1.0
+    if module >= large:
+        return least
+    return round(start - slope * module, 12)

@@ -36,7 +36,8 @@ class LifeCurve:
 
     def factor(self, cycles: float) -> float:
         """Life factor Z_NT or Y_NT at a number of cycles."""
-        x, y = np.log(self.cycles), np.log(self.factors)
+        x = np.log(self.cycles)
+        y = np.log(self.factors)
         at = math.log(max(cycles, self.cycles[0]))
         if at > x[-1]:
             return float(np.exp(y[-1] + (at - x[-1]) * (y[-1] - y[-2]) / (x[-1] - x[-2])))
@@ -47,7 +48,8 @@ class LifeCurve:
 
         A level piece at the end endures without end what does not exceed it.
         """
-        x, y = np.log(self.cycles), np.log(self.factors)
+        x = np.log(self.cycles)
+        y = np.log(self.factors)
         with np.errstate(divide="ignore"):
             need = np.log(np.asarray(factors, dtype=np.float64))
         slope = (y[-1] - y[-2]) / (x[-1] - x[-2])
@@ -104,7 +106,8 @@ def safety_factor(curve: LifeCurve, stress: Floats, strength: Floats | float, cy
     >>> round(safety_factor(curve, np.array([0.91e9]), 1e9, np.array([1.08e9])), 3)
     1.0
     """
-    low, high = math.log(1.0 / _MOST_FACTOR), math.log(_MOST_FACTOR)
+    low = math.log(1.0 / _MOST_FACTOR)
+    high = math.log(_MOST_FACTOR)
 
     def damage(logarithm: float) -> float:
         return miner_sum(curve, np.asarray(stress) * math.exp(logarithm), strength, cycles)

@@ -110,10 +110,15 @@ def rim_factor(gear: Gear) -> float:
     >>> [round(rim_factor(Gear(**gear, held_diameter=inside)), 3) for inside in (100e-3, 270e-3)]
     [1.0, 1.694]
     """
-    rim, height = abs(0.5 * gear.held_diameter - gear.root_radius), abs(gear.tip_radius - gear.root_radius)
+    rim = abs(0.5 * gear.held_diameter - gear.root_radius)
+    height = abs(gear.tip_radius - gear.root_radius)
     if gear.internal:
-        return 1.0 if rim >= _THICK_RING * gear.normal_module else 1.15 * math.log(8.324 * gear.normal_module / rim)
-    return 1.0 if rim >= _THICK_RIM * height else 1.6 * math.log(2.242 * height / rim)
+        if rim >= _THICK_RING * gear.normal_module:
+            return 1.0
+        return 1.15 * math.log(8.324 * gear.normal_module / rim)
+    if rim >= _THICK_RIM * height:
+        return 1.0
+    return 1.6 * math.log(2.242 * height / rim)
 
 
 def _deep_tooth_factor(contact_ratio: float, tolerance_class: int | None) -> float:
@@ -160,14 +165,18 @@ def form_and_correction(gear: Gear, virtual: float, loaded: float) -> tuple[floa
     loaded : float
         Diameter at which the load acts on that gear, normal modules.
     """
-    teeth, diameter = virtual * gear.outward, loaded * gear.outward
-    angle, shift = gear.normal_pressure_angle, gear.profile_shift * gear.outward
-    tool_depth, radius = gear.dedendum_factor, _rack_radius(gear)
+    teeth = virtual * gear.outward
+    diameter = loaded * gear.outward
+    angle = gear.normal_pressure_angle
+    shift = gear.profile_shift * gear.outward
+    tool_depth = gear.dedendum_factor
+    radius = _rack_radius(gear)
     section, around = (_RING_ROOT_ANGLE, 1.0) if gear.internal else (_ROOT_ANGLE, math.sqrt(3.0))
     offset = radius - tool_depth + shift
     half = 0.25 * math.pi - tool_depth * math.tan(angle) - (1.0 - math.sin(angle)) * radius / math.cos(angle)
     theta = _tangent_angle(2.0 * offset / teeth, 2.0 / teeth * (0.5 * math.pi - half) - section)
-    cosine, lean = math.cos(theta), section - theta
+    cosine = math.cos(theta)
+    lean = section - theta
     chord = teeth * math.sin(lean) + around * (offset / cosine - radius)
     fillet = radius + 2.0 * offset**2 / (cosine * (virtual * cosine**2 - 2.0 * offset))
     at_load = math.acos(teeth * math.cos(angle) / diameter)
@@ -179,7 +188,8 @@ def form_and_correction(gear: Gear, virtual: float, loaded: float) -> tuple[floa
         - math.sqrt(3.0) / around * (offset / cosine - radius)
     )
     form = 6.0 * arm * math.cos(force_angle) / (chord**2 * math.cos(angle))
-    slender, notch = chord / arm, 0.5 * chord / fillet
+    slender = chord / arm
+    notch = 0.5 * chord / fillet
     correction = (1.2 + 0.13 * slender) * notch ** (1.0 / (1.21 + 2.3 / slender))
     return form, correction, notch
 
@@ -199,6 +209,7 @@ def _rack_radius(gear: Gear) -> float:
         return gear.rack.tip_radius
     if gear.cutter is None:
         return gear.fillet_radius / gear.normal_module
-    radius, cutter = gear.cutter.tip_radius, gear.cutter
+    radius = gear.cutter.tip_radius
+    cutter = gear.cutter
     reach = max(cutter.profile_shift + gear.dedendum_factor - radius, 0.0)
     return radius + float(reach**1.95) / (3.156 * 1.036**cutter.teeth)

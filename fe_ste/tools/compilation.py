@@ -143,7 +143,9 @@ def kernel_folder(source: Path) -> Path | None:
     Path or None
         None if there is no source to tell the version by, or no place to write: nothing is kept then.
     """
-    return _folder_of(_package_of(source)) if source.is_file() else None
+    if source.is_file():
+        return _folder_of(_package_of(source))
+    return None
 
 
 def _kept(function: Function, **options: Any) -> Function:

@@ -24,7 +24,9 @@ class _Fields(Formatter):
         return getattr(self.owner, str(key))
 
     def convert_field(self, value: Any, conversion: str | None) -> Any:
-        return {"n": len, "r": repr}[conversion](value) if conversion else value
+        if conversion:
+            return {"n": len, "r": repr}[conversion](value)
+        return value
 
 
 class Displayed:
@@ -65,7 +67,9 @@ class Displayed:
 
     def _repr_html_(self) -> str:
         title, rows = self._table()
-        return html_table(title, rows) if rows else f"<p>{_shown(repr(self))}</p>"
+        if rows:
+            return html_table(title, rows)
+        return f"<p>{_shown(repr(self))}</p>"
 
     def _line(self) -> str:
         return _Fields(self).format(self._stated_line)

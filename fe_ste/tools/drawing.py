@@ -77,7 +77,8 @@ def finish_figure(figure: Figure, path: str | Path | None) -> Figure:
         assert isinstance(text, Text)
         text.set_text(drawable(text.get_text()))
     if path is not None:
-        path, content = Path(path), io.BytesIO()
+        path = Path(path)
+        content = io.BytesIO()
         if path.suffix == ".png":
             _print_png(figure, content)
         else:

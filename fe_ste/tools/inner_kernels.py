@@ -225,7 +225,9 @@ def bundle(given: Given) -> Given:
     ValueError
         If an array is not in C order.
     """
-    return given if _settings.DISABLE_JIT else cast(Given, _Bundle(given))
+    if _settings.DISABLE_JIT:
+        return given
+    return cast(Given, _Bundle(given))
 
 
 def kept_bundle(given: Given) -> Given:
@@ -287,7 +289,9 @@ def _size_of(kind: Any) -> int:
         return kind.size
     if isinstance(kind, types.Array):
         return 1 + 2 * int(kind.ndim)
-    return 0 if kind == types.none else 1
+    if kind == types.none:
+        return 0
+    return 1
 
 
 def _words_of(value: Any) -> list[int]:
@@ -299,7 +303,9 @@ def _words_of(value: Any) -> list[int]:
         return [value.ctypes.data, *value.shape, *value.strides]
     if isinstance(value, float):
         return list(struct.unpack("q", struct.pack("d", value)))
-    return [] if value is None else [int(value)]
+    if value is None:
+        return []
+    return [int(value)]
 
 
 class _BundleModel(models.PrimitiveModel):
@@ -315,7 +321,8 @@ class _Fields(AttributeTemplate):
 
 
 def _lower_field(context: Any, builder: Any, kind: _BundleType, row: Any, name: str) -> Any:
-    field, begin = kind.fields[name], kind.begin[name]
+    field = kind.fields[name]
+    begin = kind.begin[name]
     if isinstance(field, _BundleType):
         return builder.gep(row, [ir.Constant(ir.IntType(32), begin)])
     if isinstance(field, types.Array):
@@ -335,7 +342,8 @@ def _array(context: Any, builder: Any, kind: Any, words: list[Any]) -> Any:
     """Structure that numba has of an array that somebody else keeps alive."""
     proxy: Any = cgutils.create_struct_proxy
     array = proxy(kind)(context, builder)
-    shape, strides = words[1 : 1 + kind.ndim], words[1 + kind.ndim :]
+    shape = words[1 : 1 + kind.ndim]
+    strides = words[1 + kind.ndim :]
     item = context.get_constant(types.intp, context.get_abi_sizeof(context.get_data_type(kind.dtype)))
     count = shape[0]
     for size in shape[1:]:

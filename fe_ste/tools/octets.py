@@ -178,12 +178,13 @@ def _lower_all(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 def _spread(builder: Any, number: Any) -> Any:
     vector = ir.VectorType(number.type, SIZE)
-    one = builder.insert_element(ir.Constant(vector, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(one, one, ir.Constant(ir.VectorType(ir.IntType(32), SIZE), [0] * SIZE))
+    element = builder.insert_element(ir.Constant(vector, ir.Undefined), number, ir.Constant(ir.IntType(32), 0))
+    return builder.shuffle_vector(element, element, ir.Constant(ir.VectorType(ir.IntType(32), SIZE), [0] * SIZE))
 
 
 def _lower_sum(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    values, size = args[0], SIZE
+    values = args[0]
+    size = SIZE
     while size > 1:  # halves onto each other
         size //= 2
         index = ir.VectorType(ir.IntType(32), size)
@@ -197,7 +198,9 @@ def _lower_sum(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 def _lower_sums(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     # Neighbouring numbers of two octets first, then halves of what stands in groups of two.
-    rows, pairs, halves = list(args), [0, 8, 2, 10, 4, 12, 6, 14], [0, 1, 4, 5, 8, 9, 12, 13]
+    rows = list(args)
+    pairs = [0, 8, 2, 10, 4, 12, 6, 14]
+    halves = [0, 1, 4, 5, 8, 9, 12, 13]
     rows = [_fold(builder, rows[n], rows[n + 1], pairs, 1) for n in range(0, SIZE, 2)]
     while len(rows) > 1:
         rows = [_fold(builder, rows[n], rows[n + 1], halves, 2) for n in range(0, len(rows), 2)]

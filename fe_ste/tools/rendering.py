@@ -108,10 +108,12 @@ def rendered_image(plotter: pyvista.Plotter) -> tuple[Pixels, float]:
 def drawn_part(image: Pixels, margin: int = 20) -> tuple[slice, slice]:
     """Rows and columns of an image that are not white, and `margin` pixels around them."""
     drawn = np.any(image != 255, axis=-1)
-    rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
+    rows = np.flatnonzero(drawn.any(axis=1))
+    columns = np.flatnonzero(drawn.any(axis=0))
     if not rows.size:
         return slice(None), slice(None)
-    top, left = max(0, int(rows[0]) - margin), max(0, int(columns[0]) - margin)
+    top = max(0, int(rows[0]) - margin)
+    left = max(0, int(columns[0]) - margin)
     return slice(top, int(rows[-1]) + 1 + margin), slice(left, int(columns[-1]) + 1 + margin)
 
 

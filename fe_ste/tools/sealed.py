@@ -310,4 +310,6 @@ def load_dataset(path: Path, layout: Layout, names: Sequence[str] | None = None)
         for name in names or ():
             if name not in dataset.variables:
                 raise FileError(f"{path}: holds no {name}")
-        return dataset.load() if names is None else dataset[list(names)].load()
+        if names is None:
+            return dataset.load()
+        return dataset[list(names)].load()

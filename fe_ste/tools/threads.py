@@ -153,7 +153,9 @@ def second_thread() -> Executor:
     ...     thread.submit(abs, -1).result()
     1
     """
-    return ThreadPoolExecutor(1) if second_core_is_free() else AtOnce()
+    if second_core_is_free():
+        return ThreadPoolExecutor(1)
+    return AtOnce()
 
 
 def second_core_is_free() -> bool:
@@ -163,4 +165,6 @@ def second_core_is_free() -> bool:
 
 def available_cores() -> int:
     """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -117,7 +117,8 @@ class PairCompliance(Displayed):
         return self.pair.face_width / len(self.axial)
 
     def _line(self) -> str:
-        lowest, highest = self.teeth[0], self.teeth[-1]
+        lowest = self.teeth[0]
+        highest = self.teeth[-1]
         return f" of {self.pair.name!r}: {len(self.axial)} slices, tooth pairs {lowest} to {highest}"
 
     def _table(self) -> TitledRows:

@@ -88,7 +88,9 @@ def complete_loads(
         More than a tenth of the states are missing.
     """
     _check(int(np.count_nonzero(~solved)), solved.size, "states")
-    nodes, tangent, centre = nodes.copy(), tangent.copy(), centre.copy()
+    nodes = nodes.copy()
+    tangent = tangent.copy()
+    centre = centre.copy()
     known: Booleans = np.asarray(solved.any(axis=-1))
     for place in np.argwhere(known & ~solved.all(axis=-1)):
         at = tuple(place)
@@ -102,7 +104,8 @@ def complete_loads(
         nearest = tuple(indices)
         growth = nodes - nodes[..., :1]
         nodes = nodes[..., :1] + growth[nearest]
-        tangent, centre = tangent[nearest], centre[nearest]
+        tangent = tangent[nearest]
+        centre = centre[nearest]
     return nodes, tangent, centre
 
 

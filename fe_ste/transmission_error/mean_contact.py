@@ -211,9 +211,11 @@ def mean_contact(wanted: TableInput) -> MeanContact:
         centre_distance=axes.centre_distance + change,
         misalignment=axes.misalignment.mean(keepdims=True),
     )
-    finer, other = _cycle(compliance, axes), _cycle(compliance, beside)
+    finer = _cycle(compliance, axes)
+    other = _cycle(compliance, beside)
     data = finer.isel(pmc=slice(None, None, FINER))
-    mean, largest = data.mean("pmc"), data.max("pmc")
+    mean = data.mean("pmc")
+    largest = data.max("pmc")
     return MeanContact(
         force=torque / pair.pinion.base_radius,
         centre_distance=distance,

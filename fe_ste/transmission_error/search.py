@@ -133,7 +133,8 @@ def contact_states(
     Contact that reaches a form circle is solved again, cut off there, and once more on involutes that go on: see
     `fe_ste.contact.flank_ends`.
     """
-    pair, roll = compliance.pair, compliance.flanks[0].roll
+    pair = compliance.pair
+    roll = compliance.flanks[0].roll
     kinematics = FlankPair.from_pair(pair, roll[0], roll[-1])
     states = _searched(compliance, kinematics, torque, pmc, misalignments, starts)
     at_ends = [
@@ -245,7 +246,8 @@ class _Search:
     def window(self, pending: list[int], margin: int) -> _Window:
         """Lay the cells that the states of `pending` need, `margin` around the contact that is expected."""
         count = max(self.starts[index].cells for index in pending)
-        compliance, axial = self.compliance, self.compliance.axial
+        compliance = self.compliance
+        axial = self.compliance.axial
         cells = lay_cells(self.kinematics, self.rotation, compliance.teeth, axial, count * self.cell_width / 2, count)
         if not cells.tooth.size:  # wider than the flanks
             return _Window(cells, cells.tooth, {}, {}, cells.cut)
@@ -284,7 +286,8 @@ class _Search:
             return
         near &= window.expected
         end, border = (marked[near] for marked in _ends(window.cells, near))
-        cells, address = window.cells.select(near), window.address[near]
+        cells = window.cells.select(near)
+        address = window.address[near]
         compliance = self.compliance
         matrix = compliance_matrix(cells, self.kinematics, compliance.axial, compliance.flanks, compliance.regular)
         for index in group:
@@ -360,8 +363,10 @@ def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
     import xarray as xr
 
     shape = (axes.positions, len(axes.centre_distance), len(axes.misalignment))
-    ste, centre = np.empty(shape), np.empty(shape)
-    pair, roll = compliance.pair, compliance.flanks[0].roll
+    ste = np.empty(shape)
+    centre = np.empty(shape)
+    pair = compliance.pair
+    roll = compliance.flanks[0].roll
     cosine = math.cos(pair.pinion.base_helix_angle)
     width = _UNLOADED_CELLS * _UNLOADED_WIDTH * pair.pinion.normal_module
     for c, distance in enumerate(axes.centre_distance):
@@ -391,7 +396,8 @@ def _flank_radii(gear: Gear) -> tuple[float, float]:
 
 def _cell_width(compliance: PairCompliance, load: float) -> float:
     """Width of the contact cells along the profile under a normal load, m."""
-    pair, contact = compliance.pair, compliance.contact
+    pair = compliance.pair
+    contact = compliance.contact
     half_width = hertz_half_width(pair, load / least_contact_length(pair))
     return 2 * contact.window * half_width / contact.cells
 
@@ -407,7 +413,8 @@ def _ends(cells: Cells, looked: Booleans) -> tuple[Booleans, Booleans]:
     group = cells.tooth * (cells.layer.max() + 1) + cells.layer
     first = np.diff(group, prepend=group[0] - 1) != 0
     last = np.append(first[1:], True)
-    before, after = np.append(True, looked[:-1]), np.append(looked[1:], True)
+    before = np.append(True, looked[:-1])
+    after = np.append(looked[1:], True)
     return np.asarray((first | last) & ~cells.cut), np.asarray((~first & ~before) | (~last & ~after))
 
 
@@ -426,7 +433,8 @@ def _widen(chosen: Booleans, axis: int, steps: int) -> None:
     """Choose the neighbours along an axis, too, up to some steps away."""
     moved = np.moveaxis(chosen, axis, 0)
     for _ in range(steps):
-        ahead, behind = moved[:-1].copy(), moved[1:].copy()
+        ahead = moved[:-1].copy()
+        behind = moved[1:].copy()
         moved[1:] |= ahead
         moved[:-1] |= behind
 

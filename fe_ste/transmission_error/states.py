@@ -245,7 +245,8 @@ class StateResults(Displayed):
     @classmethod
     def empty(cls, compliance: PairCompliance, shape: tuple[int, int, int, int]) -> StateResults:
         """Results of `shape` of which none is there yet."""
-        teeth, axial = compliance.teeth, compliance.axial
+        teeth = compliance.teeth
+        axial = compliance.axial
         return cls(
             teeth,
             axial,
@@ -298,7 +299,8 @@ class StateResults(Displayed):
             )
             return
         cosine = math.cos(compliance.pair.pinion.base_helix_angle)
-        cells, solution = state.cells, state.solution
+        cells = state.cells
+        solution = state.solution
         # From the contact normal, on which the contact is solved, to the transverse line of action: lengths grow by
         # 1 / cos(beta_b), forces lessen by it.
         self.values["ste"][index] = solution.approach / cosine

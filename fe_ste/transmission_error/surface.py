@@ -77,7 +77,10 @@ def axis_weights(knots: ArrayLike) -> tuple[Integers, Floats]:
     unit = np.eye(count)
     for i, start in enumerate(first):
         step = x[i + 1] - x[i]
-        a, b, da, db = unit[i], unit[i + 1], step * slopes[i], step * slopes[i + 1]
+        a = unit[i]
+        b = unit[i + 1]
+        da = step * slopes[i]
+        db = step * slopes[i + 1]
         cubic = np.stack([a, da, 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db], axis=1)
         width = min(STENCIL, count)
         weights[i, :width] = cubic[start : start + width]
@@ -103,8 +106,10 @@ def slope_axis_weights(knots: ArrayLike) -> tuple[Integers, Floats]:
         raise InterpolationError(f"the values of an axis must increase: {x.tolist()}")
     step = np.diff(x)[:, None]
     none = np.zeros((x.size - 1, 4))
-    value, rise = none + [1.0, 0.0, -3.0, 2.0], none + [0.0, 0.0, 3.0, -2.0]
-    start, end = step * [0.0, 1.0, -2.0, 1.0], step * [0.0, 0.0, -1.0, 1.0]
+    value = none + [1.0, 0.0, -3.0, 2.0]
+    rise = none + [0.0, 0.0, 3.0, -2.0]
+    start = step * [0.0, 1.0, -2.0, 1.0]
+    end = step * [0.0, 0.0, -1.0, 1.0]
     return 2 * np.arange(x.size - 1), np.stack([value, start, rise, end], axis=1)
 
 
@@ -364,8 +369,10 @@ def _load_slopes(root: Floats, nodes: Floats, tangent: Floats) -> Floats:
 def _load_pieces(root: Floats, nodes: Floats, slopes: Floats) -> Floats:
     """Cubics of the load axis and the energy before each, (..., l, 5)."""
     step = np.diff(root)
-    start, rise = nodes[..., :-1], np.diff(nodes, axis=-1)
-    a, b = step * slopes[..., :-1], step * slopes[..., 1:]
+    start = nodes[..., :-1]
+    rise = np.diff(nodes, axis=-1)
+    a = step * slopes[..., :-1]
+    b = step * slopes[..., 1:]
     cubic = np.stack([start, a, 3.0 * rise - 2.0 * a - b, a + b - 2.0 * rise], axis=-1)
     powers = np.arange(4)
     # Integral over a piece of s(t) d(root^2), root = start + step t.
@@ -388,12 +395,16 @@ def _halved(knots: Floats) -> Floats:
 
 def _weights_at(knots: Floats, x: float) -> Floats:
     """Weight of every knot at x, continued along the slope outside."""
-    return np.ones(1) if len(knots) == 1 else _weights_between(knots, x, *axis_weights(knots), len(knots))
+    if len(knots) == 1:
+        return np.ones(1)
+    return _weights_between(knots, x, *axis_weights(knots), len(knots))
 
 
 def _slope_weights_at(knots: Floats, x: float) -> Floats:
     """Weights of value and slope of every knot at x, continued along the slope outside."""
-    return np.ones(1) if len(knots) == 1 else _weights_between(knots, x, *slope_axis_weights(knots), 2 * len(knots))
+    if len(knots) == 1:
+        return np.ones(1)
+    return _weights_between(knots, x, *slope_axis_weights(knots), 2 * len(knots))
 
 
 def _weights_between(knots: Floats, x: float, first: Integers, weights: Floats, count: int) -> Floats:
@@ -427,7 +438,8 @@ def periodic_stencil(t: float) -> Floats:
     >>> periodic_stencil(0.0).tolist()
     [0.0, 1.0, 0.0, 0.0]
     """
-    square, cube = t * t, t**3
+    square = t * t
+    cube = t**3
     return 0.5 * np.array(
         [2.0 * square - t - cube, 2.0 - 5.0 * square + 3.0 * cube, t + 4.0 * square - 3.0 * cube, cube - square]
     )

@@ -259,7 +259,8 @@ class MeshTable(Displayed):
         }
 
     def _ranges(self) -> dict[str, str]:
-        positions, values = self.dataset.sizes["pmc"], (self.dataset[axis].to_numpy() for axis in STATE_AXES)
+        positions = self.dataset.sizes["pmc"]
+        values = (self.dataset[axis].to_numpy() for axis in STATE_AXES)
         return StateAxes(positions, *values).ranges()
 
 

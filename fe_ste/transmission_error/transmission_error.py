@@ -98,7 +98,9 @@ def _solved_side_by_side(
     compliance: PairCompliance, axes: StateAxes, progress: Callable[[int, int], None] | None
 ) -> StateResults:
     """Solve all states, both halves of the positions at once: the contact lets go of Python's lock most of the time."""
-    total, finished, telling = math.prod(axes.shape), count(1), Lock()
+    total = math.prod(axes.shape)
+    finished = count(1)
+    telling = Lock()
 
     def tell(_: int) -> None:
         if progress is not None:

@@ -114,7 +114,8 @@ def _ends(x: Floats, u: Floats, connectors: ConnectorArrays) -> _Ends:
     axes = _axes(x[..., TILT:])
     arm = _times(axes, connectors.local)
     # Each angle's rate about the axis that it turns about: x, the tilted y, and the body's z.
-    ca, sa = np.cos(x[..., TILT]), np.sin(x[..., TILT])
+    ca = np.cos(x[..., TILT])
+    sa = np.sin(x[..., TILT])
     about_y = np.stack([np.zeros_like(ca), ca, sa], axis=-1)
     omega = about_y * u[..., TILT + 1, None] + axes[..., 2] * u[..., SPIN, None]
     omega[..., 0] += u[..., TILT]
@@ -123,7 +124,8 @@ def _ends(x: Floats, u: Floats, connectors: ConnectorArrays) -> _Ends:
 
 def _strains(ends: _Ends) -> tuple[Floats, Floats]:
     """Displacement and rate (..., c, 6) of each second end against the first, in the first one's axes."""
-    back, other = ends.axes[..., 0, :, :].swapaxes(-1, -2), ends.axes[..., 1, :, :]
+    back = ends.axes[..., 0, :, :].swapaxes(-1, -2)
+    other = ends.axes[..., 1, :, :]
     place, speed, spin = (_times(back, value[..., 1, :] - value[..., 0, :]) for value in ends[2:])
     relative = back @ other
     # Rxyz angles of the relative rotation; the sine is clipped, since round-off may carry it past 1.
@@ -195,7 +197,8 @@ def add_connector_forces(q: Floats, v: Floats, connectors: ConnectorArrays, f: F
         ends, load, torque = _loads(x, _local(v, places), connectors)
         forces = _forces(x, ends, load)
         forces[..., SPIN] += _SENSE * torque[..., None]
-        rows, width = f.reshape(-1, size), size + BODY_SIZE
+        rows = f.reshape(-1, size)
+        width = size + BODY_SIZE
         entries = places.ravel() + width * np.arange(len(rows))[:, None]
         rows += np.bincount(entries.ravel(), forces.ravel(), width * len(rows)).reshape(-1, width)[:, :size]
 
@@ -278,7 +281,8 @@ def add_connector_tangents(
     numbers = np.flatnonzero(steps)
     if not numbers.size:
         return
-    chosen, ends = connectors if numbers.size == steps.size else connectors.chosen(numbers), 2 * BODY_SIZE
+    chosen = connectors if numbers.size == steps.size else connectors.chosen(numbers)
+    ends = 2 * BODY_SIZE
     places = _places(chosen, q.size).reshape(-1, ends)
     # One coordinate of each connector at a time goes ahead and back: (coordinate, way, connector, end, coordinate).
     ways = np.eye(ends)[:, None, None] * np.array([1.0, -1.0])[:, None, None] * steps[numbers, None]

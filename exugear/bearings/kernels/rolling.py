@@ -120,9 +120,16 @@ def rolling_memory(rolling: RollingArrays) -> Floats:
 @summing_kernel
 def slices_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[float, float, float, float, float, float]:
     """Sum over the slices of a roller: U, its derivatives by d and w, then by d d, d w, w w."""
-    first, half = rolling.layout[r, GAPS], rolling.layout[r, HALF_SLICES]
-    constant, length = rolling.geometry[r, CONSTANT], rolling.geometry[r, SLICE_LENGTH]
-    u, ud, uw, udd, udw, uww = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    first = rolling.layout[r, GAPS]
+    half = rolling.layout[r, HALF_SLICES]
+    constant = rolling.geometry[r, CONSTANT]
+    length = rolling.geometry[r, SLICE_LENGTH]
+    u = 0.0
+    ud = 0.0
+    uw = 0.0
+    udd = 0.0
+    udw = 0.0
+    uww = 0.0
     for n in range(2 * half):
         t = (n - half + 0.5) * length
         approach = d - w * t - rolling.tables[first + (n - half if n >= half else half - 1 - n)]
@@ -142,7 +149,10 @@ def slices_law(r: int, d: float, w: float, rolling: RollingArrays) -> tuple[floa
 @summing_kernel
 def cubic(patch: Floats, n: int, y: float) -> tuple[float, float, float]:
     """Cubic of every fourth coefficient from the n-th on, at the share y of a step, and its two derivatives."""
-    a, b, c, d = patch[n], patch[n + 4], patch[n + 8], patch[n + 12]
+    a = patch[n]
+    b = patch[n + 4]
+    c = patch[n + 8]
+    d = patch[n + 12]
     return ((d * y + c) * y + b) * y + a, (3.0 * d * y + 2.0 * c) * y + b, 6.0 * d * y + 2.0 * c
 
 
@@ -153,7 +163,8 @@ def first_contact(r: int, d: float, tilt: float, rolling: RollingArrays) -> tupl
     Also the strip of its tilt (rad, not negative) in the table of the row and the share of the strip's width. Without
     the table, beyond its tilts, the depth is the table's limit.
     """
-    geometry, layout = rolling.geometry[r], rolling.layout[r]
+    geometry = rolling.geometry[r]
+    layout = rolling.layout[r]
     if layout[FORM] != ROLLER:
         return d, 0, 0.0
     if d + layout[HALF_SLICES] * geometry[SLICE_LENGTH] * tilt <= 0.0:  # not even an end of the roller
@@ -177,7 +188,8 @@ def contact_law(
     in w. It hardly varies, so that cubics serve from first touch to the limit of the raceways. Beyond it slices are
     summed.
     """
-    geometry, layout = rolling.geometry[r], rolling.layout[r]
+    geometry = rolling.geometry[r]
+    layout = rolling.layout[r]
     if layout[FORM] != ROLLER:
         stiff = geometry[CONSTANT] * math.sqrt(d)
         return 0.4 * stiff * d * d, stiff * d, 0.0, 1.5 * stiff, 0.0, 0.0
@@ -188,7 +200,8 @@ def contact_law(
     per = strip[STRIP_PER]
     slope = ((3.0 * strip[3] * y + 2.0 * strip[2]) * y + strip[1]) * per
     bend = (6.0 * strip[3] * y + 2.0 * strip[2]) * per * per
-    root, per_root = math.sqrt(depth), geometry[PER_ROOT]
+    root = math.sqrt(depth)
+    per_root = geometry[PER_ROOT]
     x = root * per_root
     i = int(x)
     x -= i
@@ -207,7 +220,8 @@ def contact_law(
     vww = (((b3 * x + b2) * x + b1) * x + b0) * per * per
     # U = s^2 V by s, and by w at constant s; then at constant d, where s changes with -D'(w).
     square = depth * depth
-    us, uss = depth * (2.0 * v + 0.5 * root * vx), 2.0 * v + 1.75 * root * vx + 0.25 * depth * vxx
+    us = depth * (2.0 * v + 0.5 * root * vx)
+    uss = 2.0 * v + 1.75 * root * vx + 0.25 * depth * vxx
     usw = depth * (2.0 * vw + 0.5 * root * vxw)
     mixed = usw - slope * uss
     sense = 1.0 if w >= 0.0 else -1.0
@@ -234,11 +248,13 @@ def ball_law(r: int, x: float, y: float, rolling: RollingArrays) -> tuple[float,
     approach = length - rolling.geometry[r, SPAN]
     if approach <= 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    x, y = x / length, y / length
+    x = x / length
+    y = y / length
     root = rolling.geometry[r, CONSTANT] * math.sqrt(approach)
     force = root * approach
     # Along the normal it is Hertz's contact that yields, across it the normal that turns.
-    along, across = 1.5 * root, force / length
+    along = 1.5 * root
+    across = force / length
     second = along * x * x + across * y * y, (along - across) * x * y, along * y * y + across * x * x
     return 0.4 * force * approach, force * x, force * y, second[0], second[1], second[2]
 
@@ -249,17 +265,33 @@ def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats,
 
     In two passes over `touching`: one element's way through its table is long, and many at once are on it like this.
     """
-    x, y, z, a, b = turned[0], turned[1], turned[2], turned[3], turned[4]
+    x = turned[0]
+    y = turned[1]
+    z = turned[2]
+    a = turned[3]
+    b = turned[4]
     row = rolling.geometry[r]
-    cosine, sine, lever, tilting = row[COSINE], row[SINE], row[LEVER], row[TILTING]
+    cosine = row[COSINE]
+    sine = row[SINE]
+    lever = row[LEVER]
+    tilting = row[TILTING]
     # Approach and tilt are sums of a constant, a cosine and a sine of the element's place.
-    d0, dc, ds = sine * z - row[GAP], cosine * x - lever * b, cosine * y + lever * a
-    a, b = tilting * a, tilting * b
-    energy, f, fc, fs, mc, ms = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    d0 = sine * z - row[GAP]
+    dc = cosine * x - lever * b
+    ds = cosine * y + lever * a
+    a = tilting * a
+    b = tilting * b
+    energy = 0.0
+    f = 0.0
+    fc = 0.0
+    fs = 0.0
+    mc = 0.0
+    ms = 0.0
     start = rolling.layout[r, CIRCLE]
     count = 0
     for k in range(start, start + rolling.layout[r, COUNT]):
-        c, s = rolling.circle[k, 0], rolling.circle[k, 1]
+        c = rolling.circle[k, 0]
+        s = rolling.circle[k, 1]
         depth, j, y = first_contact(r, d0 + dc * c + ds * s, abs(a * s - b * c), rolling)
         if depth > 0.0:
             o = CONTACT_SIZE * count
@@ -267,8 +299,12 @@ def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats,
             count += 1
     for n in range(count):
         o = CONTACT_SIZE * n
-        k, depth, j, y = int(touching[o]), touching[o + 1], int(touching[o + 2]), touching[o + 3]
-        c, s = rolling.circle[k, 0], rolling.circle[k, 1]
+        k = int(touching[o])
+        depth = touching[o + 1]
+        j = int(touching[o + 2])
+        y = touching[o + 3]
+        c = rolling.circle[k, 0]
+        s = rolling.circle[k, 1]
         u, force, moment, _, _, _ = contact_law(r, d0 + dc * c + ds * s, a * s - b * c, depth, j, y, rolling)
         energy += u
         f += force
@@ -287,13 +323,26 @@ def add_normal_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats,
 @summing_kernel
 def add_ball_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats) -> None:
     """Add forces and energy of a row of balls to sums: see `sum_rows`."""
-    x, y, z, a, b = turned[0], turned[1], turned[2], turned[3], turned[4]
+    x = turned[0]
+    y = turned[1]
+    z = turned[2]
+    a = turned[3]
+    b = turned[4]
     row = rolling.geometry[r]
-    radius, axial, radial_start, axial_start = row[RADIUS], row[AXIAL], row[CENTRE_RADIAL], row[CENTRE_AXIAL] + z
-    energy, rc, rs, t, tc, ts = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    radius = row[RADIUS]
+    axial = row[AXIAL]
+    radial_start = row[CENTRE_RADIAL]
+    axial_start = row[CENTRE_AXIAL] + z
+    energy = 0.0
+    rc = 0.0
+    rs = 0.0
+    t = 0.0
+    tc = 0.0
+    ts = 0.0
     start = rolling.layout[r, CIRCLE]
     for k in range(start, start + rolling.layout[r, COUNT]):
-        c, s = rolling.circle[k, 0], rolling.circle[k, 1]
+        c = rolling.circle[k, 0]
+        s = rolling.circle[k, 1]
         w = a * s - b * c
         u, fx, fy, _, _, _ = ball_law(r, radial_start + x * c + y * s - axial * w, axial_start + radius * w, rolling)
         energy += u
@@ -314,7 +363,8 @@ def add_ball_row(r: int, turned: Floats, rolling: RollingArrays, sums: Floats) -
 def turn_pairs(cosine: float, sine: float, values: Floats) -> None:
     """Turn the components across the axis of a displacement or a load (5 or more,) about z by an angle."""
     for n in (0, 3):
-        x, y = values[n], values[n + 1]
+        x = values[n]
+        y = values[n + 1]
         values[n], values[n + 1] = cosine * x - sine * y, sine * x + cosine * y
 
 
@@ -333,8 +383,11 @@ def sum_rows(
     """
     scale = rolling.scale[n]
     angle = rolling.phase[n] + rolling.cage_ratio[n] * turn
-    cosine, sine = math.cos(angle), math.sin(angle)
-    sums, turned, touching = out[MEMORY:TURNED], out[TURNED:TOUCHING], out[TOUCHING:]
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
+    sums = out[MEMORY:TURNED]
+    turned = out[TURNED:TOUCHING]
+    touching = out[TOUCHING:]
     sums[:] = 0.0
     for i in range(5):
         turned[i] = scale * (strain[i] + ahead * rate[i])
@@ -410,15 +463,22 @@ def element_stiffness(
     """Second derivatives of an element's potential by q q, q z, q w, z z, z w, w w (see the module)."""
     row = rolling.geometry[r]
     if rolling.layout[r, FORM] == BALL:
-        radius, axial = row[RADIUS], row[AXIAL]
-        x, y = row[CENTRE_RADIAL] + q - axial * w, row[CENTRE_AXIAL] + z + radius * w
+        radius = row[RADIUS]
+        axial = row[AXIAL]
+        x = row[CENTRE_RADIAL] + q - axial * w
+        y = row[CENTRE_AXIAL] + z + radius * w
         _, _, _, xx, xy, yy = ball_law(r, x, y, rolling)
-        xw, yw = radius * xy - axial * xx, radius * yy - axial * xy
+        xw = radius * xy - axial * xx
+        yw = radius * yy - axial * xy
         return xx, xy, xw, yy, yw, radius * yw - axial * xw
-    c, s, lever, tilting = row[COSINE], row[SINE], row[LEVER], row[TILTING]
+    c = row[COSINE]
+    s = row[SINE]
+    lever = row[LEVER]
+    tilting = row[TILTING]
     d = c * q + s * z + lever * w - row[GAP]
     _, _, _, dd, dw, ww = normal_law(r, d, tilting * w, rolling)
-    dw, ww = tilting * dw, tilting * ww
+    dw = tilting * dw
+    ww = tilting * ww
     across = lever * dd + dw
     return c * c * dd, c * s * dd, c * across, s * s * dd, s * across, lever * (across + dw) + ww
 
@@ -428,15 +488,22 @@ def rolling_tangent(n: int, strain: Floats, turn: float, rolling: RollingArrays,
     """Fill the derivative of the elastic force of `rolling_forces` by the strain into out (5 or more, same)."""
     scale = rolling.scale[n]
     angle = rolling.phase[n] + rolling.cage_ratio[n] * turn
-    c0, s0 = math.cos(angle), math.sin(angle)
-    x, y, z, a, b = scale * strain[0], scale * strain[1], scale * strain[2], scale * strain[3], scale * strain[4]
+    c0 = math.cos(angle)
+    s0 = math.sin(angle)
+    x = scale * strain[0]
+    y = scale * strain[1]
+    z = scale * strain[2]
+    a = scale * strain[3]
+    b = scale * strain[4]
     out[:] = 0.0
     share = abs(scale)
     for r in range(rolling.first[n], rolling.first[n + 1]):
         start = rolling.layout[r, CIRCLE]
         for k in range(start, start + rolling.layout[r, COUNT]):
-            ck, sk = rolling.circle[k, 0], rolling.circle[k, 1]
-            c, s = c0 * ck - s0 * sk, s0 * ck + c0 * sk
+            ck = rolling.circle[k, 0]
+            sk = rolling.circle[k, 1]
+            c = c0 * ck - s0 * sk
+            s = s0 * ck + c0 * sk
             qq, qt, qm, tt, tm, mm = element_stiffness(r, x * c + y * s, z, a * s - b * c, rolling)
             out[0, 0] += share * qq * c * c
             out[0, 1] += share * qq * c * s
@@ -489,9 +556,11 @@ def rolling_loads(
     turn : (..., k) array
     rolling : RollingArrays
     """
-    forces, torques = np.empty(strain.shape), np.empty(turn.shape)
+    forces = np.empty(strain.shape)
+    torques = np.empty(turn.shape)
     strains, rates = (np.ascontiguousarray(values).reshape(-1, 6) for values in (strain, rate))
     every = np.broadcast_to(numbers, turn.shape).flatten()
-    memory, out = rolling_memory(rolling), (forces.reshape(-1, 6), torques.ravel())
+    memory = rolling_memory(rolling)
+    out = (forces.reshape(-1, 6), torques.ravel())
     pass_rolling(every, strains, rates, turn.ravel(), kept_bundle(rolling), memory, *out)
     return forces, torques

@@ -156,7 +156,8 @@ def _scaled(key: str, proportion: proportions.Proportion, scale: float, unit: st
 
 def _pitch_diameter(section: CatalogueSection) -> Estimate:
     mean = 0.5 * (section.bore_mm + section.outer_diameter_mm)
-    height, beyond = section.outer_diameter_mm - section.bore_mm, proportions.PITCH_BEYOND_MEAN
+    height = section.outer_diameter_mm - section.bore_mm
+    beyond = proportions.PITCH_BEYOND_MEAN
     value, low, high = (mean + share * height for share in (beyond.value, beyond.low, beyond.high))
     return Estimate("pitch_diameter_mm", value, low, high, "mm")
 
@@ -195,7 +196,8 @@ def _element_count(section: CatalogueSection) -> Estimate:
         for each in (spacing.value, spacing.high, spacing.low)
     )
     if section.full_complement:
-        low, high = value - 1.0, float(most)
+        low = value - 1.0
+        high = float(most)
     return Estimate("element_count", value, low, high, "")
 
 
@@ -275,13 +277,15 @@ def _given(section: CatalogueSection, key: str) -> float:
 
 def _common(section: CatalogueSection) -> dict[str, Any]:
     """Give what rows of rollers and of balls share, SI, after a check that the elements fit."""
-    diameter, pitch = _given(section, "element_diameter_mm"), _given(section, "pitch_diameter_mm")
+    diameter = _given(section, "element_diameter_mm")
+    pitch = _given(section, "pitch_diameter_mm")
     count = round(_given(section, "element_count"))
     # Across the contact the elements reach from groove to groove; rings need some wall.
     height = diameter * math.cos(math.radians(section.contact_angle_deg or 0.0))
     # Needles without rings run on shaft and bore themselves.
     wall = -ROUNDING_MM if section.type == "needle_roller" else 0.0
-    inside, outside = pitch - height - section.bore_mm, section.outer_diameter_mm - pitch - height
+    inside = pitch - height - section.bore_mm
+    outside = section.outer_diameter_mm - pitch - height
     if min(inside, outside) < wall or (wall == 0.0 and min(inside, outside) == 0.0):
         raise BearingError(
             f"element_diameter_mm = {diameter:g} on pitch_diameter_mm = {pitch:g} reaches beyond the rings; between "
@@ -342,7 +346,8 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
     if section.type == "four_point_ball":
         return tuple(moved(row, each, 0.0) for each in (-angle, angle))
     if section.arrangement != "single":
-        distance, preload = 1e-3 * _given(section, "row_distance_mm"), 1e-6 * section.axial_preload_um
+        distance = 1e-3 * _given(section, "row_distance_mm")
+        preload = 1e-6 * section.axial_preload_um
         return pair_rows(moved(row, signed, 0.0), section.arrangement, distance, preload)
     if section.type == "thrust_spherical_roller":
         # All rollers press on one point of the axis, beside the bearing.

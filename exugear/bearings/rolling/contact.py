@@ -104,7 +104,8 @@ def _row_laminae(row: RollerRow, first: int, first_roller_angle: float) -> Lamin
     polar = first_roller_angle + 2.0 * math.pi * number / row.element_count
     slices = (np.arange(row.laminae) + 0.5) / row.laminae - 0.5  # middle of each slice, in roller lengths
     along = np.tile(slices, row.element_count) * row.effective_length
-    cosine, sine = math.cos(row.contact_angle), math.sin(row.contact_angle)
+    cosine = math.cos(row.contact_angle)
+    sine = math.sin(row.contact_angle)
     normal = np.column_stack([cosine * np.cos(polar), cosine * np.sin(polar), np.full(polar.size, sine)])
     radius = 0.5 * row.pitch_diameter - along * sine
     point = np.column_stack([radius * np.cos(polar), radius * np.sin(polar), row.axial_position + along * cosine])

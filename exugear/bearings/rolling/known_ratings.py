@@ -94,11 +94,15 @@ def _listed_as(section: CatalogueSection) -> tuple[str, ...]:
     if section.type == "cylindrical_roller":
         if prefix is None:
             return ()
-        return (f"NU{number}E",) if suffix.startswith("E") else (f"NU{number}", f"NU{number}E")
+        if suffix.startswith("E"):
+            return (f"NU{number}E",)
+        return (f"NU{number}", f"NU{number}E")
     if prefix is not None:
         return ()
     if section.type == "angular_contact_ball":
-        return (f"{number}B",) if suffix.startswith("B") else ()
+        if suffix.startswith("B"):
+            return (f"{number}B",)
+        return ()
     if section.type == "self_aligning_ball" and _SEALED.search(suffix):
         return ()
     return (number,)
@@ -111,7 +115,8 @@ def _listed() -> dict[tuple[str, str], tuple[float, float, float, float, float, 
     with (Path(__file__).parent / "makers.csv").open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
             bore, outer, width = (float(row[key]) for key in ("bore_mm", "outer_diameter_mm", "width_mm"))
-            dynamic, static = 1e3 * float(row["dynamic_kN"]), 1e3 * float(row["static_kN"])
+            dynamic = 1e3 * float(row["dynamic_kN"])
+            static = 1e3 * float(row["static_kN"])
             makers = tuple(row["makers"].split("/"))
             found[row["type"], row["designation"]] = bore, outer, width, dynamic, static, makers
     return found

@@ -118,9 +118,13 @@ def reference_life(
     inner, outer = powers if inner_ring_turns_against_load else powers[::-1]
     count = row_count(rows, bearing_type)
     if isinstance(rows[0], RollerRow):
-        slope, exponent, row_rating = LINE_CONTACT_LIFE, 4.5, rating / count ** (7.0 / 9.0)
+        slope = LINE_CONTACT_LIFE
+        exponent = 4.5
+        row_rating = rating / count ** (7.0 / 9.0)
     else:
-        slope, exponent, row_rating = POINT_CONTACT_LIFE, 10.0 / 3.0, rating / count**0.7
+        slope = POINT_CONTACT_LIFE
+        exponent = 10.0 / 3.0
+        row_rating = rating / count**0.7
     damage = 0.0
     for row, load in zip(rows, loads, strict=True):
         if is_rib(row):
@@ -131,7 +135,9 @@ def reference_life(
         for capacity, power in zip(capacities, (inner, outer), strict=True):
             mean = np.mean((stressed / (share * capacity)) ** power, axis=0) ** (1.0 / power)
             damage += float(np.sum(mean**exponent))
-    return math.inf if damage == 0.0 else float(damage ** (-1.0 / slope))
+    if damage == 0.0:
+        return math.inf
+    return float(damage ** (-1.0 / slope))
 
 
 def edge_stress_factors(laminae: int) -> Floats:
@@ -155,7 +161,9 @@ def life_in_hours(millions_of_revolutions: float, speed: float) -> float:
     >>> round(life_in_hours(1577.0, 900.0 * math.pi / 30.0))
     29204
     """
-    return math.inf if speed == 0.0 else 1e6 * millions_of_revolutions * 2.0 * math.pi / (3600.0 * abs(speed))
+    if speed == 0.0:
+        return math.inf
+    return 1e6 * millions_of_revolutions * 2.0 * math.pi / (3600.0 * abs(speed))
 
 
 def minimum_load(dynamic_rating: float, bearing_type: BearingType) -> float:

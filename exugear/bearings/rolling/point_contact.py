@@ -48,8 +48,11 @@ def elliptic_integrals(parameter: float) -> tuple[float, float]:
     ----------
     Abramowitz and Stegun, Handbook of Mathematical Functions, 17.6.
     """
-    mean, geometric, difference = 1.0, math.sqrt(1.0 - parameter), math.sqrt(parameter)
-    weight, total = 0.5, 0.5 * parameter
+    mean = 1.0
+    geometric = math.sqrt(1.0 - parameter)
+    difference = math.sqrt(parameter)
+    weight = 0.5
+    total = 0.5 * parameter
     while abs(difference) > 1e-16:
         mean, geometric, difference = 0.5 * (mean + geometric), math.sqrt(mean * geometric), 0.5 * (mean - geometric)
         weight *= 2.0
@@ -120,7 +123,8 @@ def elliptic_contact(curvature_sum: float, curvature_difference: float) -> Ellip
     ISO/TS 16281:2008, its equations 1 to 4. Harris and Kotzalas, Essential Concepts of Bearing Technology, contact
     stress and deformation.
     """
-    lower, upper = 0.0, math.log(LARGEST_ELLIPSE_RATIO)
+    lower = 0.0
+    upper = math.log(LARGEST_ELLIPSE_RATIO)
     for _ in range(80):
         middle = 0.5 * (lower + upper)
         if _difference_of(math.exp(middle)) < curvature_difference:
@@ -148,7 +152,8 @@ def groove_contacts(row: BallRow) -> tuple[EllipticContact, EllipticContact]:
     >>> round(inner.ratio, 2), round(outer.ratio, 2)
     (9.28, 7.3)
     """
-    ratio, size = row.diameter_ratio, row.element_diameter
+    ratio = row.diameter_ratio
+    size = row.element_diameter
     contacts = []
     for along, conformity in ((ratio / (1.0 - ratio), row.inner_conformity), (-ratio / (1.0 + ratio), _outer(row))):
         total = 2.0 + along - 0.5 / conformity
@@ -158,7 +163,9 @@ def groove_contacts(row: BallRow) -> tuple[EllipticContact, EllipticContact]:
 
 def _outer(row: BallRow) -> float:
     """Radius of the outer raceway across the rolling direction, over the ball's diameter."""
-    return 0.5 * (1.0 / row.diameter_ratio + 1.0) if row.aligning else row.outer_conformity
+    if row.aligning:
+        return 0.5 * (1.0 / row.diameter_ratio + 1.0)
+    return row.outer_conformity
 
 
 def ball_constant(row: BallRow) -> float:
@@ -232,14 +239,18 @@ def ball_arrays(rows: Sequence[tuple[BallRow, int]], first_roller_angle: float =
 def _row_balls(row: BallRow, first: int, first_roller_angle: float) -> BallArrays:
     count = row.element_count
     polar = first_roller_angle + 2.0 * math.pi * np.arange(count) / count
-    c, s = np.cos(polar), np.sin(polar)
-    cosine, sine = math.cos(row.contact_angle), math.sin(row.contact_angle)
+    c = np.cos(polar)
+    s = np.sin(polar)
+    cosine = math.cos(row.contact_angle)
+    sine = math.sin(row.contact_angle)
     beyond = (row.inner_conformity - 0.5) * row.element_diameter  # from the ball's centre to that of the inner groove
-    radius, place = 0.5 * row.pitch_diameter + beyond * cosine, row.axial_position + beyond * sine
+    radius = 0.5 * row.pitch_diameter + beyond * cosine
+    place = row.axial_position + beyond * sine
     if row.aligning:
         radius = place = 0.0  # forces pass through the middle of the bearing
     distance = (row.inner_conformity + _outer(row) - 1.0) * row.element_diameter
-    zero, one = np.zeros(count), np.ones(count)
+    zero = np.zeros(count)
+    one = np.ones(count)
     gradient = np.stack(
         [
             np.column_stack([c, s, zero, -place * s, place * c, zero]),

@@ -156,10 +156,12 @@ def _nodes(row: RollerRow, roots: Floats, tilt: float, onset: float, slope: floa
 
     U over the depth squared and its derivative by the tilt, of each the value and the slope per step of the root.
     """
-    along, depth = _along(row), roots**2
+    along = _along(row)
+    depth = roots**2
     approach = np.maximum((depth + onset)[:, None] - tilt * along - 2.0 * row.drop(along), 0.0)
     power = np.cbrt(np.cbrt(approach)) * row.contact_constant / SLICES
-    force, stiffness = power * approach, LINE_POWER * power
+    force = power * approach
+    stiffness = LINE_POWER * power
     # Derivatives by the tilt at constant approach turn into those at constant depth by that of the bound.
     by_tilt = slope - along if tilt > 0.0 else np.zeros(SLICES)
     nodes = np.zeros((len(roots), 2, 2))
@@ -235,8 +237,10 @@ class _Packing:
 
     def place(self, row: RollingRow) -> tuple[list[int], Floats]:
         """Layout and geometry of a row."""
-        cosine, sine = math.cos(row.contact_angle), math.sin(row.contact_angle)
-        layout, geometry = [0] * LAYOUT_SIZE, np.zeros(GEOMETRY_SIZE)
+        cosine = math.cos(row.contact_angle)
+        sine = math.sin(row.contact_angle)
+        layout = [0] * LAYOUT_SIZE
+        geometry = np.zeros(GEOMETRY_SIZE)
         layout[COUNT], layout[CIRCLE] = row.element_count, self._circle(row.element_count)
         geometry[[COSINE, SINE, GAP]] = cosine, sine, 0.5 * row.radial_clearance * cosine
         if row.aligning:

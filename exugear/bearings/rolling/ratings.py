@@ -228,7 +228,9 @@ def row_count(rows: Sequence[RollingRow], bearing_type: BearingType) -> int:
     given as a row of its own, rows at one place are one row of balls.
     """
     rows = on_raceways(rows)
-    return len({row.axial_position for row in rows}) if bearing_type == "four_point_ball" else len(rows)
+    if bearing_type == "four_point_ball":
+        return len({row.axial_position for row in rows})
+    return len(rows)
 
 
 def line_contact_factor(diameter_ratio: float) -> float:
@@ -331,7 +333,8 @@ def _ball_load(across: float, along: float, pressure: float) -> float:
 
     def surplus(axis_ratio: float) -> float:
         squared = axis_ratio**2
-        first, second = scipy.special.ellipk(1.0 - 1.0 / squared), scipy.special.ellipe(1.0 - 1.0 / squared)
+        first = scipy.special.ellipk(1.0 - 1.0 / squared)
+        second = scipy.special.ellipe(1.0 - 1.0 / squared)
         return float(((squared + 1.0) * second - 2.0 * first) - difference * (squared - 1.0) * second)
 
     # A circle, as on a sphere, is the root at one itself.
@@ -347,7 +350,9 @@ def _ball_reduction(bearing_type: BearingType, count: int) -> float:
     """Reduction factor lambda of ISO/TR 1281-1: what real bearings fall short of the theory's even load."""
     if bearing_type == "self_aligning_ball":
         return 1.0
-    return 0.90 if bearing_type == "deep_groove_ball" and count > 1 else 0.95
+    if bearing_type == "deep_groove_ball" and count > 1:
+        return 0.90
+    return 0.95
 
 
 def _common_row(rows: Sequence[RollingRow], bearing_type: BearingType) -> RollerRow | BallRow:
@@ -415,7 +420,9 @@ def _static_factors(rows: Sequence[RollingRow], bearing_type: BearingType) -> tu
         return 2.3 * math.tan(angle), 1.0
     else:
         y = 0.22 / math.tan(angle)
-    return (1.0, 2.0 * y) if _double_row(rows, bearing_type) else (0.5, y)
+    if _double_row(rows, bearing_type):
+        return (1.0, 2.0 * y)
+    return (0.5, y)
 
 
 def _double_row(rows: Sequence[RollingRow], bearing_type: BearingType) -> bool:

@@ -177,7 +177,8 @@ def _row_from_catalogue(kind: str, bearing: CylindricalRollerBearing | TaperedRo
     estimated = element_count(kind, diameter / pitch_diameter, usual.spacing.value, bearing.full_complement)
     factor, straight = standard_profile(kind, diameter, length)
     if bearing.profile_factor is not None:
-        factor, straight = bearing.profile_factor, 0.0
+        factor = bearing.profile_factor
+        straight = 0.0
     return RollerRow(
         element_diameter=diameter,
         effective_length=length,

@@ -56,7 +56,8 @@ def second_order(points: Floats, cells: Integers, kind: str) -> Any:
     elif kind in ("hexahedron20", "hexahedron27"):
         _place(places[:, node:], mesh.edges, numbers[:, HEX_EDGES], edges[:, :12])
         node += mesh.edges.shape[1]
-        faces, bodies = edges[:, 12:18], edges[:, 18:19]
+        faces = edges[:, 12:18]
+        bodies = edges[:, 18:19]
         if kind == "hexahedron20":  # the serendipity element's own place of these, or linear fields are lost
             ends = points[corners]
             faces = 0.5 * edges[:, HEX_FACE_EDGES].sum(axis=2) - 0.25 * ends[:, HEX_FACES].sum(axis=2)
@@ -77,7 +78,8 @@ def _linear_tetrahedra(points: Floats, cells: Integers) -> Any:
 
 def entity_numbers(entities: Integers, corners: Integers) -> Integers:
     """Numbers (m,) of edges or faces, given by corners (m, c) in any order, among all of a mesh (c, n)."""
-    known, asked = np.sort(np.asarray(entities), axis=0).T, np.sort(corners, axis=1)
+    known = np.sort(np.asarray(entities), axis=0).T
+    asked = np.sort(corners, axis=1)
     _, label = np.unique(np.concatenate([known, asked]), axis=0, return_inverse=True)
     label = label.ravel()
     number = np.empty(label.max() + 1, dtype=np.int64)

@@ -64,12 +64,16 @@ class ShaftSection:
     @property
     def outer_end(self) -> float:
         """Outer diameter where it ends, m."""
-        return self.outer_diameter if self.outer_diameter_end is None else self.outer_diameter_end
+        if self.outer_diameter_end is None:
+            return self.outer_diameter
+        return self.outer_diameter_end
 
     @property
     def inner_end(self) -> float:
         """Inner diameter where it ends, m."""
-        return self.inner_diameter if self.inner_diameter_end is None else self.inner_diameter_end
+        if self.inner_diameter_end is None:
+            return self.inner_diameter
+        return self.inner_diameter_end
 
     def outer_at(self, place: float) -> float:
         """Outer diameter so far (m) from where it begins, m."""
@@ -124,7 +128,8 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[int, float
         The seat lies outside the shaft or across a step.
     """
     places = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
-    low, high = seat.z - seat.width / 2.0, seat.z + seat.width / 2.0
+    low = seat.z - seat.width / 2.0
+    high = seat.z + seat.width / 2.0
     if low < -SAME or high > places[-1] + SAME:
         raise ShaftError(
             f"seat {seat.name}: it reaches from {low:g} to {high:g} m, the shaft from 0 to {places[-1]:g} m"

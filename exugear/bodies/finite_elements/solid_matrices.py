@@ -90,7 +90,8 @@ def assemble(mesh: Any, material: Material, axis: tuple[float, float] = (0.0, 0.
 
     numbering = skfem.assembly.Dofs(mesh, mesh.elem())
     dofs = np.asarray(numbering.element_dofs).T.astype(np.int64)
-    count, nodes = mesh.doflocs.shape[1], dofs.shape[1]
+    count = mesh.doflocs.shape[1]
+    nodes = dofs.shape[1]
     places = np.asarray(mesh.doflocs).T - np.array([*axis, 0.0])
     points, weights = skfem.quadrature.get_quadrature(mesh.elem(), 4 if nodes == 10 else 5)
     functions = [mesh.elem().lbasis(points, number) for number in range(nodes)]
@@ -121,7 +122,8 @@ def assemble(mesh: Any, material: Material, axis: tuple[float, float] = (0.0, 0.
         for a in range(3):
             for b in range(3):
                 blocks[a, b] += np.bincount(targets, stiffness[:, :, a, :, b].ravel(), len(entries))
-    rows, columns = entries // count, entries % count
+    rows = entries // count
+    columns = entries % count
     row_starts = np.searchsorted(rows, np.arange(count + 1))
     size = (count, count)
     matrices = {name: scipy.sparse.csr_array((data, columns, row_starts), shape=size) for name, data in scalar.items()}

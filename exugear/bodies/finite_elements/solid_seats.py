@@ -74,7 +74,8 @@ def _facets(mesh: Any, seat: SolidSeat) -> Integers:
     """Numbers of the facets on a seat's surface."""
     points = np.asarray(mesh.p)[:, np.asarray(mesh.facets)] - np.reshape(seat.centre, (3, 1, 1))
     points = points[:, : 3 if mesh.t.shape[0] == 4 else 4]
-    radius, height = np.hypot(points[0], points[1]), points[2]
+    radius = np.hypot(points[0], points[1])
+    height = points[2]
     middle = points.mean(axis=1)
     slack = SURFACE_TOLERANCE * seat.radius
     if seat.width > 0.0:

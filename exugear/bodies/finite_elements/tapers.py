@@ -59,7 +59,8 @@ class Tapers:
     def __init__(self, sections: Sequence[ShaftSection]) -> None:
         self._ends = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
         self._stretches = [_Stretch(np.zeros(1), np.zeros(1))]
-        outer, inner = [], []
+        outer = []
+        inner = []
         for section in sections:
             last = self._stretches[-1]
             begins = 0.5 * np.array([section.inner_diameter, section.outer_diameter])
@@ -75,9 +76,10 @@ class Tapers:
         found = np.empty(np.broadcast(cylinder, z).shape)
         for section in np.unique(number):
             here = number == section
-            low, high = self._ends[section], self._ends[section + 1]
+            low = self._ends[section]
+            high = self._ends[section + 1]
             share = np.clip((z[here] - low) / (high - low), 0.0, 1.0)
-            before, after = (one.radius(cylinder[here]) for one in self._stretches[section : section + 2])
+            before, after = (stretch.radius(cylinder[here]) for stretch in self._stretches[section : section + 2])
             found[here] = before + share * (after - before)
         return found
 
@@ -92,5 +94,5 @@ def _stretched(last: _Stretch, section: ShaftSection, begins: Floats, cylinders:
     ends = 0.5 * np.array([section.inner_end, section.outer_end])
     # A section without bore has no knot for it but the axis.
     bored = int(begins[0] == 0.0)
-    whole = _Stretch(np.concatenate([[0.0], begins[bored:]]), np.concatenate([[0.0], ends[bored:]]))
-    return _Stretch(knots, whole.radius(last.radius(knots)))
+    stretch = _Stretch(np.concatenate([[0.0], begins[bored:]]), np.concatenate([[0.0], ends[bored:]]))
+    return _Stretch(knots, stretch.radius(last.radius(knots)))

@@ -51,7 +51,8 @@ def turned_hexahedra(shaft: Shaft, around: int = 8) -> Any:
     corners = np.asarray(shaft.lines.p)[:, np.asarray(shaft.lines.t)]
     radii, heights = (np.unique(np.round(np.asarray(line) / SAME)) * SAME for line in shaft.lines.p)
     middle = corners.mean(axis=1)
-    rings, layers = np.searchsorted(radii, middle[0]) - 1, np.searchsorted(heights, middle[1]) - 1
+    rings = np.searchsorted(radii, middle[0]) - 1
+    layers = np.searchsorted(heights, middle[1]) - 1
     on_axis = bool(radii[0] < SAME)
     points, faces, level = _square_rings(around, len(radii) if on_axis else len(radii) + 1)
     # Level 0 is the core, level 1 the ring about it: both fill the first cell of the half-section.
@@ -93,12 +94,14 @@ def _square_rings(around: int, levels: int) -> tuple[Floats, Integers, Integers]
     border = np.concatenate([grid[:-1, 0], grid[-1, :-1], grid[:0:-1, -1], grid[0, :0:-1]])
     points = [np.stack([x.ravel(), y.ravel()], axis=1)]
     unit = points[0][border]
-    inner, total = border, x.size
+    inner = border
+    total = x.size
     for level in range(1, levels):
         points.append((level + 1.0) * unit)
         outer = total + np.arange(around)
         faces.append(np.stack([inner, outer, np.roll(outer, -1), np.roll(inner, -1)], axis=1))
-        inner, total = outer, total + around
+        inner = outer
+        total = total + around
     numbers = np.repeat(np.arange(levels), [len(f) for f in faces])
     return np.concatenate(points), np.concatenate(faces).astype(np.int64), numbers
 

@@ -169,7 +169,8 @@ class Shaft:
 
     def _lines(self) -> tuple[Floats, Floats]:
         """Lines of the mesh over the radius and along the axis, closing in on re-entrant corners."""
-        shoulder_z, corner_r = set(), set()
+        shoulder_z = set()
+        corner_r = set()
         for number, (left, right) in enumerate(zip(self.sections[:-1], self.sections[1:], strict=True), start=1):
             if abs(left.outer_end - right.outer_diameter) > SAME:
                 corner_r.add(self.tapers.cylinder_at(number, min(left.outer_end, right.outer_diameter) / 2.0))
@@ -222,7 +223,8 @@ class Shaft:
     @property
     def elasticity(self) -> Floats:
         """Stress by strain (6, 6), Pa, engineering shear strains."""
-        e, nu = self.material.youngs_modulus, self.material.poissons_ratio
+        e = self.material.youngs_modulus
+        nu = self.material.poissons_ratio
         shear = e / (2.0 * (1.0 + nu))
         lame = e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu))
         d = np.diag([2.0 * shear] * 3 + [shear] * 3)
@@ -273,7 +275,8 @@ class Shaft:
     def _rigid(self, harmonic: HarmonicName) -> Floats:
         """Rigid motions over all unknowns, about the origin."""
         r, z = self.nodes
-        zero, one = np.zeros_like(r), np.ones_like(r)
+        zero = np.zeros_like(r)
+        one = np.ones_like(r)
         fields: dict[HarmonicName, list[list[Floats]]] = {
             "bending": [[one, zero, zero], [z, zero, -r]],
             "torsion": [[r]],
@@ -288,11 +291,13 @@ class Shaft:
         rows = []
         for seat, (section, low, high) in zip(self.seats, self._bands, strict=True):
             nodes, weight = self._surface(seat, section, low, high)
-            r, arm = self.nodes[0, nodes], self.nodes[1, nodes] - seat.z
+            r = self.nodes[0, nodes]
+            arm = self.nodes[1, nodes] - seat.z
             weight = weight / weight.sum()
             if harmonic == "bending":
                 inertia = weight @ (arm**2 + r**2 / 2.0)
-                row, tilt = np.zeros((fields, self.nodes.shape[1])), np.zeros((fields, self.nodes.shape[1]))
+                row = np.zeros((fields, self.nodes.shape[1]))
+                tilt = np.zeros((fields, self.nodes.shape[1]))
                 row[0, nodes] = weight
                 tilt[0, nodes], tilt[2, nodes] = weight * arm / inertia, -0.5 * weight * r / inertia
                 rows += [row.T.ravel(), tilt.T.ravel()]
@@ -308,7 +313,8 @@ class Shaft:
         On a cone their share of its length, so that the seat's centre stays in its middle.
         """
         (r, z), cylinder = self.nodes, self._cylinder
-        outer, inner = self.tapers.outer[section], self.tapers.inner[section]
+        outer = self.tapers.outer[section]
+        inner = self.tapers.inner[section]
         if seat.width > 0.0:
             on = (np.abs(cylinder - outer) < SAME) & (z > low - SAME) & (z < high + SAME)
         else:
@@ -329,7 +335,8 @@ class Shaft:
         facets = self.mesh.boundary_facets()
         ends = self.mesh.facets[:, facets]
         off_axis = self.mesh.p[0, ends].max(axis=0) > SAME
-        facets, ends = facets[off_axis], ends[:, off_axis]
+        facets = facets[off_axis]
+        ends = ends[:, off_axis]
         vertices, edges = np.unique(ends, return_inverse=True)
         return Outline(
             r=np.asarray(self.mesh.p[0, vertices]),
@@ -344,7 +351,9 @@ class Shaft:
         values = self._whole(harmonic, shapes)[nodes]
         zero = np.zeros_like(values[:, 0])
         if harmonic == "bending":
-            a, s, w = values[:, 0], values[:, 1], values[:, 2]
+            a = values[:, 0]
+            s = values[:, 1]
+            w = values[:, 2]
             return np.stack([s + a, s - a, w], axis=1)
         if harmonic == "torsion":
             return np.stack([zero, values[:, 0], zero], axis=1)
@@ -388,7 +397,8 @@ def _graded_line(breaks: Sequence[float], corners: set[float], size: float, grad
         closing = room * GRADING ** np.arange(grading, 0, -1)
         left = low + closing if ends[0] else np.array([low])
         right = high - closing if ends[1] else np.array([high])
-        start, stop = left.max(initial=low), right.min(initial=high)
+        start = left.max(initial=low)
+        stop = right.min(initial=high)
         between = np.linspace(start, stop, 1 + max(1, math.ceil((stop - start) / size - SAME)))
         inside = np.unique(np.concatenate([left, between, right, [high]]))
         lines += inside[inside > low].tolist()

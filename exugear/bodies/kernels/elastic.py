@@ -63,7 +63,8 @@ class ElasticArrays(NamedTuple):
 
 def no_elastic() -> ElasticArrays:
     """Arrays of a system without elastic bodies."""
-    none, nothing = np.zeros(0, dtype=np.int64), np.zeros(0)
+    none = np.zeros(0, dtype=np.int64)
+    nothing = np.zeros(0)
     first = np.zeros(1, dtype=np.int64)
     return ElasticArrays(
         first, none, nothing, nothing, none, none, none, nothing, nothing, nothing, none, nothing, nothing
@@ -124,7 +125,8 @@ def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
         return laid_out(symmetric_tiles(sign * block) for block in blocks)
 
     def rectangle(b: int) -> Floats:
-        begin, shape = elastic.across[b], (across[b], sizes[b])
+        begin = elastic.across[b]
+        shape = (across[b], sizes[b])
         return -elastic.gyroscopic[begin : begin + sizes[b] * across[b]].reshape(shape).T
 
     stiffness, square = squares(elastic.stiffness, -1.0)
@@ -184,10 +186,12 @@ def add_gyroscopic(b: int, v: Floats, elastic: ElasticMotion, given: Floats, sum
     turning = all_eight(0.0)
     for i in range(elastic.first[block], elastic.first[block + 1], SIZE):
         turning = turning + eight(elastic.momentum, i) * eight_at(v, elastic.coordinate, i)
-    speed, first = sum_of(turning), elastic.first[partner]
+    speed = sum_of(turning)
+    first = elastic.first[partner]
     for i in range(first, elastic.first[partner + 1], SIZE):
         put(given, i - first, eight_at(v, elastic.coordinate, i) * speed)
-    rows, columns = elastic.first[b + 1] - elastic.first[b], elastic.first[partner + 1] - first
+    rows = elastic.first[b + 1] - elastic.first[b]
+    columns = elastic.first[partner + 1] - first
     add_rows(elastic.gyroscopic, elastic.across[b], rows, columns, given, sums)
 
 
@@ -203,10 +207,14 @@ def set_elastic_motion(
     damped = 0.0
     if elastic is None:
         return damped
-    given, sums, found = scratch[0], scratch[1], scratch[2]
+    given = scratch[0]
+    sums = scratch[1]
+    found = scratch[2]
     for b in range(elastic.turning.size):
-        first, square = elastic.first[b], elastic.square[b]
-        size, time = elastic.first[b + 1] - first, elastic.damping_time[b]
+        first = elastic.first[b]
+        square = elastic.square[b]
+        size = elastic.first[b + 1] - first
+        time = elastic.damping_time[b]
         gather_deformation(b, q, v, time, elastic, given)
         for i in range(0, size, SIZE):
             put(sums, i, eight_at(f, elastic.coordinate, first + i))
@@ -228,12 +236,14 @@ def set_elastic_motion(
 @kernel
 def motion_energies(q: Floats, v: Floats, elastic: ElasticMotion | None, scratch: Floats) -> tuple[float, float]:
     """Kinetic and elastic energy as of `elastic_energies`, from blocks arranged for speed; None: no such bodies."""
-    kinetic, stored = 0.0, 0.0
+    kinetic = 0.0
+    stored = 0.0
     if elastic is None:
         return kinetic, stored
     given = scratch[0]
     for b in range(elastic.turning.size):
-        first, square = elastic.first[b], elastic.square[b]
+        first = elastic.first[b]
+        square = elastic.square[b]
         size = elastic.first[b + 1] - first
         gather_deformation(b, q, v, 0.0, elastic, given)
         stored -= 0.5 * square_form(elastic.stiffness, square, size, given)
@@ -269,7 +279,8 @@ def deformation(b: int, q: Floats, v: Floats, time: float, elastic: ElasticArray
 @kernel
 def add_elastic_forces(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Floats, f: Floats) -> None:
     """Add the elastic, damping and gyroscopic forces - K (q + time v) - Omega G v of all bodies to f."""
-    given, sum_ = scratch[0], scratch[1]
+    given = scratch[0]
+    sum_ = scratch[1]
     for b in range(elastic.turning.size):
         begin = elastic.first[b]
         size = elastic.first[b + 1] - begin
@@ -331,7 +342,9 @@ def block_energy(b: int, x: Floats, matrix: Floats, elastic: ElasticArrays) -> f
 @kernel
 def elastic_energies(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Floats) -> tuple[float, float, float]:
     """Kinetic and elastic energy (J) of all elastic bodies, and the power that they damp (W)."""
-    kinetic, stored, damped = 0.0, 0.0, 0.0
+    kinetic = 0.0
+    stored = 0.0
+    damped = 0.0
     given = scratch[0]
     for b in range(elastic.turning.size):
         for i in range(elastic.first[b], elastic.first[b + 1]):

@@ -67,7 +67,8 @@ def travelling_memory(seats: TravellingArrays) -> Floats:
     count, sectors = seats.sectors.shape
     memory = np.zeros((count, SUMS + NUMBER_OF_SUMS, filled_up(max(sectors, 1))))
     x, y = np.moveaxis(seats.axes, -1, 0)
-    c, s = np.cos(seats.angle)[:, None], np.sin(seats.angle)[:, None]
+    c = np.cos(seats.angle)[:, None]
+    s = np.sin(seats.angle)[:, None]
     memory[:, AXIS_X, :sectors], memory[:, AXIS_Y, :sectors] = c * x + s * y, c * y - s * x
     return memory
 
@@ -77,14 +78,21 @@ def weigh_sectors(c: float, s: float, count: int, memory: Floats) -> None:
     """Fill what each of `count` sectors has to do with a seat; c and s are those of the angle it has travelled."""
     for k in range(0, memory.shape[1], SIZE):
         # Angle from the sector's middle to the seat, by the difference of the two directions.
-        x, y = eight(memory[AXIS_X], k), eight(memory[AXIS_Y], k)
-        cosine, sine = x * c + y * s, x * s - y * c
+        x = eight(memory[AXIS_X], k)
+        y = eight(memory[AXIS_Y], k)
+        cosine = x * c + y * s
+        sine = x * s - y * c
         # cos n d and sin n d by turning on from n - 1: one cosine and sine serve all waves.
-        weight, slope, of_n, of_n_across = all_eight(1.0), all_eight(0.0), all_eight(1.0), all_eight(0.0)
+        weight = all_eight(1.0)
+        slope = all_eight(0.0)
+        of_n = all_eight(1.0)
+        of_n_across = all_eight(0.0)
         for n in range(1, (count - 1) // 2 + 1):
             of_n, of_n_across = of_n * cosine - of_n_across * sine, of_n_across * cosine + of_n * sine
-            weight, slope = weight + of_n * 2.0, slope - of_n_across * (2.0 * n)
-        weight, slope = weight * (1.0 / count), slope * (1.0 / count)
+            weight = weight + of_n * 2.0
+            slope = slope - of_n_across * (2.0 * n)
+        weight = weight * (1.0 / count)
+        slope = slope * (1.0 / count)
         put(memory[WEIGHT], k, weight)
         put(memory[COSINE], k, weight * cosine)
         put(memory[SINE], k, weight * sine)
@@ -97,15 +105,29 @@ def weigh_sectors(c: float, s: float, count: int, memory: Floats) -> None:
 def sum_sectors(t: int, q: Floats, v: Floats, seats: TravellingArrays, memory: Floats) -> None:
     """Fill the sums for seat t: of the sectors' motions by weight, along and across; derivatives; the same of rates."""
     a = all_eight(0.0)
-    b, c, d, e, f, g, h, i = a, a, a, a, a, a, a, a
+    b = a
+    c = a
+    d = a
+    e = a
+    f = a
+    g = a
+    h = a
+    i = a
     for k in range(seats.number[t]):
         j = seats.sectors[t, k]
         place, rate = eight(q, j), eight(v, j)  # the last two of these are of the next seat and not looked at
-        weight, cosine, sine = memory[WEIGHT, k], memory[COSINE, k], memory[SINE, k]
-        a, b, c = a + place * weight, b + place * cosine, c + place * sine
-        d, e = d + place * memory[SLOPE, k], e + place * memory[SLOPE_COSINE, k]
+        weight = memory[WEIGHT, k]
+        cosine = memory[COSINE, k]
+        sine = memory[SINE, k]
+        a = a + place * weight
+        b = b + place * cosine
+        c = c + place * sine
+        d = d + place * memory[SLOPE, k]
+        e = e + place * memory[SLOPE_COSINE, k]
         f = f + place * memory[SLOPE_SINE, k]
-        g, h, i = g + rate * weight, h + rate * cosine, i + rate * sine
+        g = g + rate * weight
+        h = h + rate * cosine
+        i = i + rate * sine
     put(memory[SUMS], 0, a)
     put(memory[SUMS + 1], 0, b)
     put(memory[SUMS + 2], 0, c)
@@ -132,11 +154,17 @@ def place_travelling(q: Floats, v: Floats, seats: TravellingArrays | None, share
     """Fill coordinates and rates of all travelling seats, if any, from those of the sectors, and what each shares."""
     if seats is None:
         return
-    c, s, last = 1.0, 0.0, -1
+    c = 1.0
+    s = 0.0
+    last = -1
     for t in range(seats.first.size):
-        o, frame, memory = seats.first[t], seats.frame[t], shares[t]
+        o = seats.first[t]
+        frame = seats.frame[t]
+        memory = shares[t]
         if frame != last:  # seats that travel together need one cosine and sine
-            c, s, last = math.cos(q[frame]), math.sin(q[frame]), frame
+            c = math.cos(q[frame])
+            s = math.sin(q[frame])
+            last = frame
         weigh_sectors(c, s, seats.number[t], memory)
         sum_sectors(t, q, v, seats, memory)
         for i in range(BODY_SIZE):
@@ -154,14 +182,23 @@ def share_travelling_forces(seats: TravellingArrays | None, shares: Floats, f: F
     if seats is None:
         return
     for t in range(seats.first.size):
-        o, memory = seats.first[t], shares[t]
+        o = seats.first[t]
+        memory = shares[t]
         power = 0.0  # of the forces as the seat travels, per rad/s: the force on the frame's angle
         for i in range(BODY_SIZE):
             power += f[o + i] * memory[TRAVEL, i]
-        x, y, z, a, b, c = f[o], f[o + 1], f[o + 2], f[o + 3], f[o + 4], f[o + 5]
+        x = f[o]
+        y = f[o + 1]
+        z = f[o + 2]
+        a = f[o + 3]
+        b = f[o + 4]
+        c = f[o + 5]
         for k in range(seats.number[t]):
             # The transposed map: turned back, times the share.
-            j, weight, cosine, sine = seats.sectors[t, k], memory[WEIGHT, k], memory[COSINE, k], memory[SINE, k]
+            j = seats.sectors[t, k]
+            weight = memory[WEIGHT, k]
+            cosine = memory[COSINE, k]
+            sine = memory[SINE, k]
             f[j] += cosine * x + sine * y
             f[j + 1] += cosine * y - sine * x
             f[j + AXIAL] += weight * z
@@ -176,7 +213,8 @@ def share_travelling_forces(seats: TravellingArrays | None, shares: Floats, f: F
 def follow(q: Floats, v: Floats, seats: TravellingArrays) -> tuple[Floats, Floats]:
     """States (n, size + 6 t + 1) with those of the travelling seats and one that stays zero behind (n, size)."""
     following = ((0, 0), (0, BODY_SIZE * seats.first.size + 1))
-    x, u = np.pad(q, following), np.pad(v, following)
+    x = np.pad(q, following)
+    u = np.pad(v, following)
     place_all(x, u, seats, travelling_memory(seats))
     return x, u
 
@@ -207,9 +245,13 @@ def travelling_tangent(q: Floats, v: Floats, force: Floats, seats: TravellingArr
     """Differentiate at a state q, v of `follow` (e,) under generalized forces (e,) that are not shared yet."""
     extended = len(q)
     size = extended - BODY_SIZE * seats.first.size - 1
-    place, rate, turning = np.eye(extended, size), np.zeros((extended, size)), np.zeros((size, size))
+    place = np.eye(extended, size)
+    rate = np.zeros((extended, size))
+    turning = np.zeros((size, size))
     for t, o in enumerate(seats.first):
-        frame, acting, seat = seats.frame[t], force[o : o + BODY_SIZE], slice(o, o + BODY_SIZE)
+        frame = seats.frame[t]
+        acting = force[o : o + BODY_SIZE]
+        seat = slice(o, o + BODY_SIZE)
         for k in range(seats.number[t]):
             middle = math.atan2(seats.axes[t, k, 1], seats.axes[t, k, 0])
             maps = _sector_maps(seats.angle[t] + q[frame] - middle, int(seats.number[t]))
@@ -231,7 +273,8 @@ def _sector_maps(angle: float, count: int) -> tuple[Floats, Floats, Floats]:
     weight = (1.0 + 2.0 * np.cos(order * angle).sum()) / count
     slope = -2.0 * (order * np.sin(order * angle)).sum() / count
     curvature = -2.0 * (order**2 * np.cos(order * angle)).sum() / count
-    c, s = math.cos(angle), math.sin(angle)
+    c = math.cos(angle)
+    s = math.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     turning = np.array([[-s, -c, 0.0], [c, -s, 0.0], [0.0, 0.0, 0.0]])
     back = np.array([[-c, s, 0.0], [-s, -c, 0.0], [0.0, 0.0, 0.0]])

@@ -76,7 +76,8 @@ def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticB
     if solid is not None:
         digest = hashlib.sha256(solid.model.mesh.path.read_bytes()).hexdigest()
         return ElasticBody(reduced, inertia, solid.main_seat, solid.sectors, solid.shared_seats, floating, digest)
-    seats, shared = [seat.name for seat in of_shape.seats], shared_seats(gearbox, body.name)
+    seats = [seat.name for seat in of_shape.seats]
+    shared = shared_seats(gearbox, body.name)
     torque = shared.get(TORQUE_SEAT, TORQUE_SEAT)
     main = torque if torque in seats else seats[0]
     return ElasticBody(reduced, inertia, main, shared_seats=shared, floating=floating)
@@ -123,8 +124,12 @@ class _Hashed:
 def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
     model = hashed.model
     if isinstance(model, SolidModel):
-        return reduce_solid(model) if folder is None else load_or_reduce_solid(model, folder)
-    return reduce_shaft(model) if folder is None else load_or_reduce_shaft(model, folder)
+        if folder is None:
+            return reduce_solid(model)
+        return load_or_reduce_solid(model, folder)
+    if folder is None:
+        return reduce_shaft(model)
+    return load_or_reduce_shaft(model, folder)
 
 
 @lru_cache(maxsize=16)

@@ -32,4 +32,6 @@ def frame_of(gearbox: Gearbox, body: Body) -> Frame:
     """Frame that an elastic body is seen from: the ground, its own that turns, or one that does not."""
     if body.fixed:
         return "ground"
-    return "carrier" if any(other.carrier == body.name for other in gearbox.bodies()) else "nonrotating"
+    if any(other.carrier == body.name for other in gearbox.bodies()):
+        return "carrier"
+    return "nonrotating"

@@ -109,11 +109,9 @@ def _shape_of(gearbox: Gearbox, body: Body) -> ShapeSection:
 
 def _section_of(section: ShaftSectionSection) -> ShaftSection:
     """Piece of a shaft, m."""
-    outer_end, inner, inner_end = (
-        section.outer_diameter_end_mm,
-        section.inner_diameter_mm,
-        section.inner_diameter_end_mm,
-    )
+    outer_end = section.outer_diameter_end_mm
+    inner = section.inner_diameter_mm
+    inner_end = section.inner_diameter_end_mm
     if inner_end is not None:
         inner, inner_end = max(inner, POINT * inner_end), max(inner_end, POINT * inner)
     return ShaftSection(

@@ -46,7 +46,8 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
     """
     body = gearbox.body(name)
     section = gearbox.case.bodies[body.family]
-    key, solid = f"bodies.{body.family}.solid", section.solid
+    key = f"bodies.{body.family}.solid"
+    solid = section.solid
     if solid is None:
         raise gearbox.fault(f"bodies.{body.family}: no solid; give a [{key}] table")
     frame = frame_of(gearbox, body)
@@ -112,7 +113,8 @@ def _items(gearbox: Gearbox, body: Body) -> dict[str, _Item]:
     for bearing in gearbox.bearings:
         if body.name not in (bearing.body, bearing.on):
             continue
-        diameter, width = None, None
+        diameter = None
+        width = None
         if bearing.catalogue is not None:
             # A planet turns about its bearing, all other bodies in theirs.
             inside = (bearing.body == body.name) != bearing.carries_outer_ring

@@ -70,14 +70,18 @@ def check(
                 print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
                 print_table("Margins of gear 1 and 2", [_margin_row(pair) for pair in pairs])
             if thicknesses:
-                print_table("Tooth thickness within its allowances", [_thickness_row(one) for one in thicknesses])
+                print_table(
+                    "Tooth thickness within its allowances", [_thickness_row(thickness) for thickness in thicknesses]
+                )
             if loads:
                 band = 1e-3 * loads[0]["band_Hz"]
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}; runs keep {band:g} kHz"
-                print_table(title, [_load_row(one) for one in loads], ("loaded flanks",))
+                print_table(title, [_load_row(load) for load in loads], ("loaded flanks",))
             if bearings:
-                print_table("Bearings under the static load", [_bearing_row(one) for one in bearings], ("most by",))
-                if any(one["reaction_kN"] is not None for one in bearings):
+                print_table(
+                    "Bearings under the static load", [_bearing_row(bearing) for bearing in bearings], ("most by",)
+                )
+                if any(bearing["reaction_kN"] is not None for bearing in bearings):
                     say("* stated by the file, which the stiffness goes by")
             for variant, reason in variants.items():
                 say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
@@ -138,8 +142,8 @@ def _assemblies(gearbox: Gearbox, variants: Mapping[str, str]) -> dict[Variant, 
 def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[str, str]:
     """Say of each variant why it has no steady response over speed; empty where it has one."""
     return {
-        str(variant): str(found) if isinstance(found, FailedError) else steady_lack(found, variant)
-        for variant, found in assemblies.items()
+        str(variant): str(assembly) if isinstance(assembly, FailedError) else steady_lack(assembly, variant)
+        for variant, assembly in assemblies.items()
     }
 
 
@@ -160,7 +164,8 @@ def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
     from exugear.dynamics.readiness.margins import backlash_range, pair_margins
 
     spec = gearbox.pairs[name]
-    pair, margins = spec.pair, pair_margins(spec)
+    pair = spec.pair
+    margins = pair_margins(spec)
     return {
         "pair": name,
         "teeth": [pair.pinion.teeth, pair.gear.teeth],
@@ -201,18 +206,20 @@ def _margin_row(pair: dict[str, Any]) -> dict[str, str]:
 
 def _play(ends: list[float]) -> str:
     least, given, most = ends
-    return f"{given:.0f}" if most - least < 1.0 else f"{given:.0f} ({least:.0f} to {most:.0f})"
+    if most - least < 1.0:
+        return f"{given:.0f}"
+    return f"{given:.0f} ({least:.0f} to {most:.0f})"
 
 
 def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up the tooth thickness of gears that have allowances of it."""
     from exugear.dynamics.readiness.margins import thickness_range
 
-    found = []
+    summaries = []
     for name, section in gearbox.case.gears.items():
         if section.tooth_thickness is not None:
             one = thickness_range(gearbox, name)
-            found.append(
+            summaries.append(
                 {
                     "gear": name,
                     "normal_tooth_thickness_mm": [1e3 * end for end in one.thickness],
@@ -220,7 +227,7 @@ def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                     "base_tangent_length_mm": [1e3 * end for end in one.span] if one.span_teeth else None,
                 }
             )
-    return found
+    return summaries
 
 
 def _thickness_row(one: dict[str, Any]) -> dict[str, str]:
@@ -303,12 +310,12 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     from exugear.transient.extent import check_duration
     from exugear.transient.runup import BAND
 
-    found = []
+    summaries = []
     for name, case in gearbox.load_cases.items():
         check_duration(gearbox, case)
         loads = summarise_loads(gearbox, case)
         body, rim = loads.fastest_rim
-        found.append(
+        summaries.append(
             {
                 "load_case": name,
                 "net_torque_N_m": loads.net_torque,
@@ -329,7 +336,7 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                 ],
             }
         )
-    return found
+    return summaries
 
 
 def _beyond_band(frequencies: Mapping[str, float], band: float) -> Iterator[str]:

@@ -41,7 +41,8 @@ def import_(
         _refuse_existing(target)
         imported = _imported(file, target, Rules(shifts.value, distances.value))
         if imported.spectrum:
-            table, content = target.with_name(SPECTRUM), imported.spectrum.encode("utf-8")
+            table = target.with_name(SPECTRUM)
+            content = imported.spectrum.encode("utf-8")
             if not (table.is_file() and table.read_bytes() == content):  # as an import that was killed leaves it
                 _refuse_existing(table)
                 write_file(table, content)

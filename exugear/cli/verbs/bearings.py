@@ -104,7 +104,9 @@ def _life_row(duty: BearingDuty) -> dict[str, str]:
 
 def _mesh_row(duty: MeshDuty) -> dict[str, str]:
     def shown(value: float, form: str) -> str:
-        return "-" if math.isnan(value) else format(value, form)
+        if math.isnan(value):
+            return "-"
+        return format(value, form)
 
     return {
         "mesh": duty.name,

@@ -83,7 +83,7 @@ def _tell(data: xr.Dataset) -> None:
         print_table("Roots: largest stress of the life, safety against breakage", _root_rows(data))
     if data.sizes["bearing"]:
         print_table("Bearings: basic rating life, static safety", _bearing_rows(data))
-    worst = [one for one in limits(data) if one[2] > 0.0][:SHOWN_LIMITS]
+    worst = [limit for limit in limits(data) if limit[2] > 0.0][:SHOWN_LIMITS]
     if worst:
         rows = [{"limits": part, "by": kind, "damage": _told(damage, ".3g")} for part, kind, damage in worst]
         print_table(f"What limits the life of {float(data.attrs['life_years']):g} years", rows)
@@ -151,7 +151,9 @@ def _entries(data: xr.Dataset, name: str) -> Iterator[tuple[str, Callable[[str],
 def _with_holder(data: xr.Dataset, label: str, kind: str) -> str:
     """Label of a flank, and which of several planets it is."""
     holder = str(data[f"flank_{kind}_holder"].sel(flank=label).item())
-    return f"{label}\n  {holder}" if holder else label
+    if holder:
+        return f"{label}\n  {holder}"
+    return label
 
 
 def _figure(data: xr.Dataset, name: str, place: int, key: str) -> float:
@@ -159,4 +161,8 @@ def _figure(data: xr.Dataset, name: str, place: int, key: str) -> float:
 
 
 def _told(value: float, form: str) -> str:
-    return "" if math.isnan(value) else "infinite" if math.isinf(value) else format(value, form)
+    if math.isnan(value):
+        return ""
+    if math.isinf(value):
+        return "infinite"
+    return format(value, form)

@@ -73,7 +73,7 @@ def _source_row(row: dict[str, Any]) -> dict[str, str]:
 
 
 def _equivalent_rows(counted: CountedLoads) -> list[dict[str, str]]:
-    found = counted.distribution
+    distribution = counted.distribution
     rows = [
         {"by damage with the slope": f"{m:.4g}", "torque\nkN m": f"{1e-3 * value:.4g}", "range\nkN m": ""}
         for m, value in counted.equivalents().items()
@@ -82,7 +82,10 @@ def _equivalent_rows(counted: CountedLoads) -> list[dict[str, str]]:
         {"by damage with the slope": f"{m:.4g}", "torque\nkN m": "", "range\nkN m": f"{1e-3 * value:.4g}"}
         for m, value in counted.equivalent_ranges.get("torque", {}).items()
     ]
-    say(f"{len(found.hours)} bins, {found.hours.sum():.6g} h, {found.revolutions.sum():.4g} revolutions")
+    say(
+        f"{len(distribution.hours)} bins, {distribution.hours.sum():.6g} h, "
+        f"{distribution.revolutions.sum():.4g} revolutions"
+    )
     return rows
 
 

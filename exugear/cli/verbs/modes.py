@@ -46,7 +46,8 @@ def modes(
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         project.begin()
         project.prepare()
-        found, path = project.modes(), project.modes_path
+        found = project.modes()
+        path = project.modes_path
         picture = _draw_campbell(found, path)
         rows = _mode_summaries(found)
         if found.growth_rate > 0.0:
@@ -67,7 +68,8 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
     from exugear.results.spectra.mode_report import mobility_shares
     from exugear.results.spectra.orders import order_lines
 
-    gearbox, least = found.assembly.gearbox, 1e-3
+    gearbox = found.assembly.gearbox
+    least = 1e-3
     shares = mobility_shares(found.to_dataset())
     seen = (found.frequency > 0.0) & (shares >= least)
     highest = max(gearbox.train.mesh_frequencies(1.0).values(), default=0.0)

@@ -55,7 +55,9 @@ def _beside() -> AbstractContextManager[Executor | None]:
     from fe_ste.tools.threads import available_cores
     from fe_ste.tools.workers import Workers
 
-    return Workers(1) if available_cores() > 1 else nullcontext()
+    if available_cores() > 1:
+        return Workers(1)
+    return nullcontext()
 
 
 def _tell_report(

@@ -124,7 +124,9 @@ def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
     """Name of a run in the account of times."""
     choice = project.choice
     label = f"run, {choice.variant}, {choice.load_case}, {choice.inertias}, {choice.mesh_law}, solver {solver}"
-    return f"{label}, meshes as loads" if route is MeshRoute.loads else label
+    if route is MeshRoute.loads:
+        return f"{label}, meshes as loads"
+    return label
 
 
 def _check_extent(project: Project, duration: float | None, folder: Path) -> None:
@@ -132,8 +134,10 @@ def _check_extent(project: Project, duration: float | None, folder: Path) -> Non
     from exugear.tooth_mesh.laws.registry import LAWS
     from exugear.transient.extent import check_disk, check_duration, sample_bytes
 
-    gearbox, load_case = project.gearbox, _load_case(project)
-    jointed, tabled = project.choice.variant.spins_only, LAWS[project.choice.mesh_law].signals_positions
+    gearbox = project.gearbox
+    load_case = _load_case(project)
+    jointed = project.choice.variant.spins_only
+    tabled = LAWS[project.choice.mesh_law].signals_positions
     supports = gearbox.joints if jointed else gearbox.bearings
     size = sample_bytes(len(gearbox.meshes), len(supports), tabled, jointed)
     check_duration(gearbox, load_case, duration)

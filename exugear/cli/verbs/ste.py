@@ -91,7 +91,8 @@ def ste(
         if positions is not None and positions < LEAST_TABLE_POSITIONS:
             raise BadInputError(f"--positions {positions}: a table for dynamics needs at least {LEAST_TABLE_POSITIONS}")
         project = WatchedProject(gearbox, out or default_folder(case), Choice(Variant.bushing))
-        folder, requests = project.folder, _requested_tables(project, mesh or [], positions, grid)
+        folder = project.folder
+        requests = _requested_tables(project, mesh or [], positions, grid)
         with time_noted(folder, "tables of transmission error"):
             tables = project.computed(requests)
         with time_noted(folder, "pictures of the tables"):
@@ -261,7 +262,9 @@ def _tell_tables(
 
 def _ste_row(summary: dict[str, Any]) -> dict[str, str]:
     def shown(key: str, form: str, factor: float = 1.0) -> str:
-        return "-" if summary.get(key) is None else format(factor * summary[key], form)
+        if summary.get(key) is None:
+            return "-"
+        return format(factor * summary[key], form)
 
     solved = summary["states"] - summary["not_converged"]
     return {

@@ -135,7 +135,8 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     from exugear.gearbox.parts import RPM
     from exugear.report.findings.loudness import ranking_of
 
-    growth, ranking = float(data.attrs["growth_rate"]), ranking_of(data)
+    growth = float(data.attrs["growth_rate"])
+    ranking = ranking_of(data)
     _tell_of_stability(data, growth)
     pulling = _tell_of_pulls(data)
     swinging = _tell_of_bearings(data)
@@ -162,7 +163,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
         return
     title = f"Loudest resonances, {_speeds_of(ranking)}, {project.choice.variant}, {settings.level}"
     if ranking.resonances:
-        print_table(title, [_row(own) for own in ranking.resonances[:SHOWN_RESONANCES]])
+        print_table(title, [_row(resonance) for resonance in ranking.resonances[:SHOWN_RESONANCES]])
         say(
             "Overall transmission error, dynamic bearing force, acceleration at bearings (of the "
             f"{ranking.accelerates}), each with its place"
@@ -198,7 +199,7 @@ def _whole_summary(
         "change_with_more_harmonics": _known(float(data.attrs["change_with_more"])),
         "meshes_that_pull": [_pull_summary(pull) for pull in pulling],
         "unsolved": [
-            {"speed_rpm": own["speed"] / RPM, "reason": own["reason"]} for own in json.loads(data.attrs["unsolved"])
+            {"speed_rpm": load["speed"] / RPM, "reason": load["reason"]} for load in json.loads(data.attrs["unsolved"])
         ],
         "unstable_points": int((data["growth"] > 0.0).sum()),
         "largest_energy_error": float(abs(data["energy_error"]).max()),
@@ -211,7 +212,7 @@ def _whole_summary(
         "ranked_speeds_rpm": [speed / RPM for speed in ranking.speeds],
         "ranked_over_all_speeds": ranking.whole,
         "accelerations_of": ranking.accelerates,
-        "resonances": [_resonance_summary(own) for own in ranking.resonances],
+        "resonances": [_resonance_summary(resonance) for resonance in ranking.resonances],
         "peaks_of_overall_dte": [_summary(peak) for peak in found],
         "file": str(project.steady_path(settings)),
     }
@@ -305,8 +306,8 @@ def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
     return found
 
 
-def _wandering_summary(own: WanderingLoad) -> dict[str, Any]:
-    return {"pair": own.pair, "load_centre_m": own.amplitude, "over_transmission_error": own.over_error}
+def _wandering_summary(load: WanderingLoad) -> dict[str, Any]:
+    return {"pair": load.pair, "load_centre_m": load.amplitude, "over_transmission_error": load.over_error}
 
 
 def _left_out(data: xr.Dataset) -> dict[str, float]:
@@ -316,7 +317,9 @@ def _left_out(data: xr.Dataset) -> dict[str, float]:
 
 
 def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    if math.isfinite(value):
+        return value
+    return None
 
 
 def _tell_of_harmonics(data: xr.Dataset) -> None:
@@ -387,17 +390,17 @@ def _summary(peak: Peak) -> dict[str, Any]:
     }
 
 
-def _resonance_summary(own: Resonance) -> dict[str, Any]:
+def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
     from exugear.gearbox.parts import RPM
 
     found: dict[str, Any] = {
-        "line": own.line,
-        "order": own.order,
-        "speed_rpm": own.speed / RPM,
-        "frequency_Hz": own.frequency,
-        "best_place": own.best,
+        "line": resonance.line,
+        "order": resonance.order,
+        "speed_rpm": resonance.speed / RPM,
+        "frequency_Hz": resonance.frequency,
+        "best_place": resonance.best,
     }
-    for quantity, loudness in own.loudness.items():
+    for quantity, loudness in resonance.loudness.items():
         found[f"{quantity}_{KEYS[quantity]}"] = loudness.amplitude
         found[f"{quantity}_place"] = loudness.place
         if loudness.at:
@@ -405,11 +408,11 @@ def _resonance_summary(own: Resonance) -> dict[str, Any]:
     return found
 
 
-def _row(own: Resonance) -> dict[str, str]:
+def _row(resonance: Resonance) -> dict[str, str]:
     from exugear.gearbox.parts import RPM
 
-    found = {"line": own.line, "rpm": f"{own.speed / RPM:.2f}", "Hz": f"{own.frequency:.1f}"}
-    for quantity, loudness in own.loudness.items():
+    found = {"line": resonance.line, "rpm": f"{resonance.speed / RPM:.2f}", "Hz": f"{resonance.frequency:.1f}"}
+    for quantity, loudness in resonance.loudness.items():
         unit, factor = COLUMNS[quantity]
         place = "" if loudness.place is None else f" ({loudness.place})"
         found[unit] = f"{factor * loudness.amplitude:.3g}{place}"

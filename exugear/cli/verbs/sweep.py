@@ -65,7 +65,8 @@ def sweep(
         from exugear.studies.executors import ExecutorError
         from exugear.studies.optimisation import OptimisationError
 
-        part, opens = _shard(shard, merge), _executor(executor, workers, scheduler)
+        part = _shard(shard, merge)
+        opens = _executor(executor, workers, scheduler)
         read = _read(study, files_below, scripts)
         if read.file.optimise is not None and (merge or retry or shard is not None):
             raise BadInputError(
@@ -179,7 +180,8 @@ def _draw(study: Study, folder: Path, swept: Swept) -> list[Path]:
 def _tell(study: Study, path: Path, folder: Path, swept: Swept, pictures: list[Path], as_json: bool) -> None:
     """Print what came of it; end with 1 if points failed, or are missing where all were asked for."""
     searched = study.file.optimise is not None
-    total, failed = len(swept.records if searched else study.design.points), swept.failed
+    total = len(swept.records if searched else study.design.points)
+    failed = swept.failed
     missing = total - len(swept.records)
     summary: dict[str, Any] = {
         "study": str(path),
@@ -275,4 +277,8 @@ def _print_front(study: Study, dataset: xr.Dataset) -> None:
 
 
 def _number(value: float) -> str:
-    return "" if math.isnan(value) else "infinite" if math.isinf(value) else f"{value:.4g}"
+    if math.isnan(value):
+        return ""
+    if math.isinf(value):
+        return "infinite"
+    return f"{value:.4g}"

@@ -51,10 +51,10 @@ def view(
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         project.begin()
         project.prepare()
-        found = project.modes()
+        modes = project.modes()
         wanted = project.gearbox.case.report.reference_frequency_Hz if near is None else near
-        first = int(found.overall.argmax()) if wanted is None else found.nearest(wanted)
-        written = _draw_modes(found, project.modes_path.parent, first, animation)
+        first = int(modes.overall.argmax()) if wanted is None else modes.nearest(wanted)
+        written = _draw_modes(modes, project.modes_path.parent, first, animation)
         if as_json:
             print_json({"case": str(case), "mode": first + 1, "files": [str(file) for file in written]})
             return
@@ -79,7 +79,8 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
     if not places:
         raise BadInputError(f"{found.label}: no elastic mode to show")
     shown = places.index(first) if first in places else 0
-    words, modes = Words(assembly.gearbox), found.to_dataset()
+    words = Words(assembly.gearbox)
+    modes = found.to_dataset()
     page = write_mode_page(
         assembly,
         found.shapes[:, places],
@@ -92,7 +93,7 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
     return [page, *_draw_pictures(found, folder, places[shown], animation)]
 
 
-def _draw_pictures(found: Modes, folder: Path, place: int, animation: bool) -> list[Path]:
+def _draw_pictures(modes: Modes, folder: Path, place: int, animation: bool) -> list[Path]:
     """Draw the gearbox and one mode; nothing where this machine cannot render."""
     from exugear.report.pictures.elastic_scene import (
         animate_elastic_bodies,
@@ -104,11 +105,13 @@ def _draw_pictures(found: Modes, folder: Path, place: int, animation: bool) -> l
     from exugear.report.pictures.shapes import bodies_of
     from fe_ste.tools.rendering import RenderingError
 
-    assembly = found.assembly
-    bodies, shape = bodies_of(assembly.gearbox), found.shapes[:, place]
-    title = f"{found.frequency[place]:.0f} Hz: {found.names[place]}"
+    assembly = modes.assembly
+    bodies = bodies_of(assembly.gearbox)
+    shape = modes.shapes[:, place]
+    title = f"{modes.frequency[place]:.0f} Hz: {modes.names[place]}"
     stem = folder / f"mode_{place + 1}"
-    still, animated = stem.with_suffix(".png"), stem.with_suffix(".gif")
+    still = stem.with_suffix(".png")
+    animated = stem.with_suffix(".gif")
     try:
         draw_gearbox(bodies, folder / "gearbox.png", title=assembly.gearbox.name)
         if assembly.elastic_bodies:

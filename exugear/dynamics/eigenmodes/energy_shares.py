@@ -86,7 +86,8 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
     for name, share in zip(element_names, strain, strict=True):
         family = families.get(name, name)
         strained[family] = strained.get(family, 0.0) + float(share)
-    words, told = [], 0.0
+    words = []
+    told = 0.0
     for what, share in sorted(moving.items(), key=lambda item: -item[1]):
         if told >= 0.8 or share < 0.05:
             break

@@ -258,7 +258,8 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
     frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness, assembly.motions)
     if assembly.elastic_bodies:  # beyond the band the bodies' normal modes are only what keeps their statics right
         inside = frequency <= assembly.gearbox.case.elasticity.band_Hz
-        frequency, shapes = frequency[inside], shapes[:, inside]
+        frequency = frequency[inside]
+        shapes = shapes[:, inside]
     masses = np.einsum("im,ij,jm->m", shapes, linear.mass, shapes)
     shapes = shapes / np.sqrt(masses)
     omega = 2.0 * np.pi * frequency
@@ -331,7 +332,8 @@ def _amplification(
 
 def _tilt_stiffness(assembly: Assembly, q: Floats, n: int) -> Floats:
     """Stiffness (size, size) that a mesh with a law along a row has against misalignment: zero without any."""
-    mesh, rest = assembly.mean_meshes.one(n), np.zeros(assembly.size)
+    mesh = assembly.mean_meshes.one(n)
+    rest = np.zeros(assembly.size)
     if not mesh.tilt[0, TILT_STIFFNESS] > 0.0:
         return np.zeros((assembly.size,) * 2)
     twice = mesh._replace(tilt=mesh.tilt * (1.0 + (np.arange(TILT_COLUMNS) == TILT_STIFFNESS)))
@@ -354,7 +356,8 @@ def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats
     share : (n,) array
         Squared overlap, 1 for the same motion: the kinetic energy that both shapes share.
     """
-    source, target = before.assembly, after.assembly
+    source = before.assembly
+    target = after.assembly
     carried = np.zeros((target.size, source.size))  # coordinates of `after` that the shapes of `before` have
     for body in source.bodies:
         if body.name in source.elastic_bodies:

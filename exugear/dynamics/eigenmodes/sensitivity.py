@@ -96,7 +96,8 @@ class ParameterVariation(Displayed):
         scale = np.log(self.parameter.values) if self.parameter.logarithmic else np.array(self.parameter.values)
         crossings = []
         for mode in range(self.frequency.shape[1]):
-            distance, share = self.frequency[:, mode] - frequency, self.share[:, mode]
+            distance = self.frequency[:, mode] - frequency
+            share = self.share[:, mode]
             for n in np.flatnonzero(distance[1:] * distance[:-1] < 0.0):
                 if max(share[n], share[n + 1]) >= least_share:
                     part = distance[n] / (distance[n] - distance[n + 1])

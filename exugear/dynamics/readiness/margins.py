@@ -56,7 +56,8 @@ def pair_margins(spec: PairSpec) -> PairMargins:
     >>> bool(min(margins.form) > LEAST_FORM_MARGIN), round(1e-6 * margins.pitch_point_pressure)
     (True, 842)
     """
-    pair, torque = spec.pair, spec.static_torque
+    pair = spec.pair
+    torque = spec.static_torque
     first, second = (gear.tip_thickness / gear.normal_module for gear in (pair.pinion, pair.gear))
     return PairMargins(
         form=_form_margins(pair),
@@ -102,13 +103,14 @@ def backlash_range(gearbox: Gearbox, pair: GearPair) -> tuple[float, float, floa
     >>> [round(1e6 * play) for play in backlash_range(gearbox, gearbox.gear_pairs["high_speed"])]
     [201, 201, 201]
     """
-    given, across = pair.circumferential_backlash, 1.0 / math.cos(pair.working_pressure_angle)
+    given = pair.circumferential_backlash
+    across = 1.0 / math.cos(pair.working_pressure_angle)
     ends = [0.0, 0.0]
     for gear in (pair.pinion, pair.gear):
         # Thickness and radius grow alike along the involute: the base circle's share, on the working circle.
         thinnings = thinning_range(gearbox.case.gears[gear.name])
         share = math.cos(gear.transverse_pressure_angle) * across
-        ends = [end + share * (one - gear.tooth_thinning) for end, one in zip(ends, thinnings, strict=True)]
+        ends = [end + share * (thinning - gear.tooth_thinning) for end, thinning in zip(ends, thinnings, strict=True)]
     return given + ends[0], given, given + ends[1]
 
 
@@ -134,7 +136,8 @@ def doubts_about_pairs(gearbox: Gearbox) -> Iterator[str]:
     for name, spec in gearbox.pairs.items():
         if name not in at_work:
             continue
-        margins, gears = pair_margins(spec), (spec.pair.pinion, spec.pair.gear)
+        margins = pair_margins(spec)
+        gears = (spec.pair.pinion, spec.pair.gear)
         for gear, mate, margin in zip(gears, gears[::-1], margins.form, strict=True):
             if margin < LEAST_FORM_MARGIN and spec.table:
                 key = f"gears.{mate.name}.tip_diameter_mm = {2e3 * mate.tip_radius:.6g}"

@@ -99,7 +99,9 @@ def _doubts_about_mass(body: Body, radius: float, length: float) -> Iterator[str
 def _bores(gearbox: Gearbox) -> Iterator[str]:
     """Tell bores and rims that no gear has, and bores that the shaft does not pass."""
     for name, gear in gearbox.gears.items():
-        key, held, root = f"gears.{name}.held_diameter_mm", gear.held_diameter, 2.0 * gear.root_radius
+        key = f"gears.{name}.held_diameter_mm"
+        held = gear.held_diameter
+        root = 2.0 * gear.root_radius
         if gear.internal and held > MOST_RIM * root:
             yield (
                 f"{key} = {1e3 * held:g}: a rim {500.0 * (held - root):.4g} mm thick around roots of {1e3 * root:.4g} "
@@ -116,12 +118,14 @@ def _seats(gearbox: Gearbox) -> Iterator[str]:
     """Tell bores of wheels that are narrower than the shaft on either side of them, or than the shaft under them."""
     told = set()
     for body in gearbox.bodies():
-        for name, place in body.wheels.items():
+        for name, wheel in body.wheels.items():
             gear = gearbox.gears[name]
             if gear.internal or body.planet_of is not None or name in told:
                 continue
-            beside, under = _bores_beside(gearbox, body, place), _shaft_under(gearbox, body, gear, place)
-            root, key = 2.0 * gear.root_radius, f"gears.{name}.held_diameter_mm = {1e3 * gear.held_diameter:g}"
+            beside = _bores_beside(gearbox, body, wheel)
+            under = _shaft_under(gearbox, body, gear, wheel)
+            root = 2.0 * gear.root_radius
+            key = f"gears.{name}.held_diameter_mm = {1e3 * gear.held_diameter:g}"
             if under is not None and root >= WHEEL * under and gear.held_diameter < LEAST_OVER_SHAFT * under:
                 told.add(name)
                 yield (
@@ -143,8 +147,11 @@ def _bores_beside(gearbox: Gearbox, body: Body, place: float) -> tuple[float, fl
         for bearing in gearbox.bearings
         if bearing.catalogue is not None and bearing.body == body.name
     ]
-    before, behind = [one for one in known if one[0] < place], [one for one in known if one[0] > place]
-    return (max(before)[1], min(behind)[1]) if before and behind else None
+    before = [one for one in known if one[0] < place]
+    behind = [one for one in known if one[0] > place]
+    if before and behind:
+        return (max(before)[1], min(behind)[1])
+    return None
 
 
 def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> float | None:
@@ -152,7 +159,8 @@ def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> floa
     section = gearbox.case.bodies.get(body.family)
     if section is None or section.shape is None:
         return None
-    start, found = 1e-3 * section.shape.start_z_mm, []
+    start = 1e-3 * section.shape.start_z_mm
+    found = []
     for piece in section.shape.sections:
         end = start + 1e-3 * piece.length_mm
         if start < place + 0.5 * gear.face_width and end > place - 0.5 * gear.face_width:
@@ -167,7 +175,9 @@ def _bearings(gearbox: Gearbox) -> Iterator[str]:
         catalogue = section.catalogue
         if catalogue is None:
             continue
-        known, bore, outer = boundary_of(catalogue.designation), catalogue.bore_mm, catalogue.outer_diameter_mm
+        known = boundary_of(catalogue.designation)
+        bore = catalogue.bore_mm
+        outer = catalogue.outer_diameter_mm
         off = known is not None and max(abs(bore / known.bore - 1.0), abs(outer / known.outer - 1.0)) > OTHER_SIZE
         if known is not None and off:
             yield (
@@ -183,7 +193,8 @@ def _bearings(gearbox: Gearbox) -> Iterator[str]:
 
 def _faces(gearbox: Gearbox) -> Iterator[str]:
     """Tell gears in mesh that miss each other along the axis by a part of their face."""
-    bodies, told = gearbox.named_bodies, set()
+    bodies = gearbox.named_bodies
+    told = set()
     for mesh in gearbox.meshes:
         places = [
             bodies[body].wheels.get(gear.name)
@@ -215,7 +226,8 @@ def usual_backlash(pair: GearPair) -> float:
     >>> round(1e6 * usual_backlash(pair))
     235
     """
-    distance, module = abs(pair.centre_distance), pair.pinion.normal_module
+    distance = abs(pair.centre_distance)
+    module = pair.pinion.normal_module
     return 2.0 / 3.0 * (0.06e-3 + 0.0005 * distance + 0.03 * module)
 
 
@@ -223,10 +235,11 @@ def _backlashes(gearbox: Gearbox) -> Iterator[str]:
     """Tell pairs with far more backlash than drawings ask for: shifts and centre distance do not belong together."""
     for name in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
         pair = gearbox.gear_pairs[name]
-        usual, own = usual_backlash(pair), pair.circumferential_backlash
-        if own > MOST_BACKLASH * usual:
+        usual = usual_backlash(pair)
+        backlash = pair.circumferential_backlash
+        if backlash > MOST_BACKLASH * usual:
             yield (
-                f"pairs.{name}.centre_distance_mm = {1e3 * pair.centre_distance:g}: leaves {1e6 * own:.0f} um of "
+                f"pairs.{name}.centre_distance_mm = {1e3 * pair.centre_distance:g}: leaves {1e6 * backlash:.0f} um of "
                 f"backlash where some {1e6 * usual:.0f} um are usual; check it, and profile_shift of both gears "
                 f"({pair.pinion.profile_shift:g} and {pair.gear.profile_shift:g}) with its sign"
             )
@@ -236,14 +249,14 @@ def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
     """Tell shafts with gears that only one bearing of a type holds which gives way to tilting."""
     told = set()
     for body in gearbox.bodies():
-        own = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
-        if len(own) != 1 or body.fixed or body.planet_of is not None or body.family in told or not body.wheels:
+        bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
+        if len(bearings) != 1 or body.fixed or body.planet_of is not None or body.family in told or not body.wheels:
             continue
-        catalogue = own[0].catalogue
+        catalogue = bearings[0].catalogue
         if catalogue is not None and catalogue.type in TILTING and catalogue.arrangement == "single":
             told.add(body.family)
             yield (
-                f"bearings.{own[0].family}: is the only bearing of {body.family}, and one "
+                f"bearings.{bearings[0].family}: is the only bearing of {body.family}, and one "
                 f"{catalogue.type.replace('_', ' ')} bearing hardly keeps a shaft from tilting; is one missing?"
             )
 
@@ -253,13 +266,13 @@ def _faces_in_bearings(gearbox: Gearbox) -> Iterator[str]:
     told = set()
     for body in gearbox.bodies():
         bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
-        for name, place in body.wheels.items():
+        for name, wheel in body.wheels.items():
             for bearing in bearings:
-                depth = _clash(gearbox.gears[name], place, bearing)
+                depth = _clash(gearbox.gears[name], wheel, bearing)
                 if depth > 0.0 and (name, bearing.family) not in told:
                     told.add((name, bearing.family))
                     yield (
-                        f"bodies.{body.family}.wheels_z_mm.{name} = {1e3 * place:g}: its face runs {1e3 * depth:.3g} "
+                        f"bodies.{body.family}.wheels_z_mm.{name} = {1e3 * wheel:g}: its face runs {1e3 * depth:.3g} "
                         f"mm into bearings.{bearing.family} at z_mm = {1e3 * bearing.position[2]:g}; move one of them"
                     )
 
@@ -272,7 +285,9 @@ def _clash(gear: Gear, place: float, bearing: Bearing) -> float:
     along = 0.5 * (gear.face_width + _width(catalogue)) - abs(place - bearing.position[2])
     inside, outside = sorted((0.5 * gear.held_diameter, gear.tip_radius))
     across = min(outside, 0.5e-3 * catalogue.outer_diameter_mm) - max(inside, 0.5e-3 * catalogue.bore_mm)
-    return along if across > LEAST_CLASH and along > CLASHING_SHARE * 1e-3 * catalogue.width_mm else 0.0
+    if across > LEAST_CLASH and along > CLASHING_SHARE * 1e-3 * catalogue.width_mm:
+        return along
+    return 0.0
 
 
 def _width(catalogue: CatalogueSection) -> float:

@@ -71,7 +71,8 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     >>> [lacking(gearbox, variant) for variant in ("rigid", "bushing", "flexible")]
     ['', '', '']
     """
-    chosen, lack = Variant.of(variant), unsupported(gearbox, variant)
+    chosen = Variant.of(variant)
+    lack = unsupported(gearbox, variant)
     if lack or not chosen.on_bearings:
         return lack
     return _misfits(gearbox, chosen) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, chosen)

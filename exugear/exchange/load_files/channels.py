@@ -106,7 +106,8 @@ class Channels(Displayed):
         places = tuple(self._place(name) for name, _ in wanted)
         units = [self._unit(place, quantity) for place, (_, quantity) in zip(places, wanted, strict=True)]
         factors = np.array([unit.factor for unit in units])
-        second, steps = self._second(), _Steps(self.path)
+        second = self._second()
+        steps = _Steps(self.path)
         for time, values in self.read(places):
             steps.check(second * time)
             found = values * factors

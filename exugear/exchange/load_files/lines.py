@@ -83,7 +83,8 @@ def numbers(path: Path, columns: int, skipped: int, separator: str | None) -> It
     LoadFileError
         A line with another number of columns or with words; no line at all.
     """
-    number, some = 0, False
+    number = 0
+    some = False
     for lines in blocks_of_lines(path):
         first = number + 1
         number += len(lines)

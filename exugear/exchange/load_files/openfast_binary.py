@@ -129,7 +129,8 @@ def _layout(reader: _Reader) -> _Layout:
     if not (0 < channels <= _MOST_CHANNELS and steps > 0 and 0 < length <= _LONGEST_NAME):
         raise LoadFileError(f"{path}: declares {channels} channels, {steps} steps and names of {length:g} letters")
     first, second = reader.numbers("dd", "times")
-    scales, offsets = np.ones(channels), np.zeros(channels)
+    scales = np.ones(channels)
+    offsets = np.zeros(channels)
     if kind != NOT_COMPRESSED:
         scales = reader.array("f4", channels, "scales")
         offsets = reader.array("f4", channels, "offsets")
@@ -142,14 +143,15 @@ def _layout(reader: _Reader) -> _Layout:
     reader.demand(rows - times, "times")
     if np.any(scales == 0.0):
         raise LoadFileError(f"{path}: channel {names[1 + int(np.argmin(scales != 0.0))]} has the scale 0; damaged")
-    found = _Layout(int(kind), steps, first, second, scales, offsets, names, units, times, rows)
-    reader.demand(rows - times + steps * channels * found.value.itemsize, "values")
-    return found
+    layout = _Layout(int(kind), steps, first, second, scales, offsets, names, units, times, rows)
+    reader.demand(rows - times + steps * channels * layout.value.itemsize, "values")
+    return layout
 
 
 def _blocks(path: Path, layout: _Layout, places: tuple[int, ...]) -> Iterator[tuple[Floats, Floats]]:
     """Give time and the values of some channels, in the units of the file, by blocks of steps."""
-    chosen, width = list(places), len(layout.scales) * layout.value.itemsize
+    chosen = list(places)
+    width = len(layout.scales) * layout.value.itemsize
     each = max(1, BLOCK // width)
     with open_regular(path) as file:
         for begin in range(0, layout.steps, each):

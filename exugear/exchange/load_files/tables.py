@@ -83,7 +83,7 @@ def headings_of(path: Path) -> tuple[str, ...]:
     headings = tuple(cell.strip() for cell in cells)
     if len(headings) == 1:
         raise LoadFileError(f"{path}: its headings are {headings[0][:60]!r}; columns are separated by commas")
-    twice = next((one for one in headings if headings.count(one) > 1), None)
+    twice = next((heading for heading in headings if headings.count(heading) > 1), None)
     if twice is not None:
         raise LoadFileError(f"{path}: two columns are called {twice!r}; each needs a name of its own")
     return headings

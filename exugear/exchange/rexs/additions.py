@@ -51,7 +51,8 @@ def edited(text: str, edits: Iterable[Edit]) -> str:
     >>> edited("abcd", [(3, 3, "-"), (0, 1, "A"), (3, 3, "+")])
     'Abc-+d'
     """
-    pieces, place = [], 0
+    pieces = []
+    place = 0
     for start, end, new in sorted(edits, key=lambda edit: edit[:2]):
         pieces += [text[place:start], new]
         place = end
@@ -67,11 +68,11 @@ def by_place(additions: Iterable[Addition]) -> dict[tuple[int | None, int], dict
         Two of one name at one place.
     """
     gathered: dict[tuple[int | None, int], dict[str, Addition]] = {}
-    for one in additions:
-        names = gathered.setdefault((one.load_case, one.component), {})
-        if one.name in names:
-            raise RexsError(f"component {one.component}: two results would be called {one.name}")
-        names[one.name] = one
+    for addition in additions:
+        names = gathered.setdefault((addition.load_case, addition.component), {})
+        if addition.name in names:
+            raise RexsError(f"component {addition.component}: two results would be called {addition.name}")
+        names[addition.name] = addition
     return gathered
 
 
@@ -96,7 +97,9 @@ def unit_in(unit: str, version: tuple[int, int]) -> str:
     """
     if unit == "deg":
         return degree_sign(version)
-    return "N / mm^2" if unit == "MPa" and version < (2, 0) else unit
+    if unit == "MPa" and version < (2, 0):
+        return "N / mm^2"
+    return unit
 
 
 def json_entry(addition: Addition) -> str:

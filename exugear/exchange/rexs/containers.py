@@ -110,7 +110,8 @@ def _repacked(content: bytes, member: str, new: bytes) -> bytes:
             if one.filename == member:
                 target.writestr(one, new)
                 continue
-            start, moved = one.header_offset, copy.copy(one)
+            start = one.header_offset
+            moved = copy.copy(one)
             moved.header_offset = packed.tell()
             packed.write(content[start:stop])
             target.filelist.append(moved)
@@ -152,11 +153,11 @@ def _member(content: bytes) -> tuple[str, bytes]:
         members = archive.infolist()
         if len(members) > MOST_MEMBERS:
             raise RexsError(f"the archive has {len(members)} members; {MOST_MEMBERS} are the most")
-        if len({one.header_offset for one in members}) < len(members):
+        if len({member.header_offset for member in members}) < len(members):
             raise RexsError("the archive is damaged: two of its members lie at one place")
-        models = [one for one in members if one.filename.lower().endswith(_ENDINGS) and not one.is_dir()]
+        models = [member for member in members if member.filename.lower().endswith(_ENDINGS) and not member.is_dir()]
         if len(models) != 1:
-            names = ", ".join(plain(one.filename) for one in models[:5]) or "none"
+            names = ", ".join(plain(model.filename) for model in models[:5]) or "none"
             raise RexsError(f"the archive must hold one model ({', '.join(_ENDINGS)}); it holds {names}")
         if models[0].flag_bits & 1:
             raise RexsError("the archive is encrypted; only open ones can be read")

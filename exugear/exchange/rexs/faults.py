@@ -75,4 +75,6 @@ def plain(text: object, longest: int = LONGEST_TEXT) -> str:
     """
     words = "".join(sign if sign.isprintable() else " " for sign in str(text)[: 4 * longest]).split()
     line = " ".join(words).encode("utf-8", errors="replace").decode("utf-8")
-    return line if len(line) <= longest else f"{line[: longest - 1]}…"
+    if len(line) <= longest:
+        return line
+    return f"{line[: longest - 1]}…"

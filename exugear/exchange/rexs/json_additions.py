@@ -29,7 +29,7 @@ def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Ma
         elif case is not None:
             model = components[None, component]
             heads = [f'"{key}": {text[one.start : one.end]}' for key in ("id", "type", "name") if (one := model[key])]
-            inside = ", ".join(json_entry(one) for one in attributes.values())
+            inside = ", ".join(json_entry(attribute) for attribute in attributes.values())
             edits += _put_inside(
                 text, load_cases[case], "components", [f'{{{", ".join(heads)}, "attributes": [{inside}]}}']
             )
@@ -51,7 +51,11 @@ class _Node:
     def all(self, key: str) -> list[_Node]:
         """Return the objects in a list, or the one object in its place."""
         node = self.members.get(key)
-        return [] if node is None else [node] if node.members else node.items
+        if node is None:
+            return []
+        if node.members:
+            return [node]
+        return node.items
 
 
 def _scanned(text: str, start: int) -> _Node:
@@ -100,12 +104,12 @@ def _number(node: _Node, text: str) -> int:
     return int(float(text[value.start : value.end].strip('"')))
 
 
-def _edits(text: str, place: _Node, attributes: Mapping[str, Addition]) -> Iterator[Edit]:
-    there = {_text(text, one.members["id"]): one for one in place.all("attributes") if "id" in one.members}
+def _edits(text: str, node: _Node, attributes: Mapping[str, Addition]) -> Iterator[Edit]:
+    there = {_text(text, one.members["id"]): one for one in node.all("attributes") if "id" in one.members}
     for name in attributes.keys() & there.keys():
         yield there[name].start, there[name].end, json_entry(attributes[name])
     yield from _put_inside(
-        text, place, "attributes", [json_entry(one) for n, one in attributes.items() if n not in there]
+        text, node, "attributes", [json_entry(attribute) for n, attribute in attributes.items() if n not in there]
     )
 
 
@@ -125,7 +129,7 @@ def _put_inside(text: str, place: _Node, key: str, new: Sequence[str]) -> Iterat
     elif node is not None:
         yield node.start, node.end, f"[{', '.join(new)}]"
     else:
-        last = max(one.end for one in place.members.values())
+        last = max(member.end for member in place.members.values())
         yield last, last, f', "{key}": [{", ".join(new)}]'
 
 

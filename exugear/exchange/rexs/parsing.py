@@ -111,7 +111,8 @@ def _relation(
     kind = str(head.get("type", ""))
     roles = {}
     for reference in references:
-        role, number = str(reference.get("role", "")), _identifier(reference.get("id"), "a reference")
+        role = str(reference.get("role", ""))
+        number = _identifier(reference.get("id"), "a reference")
         roles[synonyms.ROLES.get(role, role)] = number
         if number not in components:
             faults.append(f"relation {plain(head.get('id'))} ({plain(kind)}): there is no component {number}")
@@ -173,15 +174,17 @@ def _header_of_json(content: bytes) -> _Raw:
     return _Raw(
         str(model.get("version", "")),
         f"{model.get('applicationId', '')} {model.get('applicationVersion', '')}".strip(),
-        [(one, list(_tables(one, "refs"))) for one in _tables(model, "relations")],
-        [(one, list(_json_attributes(one))) for one in _tables(model, "components")],
-        [(case, [(one, list(_json_attributes(one))) for one in _tables(case, "components")]) for case in cases],
+        [(table, list(_tables(table, "refs"))) for table in _tables(model, "relations")],
+        [(table, list(_json_attributes(table))) for table in _tables(model, "components")],
+        [(case, [(table, list(_json_attributes(table))) for table in _tables(case, "components")]) for case in cases],
     )
 
 
 def _whole_number(digits: str) -> int | float:
     """Whole number; one of more digits than any id has is a float, and infinite beyond that: it costs no time."""
-    return int(digits) if len(digits) < LONGEST_WHOLE else float(digits)
+    if len(digits) < LONGEST_WHOLE:
+        return int(digits)
+    return float(digits)
 
 
 def _no_number(text: str) -> float:
@@ -221,7 +224,9 @@ def _json_value(value: Any, depth: int = 0) -> Value:
         )
     if isinstance(value, int) and not isinstance(value, bool):
         return float(value)
-    return value if isinstance(value, str | bool | float) else ""
+    if isinstance(value, str | bool | float):
+        return value
+    return ""
 
 
 # -- XML -----------------------------------------------------------------------------------------------------
@@ -253,8 +258,11 @@ def _header_of_xml(content: bytes) -> _Raw:
     return _Raw(
         get("version", ""),
         f"{get('applicationId', '')} {get('applicationVersion', '')}".strip(),
-        [(one.attributes, [dict(reference.attributes) for reference in one.all("ref")]) for one in relations],
-        [(one.attributes, list(_xml_attributes(one))) for one in components],
+        [
+            (relation.attributes, [dict(reference.attributes) for reference in relation.all("ref")])
+            for relation in relations
+        ],
+        [(component.attributes, list(_xml_attributes(component))) for component in components],
         [
             (case.attributes, [(one.attributes, list(_xml_attributes(one))) for one in case.all("component")])
             for case in cases
@@ -279,7 +287,8 @@ def _xml_value(element: _Element) -> Value:
 def _elements(content: bytes) -> _Element:
     """Tree of an XML file; a file that declares anything of its own is refused."""
     top = _Element("", {})
-    open_elements, count = [top], 0
+    open_elements = [top]
+    count = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal count

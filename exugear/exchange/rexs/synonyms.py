@@ -91,4 +91,6 @@ def unit_factor(unit: str, wanted: str) -> float | None:
 
 def degree_sign(version: tuple[int, int]) -> str:
     """Return how a version writes degrees."""
-    return "°" if version < (1, 4) else "deg"
+    if version < (1, 4):
+        return "°"
+    return "deg"

@@ -81,7 +81,9 @@ class Component:
         value = self.quantity(key)
         if value is not None and value != round(value):
             raise RexsError(f"{self}: {key} = {value:g} is no whole number")
-        return None if value is None else round(value)
+        if value is None:
+            return None
+        return round(value)
 
     def has_lost_vector(self, key: str) -> bool:
         """Tell whether something stands under a key that wants three numbers, and is not."""
@@ -108,7 +110,9 @@ class Component:
     def text(self, key: str) -> str:
         """Text on one line; empty where the file gives none."""
         attribute = self._attribute(key)
-        return "" if attribute is None or isinstance(attribute.value, tuple) else plain(attribute.value)
+        if attribute is None or isinstance(attribute.value, tuple):
+            return ""
+        return plain(attribute.value)
 
     def flag(self, key: str, number: int = 0) -> bool | None:
         """Truth value, of an array that with a number; None where the file gives none."""

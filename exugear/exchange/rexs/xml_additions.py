@@ -29,16 +29,18 @@ def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Ma
     additions : mapping of (load case, component) to attributes by name
     """
     written = decoded(content)
-    found = _elements(written.text.encode("utf-8"))
+    elements = _elements(written.text.encode("utf-8"))
     edits: list[Edit] = []
     for (case, component), attributes in additions.items():
-        place = found.components.get((case, component))
+        place = elements.components.get((case, component))
         if place is not None:
-            edits += _edits(found, place, attributes)
+            edits += _edits(elements, place, attributes)
         elif case is not None:
-            edits.append(_new_component(found, found.load_cases[case], found.components[None, component], attributes))
+            edits.append(
+                _new_component(elements, elements.load_cases[case], elements.components[None, component], attributes)
+            )
     # Places are of bytes; UTF-8 is cut between letters only, since edits stand at tags.
-    raw = edited(found.content.decode("latin-1"), [(a, b, new.encode().decode("latin-1")) for a, b, new in edits])
+    raw = edited(elements.content.decode("latin-1"), [(a, b, new.encode().decode("latin-1")) for a, b, new in edits])
     text = raw.encode("latin-1").decode("utf-8")
     return written.mark + text.encode(written.encoding, errors="xmlcharrefreplace")
 
@@ -116,7 +118,7 @@ def _edits(found: _Found, place: _Place, attributes: Mapping[str, Addition]) -> 
     prefix = _prefix(found.tag(place))
     for name in attributes.keys() & there.keys():
         yield there[name].start, there[name].end, _element(attributes[name], prefix)
-    new = [_element(one, prefix) for name, one in attributes.items() if name not in there]
+    new = [_element(attribute, prefix) for name, attribute in attributes.items() if name not in there]
     yield from _put_inside(found, place, new)
 
 
@@ -150,7 +152,7 @@ def _new_component(found: _Found, case: _Place, model: _Place, attributes: Mappi
     head = found.first_tag(model)
     head = f"{head[:-2]}>" if head.endswith("/>") else head
     tag = found.tag(model)
-    content = "".join(inner + _element(one, _prefix(tag)) for one in attributes.values())
+    content = "".join(inner + _element(attribute, _prefix(tag)) for attribute in attributes.values())
     return next(iter(_put_inside(found, case, [f"{head}{content}{space if inner else ''}</{tag}>"])))
 
 

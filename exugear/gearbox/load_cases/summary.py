@@ -130,7 +130,8 @@ def summarise_loads(
     """
     series = torque_series(gearbox, case) if series is None else series
     total = case.duration if duration is None else duration
-    names, reference = gearbox.spinning, gearbox.case.overall.input
+    names = gearbox.spinning
+    reference = gearbox.case.overall.input
     rolling = gearbox.train.rolling_speeds(reference, 1.0)
     unit = np.array([rolling[name] for name in names])
     axial = _axial_inertias(gearbox, inertias)
@@ -161,7 +162,9 @@ def summarise_loads(
 
 def _without_round_off(total: float, parts: Floats) -> float:
     """Return a sum, or zero where it is the round-off of its parts."""
-    return total if abs(total) > UNLOADED * float(np.abs(parts).max(initial=0.0)) else 0.0
+    if abs(total) > UNLOADED * float(np.abs(parts).max(initial=0.0)):
+        return total
+    return 0.0
 
 
 def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
@@ -192,9 +195,9 @@ def doubt_about_bearings(gearbox: Gearbox, loads: LoadSummary, variant: str) -> 
     ''
     """
     led = [
-        own
-        for own in gearbox.bearings
-        if own.catalogue is not None and own.catalogue.radial_load_kN is None and own.law == "stiffness"
+        bearing
+        for bearing in gearbox.bearings
+        if bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None and bearing.law == "stiffness"
     ]
     light = {family: share for family, share in loads.least_shares.items() if share < LEAST_SHARE}
     if not led or not light or not Variant.of(variant).on_bearings:
@@ -253,7 +256,8 @@ def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> 
     more.
     """
     modes = gearbox.train.kinematic_modes
-    matrix, loads = modes.T @ (axial[:, None] * modes), modes.T @ torques.T
+    matrix = modes.T @ (axial[:, None] * modes)
+    loads = modes.T @ torques.T
     added = np.zeros_like(torques)
     if case.driven_body is None:
         return (modes @ np.linalg.solve(matrix, loads)).T, added
@@ -325,9 +329,9 @@ def _least_shares(gearbox: Gearbox, forces: Floats) -> dict[str, float]:
     """Find the smallest force (times, meshes) of each family over that of the static load; unloaded ones have none."""
     static = gearbox.train.static_mesh_forces()
     largest = max(map(abs, static.values()), default=0.0)
-    found: dict[str, float] = {}
+    shares: dict[str, float] = {}
     for m, mesh in enumerate(gearbox.meshes):
         if abs(static[mesh.name]) > UNLOADED * largest:
             share = float((forces[:, m] / static[mesh.name]).min())
-            found[mesh.family] = min(share, found.get(mesh.family, math.inf))
-    return found
+            shares[mesh.family] = min(share, shares.get(mesh.family, math.inf))
+    return shares

@@ -41,7 +41,9 @@ class Section(BaseModel):
     def __repr__(self) -> str:
         """Return one short line: the keys that were given."""
         line = f"<{type(self).__name__}: {', '.join(f'{key} = {value}' for key, value in self._given().items())}>"
-        return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 2]}…>"
+        if len(line) <= LONGEST_LINE:
+            return line
+        return f"{line[: LONGEST_LINE - 2]}…>"
 
     def __str__(self) -> str:
         """Return the same short line."""
@@ -63,7 +65,9 @@ def _shown(value: Any) -> str:
     if isinstance(value, Mapping) or (isinstance(value, tuple) and len(value) > 3):
         return f"{len(value)} entries"
     text = repr(value)
-    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 1]}…"
+    if len(text) <= LONGEST_VALUE:
+        return text
+    return f"{text[: LONGEST_VALUE - 1]}…"
 
 
 def check_wall(inner: float, outer: float, keys: str) -> None:

@@ -171,7 +171,8 @@ class StrengthSection(Section):
             raise ValueError("give curve, or contact_curve and bending_curve")
         for key in ("contact_curve", "bending_curve"):
             points = getattr(self, key) or ()
-            cycles, factors = [point[0] for point in points], [point[1] for point in points]
+            cycles = [point[0] for point in points]
+            factors = [point[1] for point in points]
             if cycles != sorted(set(cycles)) or factors != sorted(factors, reverse=True):
                 raise ValueError(f"{key}: cycles must rise and factors must not")
         return self
@@ -212,8 +213,9 @@ class RatingSection(Section):
     @model_validator(mode="after")
     def _dynamic_factor(self) -> RatingSection:
         sources = (self.dynamic_factor, self.dynamic_factor_run, self.dynamic_factor_steady)
-        stated, least = self.dynamic_factor is not None, self.least_dynamic_factor is not None
-        if sum(one is not None for one in sources) != 1 or stated == least:
+        stated = self.dynamic_factor is not None
+        least = self.least_dynamic_factor is not None
+        if sum(source is not None for source in sources) != 1 or stated == least:
             raise ValueError(
                 "give dynamic_factor, or one of dynamic_factor_run and dynamic_factor_steady with least_dynamic_factor"
             )

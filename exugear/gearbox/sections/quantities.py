@@ -59,7 +59,9 @@ class Range:
 
     @property
     def _reason(self) -> str:
-        return f" ({self.why})" if self.why else ""
+        if self.why:
+            return f" ({self.why})"
+        return ""
 
 
 def _within(limit: float, usual: float, why: str = "") -> Range:

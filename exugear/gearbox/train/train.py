@@ -140,7 +140,8 @@ class Train(
         if not self.degrees_of_freedom:
             raise self.fault("meshes: the gear train cannot turn, its meshes and couplings lock each other")
         prescribed = self._prescribed(speeds)
-        rows, given = self._modes_of(prescribed), np.array([speeds.get(name, 0.0) for name in prescribed])
+        rows = self._modes_of(prescribed)
+        given = np.array([speeds.get(name, 0.0) for name in prescribed])
         weights, _, rank, _ = np.linalg.lstsq(rows, given, rcond=1e-9)
         if rank < self.degrees_of_freedom:
             raise self.fault(
@@ -215,7 +216,9 @@ class Train(
         drag = -sense * np.sign(without_round_off(np.array([speeds[name] for name in self.spins]), 1.0, 1.0))
         locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
         forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), drag)
-        return {} if forces is None else dict(zip((mesh.name for mesh in self.meshes), forces.tolist(), strict=False))
+        if forces is None:
+            return {}
+        return dict(zip((mesh.name for mesh in self.meshes), forces.tolist(), strict=False))
 
     def _check_load(self, torques: Mapping[str, float]) -> None:
         """Refuse loads and locks on bodies that do not turn, and more locks than degrees of freedom."""

@@ -45,7 +45,9 @@ class DurationDistribution(Displayed):
 
     def torques(self, value: str) -> Floats:
         """Torque that stands for each bin: its ``mean``, or its ``upper`` edge, which adds damage."""
-        return self.upper if value == "upper" else self.torque
+        if value == "upper":
+            return self.upper
+        return self.torque
 
 
 def load_duration(
@@ -121,7 +123,13 @@ class LoadPoints(Displayed):
 
 
 def load_points(
-    found: DurationDistribution, value: str, torque: Floats, speed: Floats, hours: Floats, other: Floats, cells: int
+    distribution: DurationDistribution,
+    value: str,
+    torque: Floats,
+    speed: Floats,
+    hours: Floats,
+    other: Floats,
+    cells: int,
 ) -> LoadPoints:
     """Split the bins of a distribution by other loads.
 
@@ -138,15 +146,18 @@ def load_points(
     cells : int
         Cells from the least to the largest of each of them.
     """
-    torques = found.torques(value)
+    torques = distribution.torques(value)
     if not other.any():
         zeros = np.zeros((len(torques), other.shape[1]))
-        return LoadPoints(torques, zeros, found.hours, found.revolutions, np.arange(len(torques)))
-    width = float(np.abs(found.upper - found.lower)[0])
+        return LoadPoints(torques, zeros, distribution.hours, distribution.revolutions, np.arange(len(torques)))
+    width = float(np.abs(distribution.upper - distribution.lower)[0])
     side = np.where(torque < 0.0, -1.0, 1.0)
-    place = side * np.minimum(np.floor(np.abs(torque) / width), np.round(np.abs(found.upper).max() / width) - 1.0)
+    place = side * np.minimum(
+        np.floor(np.abs(torque) / width), np.round(np.abs(distribution.upper).max() / width) - 1.0
+    )
     number = np.argmin(
-        np.abs((side * width * (np.abs(place) + 0.5))[:, None] - 0.5 * (found.lower + found.upper)), axis=1
+        np.abs((side * width * (np.abs(place) + 0.5))[:, None] - 0.5 * (distribution.lower + distribution.upper)),
+        axis=1,
     )
     span = np.ptp(other, axis=0)
     cell = np.floor((other - other.min(axis=0)) / np.where(span > 0.0, span, 1.0) * (cells - 1e-9))

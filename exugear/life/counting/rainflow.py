@@ -70,7 +70,8 @@ class Rainflow(Displayed):
 
     def cycles(self) -> tuple[Floats, Floats, Floats]:
         """Ranges, means and counts of all cycles, (cycles,) each; what is open counts as half cycles."""
-        stack, closed = list(self._open), array("d", self._closed)
+        stack = list(self._open)
+        closed = array("d", self._closed)
         if len(self._tail):
             _take(float(self._tail[-1]), stack, closed)
         for one, other in itertools.pairwise(stack):

@@ -68,8 +68,8 @@ class DynamicFactor(Displayed):
 
 def stated_factors(gearbox: Gearbox, value: float) -> dict[str, DynamicFactor]:
     """One factor for all mesh families and speeds."""
-    one = DynamicFactor(np.zeros(1), np.full(1, value), source="as stated")
-    return {mesh.family: one for mesh in gearbox.meshes}
+    dynamicfactor = DynamicFactor(np.zeros(1), np.full(1, value), source="as stated")
+    return {mesh.family: dynamicfactor for mesh in gearbox.meshes}
 
 
 def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
@@ -90,7 +90,8 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
     CaseError
         No run there, one of another input, or one that is sampled too coarsely for its meshes.
     """
-    gearbox, key = assembly.gearbox, f"rating.dynamic_factor_run = {rating.dynamic_factor_run!r}"
+    gearbox = assembly.gearbox
+    key = f"rating.dynamic_factor_run = {rating.dynamic_factor_run!r}"
     try:
         arrays, attributes = read_run(path, ["time", "input_speed", "mesh_force"])
     except FileError as error:

@@ -108,7 +108,8 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
     CaseError
         No response there, or one of another input.
     """
-    gearbox, level = assembly.gearbox, rating.dynamic_factor_steady
+    gearbox = assembly.gearbox
+    level = rating.dynamic_factor_steady
     key = f"rating.dynamic_factor_steady = {level!r}"
     try:
         data = load_response(path)
@@ -118,7 +119,8 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
         raise gearbox.fault(f"{key}: {error}; `{command}` makes it") from error
     if not fits:
         raise gearbox.fault(f"{key}: {path} belongs to another input; compute it again")
-    frequencies, sets = gearbox.train.mesh_frequencies(2.0 * np.pi), planet_sets(assembly)
+    frequencies = gearbox.train.mesh_frequencies(2.0 * np.pi)
+    sets = planet_sets(assembly)
     ratio = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)[body])
     speed = ratio * np.abs(data["speed"].to_numpy())
     found: dict[str, list[tuple[Floats, Floats]]] = {}
@@ -145,10 +147,10 @@ def family_factors(data: xr.Dataset, family: str, mesh: str, planets: PlanetSet 
     lines = size * np.exp(1j * phase)
     orders = data["order"].to_numpy()
     found = np.empty(len(lines))
-    for n, one in enumerate(lines):
-        loud = np.abs(one).max(axis=1) > SMALLEST * np.abs(one[0]).max()
+    for n, line in enumerate(lines):
+        loud = np.abs(line).max(axis=1) > SMALLEST * np.abs(line[0]).max()
         loud[0] = True
-        waves, angles = _sampled(one[loud], orders[loud], order)
+        waves, angles = _sampled(line[loud], orders[loud], order)
         shapes = np.ones((1, 1, 1)) if planets is None else planets.values(planets.ratio * angles)[..., : len(places)]
         force = np.abs(np.einsum("snw,sw->ns", np.broadcast_to(shapes, (len(angles), *shapes.shape[1:])), waves))
         windows = force.reshape(len(force), WINDOWS, -1)

@@ -107,7 +107,8 @@ class CountedLoads(Displayed, line=" on {body!r}: {sources!n} sources, {distribu
 
     def part_rows(self) -> list[dict[str, Any]]:
         """Cycles of teeth by gear and flank, revolutions of bearings, and what meshes carry at the largest torque."""
-        found, rows = self.distribution, []
+        found = self.distribution
+        rows = []
         for sense in (1, -1):
             own = np.sign(found.torque) == sense
             turns = float(found.revolutions[own].sum())
@@ -166,7 +167,8 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
     CaseError
         A source that cannot be used: see `exugear.life.load_spectrum.sources.load_sources`.
     """
-    loads, sources = section_of(gearbox), load_sources(gearbox, progress)
+    loads = section_of(gearbox)
+    sources = load_sources(gearbox, progress)
     found = distribution(gearbox, sources)
     teeth = tooth_exposures(gearbox, loads.body)
     forces = gearbox.train.static_mesh_forces({loads.body: 1.0})
@@ -188,18 +190,22 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
 
 
 def _weights(source: LoadSource) -> Any:
-    return source.hours if source.hours.sum() > 0.0 else None
+    if source.hours.sum() > 0.0:
+        return source.hours
+    return None
 
 
 def _equivalent_ranges(sources: tuple[LoadSource, ...]) -> dict[str, dict[float, float]]:
     """Damage-equivalent range of each component of all series of fatigue together, one cycle a second."""
-    series = [one for one in sources if one.series and one.kind == "fatigue" and one.hours.sum() > 0.0]
-    hours = np.array([float(one.hours.sum()) for one in series])
-    found: dict[str, dict[float, float]] = {}
+    series = [source for source in sources if source.series and source.kind == "fatigue" and source.hours.sum() > 0.0]
+    hours = np.array([float(history.hours.sum()) for history in series])
+    ranges: dict[str, dict[float, float]] = {}
     for name in COMPONENTS:
-        if any((name, RANGE_EXPONENTS[0]) in one.equivalent_ranges for one in series):
-            found[name] = {
-                m: equivalent_load(np.array([one.equivalent_ranges.get((name, m), 0.0) for one in series]), hours, m)
+        if any((name, RANGE_EXPONENTS[0]) in history.equivalent_ranges for history in series):
+            ranges[name] = {
+                m: equivalent_load(
+                    np.array([history.equivalent_ranges.get((name, m), 0.0) for history in series]), hours, m
+                )
                 for m in RANGE_EXPONENTS
             }
-    return found
+    return ranges

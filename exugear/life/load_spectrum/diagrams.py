@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def draw_duration(found: DurationDistribution, body: str, path: str | Path | None = None) -> Figure:
+def draw_duration(distribution: DurationDistribution, body: str, path: str | Path | None = None) -> Figure:
     """Draw the load duration distribution of a body: hours in each bin, and hours above each torque.
 
     Parameters
@@ -28,16 +28,18 @@ def draw_duration(found: DurationDistribution, body: str, path: str | Path | Non
     with drawing_style():
         figure = new_figure(7.0, 3.2)
         bars, above = figure.subplots(1, 2)
-        width = 1e-3 * np.abs(found.upper - found.lower)
-        middle = 0.5e-3 * (found.lower + found.upper)
-        bars.bar(middle, found.hours, width=width, color=COLOURS[0])
+        width = 1e-3 * np.abs(distribution.upper - distribution.lower)
+        middle = 0.5e-3 * (distribution.lower + distribution.upper)
+        bars.bar(middle, distribution.hours, width=width, color=COLOURS[0])
         bars.set(xlabel=f"torque on {body} / kN m", ylabel="hours in the life", title="time at each torque")
         for sign, colour, name in ((1.0, COLOURS[0], "positive"), (-1.0, COLOURS[1], "negative")):
-            own = found.torque * sign > 0.0
+            own = distribution.torque * sign > 0.0
             if own.any():
-                order = np.argsort(-np.abs(found.torque[own]))
-                lasting = np.cumsum(found.hours[own][order])
-                above.step(lasting, 1e-3 * np.abs(found.torque[own][order]), where="pre", color=colour, label=name)
+                order = np.argsort(-np.abs(distribution.torque[own]))
+                lasting = np.cumsum(distribution.hours[own][order])
+                above.step(
+                    lasting, 1e-3 * np.abs(distribution.torque[own][order]), where="pre", color=colour, label=name
+                )
         above.set(xlabel="hours with at least this torque", ylabel="torque without sign / kN m", xscale="log")
         above.xaxis.set_major_formatter("{x:g}")
         above.set_title("duration")

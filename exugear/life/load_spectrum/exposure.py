@@ -53,11 +53,11 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
     """
     spins = gearbox.train.rolling_speeds(body, 1.0)
     forces = gearbox.train.static_mesh_forces(_torque_on(gearbox, body))
-    found: dict[tuple[str, str, str], ToothExposure] = {}
+    exposures: dict[tuple[str, str, str], ToothExposure] = {}
     for mesh in gearbox.meshes:
         for member, holder in enumerate((mesh.pinion, mesh.gear)):
             gear = (mesh.pair.pinion, mesh.pair.gear)[member]
-            if (gear.name, mesh.family, holder) in found:
+            if (gear.name, mesh.family, holder) in exposures:
                 continue
             passed = tuple(
                 number
@@ -66,7 +66,7 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
             )
             opposite = member == 1 and gear.internal
             sign = 1 if forces[mesh.name] >= 0.0 else -1
-            found[gear.name, mesh.family, holder] = ToothExposure(
+            exposures[gear.name, mesh.family, holder] = ToothExposure(
                 gear=gear.name,
                 family=mesh.family,
                 holder=holder,
@@ -75,7 +75,7 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
                 meshes=passed,
                 cycles=len(passed) * abs(_against_frame(spins, mesh, holder)),
             )
-    return tuple(found.values())
+    return tuple(exposures.values())
 
 
 def distinct(teeth: Iterable[ToothExposure]) -> tuple[ToothExposure, ...]:
@@ -98,7 +98,9 @@ def bearing_turns(gearbox: Gearbox, body: str) -> dict[str, float]:
     (2.538462, 2.538462)
     """
     spins = gearbox.train.rolling_speeds(body, 1.0)
-    return {one.name: abs(spins.get(one.body, 0.0) - spins.get(one.on, 0.0)) for one in gearbox.bearings}
+    return {
+        bearing.name: abs(spins.get(bearing.body, 0.0) - spins.get(bearing.on, 0.0)) for bearing in gearbox.bearings
+    }
 
 
 def _against_frame(spins: Mapping[str, float], mesh: Mesh, holder: str) -> float:

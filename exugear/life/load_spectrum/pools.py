@@ -162,7 +162,8 @@ class Pool:
 
     def merge(self, other: Pool) -> None:
         """Take all that another pool has."""
-        parts, count = other._parts, other.count
+        parts = other._parts
+        count = other.count
         for samples in parts:
             self.add(samples)
         self.count += count - sum(map(len, parts))
@@ -186,7 +187,9 @@ class Pool:
     def samples(self) -> Samples:
         """Give all samples, put together where they are many."""
         found = together(self._parts)
-        return condensed(found, self.extreme) if len(found) > MOST_POINTS else found
+        if len(found) > MOST_POINTS:
+            return condensed(found, self.extreme)
+        return found
 
     def equivalent_ranges(self) -> dict[tuple[str, float], float]:
         """Range of one cycle a second that does the same damage in all files together, by component and slope."""

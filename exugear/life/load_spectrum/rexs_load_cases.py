@@ -33,7 +33,8 @@ def rexs_load_cases(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Fl
     RexsError
         No load cases, or one without torque on the body, a speed, or its share of the time.
     """
-    model, notes = read_rexs(path), Notes()
+    model = read_rexs(path)
+    notes = Notes()
     if not model.load_cases:
         raise RexsError(f"{path}: holds no load spectrum; expected load cases with their share of the time")
     places = Places(model)

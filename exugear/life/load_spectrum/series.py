@@ -140,7 +140,8 @@ class SeriesReader:
 
     def _kept(self, series: Channels, wanted: list[tuple[str, str]]) -> Iterator[tuple[Floats, Floats, float]]:
         """Blocks behind the time that is skipped, and the time at which the series begins."""
-        start, before = None, 0
+        start = None
+        before = 0
         top = 0.0
         for time, values in series.blocks(wanted):
             start = float(time[0]) if start is None else start

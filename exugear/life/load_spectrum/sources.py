@@ -111,7 +111,9 @@ class LoadSource(Displayed):
     @property
     def hub_loads(self) -> Floats:
         """Loads of a hub (samples, 5), zeros where there are none."""
-        return self.hub if self.hub.shape[1] else np.zeros((len(self.torque), HUB_LOADS))
+        if self.hub.shape[1]:
+            return self.hub
+        return np.zeros((len(self.torque), HUB_LOADS))
 
 
 def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[LoadSource, ...]:
@@ -132,7 +134,8 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
     if loads.body not in gearbox.spinning:
         raise gearbox.fault(f"loads.body = {loads.body!r} does not turn; bodies are {', '.join(gearbox.spinning)}")
     paths = {name: _paths(gearbox, f"loads.sources.{name}", source) for name, source in loads.sources.items()}
-    total, done = sum(map(len, paths.values())), 0
+    total = sum(map(len, paths.values()))
+    done = 0
     drafts = []
     for name, source in loads.sources.items():
         draft = _Draft(gearbox, loads, name, source)
@@ -192,7 +195,8 @@ def _paths(gearbox: Gearbox, key: str, source: SourceSection) -> list[Path]:
             known = ", ".join((*SERIES_ENDINGS, *REXS_ENDINGS))
             raise gearbox.fault(f"{key}.file = {source.file!r}: files of loads end in {known}")
         return [path]
-    folder, pattern = Path(gearbox.source).parent, str(source.files)
+    folder = Path(gearbox.source).parent
+    pattern = str(source.files)
     try:
         names = sorted(path.relative_to(folder).as_posix() for path in folder.glob(pattern) if path.is_file())
     except (ValueError, NotImplementedError, OSError) as error:
@@ -257,8 +261,11 @@ class _Draft:
 
     @property
     def _weighed(self) -> bool:
-        one = self.section
-        return any(way is not None for way in (one.hours_per_year, one.events_per_year, one.hours_table, one.wind))
+        section = self.section
+        return any(
+            way is not None
+            for way in (section.hours_per_year, section.events_per_year, section.hours_table, section.wind)
+        )
 
     def _stated_hours(self) -> dict[str, float] | None:
         """Hours a year of each file by its name, from a table."""
@@ -331,7 +338,8 @@ class _Draft:
     def source(self, by_wind: Mapping[float, float]) -> LoadSource:
         """All that was read, in hours of the life."""
         samples = self._table_in_hours() if self._table is not None else self._series_in_hours(by_wind)
-        pools, section = [*self.pools.values()], self.section
+        pools = [*self.pools.values()]
+        section = self.section
         loaded = np.abs(samples.speed[samples.torque != 0.0])
         return LoadSource(
             name=self.name,
@@ -421,16 +429,18 @@ def _hours_in(row: Sequence[str]) -> float | None:
         hours = float(row[1]) if len(row) == len(HOURS_HEADINGS) else math.nan
     except ValueError:
         return None
-    return hours if 0.0 <= hours <= HOURS_PER_YEAR else None
+    if 0.0 <= hours <= HOURS_PER_YEAR:
+        return hours
+    return None
 
 
 def _wind_seconds(drafts: Sequence[_Draft]) -> dict[float, float]:
     """Length of all files of each bin of wind speed, s, whatever source they are of."""
-    found: dict[float, float] = {}
+    seconds: dict[float, float] = {}
     for draft in drafts:
         for group, pool in draft.pools.items() if draft.section.wind is not None else ():
-            found[group] = found.get(group, 0.0) + pool.seconds
-    return found
+            seconds[group] = seconds.get(group, 0.0) + pool.seconds
+    return seconds
 
 
 def told(sources: tuple[LoadSource, ...]) -> Iterator[str]:

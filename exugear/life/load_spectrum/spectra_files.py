@@ -13,18 +13,26 @@ from fe_ste.tools.files import write_file
 
 def write_spectra(counted: CountedLoads, folder: Path) -> list[Path]:
     """Write the distribution of the body, and one for each gear and flank; return the paths."""
-    found = counted.distribution
-    rows = zip(found.lower, found.upper, found.torque, found.speed / RPM, found.hours, found.revolutions, strict=True)
+    distribution = counted.distribution
+    rows = zip(
+        distribution.lower,
+        distribution.upper,
+        distribution.torque,
+        distribution.speed / RPM,
+        distribution.hours,
+        distribution.revolutions,
+        strict=True,
+    )
     headings = ("lower_N_m", "upper_N_m", "torque_N_m", "speed_rpm", "hours", "revolutions")
     paths = [write_table(folder / f"{counted.body}.csv", headings, rows)]
     for tooth in distinct(counted.teeth):
         for sense in (1, -1):
-            own = found.torque * sense > 0.0
+            own = distribution.torque * sense > 0.0
             if not own.any():
                 continue
-            forces = abs(found.torques(counted.bin_value)[own]) * counted.mesh_forces[tooth.family]
+            forces = abs(distribution.torques(counted.bin_value)[own]) * counted.mesh_forces[tooth.family]
             side = "plus" if sense * tooth.flank > 0 else "minus"
-            lines = zip(forces, found.hours[own], found.revolutions[own] * tooth.cycles, strict=True)
+            lines = zip(forces, distribution.hours[own], distribution.revolutions[own] * tooth.cycles, strict=True)
             path = folder / f"{tooth.gear}_{tooth.family}_{side}.csv"
             paths.append(write_table(path, ("mesh_force_N", "hours", "cycles"), lines))
     return paths

@@ -60,12 +60,14 @@ def of_nominal_load(
     dynamic = stated_factors(gearbox, rating.dynamic_factor or rating.least_dynamic_factor or 1.0)
     lives = flank_lives(gearbox, rating, counted.teeth, acting_loads(counted), balance, stresses, dynamic)
     return {
-        (one.gear, one.family, one.flank): {name: float(getattr(one, figure)) for name, figure in _NAMES.items()}
-        for one in lives
+        (life.gear, life.family, life.flank): {name: float(getattr(life, figure)) for name, figure in _NAMES.items()}
+        for life in lives
     }
 
 
 def remarks_on(stresses: Mapping[str, MeshCycleStress]) -> list[str]:
     """Say of which gears that stand aligned the finite elements are."""
-    straight = [name for name, one in stresses.items() if len(one.misalignment) < 2]
-    return [f"sigma and K_Hbeta by finite elements of {', '.join(straight)} are of aligned gears"] if straight else []
+    straight = [name for name, stress in stresses.items() if len(stress.misalignment) < 2]
+    if straight:
+        return [f"sigma and K_Hbeta by finite elements of {', '.join(straight)} are of aligned gears"]
+    return []

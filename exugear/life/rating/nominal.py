@@ -37,7 +37,8 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
     CaseError
         No rated speed, or a static load on several bodies.
     """
-    overall, torques = gearbox.case.overall, gearbox.case.static_load.torques_N_m
+    overall = gearbox.case.overall
+    torques = gearbox.case.static_load.torques_N_m
     rated = gearbox.case.operation.rated_speed_rpm
     if rated is None:
         raise gearbox.fault(
@@ -57,7 +58,7 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
     least = min((one.cycles for one in teeth if one.cycles > 0.0), default=1.0)
     torque *= factor
     hours = rating.nominal_hours or LONGEST / least * 2.0 * math.pi / speed / 3600.0
-    found = load_duration(np.array([torque]), np.array([speed]), np.array([hours]), 1)
+    duration = load_duration(np.array([torque]), np.array([speed]), np.array([hours]), 1)
     forces = gearbox.train.static_mesh_forces({body: 1.0})
     families: dict[str, float] = {}
     for mesh in gearbox.meshes:
@@ -66,8 +67,10 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
         body=body,
         life_years=hours / HOURS_PER_YEAR,
         sources=(_source(torque, speed, hours),),
-        distribution=found,
-        points=LoadPoints(found.torque, np.zeros((1, HUB_LOADS)), found.hours, found.revolutions, np.zeros(1, int)),
+        distribution=duration,
+        points=LoadPoints(
+            duration.torque, np.zeros((1, HUB_LOADS)), duration.hours, duration.revolutions, np.zeros(1, int)
+        ),
         equivalent_ranges={},
         teeth=teeth,
         bearings=bearing_turns(gearbox, body),

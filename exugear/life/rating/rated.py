@@ -47,7 +47,8 @@ def balanced(
     BalanceError
         A static state that is not held.
     """
-    acting, angles = acting_loads(counted), rating_of(assembly.gearbox).carrier_angles
+    acting = acting_loads(counted)
+    angles = rating_of(assembly.gearbox).carrier_angles
     return static_balance(assembly, counted.body, acting.torques, angles, progress, 0.5 * acting.hub_sizes)
 
 

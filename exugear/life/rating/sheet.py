@@ -93,15 +93,15 @@ class RatingSheet(Displayed, line=" by {edition}: {flanks!n} flanks"):
             "load": self.load,
             "flanks": [
                 {
-                    "gear": one.gear,
-                    "mesh": one.family,
-                    "flank": one.flank,
-                    "standard": _for_programs(one.standard),
-                    "finite_elements": _for_programs(one.finite_elements),
-                    "not_rated": dict(one.lacking),
-                    "remarks": list(one.remarks),
+                    "gear": flank.gear,
+                    "mesh": flank.family,
+                    "flank": flank.flank,
+                    "standard": _for_programs(flank.standard),
+                    "finite_elements": _for_programs(flank.finite_elements),
+                    "not_rated": dict(flank.lacking),
+                    "remarks": list(flank.remarks),
                 }
-                for one in self.flanks
+                for flank in self.flanks
             ],
             "shortfalls": list(self.shortfalls),
             "assumptions": list(self.assumptions),
@@ -110,13 +110,13 @@ class RatingSheet(Displayed, line=" by {edition}: {flanks!n} flanks"):
 
 
 def _for_programs(figures: Mapping[str, float]) -> dict[str, float | str]:
-    found: dict[str, float | str] = {}
+    programs: dict[str, float | str] = {}
     for name, value in figures.items():
         scale, unit = UNITS.get(name, (1.0, ""))
         key = f"{name.replace(chr(39), '_single')}" + (f"_{_KEY_UNITS.get(unit, unit)}" if unit else "")
         if not math.isnan(value):
-            found[key] = "infinite" if math.isinf(value) else scale * value
-    return found
+            programs[key] = "infinite" if math.isinf(value) else scale * value
+    return programs
 
 
 def rating_sheet(
@@ -149,8 +149,8 @@ def rating_sheet(
         for sense in (1, -1):
             key = tooth.gear, tooth.family, FLANKS[sense * tooth.flank]
             if np.any(acting.points.torque * sense > 0.0):
-                one = _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
-                flanks += [] if one is None else [one]
+                flank = _flank(gearbox, rating, counted, acting, balance, tooth, sense, finite_elements.get(key, {}))
+                flanks += [] if flank is None else [flank]
     return RatingSheet(
         edition=rating.edition,
         load=_load_in_words(gearbox, counted),
@@ -229,7 +229,8 @@ def _mesh_loads(
     """Find what the meshes of a family carry, from the static balance."""
     points = acting.points
     own = np.sign(points.torque) == sense
-    torque, hub = points.torque[own], points.other[own]
+    torque = points.torque[own]
+    hub = points.other[own]
     numbers = [number for number, mesh in enumerate(gearbox.meshes) if mesh.family == tooth.family]
     forces = np.abs(balance.at(balance.mesh_force, torque, hub)[..., numbers])
     plain = np.abs(balance.at(balance.mesh_force, torque)[..., numbers]).mean(axis=(1, 2))
@@ -254,18 +255,17 @@ def _load_in_words(gearbox: Gearbox, counted: CountedLoads) -> str:
     if gearbox.case.loads is not None:
         count = len(counted.points.torque)
         return f"spectrum on {counted.body}: {count} loads, {hours:,.0f} h; factors are those of the load that decides"
-    one = counted.sources[0]
-    return (
-        f"nominal load: {1e-3 * one.largest:.6g} kN m on {counted.body} at {one.fastest / RPM:.4g} rpm, {hours:,.0f} h"
-    )
+    source = counted.sources[0]
+    torque = f"{1e-3 * source.largest:.6g} kN m on {counted.body}"
+    return f"nominal load: {torque} at {source.fastest / RPM:.4g} rpm, {hours:,.0f} h"
 
 
 def _shortfalls(rating: RatingSection, flanks: list[FlankSheet]) -> Iterator[str]:
-    for one in flanks:
+    for flank in flanks:
         for name, asked in (("S_H", rating.least_S_H), ("S_F", rating.least_S_F)):
-            found = one.standard[name]
+            found = flank.standard[name]
             if found < asked:
-                part = f"{one.gear} {one.flank} {one.family}"
+                part = f"{flank.gear} {flank.flank} {flank.family}"
                 yield f"{part}: {name} = {found:.3g} by the standard, {asked:g} is asked for"
 
 

@@ -113,8 +113,10 @@ class FlankRules:
     @property
     def classes(self) -> tuple[int, int] | None:
         """Tolerance classes of both gears; None without that of one."""
-        found = [one.tolerance_class for one in self.strengths if one is not None]
-        return None if len(found) < 2 or None in found else (found[0] or 0, found[1] or 0)
+        found = [strength.tolerance_class for strength in self.strengths if strength is not None]
+        if len(found) < 2 or None in found:
+            return None
+        return (found[0] or 0, found[1] or 0)
 
     def deviations(self) -> FlankDeviations | None:
         """Tolerances of the classes, the larger of both gears, f_ma of both; None without classes."""
@@ -161,10 +163,10 @@ def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
         Stresses in Pa, F_t in N, v in m/s; what is not rated is NaN.
     """
     factors = [_load_factors(rules, loads, place) for place in range(len(loads.force))]
-    stresses = [_stresses(rules, one) for one in factors]
-    contact = np.array([one["sigma_H"] for one in stresses])
-    root = np.array([one["sigma_F"] for one in stresses])
-    allowed = np.array([_contact_influences(rules, one["v"]) for one in factors])
+    stresses = [_stresses(rules, factor) for factor in factors]
+    contact = np.array([stress["sigma_H"] for stress in stresses])
+    root = np.array([stress["sigma_F"] for stress in stresses])
+    allowed = np.array([_contact_influences(rules, factor["v"]) for factor in factors])
     found = {"S_H": math.nan, "S_F": math.nan, "sigma_HG": math.nan, "sigma_FG": math.nan}
     decides = int((contact * loads.turns**0.05).argmax())
     strength = rules.strength
@@ -196,9 +198,12 @@ ROOT_STRENGTH = ("Y_deltarelT", "Y_RrelT", "Y_X")
 
 def _load_factors(rules: FlankRules, loads: MeshLoads, place: int) -> dict[str, float]:
     """F_t, v and the K factors of one load."""
-    pair, force, sharing = rules.pair, float(loads.force[place]), float(loads.sharing[place])
+    pair = rules.pair
+    force = float(loads.force[place])
+    sharing = float(loads.sharing[place])
     velocity = float(loads.speed[place]) * pair.pinion.reference_radius
-    width, deviations = pair.face_width, rules.deviations()
+    width = pair.face_width
+    deviations = rules.deviations()
     stiffness = mesh_stiffness(pair, tangential_force=force, application_factor=rules.application_factor * sharing)
     line_load = force * rules.application_factor * sharing / width
     left = _run_in(rules, deviations, velocity)
@@ -244,7 +249,7 @@ def _dynamic(
 
 def _running_in_relief(rules: FlankRules) -> float:
     """C_ay that running in gives tips, m; designed relief is not looked at (ISO 6336-1:2006, 6.5.4)."""
-    limits = [one.sigma_H_lim_MPa for one in rules.strengths if one is not None]
+    limits = [strength.sigma_H_lim_MPa for strength in rules.strengths if strength is not None]
     return 1e-6 * sum(((limit / 97.0 - 18.45) ** 2 / 18.0 + 1.5) / len(limits) for limit in limits)
 
 
@@ -261,14 +266,17 @@ def _run_in(rules: FlankRules, deviations: FlankDeviations | None, velocity: flo
 
 def _mean(rules: FlankRules, taken: Callable[[Hardening, float], float]) -> float:
     """Mean of both gears of what running in takes; nothing without their strength."""
-    known = [one for one in rules.strengths if one is not None]
+    known = [strength for strength in rules.strengths if strength is not None]
     values = [taken(hardening_of(one), 1e6 * one.sigma_H_lim_MPa) for one in known]
-    return sum(values) / len(values) if values else 0.0
+    if values:
+        return sum(values) / len(values)
+    return 0.0
 
 
 def _stresses(rules: FlankRules, of: dict[str, float]) -> dict[str, float]:
     """Nominal and acting stresses of one load with its Z and Y factors; K_Halpha and K_Falpha that are none count 1."""
-    pair, member = rules.pair, rules.member
+    pair = rules.pair
+    member = rules.member
     strength = rules.strength
     root = root_stress_factors(pair, member, strength.tolerance_class if strength else None, rules.free_bore)
     single = single_contact_factors(pair)[member]
@@ -298,7 +306,7 @@ def _stresses(rules: FlankRules, of: dict[str, float]) -> dict[str, float]:
 
 def _contact_influences(rules: FlankRules, velocity: float) -> tuple[float, float, float]:
     """Z_L, Z_v and Z_R of the softer gear at a pitch line velocity; NaN without strengths."""
-    known = [one for one in rules.strengths if one is not None]
+    known = [strength for strength in rules.strengths if strength is not None]
     if not known:
         return math.nan, math.nan, math.nan
     softer = 1e6 * min(one.sigma_H_lim_MPa for one in known)

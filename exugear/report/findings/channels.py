@@ -97,7 +97,8 @@ def channels_of(run: VariantRun, words: Words, response: xr.Dataset | None) -> I
 
 
 def _supports(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
-    force, names = data["support_force"], [str(name) for name in data["support"]]
+    force = data["support_force"]
+    names = [str(name) for name in data["support"]]
     sample = force[::SAMPLED]
     swings = np.hypot(sample[..., 0], sample[..., 1]).std(axis=0)
     for place, copies in _standing_for(names, swings, words):
@@ -114,7 +115,8 @@ def _supports(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel
 
 
 def _meshes(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
-    force, names = data["mesh_force"], [str(name) for name in data["mesh"]]
+    force = data["mesh_force"]
+    names = [str(name) for name in data["mesh"]]
     for place, copies in _standing_for(names, force[::SAMPLED].std(axis=0), words):
         own = np.ascontiguousarray(force[:, place])
         told = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
@@ -145,16 +147,19 @@ def _standing_for(names: Sequence[str], swings: Floats, words: Words) -> list[tu
     families: dict[str, list[int]] = {}
     for place, name in enumerate(names):
         families.setdefault(words.family(name), []).append(place)
-    return [(max(places, key=lambda place: float(swings[place])), len(places)) for places in families.values()]
+    return [(max(family, key=lambda place: float(swings[place])), len(family)) for family in families.values()]
 
 
 def _middle(values: Floats) -> Floats:
     third = len(values) // 3
-    return values[MEAN_PART.start * third : MEAN_PART.stop * third] if third else values
+    if third:
+        return values[MEAN_PART.start * third : MEAN_PART.stop * third]
+    return values
 
 
 def _waterfall(values: Floats, data: _Signals, run: VariantRun) -> Waterfall:
-    time, speed = data["time"], data["input_speed"]
+    time = data["time"]
+    speed = data["input_speed"]
     rate = (time.size - 1) / float(np.ptp(time))
     return waterfall(
         values, speed, rate, window_length=run.spectra.window_length, overlap=OVERLAP, reference=1.0, unit="N"

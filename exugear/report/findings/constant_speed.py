@@ -70,7 +70,9 @@ class ConstantSpeed:
     def along(self, line: OrderLine) -> Floats | None:
         """Level at each speed, dB re 1 µm; None if the response has no such order."""
         place = line.place(self.orders)
-        return None if place is None else self.level[:, place]
+        if place is None:
+            return None
+        return self.level[:, place]
 
     def near(self, line: OrderLine, frequency: float, resolution: float) -> Highest | None:
         """Return the highest peak of an order within what a run-up resolves about a frequency (both Hz).
@@ -78,7 +80,8 @@ class ConstantSpeed:
         Without a peak there, the level at the frequency; None if the response does not go there. The sweep shifts a
         peak besides, by up to a few percent.
         """
-        along, frequencies = self.along(line), line.frequency(self.speed)
+        along = self.along(line)
+        frequencies = line.frequency(self.speed)
         there = np.flatnonzero(np.abs(frequencies - frequency) <= max(BESIDE * frequency, resolution))
         if along is None or not there.size:
             return None
@@ -86,8 +89,8 @@ class ConstantSpeed:
         beside = np.pad(along, 1, constant_values=np.inf)
         peaks = there[(along[there] > beside[there]) & (along[there] >= beside[there + 2])]
         nearest = there[np.argmin(np.abs(frequencies[there] - frequency))]
-        place = int(peaks[np.argmax(along[peaks])] if peaks.size else nearest)
-        return Highest(float(along[place]), float(self.speed[place]), float(frequencies[place]))
+        index = int(peaks[np.argmax(along[peaks])] if peaks.size else nearest)
+        return Highest(float(along[index]), float(self.speed[index]), float(frequencies[index]))
 
     def highest(self, lines: Iterable[OrderLine]) -> tuple[OrderLine, Highest] | None:
         """Return the order that is loudest of all, and where; None if the response has none of them."""
@@ -95,9 +98,9 @@ class ConstantSpeed:
         for line in lines:
             along = self.along(line)
             if along is not None:
-                place = int(np.argmax(along))
-                frequency = float(line.frequency(self.speed[place : place + 1])[0])
-                found.append((line, Highest(float(along[place]), float(self.speed[place]), frequency)))
+                index = int(np.argmax(along))
+                frequency = float(line.frequency(self.speed[index : index + 1])[0])
+                found.append((line, Highest(float(along[index]), float(self.speed[index]), frequency)))
         return max(found, key=lambda own: own[1].level, default=None)
 
 
@@ -129,7 +132,9 @@ def truest_response(responses: Iterable[xr.Dataset], choice: Choice) -> xr.Datas
 def truest_of(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
     """Levels of a choice by the response that leaves least out, as `truest_response` finds it."""
     best = truest_response(responses, choice)
-    return None if best is None else constant_speed_of(best)
+    if best is None:
+        return None
+    return constant_speed_of(best)
 
 
 def is_over_speed(response: xr.Dataset) -> bool:
@@ -165,5 +170,5 @@ def response_spectra(
     parts = response["amplitude"].to_numpy()[places, 1:][..., [names.index(name) for name in signals]]
     amplitude = np.sqrt((parts.astype(np.float64) ** 2).sum(axis=-1))
     orders = response["order"].to_numpy()[1:]
-    unknown = [abs(float(own["speed"])) for own in json.loads(response.attrs.get("unsolved", "[]"))]
+    unknown = [abs(float(load["speed"])) for load in json.loads(response.attrs.get("unsolved", "[]"))]
     return line_spectra(speed, orders, amplitude, highest, unknown=unknown, reference=reference, unit=unit)

@@ -131,12 +131,14 @@ def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
     return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
 
 
-def _moves(words: Words, group: RunGroup, own: RankedResonance) -> str:
+def _moves(words: Words, group: RunGroup, resonance: RankedResonance) -> str:
     """Tell what moves in the mode of a resonance, after a colon; nothing where none is known."""
     modes = group.runs[group.main].modes
-    if own.finding.mode is not None and modes is not None:
-        return f": {words.moves(modes, own.finding.mode)}"
-    return f": {words.told(own.finding.mode_name)}" if own.finding.mode_name else ""
+    if resonance.finding.mode is not None and modes is not None:
+        return f": {words.moves(modes, resonance.finding.mode)}"
+    if resonance.finding.mode_name:
+        return f": {words.told(resonance.finding.mode_name)}"
+    return ""
 
 
 def _in_operation(words: Words, group: RunGroup, ranking: Ranking) -> Fact:
@@ -155,16 +157,18 @@ def _in_operation(words: Words, group: RunGroup, ranking: Ranking) -> Fact:
     return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "ranking")
 
 
-def quantity_text(words: Words, name: str, own: Loudness, ranking: Ranking) -> str:
+def quantity_text(words: Words, name: str, loudness: Loudness, ranking: Ranking) -> str:
     """Amplitude of a resonance in one of the three quantities, with its place and where it is largest."""
     count = sum(other.loudness[name].place is not None for other in ranking.resonances)
-    place = "no peak of its own" if own.place is None else f"place {own.place} of {count}"
+    place = "no peak of its own" if loudness.place is None else f"place {loudness.place} of {count}"
     if name == "error":
-        return f"the overall transmission error swings by ±{figure_text(1e6 * own.amplitude)} µm ({place})"
-    at = words.of(own.at)
+        return f"the overall transmission error swings by ±{figure_text(1e6 * loudness.amplitude)} µm ({place})"
+    at = words.of(loudness.at)
     if name == "force":
-        return f"the largest bearing force by ±{figure_text(1e-3 * own.amplitude)} kN, {at} ({place})"
-    return f"the {ranking.accelerates} accelerate at bearings by ±{figure_text(own.amplitude)} m/s², {at} ({place})"
+        return f"the largest bearing force by ±{figure_text(1e-3 * loudness.amplitude)} kN, {at} ({place})"
+    return (
+        f"the {ranking.accelerates} accelerate at bearings by ±{figure_text(loudness.amplitude)} m/s², {at} ({place})"
+    )
 
 
 def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonance) -> Fact | None:
@@ -183,13 +187,13 @@ def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonanc
     return Fact("Loudest resonance", frequency_text(at.frequency), beside, said, "steady")
 
 
-def _how(group: RunGroup, own: RankedResonance) -> str:
+def _how(group: RunGroup, resonance: RankedResonance) -> str:
     """Tell what a level was read from, unless it is a run-up alone."""
     if group.responses:
         return " at constant speed"
-    if own.constant is None:
+    if resonance.constant is None:
         return ""
-    return f" at constant speed, {amplitude_text(own.peak.level)} in the run-up"
+    return f" at constant speed, {amplitude_text(resonance.peak.level)} in the run-up"
 
 
 def _against_rated(context: Context, group: RunGroup) -> str:
@@ -211,13 +215,14 @@ def _against_rated(context: Context, group: RunGroup) -> str:
     )
 
 
-def _is_near_rated(own: RankedResonance, rated: float) -> bool:
-    return own.speed / RPM <= AROUND_RATED * rated
+def _is_near_rated(resonance: RankedResonance, rated: float) -> bool:
+    return resonance.speed / RPM <= AROUND_RATED * rated
 
 
 def _compliance(group: RunGroup) -> Fact | None:
     """Tell what compliance does, against the stiff reference."""
-    reference, top = group.ranked.get(REFERENCE_VARIANT), group.loudest
+    reference = group.ranked.get(REFERENCE_VARIANT)
+    top = group.loudest
     if reference is None or group.main == REFERENCE_VARIANT:
         return None
     stiff = next((own for own in reference if own.steady), None)
@@ -239,12 +244,15 @@ def _compliance(group: RunGroup) -> Fact | None:
 
 
 def _resonances(count: int) -> str:
-    return f"{count} resonance appears" if count == 1 else f"{count} resonances appear"
+    if count == 1:
+        return f"{count} resonance appears"
+    return f"{count} resonances appear"
 
 
 def _lever(words: Words, group: RunGroup, variations: Sequence[ModelVariations]) -> Fact | None:
     """Tell what moves the loudest resonance, and whether any change makes it quieter."""
-    top, modes = group.loudest, group.runs[group.main].modes
+    top = group.loudest
+    modes = group.runs[group.main].modes
     if top is None or modes is None or top.finding.mode is None:
         return None
     levers = levers_of(words, modes, top.finding.mode)

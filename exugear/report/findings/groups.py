@@ -67,22 +67,30 @@ class RankedResonance:
     @property
     def loudness(self) -> float:
         """Level (dB) that it is ranked by: at constant speed where that is known, else in the run-up."""
-        return self.peak.level if self.constant is None else self.constant.level
+        if self.constant is None:
+            return self.peak.level
+        return self.constant.level
 
     @property
     def frequency(self) -> float:
         """Frequency where it is loudest, Hz."""
-        return self.finding.resonance.frequency if self.constant is None else self.constant.frequency
+        if self.constant is None:
+            return self.finding.resonance.frequency
+        return self.constant.frequency
 
     @property
     def speed(self) -> float:
         """Speed of the input where it is loudest, without sign, rad/s."""
-        return abs(self.peak.speed) if self.constant is None else self.constant.speed
+        if self.constant is None:
+            return abs(self.peak.speed)
+        return self.constant.speed
 
     @property
     def missed(self) -> float:
         """By how many dB the run-up shows it below its level at constant speed; 0 where that is not known."""
-        return 0.0 if self.constant is None else self.constant.level - self.peak.level
+        if self.constant is None:
+            return 0.0
+        return self.constant.level - self.peak.level
 
 
 @dataclass(frozen=True)
@@ -175,7 +183,7 @@ def _of_runs(
     by_variant = {run.variant: run for run in sorted(runs, key=lambda run: OFFERED.index(Variant.of(run.variant)))}
     windows = other_windows(list(by_variant.values()), order_lines(context.gearbox))
     levels = {variant: truest_of(results.steady, Choice(variant, *key[1:])) for variant in by_variant}
-    constant = {variant: own for variant, own in levels.items() if own is not None}
+    constant = {variant: level for variant, level in levels.items() if level is not None}
     response = truest_response(results.steady, Choice(list(by_variant)[-1], *key[1:]))
     loud = response if response is not None and is_over_speed(response) else None
     return _group(f"run-up {key[0]}", key, by_variant, windows, constant, {}, loud)
@@ -225,7 +233,8 @@ def _ranked(
     response: xr.Dataset | None,
 ) -> tuple[RankedResonance, ...]:
     """Resonances of a variant, judged; of a steady response there are no windows, and none is needed."""
-    run, rule = runs[variant], AbsenceRule()
+    run = runs[variant]
+    rule = AbsenceRule()
     others = {name: other.spectra for name, other in runs.items() if name != variant}
     ranked = []
     for finding in run.findings():
@@ -247,7 +256,8 @@ def _ranked(
 
 def _named(finding: Finding, data: xr.Dataset) -> Finding:
     """Name the mode of a resonance by those that the response followed over speed, where no others were computed."""
-    diagram, peak = campbell_from(data), finding.strongest
+    diagram = campbell_from(data)
+    peak = finding.strongest
     sense = 1.0 if float(data["speed"][0]) >= 0.0 else -1.0
     mode = diagram.mode_at(sense * peak.speed, peak.frequency)
     if mode is None:
@@ -259,4 +269,6 @@ def _named(finding: Finding, data: xr.Dataset) -> Finding:
 def _level_at(spectra: Waterfall, peak: Pick) -> float:
     near = np.abs(peak.line.frequency(spectra.speed) - peak.frequency) <= peak.resolution
     level = spectra.along(peak.line)[near]
-    return float(np.max(level, initial=-np.inf, where=np.isfinite(level))) if np.isfinite(level).any() else float("nan")
+    if np.isfinite(level).any():
+        return float(np.max(level, initial=-np.inf, where=np.isfinite(level)))
+    return float("nan")

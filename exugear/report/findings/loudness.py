@@ -27,7 +27,9 @@ LEAST = 1e-9
 """Peaks below this share of the largest of their quantity are round-off."""
 NOTHING = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9}
 """Amplitudes below which nothing is excited, in the quantities' units."""
-SHAFTS, HOUSING, BOTH = "shafts", "housing", "shafts and housing"
+SHAFTS = "shafts"
+HOUSING = "housing"
+BOTH = "shafts and housing"
 
 
 @dataclass(frozen=True)
@@ -118,18 +120,18 @@ def ranking_of(data: xr.Dataset) -> Ranking:
     inside = (speed >= low) & (speed <= high)
     amplitude: Floats = data["amplitude"].to_numpy()[:, 1:].astype(np.float64)
     quantities = quantities_of([str(name) for name in data["signal"].to_numpy()])
-    sizes = {own.name: own.sizes(amplitude) for own in quantities}
-    peaks = {own.name: _peaks(own, sizes[own.name].max(axis=2), inside) for own in quantities}
+    sizes = {quantity.name: quantity.sizes(amplitude) for quantity in quantities}
+    peaks = {quantity.name: _peaks(quantity, sizes[quantity.name].max(axis=2), inside) for quantity in quantities}
     places = [
-        (place, number, own.name, point, line)
-        for number, own in enumerate(quantities)
-        for place, (point, line) in enumerate(peaks[own.name], start=1)
+        (place, number, quantity.name, point, line)
+        for number, quantity in enumerate(quantities)
+        for place, (point, line) in enumerate(peaks[quantity.name], start=1)
     ]
     groups: list[dict[str, tuple[int, int, int]]] = []
     of_line: dict[int, list[dict[str, tuple[int, int, int]]]] = {}
     for place, _, name, point, line in sorted(places):
         others = of_line.setdefault(line, [])
-        group = next((own for own in others if name not in own and _is_one(own, speed, point)), None)
+        group = next((other for other in others if name not in other and _is_one(other, speed, point)), None)
         if group is None:
             group = {}
             groups.append(group)
@@ -169,17 +171,22 @@ def _resonance(
 ) -> Resonance:
     _, first, line = next(iter(group.values()))
     loudness = {}
-    for own in quantities:
-        place, point, _ = group.get(own.name, (None, first, line))
-        at = sizes[own.name][point, line]
-        loudness[own.name] = Loudness(float(at.max()), own.places[int(at.argmax())], place)
+    for quantity in quantities:
+        place, point, _ = group.get(quantity.name, (None, first, line))
+        at = sizes[quantity.name][point, line]
+        loudness[quantity.name] = Loudness(float(at.max()), quantity.places[int(at.argmax())], place)
     bases = tuple(str(name) for name in data["base"].to_numpy())
-    order, speed = float(data["order"][line + 1]), float(data["speed"][first])
+    order = float(data["order"][line + 1])
+    speed = float(data["speed"][first])
     name = line_name(tuple(int(n) for n in data["index"].to_numpy()[line + 1]), bases)
     return Resonance(name, order, speed, order * abs(speed) / (2.0 * np.pi), loudness)
 
 
 def _whose(data: xr.Dataset) -> str:
     """Tell whose the accelerations are, as the file has it by bearing."""
-    carried = {bool(own) for own in json.loads(str(data.attrs["carried_seats"])).values()}
-    return SHAFTS if carried <= {False} else HOUSING if carried == {True} else BOTH
+    carried = {bool(load) for load in json.loads(str(data.attrs["carried_seats"])).values()}
+    if carried <= {False}:
+        return SHAFTS
+    if carried == {True}:
+        return HOUSING
+    return BOTH

@@ -100,7 +100,9 @@ def begin_variations(context: Context, modes: Mapping[Choice, xr.Dataset], execu
 def varied_models(folder: Path, files_below: Path | None, models: Sequence[Choice]) -> VariedModels:
     """Vary what was assumed in models of the case that a folder keeps: for `begin_variations`."""
     context = Context(folder, kept_case(folder, Permissions(below=files_below)), None, lambda what: None)
-    return {model: {own.label: _figures(own) for own in _parameters(context, model)} for model in models}
+    return {
+        model: {parameter.label: _figures(parameter) for parameter in _parameters(context, model)} for model in models
+    }
 
 
 def model_variations(
@@ -171,7 +173,7 @@ def guarded(variation: ParameterVariation, frequency: float) -> Guarded:
 def best_change(variation: ParameterVariation, frequency: float) -> BestChange:
     """Find the value that makes what lies within an octave of a mode quietest."""
     loudest = guarded(variation, frequency).loudest
-    place = int(np.argmin(loudest))
-    gain = 20.0 * np.log10(max(loudest[default_place(variation)], 1e-300) / max(loudest[place], 1e-300))
+    index = int(np.argmin(loudest))
+    gain = 20.0 * np.log10(max(loudest[default_place(variation)], 1e-300) / max(loudest[index], 1e-300))
     parameter = variation.parameter
-    return BestChange(parameter.label, parameter.values[place], parameter.default, float(gain))
+    return BestChange(parameter.label, parameter.values[index], parameter.default, float(gain))

@@ -81,7 +81,8 @@ def run_figures(run: VariantRun) -> RunFigures:
 def verdicts_of(context: Context, group: RunGroup) -> tuple[Verdict, ...]:
     """Judge the main variant of a group; what was passed comes first."""
     case = context.gearbox.case
-    run, response = group.runs[group.main], group.responses.get(group.main)
+    run = group.runs[group.main]
+    response = group.responses.get(group.main)
     own = _of_run(run, run_figures(run)) if response is None else _of_response(response)
     verdicts = [*own, *_of_resonances(group)]
     verdicts.append(
@@ -90,7 +91,8 @@ def verdicts_of(context: Context, group: RunGroup) -> tuple[Verdict, ...]:
     sets = context.gearbox.inertia_sets
     if len(sets) > 1:
         verdicts.append(Verdict(False, f"inertias are one of {len(sets)} sets ({', '.join(sets)}): see the others"))
-    rated, fastest = case.operation.rated_speed_rpm, float(run.spectra.speed.max()) / RPM
+    rated = case.operation.rated_speed_rpm
+    fastest = float(run.spectra.speed.max()) / RPM
     if rated is None:
         verdicts.append(Verdict(False, "the case names no rated speed ([operation] rated_speed_rpm)"))
     elif fastest > BEYOND_RATED * rated:
@@ -124,7 +126,8 @@ def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
 
 
 def _of_response(response: xr.Dataset) -> list[Verdict]:
-    error, growth = float(np.nanmax(response["energy_error"])), float(response.attrs["growth_rate"])
+    error = float(np.nanmax(response["energy_error"]))
+    growth = float(response.attrs["growth_rate"])
     verdicts = [
         Verdict(error < STEADY_ENERGY, f"what damping takes is what the meshes give within {100.0 * error:.1g} %"),
         Verdict(growth <= 0.0, f"disturbances {'decay' if growth <= 0.0 else 'grow: the steady state does not last'}"),
@@ -157,7 +160,8 @@ def _of_resonances(group: RunGroup) -> list[Verdict]:
     loudest = group.ranked[group.main][:LOUDEST]
     if not loudest:
         return []
-    count, steady = len(loudest), sum(own.steady for own in loudest)
+    count = len(loudest)
+    steady = sum(own.steady for own in loudest)
     verdicts: list[Verdict] = []
     if not group.responses:
         verdicts.append(Verdict(steady == count, f"{steady} of the {count} loudest stay with windows of other lengths"))

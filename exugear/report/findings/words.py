@@ -91,7 +91,9 @@ class Words:
     def family(self, name: str) -> str:
         """Name that the copies of a planet set share."""
         copy = _COPY.match(name)
-        return copy[1] if copy and copy[1] in self._copied else name
+        if copy and copy[1] in self._copied:
+            return copy[1]
+        return name
 
     @cached_property
     def _copied(self) -> set[str]:
@@ -130,7 +132,9 @@ class Words:
     def line(self, line: OrderLine) -> str:
         """Order in short: its harmonic and the mesh."""
         harmonic, mesh = self._split(line)
-        return mesh if harmonic == 1 else f"{harmonic} × {mesh}"
+        if harmonic == 1:
+            return mesh
+        return f"{harmonic} × {mesh}"
 
     def line_sentence(self, line: OrderLine) -> str:
         """Order in a sentence, such as "the 2nd harmonic of the mesh high-speed"."""
@@ -143,7 +147,7 @@ class Words:
         harmonic = int(number) if number else 1
         order = line.order / harmonic
         meshes = next((f for o, f in self._families.items() if abs(o - order) < 1e-6 * order), [family])
-        return harmonic, " and ".join(self.of(one) for one in meshes)
+        return harmonic, " and ".join(self.of(mesh) for mesh in meshes)
 
     def moves(self, modes: xr.Dataset, index: int) -> str:
         """Say what moves in a mode, until most of its kinetic energy is told."""
@@ -161,7 +165,7 @@ class Words:
                 break
             verbs.setdefault(name, []).append(MOTIONS[motion][name == "planets"])
             told += share
-        return joined(f"{name} {joined(own)}" for name, own in verbs.items())
+        return joined(f"{name} {joined(verb)}" for name, verb in verbs.items())
 
     def gives(self, modes: xr.Dataset, index: int) -> dict[str, float]:
         """Shares of strain energy by what gives way, copies of a planet set together, the largest first."""
@@ -200,7 +204,9 @@ def joined(parts: Iterable[str]) -> str:
     'a, b and c'
     """
     *first, last = parts
-    return f"{', '.join(first)} and {last}" if first else last
+    if first:
+        return f"{', '.join(first)} and {last}"
+    return last
 
 
 def figure_text(value: float, digits: int = 3) -> str:
@@ -212,5 +218,7 @@ def figure_text(value: float, digits: int = 3) -> str:
     ('205.9', '62', '1234', '-0.0004')
     """
     if value and abs(value) >= 10.0 ** (digits - 1):
-        return f"{value:.0f}" if abs(value) < 1e7 else f"{value:.{digits - 1}e}"
+        if abs(value) < 1e7:
+            return f"{value:.0f}"
+        return f"{value:.{digits - 1}e}"
     return f"{value:.{digits}g}"

@@ -85,7 +85,9 @@ class Part:
 
 def only_for(content: str, group: str, variant: str = "") -> str:
     """Mark content as that of a group of results, or of one variant: scripts show what was chosen, paper shows all."""
-    return element("div", content, data_group=group, data_variant=variant or None) if content else ""
+    if content:
+        return element("div", content, data_group=group, data_variant=variant or None)
+    return ""
 
 
 def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:

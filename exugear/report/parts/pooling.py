@@ -39,7 +39,8 @@ def pooled(level: Floats, speed: Floats, columns: int, lines: int) -> Floats:
     narrow = level[:, :count:lines].copy()
     for line in range(1, lines):
         np.maximum(narrow, level[:, line:count:lines], out=narrow)
-    low, span = float(speed.min()), max(float(np.ptp(speed)), 1e-12)
+    low = float(speed.min())
+    span = max(float(np.ptp(speed)), 1e-12)
     cell = np.minimum(((speed - low) / span * columns).astype(np.int64), columns - 1)
     whole = np.full((columns, narrow.shape[1]), -np.inf)
     order = np.argsort(cell, kind="stable")

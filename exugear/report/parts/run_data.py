@@ -146,36 +146,37 @@ def _cuts(material: Material, spectra: Waterfall, every: int) -> dict[str, Any]:
     }
 
 
-def _constant(material: Material, own: ConstantSpeed | None) -> dict[str, Any] | None:
+def _constant(material: Material, speed: ConstantSpeed | None) -> dict[str, Any] | None:
     """Levels along the orders at constant speed, for the cuts of the overall transmission error."""
-    if own is None:
+    if speed is None:
         return None
-    along = [own.along(line) for line in material.lines]
-    nothing = np.full(own.speed.size, np.nan)
-    levels = np.array([nothing if one is None else one for one in along]).reshape(len(along), own.speed.size).T
+    along = [speed.along(line) for line in material.lines]
+    nothing = np.full(speed.speed.size, np.nan)
+    levels = np.array([nothing if one is None else one for one in along]).reshape(len(along), speed.speed.size).T
     return {
         "cuts": material.arrays.add(tenths(levels), differences=True),
-        "speeds": material.arrays.add((own.speed / RPM).astype("f4")),
+        "speeds": material.arrays.add((speed.speed / RPM).astype("f4")),
     }
 
 
 def _loudest(material: Material, channel: Channel) -> dict[str, Any] | None:
     """Figures of a bearing for its table."""
-    found = loudest_order(channel.spectra, material.lines)
+    order = loudest_order(channel.spectra, material.lines)
     return {
         "words": channel.words,
         "copies": channel.copies,
         "mean": rounded(channel.mean, 4),
         "axial": rounded(channel.axial, 4),
-        "amplitude": rounded(found.amplitude, 4) if found else None,
-        "line": material.words.line(found.line) if found else "",
-        "speed": rounded(found.speed / RPM, 5) if found else None,
-        "frequency": rounded(found.frequency, 5) if found else None,
+        "amplitude": rounded(order.amplitude, 4) if order else None,
+        "line": material.words.line(order.line) if order else "",
+        "speed": rounded(order.speed / RPM, 5) if order else None,
+        "frequency": rounded(order.frequency, 5) if order else None,
     }
 
 
 def _resonance(material: Material, group: RunGroup, run: VariantRun, own: RankedResonance) -> dict[str, Any]:
-    peak, resonance = own.peak, own.finding.resonance
+    peak = own.peak
+    resonance = own.finding.resonance
     return {
         "frequency": rounded(resonance.frequency, 6),
         "tolerance": rounded(resonance.resolution, 3),
@@ -189,11 +190,12 @@ def _resonance(material: Material, group: RunGroup, run: VariantRun, own: Ranked
     }
 
 
-def _facts(material: Material, group: RunGroup, run: VariantRun, own: RankedResonance) -> list[list[str]]:
+def _facts(material: Material, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> list[list[str]]:
     """Terms and words of a resonance for the panel beside the waterfall."""
-    words, peak = material.words, own.peak
-    others = list(dict.fromkeys(p.line for p in own.finding.resonance.picks[1:] if p.line != peak.line))[:ALSO]
-    at = own.constant
+    words = material.words
+    peak = resonance.peak
+    others = list(dict.fromkeys(p.line for p in resonance.finding.resonance.picks[1:] if p.line != peak.line))[:ALSO]
+    at = resonance.constant
     at_constant = "" if at is None else f"; at constant speed {figure_text(at.level)} dB at {at.frequency:.1f} Hz"
     facts = [
         [
@@ -205,28 +207,29 @@ def _facts(material: Material, group: RunGroup, run: VariantRun, own: RankedReso
     ]
     if others:
         facts.append(["Shown by", ", ".join(words.line(line) for line in others)])
-    for variant, level in own.elsewhere.items():
-        lacks = "does not show it, " if variant in own.lacking else ""
+    for variant, level in resonance.elsewhere.items():
+        lacks = "does not show it, " if variant in resonance.lacking else ""
         there = f"{figure_text(level)} dB there" if math.isfinite(level) else "did not go there"
         facts.append([Variant.of(variant).label.capitalize(), f"{lacks}{there}"])
-    facts += _mode_facts(material, group, run, own)
-    if not own.steady:
+    facts += _mode_facts(material, group, run, resonance)
+    if not resonance.steady:
         facts.append(["Mind", "not every length of the window shows it: it may be no resonance"])
     return facts
 
 
-def _mode_facts(material: Material, group: RunGroup, run: VariantRun, own: RankedResonance) -> list[list[str]]:
-    mode, modes = own.finding.mode, run.modes
-    if own.finding.mode_name and modes is None:
-        moves = material.words.told(own.finding.mode_name)
-        return [["Mode", f"{own.finding.mode_frequency:.1f} Hz at this speed"], ["What moves", moves]]
+def _mode_facts(material: Material, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> list[list[str]]:
+    mode = resonance.finding.mode
+    modes = run.modes
+    if resonance.finding.mode_name and modes is None:
+        moves = material.words.told(resonance.finding.mode_name)
+        return [["Mode", f"{resonance.finding.mode_frequency:.1f} Hz at this speed"], ["What moves", moves]]
     if modes is None and not group.responses:
         return [["Mode", "no modes were computed: `exugear modes`"]]
     if mode is None or modes is None:
         return [["Mode", "none near"]]
     damping = 100.0 * float(modes["damping_ratio"][mode])
     return [
-        ["Mode", f"{own.finding.mode_frequency:.1f} Hz, damping {figure_text(damping, 2)} %"],
+        ["Mode", f"{resonance.finding.mode_frequency:.1f} Hz, damping {figure_text(damping, 2)} %"],
         ["What moves", material.words.moves(modes, mode)],
         ["What gives", percentages(material.words.gives(modes, mode))],
     ]

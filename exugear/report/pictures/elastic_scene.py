@@ -141,7 +141,8 @@ def _density_below(density: Floats, area: Floats) -> float:
 
 
 def _gears(assembly: Assembly, shape: Floats) -> tuple[tuple[BodyShape, ...], tuple[Floats, ...]]:
-    gears, motions = [], []
+    gears = []
+    motions = []
     for body in assembly.bodies:
         if body.name not in assembly.elastic_bodies or body.fixed:  # a housing has its ring in its own surface
             continue
@@ -223,7 +224,8 @@ def animate_elastic_bodies(
 
 
 def _add(plotter: pyvista.Plotter, scene: ElasticScene) -> tuple[list[pyvista.PolyData], list[pyvista.PolyData]]:
-    bodies, gears = [], []
+    bodies = []
+    gears = []
     for body in scene.bodies:
         mesh = quad_mesh(body.points + body.displacement, body.quads)
         mesh.cell_data["energy"] = body.energy

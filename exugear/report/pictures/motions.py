@@ -67,7 +67,8 @@ def motion_matrix(reference: ArrayLike, motion: ArrayLike) -> Floats:
     >>> [round(float(entry), 12) for entry in (quarter @ [2.0, 0.0, 0.0, 1.0])[:3]]
     [1.0, 1.0, 0.5]
     """
-    centre, vector = np.asarray(reference, dtype=np.float64), np.asarray(motion, dtype=np.float64)
+    centre = np.asarray(reference, dtype=np.float64)
+    vector = np.asarray(motion, dtype=np.float64)
     angle = float(np.linalg.norm(vector[3:]))
     rotation = np.eye(3)
     if angle > 0.0:

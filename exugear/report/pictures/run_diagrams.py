@@ -155,7 +155,8 @@ def _draw_order_lines(panel: Axes, lines: Sequence[OrderLine], fastest: float, t
 
 def _draw_marks(panel: Axes, picks: Sequence[Pick]) -> None:
     for number, pick in enumerate(picks, start=1):
-        speed, frequency = pick.speed / RPM, 1e-3 * pick.frequency
+        speed = pick.speed / RPM
+        frequency = 1e-3 * pick.frequency
         panel.plot(speed, frequency, "o", markersize=9, markerfacecolor="none", markeredgecolor=MARK_COLOUR)
         panel.annotate(
             str(number), (speed, frequency), (6, 6), textcoords="offset points", fontsize=8, color=MARK_COLOUR

@@ -223,7 +223,9 @@ def displacement_map() -> Colormap:
 
 
 def _opacity(body: BodyShape) -> float:
-    return 0.22 if body.fixed else 1.0
+    if body.fixed:
+        return 0.22
+    return 1.0
 
 
 def channels(colour: str) -> tuple[float, float, float]:

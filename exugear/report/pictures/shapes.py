@@ -134,7 +134,9 @@ def _has_shaft(body: Body) -> bool:
 
 def _rim(gearbox: Gearbox, body: Body, gear: str) -> float | None:
     """Wheels reach down to their shaft; planets and rings end where they are held."""
-    return _shaft_diameter(gearbox, body) if _has_shaft(body) and not gearbox.gears[gear].internal else None
+    if _has_shaft(body) and not gearbox.gears[gear].internal:
+        return _shaft_diameter(gearbox, body)
+    return None
 
 
 def _shaft(gearbox: Gearbox, body: Body) -> list[Surface]:

@@ -101,7 +101,8 @@ def _forces(material: Material, data: Mapping[str, Any], group: RunGroup, varian
 def _force_row(
     group: RunGroup, variant: str, name: str, figures: Mapping[str, Any], largest: float
 ) -> dict[str, object]:
-    amplitude, mean = figures["amplitude"], figures["mean"] or 0.0
+    amplitude = figures["amplitude"]
+    mean = figures["mean"] or 0.0
     copies = f" (1 of {figures['copies']})" if figures["copies"] > 1 else ""
     share = amplitude / mean if mean else math.inf
     named = Cell(f"{figures['words']}{copies}", choice=f"channel:{group.name}:{variant}:{name}")
@@ -125,12 +126,16 @@ def _force_row(
 
 def _above(force: float | None, felt: float) -> float:
     """Force, or none where it is no more than rounding beside the other bearings' forces."""
-    return force if force and force > felt else 0.0
+    if force and force > felt:
+        return force
+    return 0.0
 
 
 def _without_noise(value: float, mean: float) -> float:
     """Force (kN) beside a mean one (N): zero where only rounding and start-up are left."""
-    return value if abs(value) > NOISE * 1e-3 * mean else 0.0
+    if abs(value) > NOISE * 1e-3 * mean:
+        return value
+    return 0.0
 
 
 def _accelerations(material: Material, data: xr.Dataset) -> str:
@@ -225,7 +230,9 @@ def _meshes(material: Material, assembly: Assembly) -> str:
 
 def _mesh_row(material: Material, duty: MeshDuty) -> dict[str, object]:
     def shown(value: float, form: str) -> str:
-        return "–" if math.isnan(value) else format(value, form)
+        if math.isnan(value):
+            return "–"
+        return format(value, form)
 
     return {
         "mesh": material.words.of(duty.name),
@@ -258,4 +265,6 @@ def _duty_row(material: Material, duty: BearingDuty) -> dict[str, object]:
 
 
 def _life(value: float) -> str:
-    return f"{value:.3g}" if math.isfinite(value) else "no load"
+    if math.isfinite(value):
+        return f"{value:.3g}"
+    return "no load"

@@ -33,7 +33,8 @@ def change_section(material: Material) -> Part:
 
 
 def _group(material: Material, group: RunGroup, charts: dict[str, Any]) -> str:
-    top, modes = group.loudest, group.runs[group.main].modes
+    top = group.loudest
+    modes = group.runs[group.main].modes
     if top is None or modes is None or top.finding.mode is None:
         return ""
     mode = top.finding.mode
@@ -42,7 +43,7 @@ def _group(material: Material, group: RunGroup, charts: dict[str, Any]) -> str:
         f"For the mode at {frequency:.1f} Hz {Variant.of(group.main).label}, inertias {group.inertias}: "
         f"{material.words.moves(modes, mode)}."
     )
-    own = next((one for one in material.variations if one.choice == group.choice(group.main)), None)
+    own = next((variation for variation in material.variations if variation.choice == group.choice(group.main)), None)
     full = _variations(material, group, own, frequency, charts) if own and own.variations else ""
     return pieces.paragraph(scope, "note") + _levers(material, group, mode) + full
 
@@ -73,11 +74,13 @@ def _levers(material: Material, group: RunGroup, mode: int) -> str:
 
 
 def _variations(
-    material: Material, group: RunGroup, own: ModelVariations, frequency: float, charts: dict[str, Any]
+    material: Material, group: RunGroup, variations: ModelVariations, frequency: float, charts: dict[str, Any]
 ) -> str:
-    figures, told = [], []
-    for number, variation in enumerate(own.variations):
-        parameter, seen = variation.parameter, guarded(variation, frequency)
+    figures = []
+    told = []
+    for number, variation in enumerate(variations.variations):
+        parameter = variation.parameter
+        seen = guarded(variation, frequency)
         best = best_change(variation, frequency)
         label = material.words.parameter(parameter.label)
         told.append(f"{label.partition(' / ')[0]}: {best_words(material.words, best)}")

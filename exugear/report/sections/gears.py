@@ -41,30 +41,30 @@ def gears_section(material: Material) -> Part:
     return Part(html, {"charts": charts}, "Excitation", "gears-section")
 
 
-def _swing(own: PairExcitation) -> float:
-    return 1e6 * float(np.ptp(own.error))
+def _swing(excitation: PairExcitation) -> float:
+    return 1e6 * float(np.ptp(excitation.error))
 
 
-def _row(material: Material, own: PairExcitation) -> dict[str, object]:
+def _row(material: Material, excitation: PairExcitation) -> dict[str, object]:
     return {
-        "pair": material.words.of(own.pair),
-        "torque on gear 1 / N m": f"{own.torque:.1f}",
-        "positions": own.position.size,
-        "mean / µm": f"{1e6 * float(own.error.mean()):.2f}",
-        "peak to peak / µm": Cell(f"{_swing(own):.3f}", _swing(own)),
-        "mean stiffness / (N/µm)": f"{1e-6 * float(own.stiffness.mean()):.0f}",
-        "ISO 6336-1 B / (N/µm)": f"{1e-6 * own.iso_stiffness:.0f}",
-        "pressure / MPa": f"{1e-6 * own.pressure:.0f}" if math.isfinite(own.pressure) else "–",
+        "pair": material.words.of(excitation.pair),
+        "torque on gear 1 / N m": f"{excitation.torque:.1f}",
+        "positions": excitation.position.size,
+        "mean / µm": f"{1e6 * float(excitation.error.mean()):.2f}",
+        "peak to peak / µm": Cell(f"{_swing(excitation):.3f}", _swing(excitation)),
+        "mean stiffness / (N/µm)": f"{1e-6 * float(excitation.stiffness.mean()):.0f}",
+        "ISO 6336-1 B / (N/µm)": f"{1e-6 * excitation.iso_stiffness:.0f}",
+        "pressure / MPa": f"{1e-6 * excitation.pressure:.0f}" if math.isfinite(excitation.pressure) else "–",
     }
 
 
-def _harmonics_row(material: Material, own: PairExcitation) -> dict[str, object]:
-    largest = max(float(own.harmonics.max()), 1e-300)
+def _harmonics_row(material: Material, excitation: PairExcitation) -> dict[str, object]:
+    largest = max(float(excitation.harmonics.max()), 1e-300)
     cells = {
         f"{n + 1}.": Cell(figure_text(1e6 * float(value), 2), float(value), bar=float(value) / largest)
-        for n, value in enumerate(own.harmonics[:HARMONICS])
+        for n, value in enumerate(excitation.harmonics[:HARMONICS])
     }
-    return {"pair": material.words.of(own.pair), **cells}
+    return {"pair": material.words.of(excitation.pair), **cells}
 
 
 def _gear_rows(material: Material) -> list[dict[str, object]]:

@@ -109,7 +109,7 @@ def _deformed(material: Material, model: Choice, data: xr.Dataset) -> set[int]:
         if own.finding.mode is not None
     }
     reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
-    seen = sorted((one for one in reports if one.share >= VISIBLE_SHARE), key=lambda one: -one.amplification)
+    seen = sorted((report for report in reports if report.share >= VISIBLE_SHARE), key=lambda one: -one.amplification)
     most = [*sorted(matched), *(one.index for one in seen if one.index not in matched)]
     return set(most[: max(DEFORMED, len(matched))])
 

@@ -36,7 +36,8 @@ class ModelMatch:
 
 def near_section(material: Material) -> Part:
     """Tell which modes lie near the target frequency, and which assumptions would bring one there."""
-    target, modes = material.context.target, material.results.modes
+    target = material.context.target
+    modes = material.results.modes
     if target is None or not modes:
         return Part("")
     rows = []
@@ -92,24 +93,24 @@ def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: Mo
 
 def _matches(material: Material, target: float) -> Iterator[str]:
     """Table of the assumptions that bring a mode to the target, or that none does."""
-    found = [
-        ModelMatch(own.choice, match)
-        for own in material.variations
-        for match in frequency_matches(own.variations, target, VISIBLE_SHARE)
+    modelmatchs = [
+        ModelMatch(variation.choice, match)
+        for variation in material.variations
+        for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
     ]
     yield pieces.element("h3", f"Assumptions that bring a mode to {target:.0f} Hz")
-    if not found:
+    if not modelmatchs:
         yield pieces.paragraph(f"No value in the ranges varied brings a mode that is seen to {target:.0f} Hz.")
         return
     told = "; ".join(
-        f"{one.assumption} instead of {one.match.parameter.default:g} ({words_of(one.model)}: "
-        f"{one.match.frequency:.0f} Hz)"
-        for one in found
+        f"{modelmatch.assumption} instead of {modelmatch.match.parameter.default:g} ({words_of(modelmatch.model)}: "
+        f"{modelmatch.match.frequency:.0f} Hz)"
+        for modelmatch in modelmatchs
     )
     material.context.notes.statements.append(
         f"Assumptions that bring a mode seen by the overall transmission error to {target:.0f} Hz: {told}."
     )
-    rows = [_match_row(material, one, target) for one in found]
+    rows = [_match_row(material, modelmatch, target) for modelmatch in modelmatchs]
     yield pieces.table(rows, ("inertias", "assumption", "what moves"), caption="Assumptions", name="matches")
 
 
@@ -131,10 +132,13 @@ def _match_row(material: Material, found: ModelMatch, target: float) -> dict[str
 
 def _reference_frequency(material: Material, found: ModelMatch, target: float) -> float:
     """Frequency (Hz) of the nearest visible mode of the reference variant under the same assumption."""
-    context, match = material.context, found.match
+    context = material.context
+    match = found.match
     reference = replace(found.model, variant=REFERENCE_VARIANT)
     parameters = assumed_parameters(context.gearbox, reference, context.stiffness(found.model.mesh_law))
     same = next((parameter for parameter in parameters if parameter.label == match.parameter.label), None)
     assembly = same.build(match.value) if same else context.assembled(reference)
     nearest = nearest_mode(modes_of(assembly).to_dataset(), target, VISIBLE_SHARE)
-    return nearest.frequency if nearest else math.nan
+    if nearest:
+        return nearest.frequency
+    return math.nan

@@ -63,7 +63,7 @@ def _in_operation(material: Material, group: RunGroup) -> str:
         return ""
     low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
     which = "all speeds" if ranking.whole else "speeds of operation"
-    rows = [_loud_row(material, own) for own in ranking.resonances[:SHOWN]]
+    rows = [_loud_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
     title = f"At constant speed, {Variant.of(group.main).label}, {which}, {low} to {high} rpm: the first {len(rows)}"
     table = pieces.table(rows, ("Excited by", "At"), caption=title, name=f"in-operation-{group.name}", sortable=True)
     note = (
@@ -73,13 +73,13 @@ def _in_operation(material: Material, group: RunGroup) -> str:
     return pieces.element("h3", pieces.text(title)) + table + pieces.paragraph(note, "note")
 
 
-def _loud_row(material: Material, own: Resonance) -> dict[str, object]:
+def _loud_row(material: Material, resonance: Resonance) -> dict[str, object]:
     row: dict[str, object] = {
-        "Excited by": material.words.told(own.line),
-        "Speed / rpm": Cell(figure_text(abs(own.speed) / RPM, 4), abs(own.speed) / RPM),
-        "Frequency / Hz": Cell(f"{own.frequency:.1f}", own.frequency),
+        "Excited by": material.words.told(resonance.line),
+        "Speed / rpm": Cell(figure_text(abs(resonance.speed) / RPM, 4), abs(resonance.speed) / RPM),
+        "Frequency / Hz": Cell(f"{resonance.frequency:.1f}", resonance.frequency),
     }
-    for name, loudness in own.loudness.items():
+    for name, loudness in resonance.loudness.items():
         title, factor = QUANTITIES[name]
         place = "" if loudness.place is None else f" ({loudness.place})"
         row[title] = Cell(f"{figure_text(factor * loudness.amplitude)}{place}", loudness.amplitude)
@@ -122,7 +122,8 @@ def _rules() -> str:
 
 
 def _table(material: Material, group: RunGroup, variant: str) -> str:
-    run, ranked = group.runs[variant], group.ranked[variant]
+    run = group.runs[variant]
+    ranked = group.ranked[variant]
     title = f"{Variant.of(variant).label.capitalize()}, inertias {group.inertias}, {group.source}"
     heading = pieces.element("h3", pieces.text(f"{title}: {len(ranked)}"))
     rows = [_row(material, group, run, number, own) for number, own in enumerate(ranked, start=1)]
@@ -144,8 +145,11 @@ def _others(group: RunGroup, variant: str) -> list[str]:
     return [f"{Variant.of(name).label.capitalize()} / dB" for name in group.runs if name != variant]
 
 
-def _row(material: Material, group: RunGroup, run: VariantRun, number: int, own: RankedResonance) -> dict[str, object]:
-    finding, peak = own.finding, own.peak
+def _row(
+    material: Material, group: RunGroup, run: VariantRun, number: int, resonance: RankedResonance
+) -> dict[str, object]:
+    finding = resonance.finding
+    peak = resonance.peak
     loudest = group.ranked[run.variant][0].loudness
     frequency = f"{finding.resonance.frequency:.0f} ± {figure_text(finding.resonance.resolution, 1)}"
     choice = f"resonance:{group.name}:{run.variant}:{number - 1}"
@@ -155,52 +159,57 @@ def _row(material: Material, group: RunGroup, run: VariantRun, number: int, own:
         "Frequency / Hz": Cell(frequency, finding.resonance.frequency, choice),
         "Speed / rpm": Cell(figure_text(finding.speed, 4), finding.speed),
         "Excited by": material.words.line(peak.line),
-        "Level / dB": _level(own, loudest),
+        "Level / dB": _level(resonance, loudest),
     }
     if run.variant in group.constant:
-        row[AT_CONSTANT] = _at_constant(own, loudest)
-    row["± µm"] = Cell(figure_text(10.0 ** (own.loudness / 20.0), 2), own.loudness)
+        row[AT_CONSTANT] = _at_constant(resonance, loudest)
+    row["± µm"] = Cell(figure_text(10.0 ** (resonance.loudness / 20.0), 2), resonance.loudness)
     row["Prominence / dB"] = Cell(figure_text(peak.prominence, 2), peak.prominence)
     for name, key in zip((n for n in group.runs if n != run.variant), _others(group, run.variant), strict=True):
-        level = own.elsewhere[name]
-        if name in own.lacking:
+        level = resonance.elsewhere[name]
+        if name in resonance.lacking:
             row[key] = Cell("absent", -1e3, tag="plain")
         else:
             row[key] = Cell(f"{level:.1f}" if math.isfinite(level) else "–", level if math.isfinite(level) else -1e4)
     row["Mode / Hz"] = Cell(
         f"{finding.mode_frequency:.1f}" if matched else "–", finding.mode_frequency if matched else -1.0
     )
-    row["What moves; what gives"] = _story(material, group, run, own)
+    row["What moves; what gives"] = _story(material, group, run, resonance)
     if group.responses:
         return row
-    row["Windows"] = Cell("all" if own.steady else "unsteady", float(own.steady), tag="good" if own.steady else "mind")
+    row["Windows"] = Cell(
+        "all" if resonance.steady else "unsteady", float(resonance.steady), tag="good" if resonance.steady else "mind"
+    )
     return row
 
 
-def _level(own: RankedResonance, loudest: float) -> Cell:
+def _level(resonance: RankedResonance, loudest: float) -> Cell:
     """Level of the run-up; marked where it is too fast."""
-    level = own.peak.level
-    if own.constant is None:
+    level = resonance.peak.level
+    if resonance.constant is None:
         return Cell(f"{level:.1f}", level, bar=1.0 - (loudest - level) / SHOWN_SPAN)
-    if own.missed >= BUILT_UP:
+    if resonance.missed >= BUILT_UP:
         return Cell(f"{level:.1f} too fast", level, tag="mind")
     return Cell(f"{level:.1f}", level)
 
 
-def _at_constant(own: RankedResonance, loudest: float) -> Cell:
+def _at_constant(resonance: RankedResonance, loudest: float) -> Cell:
     """Level at constant speed, and the frequency where it is highest."""
-    at = own.constant
+    at = resonance.constant
     if at is None:
         return Cell("–", -1e4)
     return Cell(f"{at.level:.1f}, {at.frequency:.0f} Hz", at.level, bar=1.0 - (loudest - at.level) / SHOWN_SPAN)
 
 
-def _story(material: Material, group: RunGroup, run: VariantRun, own: RankedResonance) -> str:
-    mode, modes = own.finding.mode, run.modes
-    if own.finding.mode_name and modes is None:
-        return material.words.told(own.finding.mode_name)
+def _story(material: Material, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> str:
+    mode = resonance.finding.mode
+    modes = run.modes
+    if resonance.finding.mode_name and modes is None:
+        return material.words.told(resonance.finding.mode_name)
     if modes is None:
-        return NOT_NEAR if group.responses else "no modes were computed"
+        if group.responses:
+            return NOT_NEAR
+        return "no modes were computed"
     if mode is None:
         return NOT_NEAR
     gives = percentages(material.words.gives(modes, mode))
@@ -211,7 +220,8 @@ def _note_comparisons(material: Material, group: RunGroup) -> None:
     """Tell which resonances only one of two variants has; unsteady ones are not counted."""
     for variant, comparison in group.comparisons.items():
         reference = comparison.second.variant
-        here, there = _only(group, variant, reference), _only(group, reference, variant)
+        here = _only(group, variant, reference)
+        there = _only(group, reference, variant)
         material.context.notes.statements.append(
             f"Resonances in {variant} and not in {reference} ({group.title}): {here}. In {reference} and not in "
             f"{variant}: {there}."
@@ -222,4 +232,6 @@ def _only(group: RunGroup, variant: str, other: str) -> str:
     frequencies = sorted(
         own.finding.resonance.frequency for own in group.ranked[variant] if own.steady and other in own.lacking
     )
-    return ", ".join(f"{frequency:.0f}" for frequency in frequencies) + " Hz" if frequencies else "none"
+    if frequencies:
+        return ", ".join(f"{frequency:.0f}" for frequency in frequencies) + " Hz"
+    return "none"

@@ -16,13 +16,14 @@ def short_section(material: Material) -> Part:
 
     Those of steady responses are printed where there is no run-up, which else tells of both.
     """
-    context, told = material.context, told_groups(material.groups)
+    context = material.context
+    groups = told_groups(material.groups)
     content = []
     for group in material.groups:
         facts = facts_of(context, material.words, group, material.variations)
         verdicts = verdicts_of(context, group)
-        if group in told:
-            several = f"{group_words(told, group)}: " if len(told) > 1 else ""
+        if group in groups:
+            several = f"{group_words(groups, group)}: " if len(groups) > 1 else ""
             context.notes.statements.extend(f"{several}{fact.line}" for fact in facts)
             context.notes.statements.extend(f"{several}{verdict.line}." for verdict in verdicts)
         content.append(only_for(_group(material, group, facts, verdicts), group.name))
@@ -70,8 +71,10 @@ def verdict_list(verdicts: Sequence[Verdict]) -> str:
     entries = []
     for verdict in verdicts:
         sign = pieces.element("b", "✓" if verdict.passed else "!", aria_hidden="true")
-        said = pieces.element("span", "Passed: " if verdict.passed else "Mind: ", class_="unseen")
+        element = pieces.element("span", "Passed: " if verdict.passed else "Mind: ", class_="unseen")
         entries.append(
-            pieces.element("li", sign + said + pieces.text(verdict.words), class_="good" if verdict.passed else "mind")
+            pieces.element(
+                "li", sign + element + pieces.text(verdict.words), class_="good" if verdict.passed else "mind"
+            )
         )
     return pieces.element("ul", "".join(entries), class_="verdicts", aria_label="Can this be trusted?")

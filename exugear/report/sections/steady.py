@@ -58,12 +58,13 @@ def steady_section(material: Material) -> Part:
 
 def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> str:
     context = material.context
-    choice, level = choice_of(data.attrs), str(data.attrs["level"])
-    own = [run for run in material.results.runs if choice_of(run.attributes) == choice]
+    choice = choice_of(data.attrs)
+    level = str(data.attrs["level"])
+    runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
     label = f"{words_of(choice)}, level {level}"
     context.tell(f"steady response, {label}")
     found = peaks(data)[:SHOWN]
-    rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in own}
+    rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
     rows = [_row(material, peak, data, rates) for peak in found]
     lost = [row for row in rows if any(value == TELL_FAST for value in row.values())]
     note = ""
@@ -77,7 +78,7 @@ def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> s
         note,
         _shared_lines(material, data),
         _remarks(data, f"remarks-{level}-{model_name(choice)}"),
-        _order_charts(material, data, own, f"steady-{level}-{model_name(choice)}", charts),
+        _order_charts(material, data, runs, f"steady-{level}-{model_name(choice)}", charts),
         pieces.element("h4", f"Loudest peaks: the first {len(rows)}"),
         pieces.table(
             rows,
@@ -116,7 +117,9 @@ def _remarks(data: xr.Dataset, name: str) -> str:
     """Table of the speeds that something is to be said of, and of those at which no state was found."""
     speeds = data["speed"].to_numpy()
     said = [(abs(float(speed)), str(words)) for speed, words in zip(speeds, data["remark"].to_numpy(), strict=True)]
-    lost = [(abs(float(own["speed"])), f"left out: {own['reason']}") for own in json.loads(str(data.attrs["unsolved"]))]
+    lost = [
+        (abs(float(load["speed"])), f"left out: {load['reason']}") for load in json.loads(str(data.attrs["unsolved"]))
+    ]
     told = sorted([own for own in said if own[1]] + lost)
     if not told:
         return ""
@@ -154,18 +157,20 @@ def _order_charts(
 def _contributions_table(material: Material, data: xr.Dataset, name: str) -> str:
     """Table of what makes the strongest resonances at the level `linear`."""
     told = material.words.told
-    bases, index = tuple(str(name) for name in data["base"].to_numpy()), data["index"].to_numpy()
+    bases = tuple(str(name) for name in data["base"].to_numpy())
+    index = data["index"].to_numpy()
     rows = []
-    for own in json.loads(data.attrs["contributions"]):
-        line, speed = own["line"], abs(float(own["speed"]))
+    for load in json.loads(data.attrs["contributions"]):
+        line = load["line"]
+        speed = abs(float(load["speed"]))
         rows.append(
             {
                 "line": told(line_name(tuple(int(n) for n in index[line]), bases)),
                 "speed / rpm": f"{speed / RPM:.2f}",
-                "excited by": told(_shares(own["meshes"].items())),
-                "carried by": _shares((f"{frequency:.1f} Hz", share) for frequency, share in own["modes"]),
-                "per stiffness of": told(_slopes_of(own["supports"])),
-                "per inertia of": told(_slopes_of(own["bodies"])),
+                "excited by": told(_shares(load["meshes"].items())),
+                "carried by": _shares((f"{frequency:.1f} Hz", share) for frequency, share in load["modes"]),
+                "per stiffness of": told(_slopes_of(load["supports"])),
+                "per inertia of": told(_slopes_of(load["bodies"])),
             }
         )
     if not rows:
@@ -234,7 +239,9 @@ def _campbell(material: Material, data: xr.Dataset, name: str, label: str, chart
 def _speed_ranges(context: Context) -> str:
     """Speeds that the load cases pass, in words."""
     told = [f"{name}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm" for name, (slow, fast) in _ranges(context).items()]
-    return pieces.paragraph(f"Speeds of the load cases. {'; '.join(told)}.", "note") if told else ""
+    if told:
+        return pieces.paragraph(f"Speeds of the load cases. {'; '.join(told)}.", "note")
+    return ""
 
 
 def _ranges(context: Context) -> dict[str, tuple[float, float]]:
@@ -255,12 +262,13 @@ def _mode_rows(
     material: Material, diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
 ) -> list[dict[str, object]]:
     """Rows of the modes, those that are excited most first."""
-    bases, index = tuple(str(name) for name in data["base"].to_numpy()), data["index"].to_numpy()
+    bases = tuple(str(name) for name in data["base"].to_numpy())
+    index = data["index"].to_numpy()
     strongest: dict[int, Mapping[str, float]] = {}
-    for own in crossings:
-        mode = diagram.mode_at(own["speed"], own["frequency"])
-        if mode is not None and own["share"] > strongest.get(mode, {"share": 0.0})["share"]:
-            strongest[mode] = own
+    for crossing in crossings:
+        mode = diagram.mode_at(crossing["speed"], crossing["frequency"])
+        if mode is not None and crossing["share"] > strongest.get(mode, {"share": 0.0})["share"]:
+            strongest[mode] = crossing
     rows: list[dict[str, object]] = []
     for mode in sorted(range(len(diagram.names)), key=lambda m: -strongest.get(m, {"share": 0.0})["share"]):
         met = strongest.get(mode)
@@ -289,7 +297,8 @@ def _mode_rows(
 
 def _sidebands_table(material: Material, data: xr.Dataset, found: Sequence[Peak]) -> str:
     """Table of the lines beside the loudest peaks, each with its cause."""
-    context, told = material.context, material.words.told
+    context = material.context
+    told = material.words.told
     carriers = _carriers(context)
     loudest: dict[str, Peak] = {}
     for peak in found:
@@ -333,7 +342,9 @@ def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> st
 
 
 def _amplitude(line: str, amplitude: float) -> str:
-    return f"{amplitude:.3g} N" if line.startswith("mesh_force ") else f"{1e6 * amplitude:.3g} µm"
+    if line.startswith("mesh_force "):
+        return f"{amplitude:.3g} N"
+    return f"{1e6 * amplitude:.3g} µm"
 
 
 def _carriers(context: Context) -> dict[str, tuple[str, float]]:
@@ -357,15 +368,19 @@ def _slopes_of(slopes: Mapping[str, float]) -> str:
 def _place(data: xr.Dataset, line: OrderLine) -> int | None:
     """Place of an order among the lines of a response."""
     order = data["order"].to_numpy()
-    place = int(np.argmin(np.abs(order - line.order)))
-    return place if abs(order[place] - line.order) < 1e-6 * line.order else None
+    index = int(np.argmin(np.abs(order - line.order)))
+    if abs(order[index] - line.order) < 1e-6 * line.order:
+        return index
+    return None
 
 
 def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> list[Curve]:
     place = _place(data, line)
     amplitude = data["amplitude"].to_numpy()[:, place, 0].astype(np.float64)
-    speed, level = np.abs(data["speed"].to_numpy()) / RPM, _level(amplitude)
-    quiet, curves = float(level.min()) - BELOW, []
+    speed = np.abs(data["speed"].to_numpy()) / RPM
+    level = _level(amplitude)
+    quiet = float(level.min()) - BELOW
+    curves = []
     for run in runs:
         stored, _ = read_run(run.path, ("time", "overall_dte", "input_speed"))
         cut = run_up_cut(stored["time"], stored["overall_dte"], stored["input_speed"], line)
@@ -392,7 +407,8 @@ def branch_curves(speed: Floats, level: Floats, growth: Floats) -> list[Curve]:
     # A part ends where the next step turns back, and where the next point is of the other stability.
     turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
     ends = np.unique(np.concatenate([turns, np.flatnonzero(stable[1:] != stable[:-1]) + 1, [len(speed) - 1]]))
-    curves, first = [], 0
+    curves = []
+    first = 0
     for number, last in enumerate(ends, start=1):
         part = slice(first, last + 1)
         kind, style = ("stable", "line") if stable[part].mean() > 0.5 else ("unstable", "dashed")
@@ -429,9 +445,12 @@ def _row(material: Material, peak: Peak, data: xr.Dataset, rates: dict[str, floa
 
 def _damping(peak: Peak, data: xr.Dataset) -> float | None:
     """Damping of the mode that the line of a peak crosses there, where one is known."""
-    orders, near = data["order"].to_numpy(), []
+    orders = data["order"].to_numpy()
+    near = []
     for crossing in json.loads(data.attrs["crossings"]):
         same = abs(orders[crossing["line"]] - peak.order) < 1e-9 * peak.order
         if same and abs(crossing["speed"] - peak.speed) < SAME_SPEED * abs(peak.speed):
             near.append((abs(crossing["speed"] - peak.speed), float(crossing["damping"])))
-    return min(near)[1] if near else None
+    if near:
+        return min(near)[1]
+    return None

@@ -77,7 +77,8 @@ def trust_section(material: Material) -> Part:
 
 
 def _assumptions(material: Material) -> str:
-    gearbox, case = material.context.gearbox, material.context.gearbox.case
+    gearbox = material.context.gearbox
+    case = material.context.gearbox.case
     acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
     listed = [
         f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}.",
@@ -177,7 +178,8 @@ def flat_keys(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
 
 
 def _provenance(material: Material) -> str:
-    results, context = material.results, material.context
+    results = material.results
+    context = material.context
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
     hashes |= {

@@ -127,7 +127,9 @@ def drawn_mode(assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats,
 def _reference(assembly: Assembly, body: DrawnBody) -> Floats:
     """Point that the motion of the owner as a whole belongs to: its centre of mass."""
     own = next((one for one in assembly.gearbox.bodies(assembly.inertias) if one.name == body.owner), None)
-    return body.shape.reference if own is None else np.array([*own.axis, own.centre_of_mass_z])
+    if own is None:
+        return body.shape.reference
+    return np.array([*own.axis, own.centre_of_mass_z])
 
 
 def _largest(bodies: tuple[DrawnBody, ...], motions: Floats, fields: dict[int, Floats]) -> float:
@@ -143,11 +145,15 @@ def turn_between(first: BodyShape, other: BodyShape) -> float | None:
 
     Planets of a set are drawn from the points of the first of them.
     """
-    one, two = first.surface.points - first.reference, other.surface.points - other.reference
+    one = first.surface.points - first.reference
+    two = other.surface.points - other.reference
     if one.shape != two.shape or not np.array_equal(first.surface.triangles, other.surface.triangles):
         return None
     cross = float(np.sum(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]))
     angle = math.atan2(cross, float(np.sum(one[:, :2] * two[:, :2])))
-    cosine, sine = math.cos(angle), math.sin(angle)
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
     turned = one @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-    return angle if float(np.abs(turned - two).max()) < SAME_SHAPE else None
+    if float(np.abs(turned - two).max()) < SAME_SHAPE:
+        return angle
+    return None

@@ -116,8 +116,8 @@ def _body(heading: str, titles: Sequence[tuple[float, str]]) -> str:
     steps = pieces.element("button", "‹", type="button", id="before", aria_label="Mode before") + pieces.element(
         "button", "›", type="button", id="next", aria_label="Next mode"
     )
-    said = pieces.element("p", "", id="mode-words", aria_live="polite")
-    shown = pieces.element("div", steps, class_="controls") + said + stage_figure()
+    element = pieces.element("p", "", id="mode-words", aria_live="polite")
+    shown = pieces.element("div", steps, class_="controls") + element + stage_figure()
     main = pieces.element(
         "main",
         pieces.element(

@@ -40,7 +40,9 @@ def element(tag: str, content: str = "", **attributes: object) -> str:
         if value is not None and value is not False
     ]
     opening = f"<{tag}{''.join(written)}>"
-    return opening if tag in _VOID else f"{opening}{content}</{tag}>"
+    if tag in _VOID:
+        return opening
+    return f"{opening}{content}</{tag}>"
 
 
 def paragraph(value: str, kind: str = "") -> str:
@@ -119,7 +121,8 @@ def table(
     if not rows:
         return ""
     keys = list(rows[0])
-    left, small = {keys[0], *texts}, set(hidden)
+    left = {keys[0], *texts}
+    small = set(hidden)
 
     kinds = {key: " ".join(_text_kinds(rows, key) * (key in left) + ["wide"] * (key in small)) or None for key in keys}
     head = "".join(element("th", text(key), class_=kinds[key], scope="col") for key in keys)
@@ -170,7 +173,9 @@ def alert(title: str, values: Iterable[str]) -> str:
 
 def folded(title: str, content: str, opened: bool = False) -> str:
     """Hide content behind a title until it is clicked; paper shows it."""
-    return element("details", f"<summary>{text(title)}</summary>{content}", open=opened) if content else ""
+    if content:
+        return element("details", f"<summary>{text(title)}</summary>{content}", open=opened)
+    return ""
 
 
 def section(title: str, *content: str, level: int = 2, name: str = "") -> str:

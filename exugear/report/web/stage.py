@@ -68,7 +68,8 @@ def _bodies(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays: Ar
         turn = turn_between(first.shape, body.shape)
         drawn = body if turn is None else first
         local = drawn.shape.surface.points - drawn.shape.reference
-        low, span = local.min(axis=0), np.maximum(np.ptp(local, axis=0), 1e-9)
+        low = local.min(axis=0)
+        span = np.maximum(np.ptp(local, axis=0), 1e-9)
         triangles = drawn.shape.surface.triangles
         kind = "u2" if len(local) <= _U16 else "u4"
         listed.append(

@@ -57,14 +57,16 @@ def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | N
     tuple of Pick
         Peaks that satisfy the rule; a peak where the second run has no data does not.
     """
-    stated, asked = rule or AbsenceRule(), tuple(picks)
+    stated = rule or AbsenceRule()
+    asked = tuple(picks)
     peaks = {line: peaks_on_line(other, line, stated.prominence) for line in {pick.line for pick in asked}}
     return tuple(pick for pick in asked if _is_absent(pick, other, peaks[pick.line], stated))
 
 
 def _is_absent(pick: Pick, other: Waterfall, peaks: Sequence[Pick], rule: AbsenceRule) -> bool:
     """Tell whether a peak is absent from another run, of which the peaks on the same order line are given."""
-    frequency, level = pick.line.frequency(other.speed), other.along(pick.line)
+    frequency = pick.line.frequency(other.speed)
+    level = other.along(pick.line)
     near = np.isfinite(level) & (np.abs(frequency - pick.frequency) <= pick.resolution)
     if not np.any(near):
         return False

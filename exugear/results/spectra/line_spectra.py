@@ -40,7 +40,9 @@ class LineSpectra(Waterfall):
     def along(self, line: OrderLine) -> Floats:
         """Level (dB) of an order at each speed, shape (n,); NaN throughout if it is none of the lines."""
         place = line.place(self.orders)
-        return np.full(self.speed.size, np.nan) if place is None else self.line_level[:, place]
+        if place is None:
+            return np.full(self.speed.size, np.nan)
+        return self.line_level[:, place]
 
     def resolution(self, line: OrderLine) -> Floats:
         """Distance of the speeds along an order, Hz, shape (n,)."""
@@ -98,7 +100,8 @@ def line_spectra(
     level = np.array([np.interp(fine, speed, own) for own in known.T]).reshape(-1, fine.size).T
     for place in unknown:
         after = int(np.searchsorted(speed, abs(place)))
-        low, high = (speed[after - 1] if after else -np.inf), (speed[after] if after < speed.size else np.inf)
+        low = speed[after - 1] if after else -np.inf
+        high = speed[after] if after < speed.size else np.inf
         level[(fine > low) & (fine < high)] = np.nan
     frequency = np.linspace(0.0, highest, ROWS)
     picture = _picture(fine, orders, reference * 10.0 ** (level / 20.0), frequency)
@@ -109,7 +112,8 @@ def line_spectra(
 def _picture(speed: Floats, orders: Floats, amplitude: Floats, frequency: Floats) -> NDArray[Any]:
     """Amplitudes over speeds and frequencies: each line over all rows that it passes on its way between speeds."""
     middle = 0.5 * (speed[1:] + speed[:-1])
-    low, high = np.append(speed[0], middle), np.append(middle, speed[-1])
+    low = np.append(speed[0], middle)
+    high = np.append(middle, speed[-1])
     rows_per_hertz = (frequency.size - 1) / frequency[-1]
     picture: NDArray[Any] = np.zeros((speed.size, frequency.size), dtype=np.float32)
     drawn = np.nan_to_num(amplitude)
@@ -133,14 +137,16 @@ def line_peaks(spectra: Waterfall, line: OrderLine, prominence: float) -> list[P
     usable = np.flatnonzero(np.isfinite(spectra.along(line)))
     if usable.size < 3:
         return []
-    level, speed = spectra.along(line)[usable], spectra.speed[usable]
+    level = spectra.along(line)[usable]
+    speed = spectra.speed[usable]
     frequency = line.frequency(speed)
     found, properties = scipy.signal.find_peaks(level, prominence=prominence)
     picks = []
     for peak, height in zip(found, properties["prominences"], strict=True):
         quiet = np.flatnonzero(level < level[peak] - HALF_POWER)
         # A prominent peak has quiet places on both sides.
-        left, right = quiet[quiet < peak][-1], quiet[quiet > peak][0]
+        left = quiet[quiet < peak][-1]
+        right = quiet[quiet > peak][0]
         width = 0.5 * float(frequency[right] - frequency[left])
         picks.append(
             Pick(line, np.nan, float(speed[peak]), float(frequency[peak]), float(level[peak]), float(height), width)

@@ -98,7 +98,8 @@ def order_cut(
     """
     import scipy.signal  # loads all of scipy.stats, for which others need not wait
 
-    signal, shaft = np.asarray(values, dtype=np.float64), np.asarray(speed, dtype=np.float64)
+    signal = np.asarray(values, dtype=np.float64)
+    shaft = np.asarray(speed, dtype=np.float64)
     length = round(window_length * rate)
     step = 0.5 * (np.abs(shaft[1:]) + np.abs(shaft[:-1])) / rate
     angle = np.concatenate([[0.0], np.cumsum(step)])

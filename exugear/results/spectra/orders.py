@@ -37,7 +37,9 @@ class OrderLine:
     def place(self, orders: Floats) -> int | None:
         """Place of the line among orders (n,); None if it is none of them."""
         nearest = int(np.argmin(np.abs(orders - self.order)))
-        return nearest if abs(orders[nearest] - self.order) <= SAME_ORDER * self.order else None
+        if abs(orders[nearest] - self.order) <= SAME_ORDER * self.order:
+            return nearest
+        return None
 
     def frequency(self, speed: ArrayLike) -> Floats:
         """Frequency on the line, Hz, at speeds of the reference shaft in rad/s."""

@@ -40,7 +40,8 @@ def resample_uniform(time: ArrayLike, values: ArrayLike, rate: float) -> tuple[F
     """
     import scipy.signal  # loads all of scipy.stats, for which others need not wait
 
-    instants, signal = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    instants = np.asarray(time, dtype=np.float64)
+    signal = np.asarray(values, dtype=np.float64)
     if instants.shape != signal.shape or instants.ndim != 1 or instants.size < 8:
         raise ValueError(f"time {instants.shape} and values {signal.shape} must be two rows of 8 or more samples")
     steps = np.diff(instants)

@@ -103,7 +103,8 @@ def peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> lis
     usable = np.flatnonzero(np.isfinite(level))
     if usable.size < 3:
         return []
-    frequency, resolution = line.frequency(spectra.speed), spectra.resolution(line)
+    frequency = line.frequency(spectra.speed)
+    resolution = spectra.resolution(line)
     pace = np.median(np.abs(np.diff(frequency[usable])))
     apart = max(1.0, float(np.median(resolution[usable]) / pace)) if pace > 0.0 else 1.0
     peaks, properties = scipy.signal.find_peaks(level[usable], prominence=prominence, distance=apart)

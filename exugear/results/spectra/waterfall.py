@@ -162,7 +162,8 @@ def waterfall(
     >>> float(run.frequency[np.argmax(run.amplitude[0])]), round(float(run.amplitude.max()), 6)
     (300.0, 1.0)
     """
-    signal, shaft = np.asarray(values), np.asarray(speed, dtype=np.float64)
+    signal = np.asarray(values)
+    shaft = np.asarray(speed, dtype=np.float64)
     length = round(window_length * rate)
     if signal.shape != shaft.shape or signal.ndim != 1:
         raise ValueError(f"values {signal.shape} and speed {shaft.shape} must be two rows of equal length")

@@ -61,7 +61,7 @@ def other_windows(
 def _with_window(
     signals: Mapping[str, RunSignals], lines: Sequence[OrderLine], length: float, rule: AbsenceRule | None
 ) -> OtherWindow:
-    spectra = {variant: own.waterfall(length) for variant, own in signals.items()}
+    spectra = {variant: signal.waterfall(length) for variant, signal in signals.items()}
     picks = {variant: pick_resonances(own, lines) for variant, own in spectra.items()}
     absent = {
         (variant, other): only_in_first(picks[variant], spectra[other], rule)

@@ -59,7 +59,9 @@ class Campbell(Displayed, line=": {names!n} modes at {speeds!n} speeds"):
         own = np.array([np.interp(speed, self.speeds, column) for column in self.frequency.T])
         apart = np.where(np.isnan(own), np.inf, np.abs(own - frequency))
         nearest = int(np.argmin(apart))
-        return nearest if apart[nearest] <= SAME_FREQUENCY * frequency else None
+        if apart[nearest] <= SAME_FREQUENCY * frequency:
+            return nearest
+        return None
 
     def variables(self) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
         """Arrays with dimensions and units, as files hold them."""
@@ -87,7 +89,8 @@ def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float
 
 def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
     """Campbell diagram of the modes of a mean system, followed over speed."""
-    low, high = tracks.speeds[0], tracks.speeds[-1]
+    low = tracks.speeds[0]
+    high = tracks.speeds[-1]
     namer = ModeNamer(system, high if abs(high) > abs(low) else low)
     whirl = np.full(tracks.frequency.shape, np.nan)
     for n, m in zip(*np.nonzero(~np.isnan(tracks.frequency)), strict=True):
@@ -106,7 +109,7 @@ def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
 def campbell_from(data: xr.Dataset) -> Campbell:
     """Read a diagram from the dataset of a file that holds one."""
     values = {name: data[name].to_numpy() for name in LAYOUT}
-    kinds, names = (tuple(str(own) for own in values[name]) for name in ("mode_kind", "mode_name"))
+    kinds, names = (tuple(str(value) for value in values[name]) for name in ("mode_kind", "mode_name"))
     speeds, frequency, damping, whirl = (values[name] for name in list(LAYOUT)[:4])
     return Campbell(speeds, frequency, damping, whirl, kinds, names)
 

@@ -87,13 +87,17 @@ class ModeNamer:
                     circling += self._senses.get(body.name, 0.0) * energy[x] * circle(shape[x], shape[y])
                     total += energy[x] * (abs(shape[x]) ** 2 + abs(shape[y]) ** 2)
         whole = float((shape.conj() @ self.system.mass @ shape).real)
-        return float(circling / total) if total > LATERAL * whole else 0.0
+        if total > LATERAL * whole:
+            return float(circling / total)
+        return 0.0
 
     def _parts(self, shape: Complexes) -> tuple[tuple[Floats, float], ...]:
         """Real and imaginary part of a shape with the share of its energy that each has."""
         parts = (shape.real, shape.imag)
         energies = [float(part @ self.system.mass @ part) for part in parts]
-        return tuple((part, own / sum(energies)) for part, own in zip(parts, energies, strict=True) if own > 0.0)
+        return tuple(
+            (part, energy / sum(energies)) for part, energy in zip(parts, energies, strict=True) if energy > 0.0
+        )
 
     def _kinetic(self, shape: Complexes) -> Floats:
         """Share of kinetic energy (bodies, motions)."""
@@ -117,7 +121,9 @@ class ModeNamer:
             return ""
         most = int(np.argmax(own))
         kind = KINDS[most] if own[most] >= OF_KIND * own.sum() else MIXED
-        return kind if len(sets) == 1 else f"{kind} of {planets.carrier}"
+        if len(sets) == 1:
+            return kind
+        return f"{kind} of {planets.carrier}"
 
     def _of_kinds(self, planets: PlanetSet, shape: Complexes, kinetic: Floats) -> tuple[float, Floats]:
         """Share of the planets of a set, and shares (3,) of the set by type of motion."""

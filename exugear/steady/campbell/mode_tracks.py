@@ -120,7 +120,8 @@ def _matches(one: Found, other: Found) -> tuple[Integers, Integers, Floats]:
     values = assurance(one, other)
     rows, columns = scipy.optimize.linear_sum_assignment(values, maximize=True)
     kept = values[rows, columns] >= LEAST
-    rows, columns = rows[kept], columns[kept]
+    rows = rows[kept]
+    columns = columns[kept]
     return rows, columns, values[rows, columns]
 
 
@@ -128,14 +129,17 @@ def _clarity(one: Found, other: Found, narrowest: float) -> float:
     """Least MAC of modes that are one across a step, or less than `CLEAR` where a veering may hide in it."""
     rows, columns, values = _matches(one, other)
     before, after = (own[0][places].imag for own, places in ((one, rows), (other, columns)))
-    far, near = np.triu(np.subtract.outer(before, before), 1), np.triu(np.subtract.outer(after, after), 1)
+    far = np.triu(np.subtract.outer(before, before), 1)
+    near = np.triu(np.subtract.outer(after, after), 1)
     first, second = np.nonzero(far * near < 0.0)
     apart = np.abs(far[first, second]), np.abs(near[first, second])
     cross = assurance(one, other)[rows[first], columns[second]]
     share = 2.0 * np.sqrt(cross) / (1.0 / apart[0] + 1.0 / apart[1]) / (apart[0] + apart[1])
     hidden = share[share > narrowest].max(initial=0.0)
     clear = float(values.min(initial=1.0))
-    return min(clear, CLEAR * (1.0 - min(1.0, float(hidden)))) if hidden else clear
+    if hidden:
+        return min(clear, CLEAR * (1.0 - min(1.0, float(hidden))))
+    return clear
 
 
 def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:

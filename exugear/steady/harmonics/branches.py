@@ -64,7 +64,8 @@ class Branch:
     @property
     def folds(self) -> tuple[tuple[int, float], ...]:
         """Points after which the parameter turns back, and its value at the fold, from a parabola through three."""
-        p, found = self.parameter, []
+        p = self.parameter
+        found = []
         for n in range(1, len(p) - 1):
             if (p[n] - p[n - 1]) * (p[n + 1] - p[n]) < 0.0:
                 chords = [float(np.linalg.norm((self.lines[n + k] - self.lines[n + k - 1]).ravel())) for k in (0, 1)]
@@ -112,9 +113,12 @@ def trace(
         No solution at `first`, or none near the branch with steps a thousandth of the first.
     """
     solve = solve or _by_gmres
-    lines, parameters = [_at(residual, solve, start, first, scales)], [first]
-    sense, length = np.sign(last - first), step
-    tangent_lines, tangent_parameter = np.zeros_like(start), sense * scales.parameter
+    lines = [_at(residual, solve, start, first, scales)]
+    parameters = [first]
+    sense = np.sign(last - first)
+    length = step
+    tangent_lines = np.zeros_like(start)
+    tangent_parameter = sense * scales.parameter
     whole = False
     while not whole and len(parameters) < most:
         ahead = lines[-1] + length * tangent_lines, parameters[-1] + length * tangent_parameter
@@ -126,7 +130,8 @@ def trace(
             continue
         y, p, corrections = found
         size = np.hypot(_size(y - lines[-1]) / scales.lines, (p - parameters[-1]) / scales.parameter)
-        tangent_lines, tangent_parameter = (y - lines[-1]) / size, (p - parameters[-1]) / size
+        tangent_lines = (y - lines[-1]) / size
+        tangent_parameter = (p - parameters[-1]) / size
         lines.append(y)
         parameters.append(p)
         if progress is not None:
@@ -159,7 +164,8 @@ def _corrected(
 ) -> tuple[Complexes, float, int] | None:
     """Solution on the plane through a predicted point across the tangent, None where there is none near."""
     y, p = ahead
-    along, by_parameter = tangent[0] / scales.lines**2, tangent[1] / scales.parameter**2
+    along = tangent[0] / scales.lines**2
+    by_parameter = tangent[1] / scales.parameter**2
     before = np.inf
     for corrections in range(MOST_CORRECTIONS + 1):
         missing, change = residual(y, p)
@@ -177,5 +183,6 @@ def _corrected(
             return None
         off = float(np.real(np.vdot(along, ahead[0] - y))) + by_parameter * (ahead[1] - p)
         dp = (off - float(np.real(np.vdot(along, step)))) / (float(np.real(np.vdot(along, turn))) + by_parameter)
-        y, p = y + step + dp * turn, p + dp
+        y = y + step + dp * turn
+        p = p + dp
     return None

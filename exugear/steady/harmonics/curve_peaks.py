@@ -41,7 +41,8 @@ def standing_peaks(values: Floats, stands: float = STANDS) -> Integers:
 @compiled
 def find_standing(values: Floats, stands: float, found: Integers) -> int:
     """Fill the places of `standing_peaks` and count them; of equal highest values that of the middle one."""
-    count, last = 0, values.size - 1
+    count = 0
+    last = values.size - 1
     first = 1
     while first < last:
         end = first
@@ -52,10 +53,12 @@ def find_standing(values: Floats, stands: float, found: Integers) -> int:
             before = after = peak
             at = first - 1
             while at >= 0 and values[at] <= peak:
-                before, at = min(before, values[at]), at - 1
+                before = min(before, values[at])
+                at = at - 1
             at = end + 1
             while at <= last and values[at] <= peak:
-                after, at = min(after, values[at]), at + 1
+                after = min(after, values[at])
+                at = at + 1
             if peak - max(before, after) >= stands * peak:
                 found[count] = (first + end) // 2
                 count += 1
@@ -99,9 +102,12 @@ def predicted_top(places: Floats, values: Complexes, highest: int) -> tuple[floa
 
 def _top(places: Floats, values: Complexes, highest: int, first: int) -> tuple[float, float]:
     """Place and height of the top near a place by the curve through five places from one on."""
-    middle, width = places[highest], places[highest + 1] - places[highest - 1]
-    x, f = (places[first : first + NEIGHBOURS] - middle) / width, values[first : first + NEIGHBOURS]
-    carrying, others = x[SUPPORT], x[OTHERS]
+    middle = places[highest]
+    width = places[highest + 1] - places[highest - 1]
+    x = (places[first : first + NEIGHBOURS] - middle) / width
+    f = values[first : first + NEIGHBOURS]
+    carrying = x[SUPPORT]
+    others = x[OTHERS]
     divided = (f[OTHERS][:, None] - f[SUPPORT]) / (others[:, None] - carrying)[..., None]
     weights = np.linalg.svd(np.moveaxis(divided, 2, 1).reshape(-1, len(SUPPORT)))[2][-1].conj()
 
@@ -111,13 +117,17 @@ def _top(places: Floats, values: Complexes, highest: int, first: int) -> tuple[f
         return np.asarray(np.linalg.norm((parts @ f[SUPPORT]) / parts.sum(axis=1)[:, None], axis=1))
 
     low, high = ((places[highest + side] - middle) / width for side in (-1, 1))
-    top, height = 0.0, float(np.linalg.norm(values[highest]))
+    top = 0.0
+    height = float(np.linalg.norm(values[highest]))
     for _ in range(CLOSER):
         at = np.linspace(low, high, LOOKED_AT)
         found = heights(at)
         best = int(np.argmax(found))
         if not found[best] > height:
             break
-        top, height, step = float(at[best]), float(found[best]), (high - low) / LOOKED_AT
-        low, high = max(low, top - step), min(high, top + step)
+        top = float(at[best])
+        height = float(found[best])
+        step = (high - low) / LOOKED_AT
+        low = max(low, top - step)
+        high = min(high, top + step)
     return float(middle + top * width), height

@@ -76,7 +76,8 @@ def _after_kicks(state: Floats, advance: Floats, pushes: Floats, reads: Floats, 
     count = len(kicks)
     if not pushes.shape[1] or not len(reads):  # nothing varies: the constant part acts alone
         return np.asarray(np.linalg.matrix_power(advance, count) @ state)
-    rows, columns = [reads], [advance @ pushes]
+    rows = [reads]
+    columns = [advance @ pushes]
     for _ in range(count - 1):
         rows.append(rows[-1] @ advance)
         columns.append(advance @ columns[-1])

@@ -65,7 +65,8 @@ class LineSet(Displayed, line=": {index!n} lines of {index.shape[1]} bases"):
         found = []
         for a, b in itertools.combinations(range(len(self.bases)), 2):
             column = int(np.argmax(self.units[a]))
-            one, other = int(self.units[a, column]), int(self.units[b, column])
+            one = int(self.units[a, column])
+            other = int(self.units[b, column])
             if other:
                 row = np.zeros(len(self.bases), dtype=np.int64)
                 row[[a, b]] = np.array([other, -one]) // math.gcd(one, other)
@@ -110,7 +111,8 @@ class LineSet(Displayed, line=": {index!n} lines of {index.shape[1]} bases"):
             at = np.minimum(np.searchsorted(keys, values), len(keys) - 1)
             return np.where(keys[at] == values, order[at], -1)
 
-        direct, mirrored = look(wanted), look(-wanted)
+        direct = look(wanted)
+        mirrored = look(-wanted)
         return np.where(direct >= 0, direct, mirrored), (direct < 0) & (mirrored >= 0)
 
     def values(self, coefficients: Complexes, angles: Floats) -> Floats:

@@ -97,7 +97,8 @@ class Coupling:
             coefficients = group.size * _filled(group.size)
             first.append(terms + np.searchsorted(line, np.arange(len(self.lines.index) + 1)))
             parts.append((place[line, at], mirrored[line, at].astype(np.int64), blocks + coefficients * at))
-            terms, blocks = terms + len(line), blocks + coefficients * len(group.harmonics)
+            terms = terms + len(line)
+            blocks = blocks + coefficients * len(group.harmonics)
         places, conjugates, at_blocks = (np.concatenate(own) for own in zip(*parts, strict=True))
         begin, size, room = (
             np.array(own, dtype=np.int64)
@@ -124,7 +125,10 @@ class Coupling:
         whole = (real + 1j * imaginary).reshape(len(values), -1)
         ends = np.cumsum(self.terms.room)
         return np.hstack(
-            [whole[:, end - _filled(own.size) :][:, : own.size] for own, end in zip(self.groups, ends, strict=True)]
+            [
+                whole[:, end - _filled(group.size) :][:, : group.size]
+                for group, end in zip(self.groups, ends, strict=True)
+            ]
         )
 
 
@@ -139,9 +143,9 @@ def flat(functions: Sequence[Complexes]) -> tuple[Floats, Floats]:
     One column after the other, rows filled up to whole octets.
     """
     parts = []
-    for own in functions:
-        columns = np.zeros((*own.shape[:-2], own.shape[-1], _filled(own.shape[-2])), dtype=complex)
-        columns[..., : own.shape[-2]] = np.swapaxes(own, -1, -2)
+    for function in functions:
+        columns = np.zeros((*function.shape[:-2], function.shape[-1], _filled(function.shape[-2])), dtype=complex)
+        columns[..., : function.shape[-2]] = np.swapaxes(function, -1, -2)
         parts.append(columns.ravel())
     whole = np.concatenate(parts)
     return np.ascontiguousarray(whole.real), np.ascontiguousarray(whole.imag)
@@ -157,17 +161,24 @@ def take_in(
         room += terms.room[group]
     to = 0
     for group in range(terms.room.size):
-        begin, size, rows = terms.begin[group], terms.size[group], terms.room[group]
+        begin = terms.begin[group]
+        size = terms.size[group]
+        rows = terms.room[group]
         for octet in range(0, rows, SIZE):
             for line in range(values.shape[0]):
-                x, y = all_eight(0.0), all_eight(0.0)
+                x = all_eight(0.0)
+                y = all_eight(0.0)
                 for term in range(terms.first[group, line], terms.first[group, line + 1]):
-                    place, at = terms.place[term], terms.block[term] + octet
+                    place = terms.place[term]
+                    at = terms.block[term] + octet
                     sign = -1.0 if terms.mirrored[term] else 1.0
                     for column in range(begin, begin + size):
-                        a, b = values[place, column].real, sign * values[place, column].imag
-                        c, s = eight(real, at), eight(imaginary, at)
-                        x, y = x + c * a - s * b, y + c * b + s * a
+                        a = values[place, column].real
+                        b = sign * values[place, column].imag
+                        c = eight(real, at)
+                        s = eight(imaginary, at)
+                        x = x + c * a - s * b
+                        y = y + c * b + s * a
                         at += rows
                 put(out_real, line * room + to + octet, x)
                 put(out_imaginary, line * room + to + octet, y)
@@ -195,15 +206,21 @@ def add_answered(
     lines, size = values.shape
     at = product = 0
     for line in range(lines):
-        from_line, from_answers = product, at
+        from_line = product
+        from_answers = at
         for octet in range(0, size, SIZE):
-            x, y = all_eight(0.0), all_eight(0.0)
-            product, at = from_line, from_answers + octet
+            x = all_eight(0.0)
+            y = all_eight(0.0)
+            product = from_line
+            at = from_answers + octet
             for group in range(terms.room.size):
                 for column in range(product, product + terms.size[group]):
-                    a, b = taken_real[column], taken_imaginary[column]
-                    c, s = eight(answers_real, at), eight(answers_imaginary, at)
-                    x, y = x + c * a - s * b, y + c * b + s * a
+                    a = taken_real[column]
+                    b = taken_imaginary[column]
+                    c = eight(answers_real, at)
+                    s = eight(answers_imaginary, at)
+                    x = x + c * a - s * b
+                    y = y + c * b + s * a
                     at += SIZE * ((size + SIZE - 1) // SIZE)
                 product += terms.room[group]
             put(memory, 0, x)

@@ -64,7 +64,9 @@ def elimination(pattern: Booleans) -> Elimination:
     n = len(pattern)
     linked = pattern | pattern.T
     np.fill_diagonal(linked, True)
-    filled, left, order = linked.copy(), np.ones(n, dtype=bool), []
+    filled = linked.copy()
+    left = np.ones(n, dtype=bool)
+    order = []
     touched: list[Integers] = []
     for _ in range(n):
         counts = np.where(left, (filled & left).sum(axis=1), n + 1)
@@ -114,10 +116,13 @@ def solve_side_by_side(
         Angular frequencies w, rad/s.
     loads : (n, loads) array
     """
-    places, given = (plan.row, plan.column), np.ascontiguousarray(loads[plan.order])
+    places = (plan.row, plan.column)
+    given = np.ascontiguousarray(loads[plan.order])
     memory = aligned_zeros(2 * SIZE * max(len(plan.row), 2 * len(plan.order))).reshape(2, -1)
-    x, numbers = aligned_zeros(2 * SIZE * loads.size), amplitudes.view(np.float64)
-    pencil, missing = (stiffness[places], damping[places], mass[places]), np.empty(len(frequencies))
+    x = aligned_zeros(2 * SIZE * loads.size)
+    numbers = amplitudes.view(np.float64)
+    pencil = (stiffness[places], damping[places], mass[places])
+    missing = np.empty(len(frequencies))
     solve_octets(kept_bundle(plan), *pencil, frequencies, given, memory[0], memory[1], x, numbers, missing)
     scale = np.abs(loads.sum(axis=1)).max() + 1e-3 * np.abs(loads).max()
     # A residual that is no number is none that is small.
@@ -175,10 +180,13 @@ def add_cases(order: Integers, loads: Floats, real: Floats, imaginary: Floats, x
     """Put the sum of the solutions of all cases into the first 8 n numbers of the memory, by row, its loads behind."""
     size, cases = loads.shape
     for k in range(size):
-        a, b, given = all_eight(0.0), all_eight(0.0), 0.0
+        a = all_eight(0.0)
+        b = all_eight(0.0)
+        given = 0.0
         for case in range(cases):
             at = 2 * SIZE * (k * cases + case)
-            a, b = a + eight(x, at), b + eight(x, at + SIZE)
+            a = a + eight(x, at)
+            b = b + eight(x, at + SIZE)
             given += loads[k, case]
         put(real, SIZE * order[k], a)
         put(imaginary, SIZE * order[k], b)
@@ -191,16 +199,21 @@ def leave_over(
     plan: Elimination, stiffness: Floats, damping: Floats, mass: Floats, real: Floats, imaginary: Floats, x: Floats
 ) -> None:
     """Turn eight frequencies, the first numbers of `x`, into the squares of what solutions in the memory leave over."""
-    size, w = plan.order.size, eight(x, 0)
+    size = plan.order.size
+    w = eight(x, 0)
     for entry in range(stiffness.size):
-        p, q = stiffness[entry] - w * w * mass[entry], w * damping[entry]
-        at, to = SIZE * plan.column[entry], SIZE * (size + plan.row[entry])
-        a, b = eight(real, at), eight(imaginary, at)
+        p = stiffness[entry] - w * w * mass[entry]
+        q = w * damping[entry]
+        at = SIZE * plan.column[entry]
+        to = SIZE * (size + plan.row[entry])
+        a = eight(real, at)
+        b = eight(imaginary, at)
         put(real, to, eight(real, to) + p * a - q * b)
         put(imaginary, to, eight(imaginary, to) + p * b + q * a)
     total = all_eight(0.0)
     for row in range(size, 2 * size):
-        a, b = eight(real, SIZE * row), eight(imaginary, SIZE * row)
+        a = eight(real, SIZE * row)
+        b = eight(imaginary, SIZE * row)
         total = total + a * a + b * b
     put(x, 0, total)
 
@@ -232,21 +245,30 @@ def invert(at: int, real: Floats, imaginary: Floats) -> None:
 @kernel
 def eliminate_row(k: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
     """Take the row of step k, its diagonal inverted, out of all later rows."""
-    x, y = eight(real, SIZE * plan.diagonal[k]), eight(imaginary, SIZE * plan.diagonal[k])
-    begin, end, change = plan.first[k], plan.first[k + 1], plan.change[k]
+    x = eight(real, SIZE * plan.diagonal[k])
+    y = eight(imaginary, SIZE * plan.diagonal[k])
+    begin = plan.first[k]
+    end = plan.first[k + 1]
+    change = plan.change[k]
     for i in range(begin, end):
         at = SIZE * plan.below[i]
-        a, b = eight(real, at), eight(imaginary, at)
-        factor, turned = a * x - b * y, a * y + b * x
+        a = eight(real, at)
+        b = eight(imaginary, at)
+        factor = a * x - b * y
+        turned = a * y + b * x
         for j in range(begin, end):
-            at, to = SIZE * plan.right[j], SIZE * plan.changed[change]
+            at = SIZE * plan.right[j]
+            to = SIZE * plan.changed[change]
             change += 1
-            a, b = eight(real, at), eight(imaginary, at)
+            a = eight(real, at)
+            b = eight(imaginary, at)
             put(real, to, eight(real, to) - factor * a + turned * b)
             put(imaginary, to, eight(imaginary, to) - factor * b - turned * a)
         for case in range(cases):
-            at, to = 2 * SIZE * (k * cases + case), 2 * SIZE * (plan.later[i] * cases + case)
-            a, b = eight(out, at), eight(out, at + SIZE)
+            at = 2 * SIZE * (k * cases + case)
+            to = 2 * SIZE * (plan.later[i] * cases + case)
+            a = eight(out, at)
+            b = eight(out, at + SIZE)
             put(out, to, eight(out, to) - factor * a + turned * b)
             put(out, to + SIZE, eight(out, to + SIZE) - factor * b - turned * a)
 
@@ -254,14 +276,20 @@ def eliminate_row(k: int, cases: int, plan: Elimination, real: Floats, imaginary
 @kernel
 def substitute_back(k: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
     """Find the solution of step k from those of later ones."""
-    x, y = eight(real, SIZE * plan.diagonal[k]), eight(imaginary, SIZE * plan.diagonal[k])
+    x = eight(real, SIZE * plan.diagonal[k])
+    y = eight(imaginary, SIZE * plan.diagonal[k])
     for case in range(cases):
         to = 2 * SIZE * (k * cases + case)
-        p, q = eight(out, to), eight(out, to + SIZE)
+        p = eight(out, to)
+        q = eight(out, to + SIZE)
         for j in range(plan.first[k], plan.first[k + 1]):
-            at, known = SIZE * plan.right[j], 2 * SIZE * (plan.later[j] * cases + case)
-            a, b = eight(real, at), eight(imaginary, at)
-            c, d = eight(out, known), eight(out, known + SIZE)
-            p, q = p - a * c + b * d, q - a * d - b * c
+            at = SIZE * plan.right[j]
+            known = 2 * SIZE * (plan.later[j] * cases + case)
+            a = eight(real, at)
+            b = eight(imaginary, at)
+            c = eight(out, known)
+            d = eight(out, known + SIZE)
+            p = p - a * c + b * d
+            q = q - a * d - b * c
         put(out, to, p * x - q * y)
         put(out, to + SIZE, p * y + q * x)

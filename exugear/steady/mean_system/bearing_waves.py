@@ -138,11 +138,13 @@ class BearingWaves:
 
     def at(self, speed: float) -> BearingMean:
         """Find how the bearings stand in the mean system at a speed of the input, rad/s."""
-        frame, numbers = self.system.frame, self._numbers
+        frame = self.system.frame
+        numbers = self._numbers
         q, v, _ = frame.state(0.0, speed, self.system.static_at(speed))
         t, t1, _ = frame.matrices(0.0)
         chosen = self.assembly.connectors.chosen(numbers)
-        ways, turn = np.eye(q.size), self._along_radii()
+        ways = np.eye(q.size)
+        turn = self._along_radii()
 
         def slopes(step: float, by_place: float) -> Floats:
             moved = [
@@ -151,7 +153,8 @@ class BearingWaves:
             ]
             return np.asarray(turn @ np.moveaxis((moved[0] - moved[1]) / (2.0 * step), 0, -1))
 
-        by_q, by_v = slopes(PLACE_STEP, 1.0), slopes(RATE_STEP, 0.0)
+        by_q = slopes(PLACE_STEP, 1.0)
+        by_v = slopes(RATE_STEP, 0.0)
         static = (turn @ rolling_strains(q, v, chosen)[..., None])[..., 0]
         return BearingMean(
             readings=self._waves_of(by_q @ t + speed * by_v @ t1),
@@ -173,7 +176,8 @@ class BearingWaves:
         angles = [np.zeros(1) if planets is None else planets.angles for planets in sets]
         turn = np.tile(np.eye(COMPONENTS), (len(self._numbers), 1, 1))
         for own, angle in zip(turn, np.concatenate(angles), strict=True):
-            c, s = math.cos(angle), math.sin(angle)
+            c = math.cos(angle)
+            s = math.sin(angle)
             own[:2, :2] = own[3:, 3:] = [[c, s], [-s, c]]
         return turn
 
@@ -191,7 +195,8 @@ class BearingWaves:
 
     def _shapes(self, first: int, turned: Floats) -> Floats:
         """Waves of the law whose mean is wave `first`, where its carrier has turned (s, bearings, waves)."""
-        planets, law = self.waves[first].planets, self.waves[first].law
+        planets = self.waves[first].planets
+        law = self.waves[first].law
         if planets is None:
             return np.ones((len(turned), 1, 1))
         return planets.values(turned)[..., : sum(wave.law == law for wave in self.waves)]
@@ -209,7 +214,8 @@ class BearingWaves:
         """
         out = np.zeros((len(self.waves), COMPONENTS) * 2)
         for n in self.firsts:
-            planets, law = self.waves[n].planets, self.waves[n].law
+            planets = self.waves[n].planets
+            law = self.waves[n].law
             turned = np.zeros(1) if planets is None else 2.0 * np.pi / planets.waves * np.arange(PLACES) / PLACES
             shapes = self._shapes(n, turned)
             own = slice(n, n + shapes.shape[-1])
@@ -266,11 +272,14 @@ def ports_with_bearings(ports: MeshPorts, bearings: BearingMean) -> MeshPorts:
     Laws with fewer readings or forces have rows of zeros; the first reading of a mesh is the first here, the last the
     last.
     """
-    count, size = ports.readings.shape[0], ports.readings.shape[2]
-    forces, readings = max(ports.forces.shape[1], COMPONENTS), max(ports.readings.shape[1], COMPONENTS + 1)
+    count = ports.readings.shape[0]
+    size = ports.readings.shape[2]
+    forces = max(ports.forces.shape[1], COMPONENTS)
+    readings = max(ports.readings.shape[1], COMPONENTS + 1)
     total = count + len(bearings.static)
     read, rates, pushed = (np.zeros((total, own, size)) for own in (readings, readings, forces))
-    static, own = np.zeros((total, readings)), ports.readings.shape[1] - 1
+    static = np.zeros((total, readings))
+    own = ports.readings.shape[1] - 1
     read[:count, :own], read[:count, POSITION] = ports.readings[:, :own], ports.readings[:, POSITION]
     static[:count, :own], static[:count, POSITION] = ports.static[:, :own], ports.static[:, POSITION]
     pushed[:count, : ports.forces.shape[1]] = ports.forces
@@ -295,8 +304,10 @@ def places_with_bearings(
     angles : (s, bases) array
         Of the bases, rad.
     """
-    count, means = places.there.shape[-1], list(places.means)
-    there, back = [places.there], [places.back]
+    count = places.there.shape[-1]
+    means = list(places.means)
+    there = [places.there]
+    back = [places.back]
     total = count + len(bearings.waves)
     for n in bearings.firsts:
         planets = bearings.waves[n].planets
@@ -304,7 +315,8 @@ def places_with_bearings(
         column = meshes + bearings.carriers.index(planets.carrier) if planets and turning else None
         shapes = wave_shapes(planets, speed, None if column is None else angles[:, column])
         own = slice(count + n, count + n + shapes.shape[-1])
-        rows, columns = np.zeros((*shapes.shape[:-1], total)), np.zeros((*shapes.shape[:-2], total, shapes.shape[-2]))
+        rows = np.zeros((*shapes.shape[:-1], total))
+        columns = np.zeros((*shapes.shape[:-2], total, shapes.shape[-2]))
         rows[..., own] = shapes
         columns[..., own, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
         samples = places.there.shape[:-2]

@@ -39,7 +39,8 @@ def vibrations(mass: Floats, damping: Floats, stiffness: Floats) -> tuple[Comple
     kept = values.imag > 2.0 * np.pi * RIGID_BODY_LIMIT
     kept &= np.abs(values.imag) > np.abs(values.real)
     order = np.flatnonzero(kept)[np.argsort(values[kept].imag)]
-    right, left = right[:, order].T, left[:, order].conj().T
+    right = right[:, order].T
+    left = left[:, order].conj().T
     return values[order], right, left / np.einsum("js,js->j", left, right)[:, None]
 
 

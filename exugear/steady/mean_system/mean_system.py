@@ -206,10 +206,12 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
     assembly, spread = _with_equal_planets(assembly, sets)
     frame = RotatingFrame(assembly, sets)
     drive, load = _drive_and_load(assembly)
-    low, high = float(np.min(speeds)), float(np.max(speeds))
+    low = float(np.min(speeds))
+    high = float(np.max(speeds))
     low, high = (low, high) if high > low else (low - 0.5 * abs(low), high + 0.5 * abs(high))
     at = np.array([low, 0.5 * (low + high), high])
-    u, torque = _first_guess(assembly, frame, drive), 0.0
+    u = _first_guess(assembly, frame, drive)
+    torque = 0.0
     rows = []
     matrix = None
     for speed in at:
@@ -217,10 +219,13 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
         damping, matrix = tangents(frame, 0.0, float(speed), u)
         rows.append((u, torque, damping, matrix))
     static, torques, dampings, stiffnesses = (np.array(values) for values in zip(*rows, strict=True))
-    mass, variation = _mass(frame, 0.0, static[1]), 0.0
+    mass = _mass(frame, 0.0, static[1])
+    variation = 0.0
     if sets:
         more, variation = _mean_over_places(frame, float(at[1]), static[1], (mass, dampings[1], stiffnesses[1]))
-        mass, dampings, stiffnesses = mass + more[0], dampings + more[1], stiffnesses + more[2]
+        mass = mass + more[0]
+        dampings = dampings + more[1]
+        stiffnesses = stiffnesses + more[2]
     pinned = assembly.spin[assembly.gearbox.case.overall.input]
     return MeanSystem(frame, at, mass, dampings, stiffnesses, static, torques, drive, pinned, spread, variation)
 
@@ -230,7 +235,11 @@ def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tupl
 
     Those from a catalogue are equal already: what is left are matrices of the file that are not the same all around.
     """
-    supports = [own for planets in sets for own in planet_supports(assembly.supports, planets.names, planets.angles)]
+    supports = [
+        planet_support
+        for planets in sets
+        for planet_support in planet_supports(assembly.supports, planets.names, planets.angles)
+    ]
     connectors, spread = with_equal_planets(assembly.connectors, supports)
     return replace(assembly, connectors=connectors), max(spread, assembly.planet_spread)
 
@@ -256,7 +265,8 @@ def torque_of_vibration(system: MeanSystem, speed: float, frequencies: Floats, m
     The power that all forces together have along the rolling has to vanish in the mean. Meshes have none: rolling does
     not deflect them. What two lines do together has no mean, so that each line is looked at alone, as far as it counts.
     """
-    frame, assembly = system.frame, system.frame.assembly
+    frame = system.frame
+    assembly = system.frame.assembly
     load = assembly.torque_vector(assembly.gearbox.case.static_load.torques_N_m)
     here = system.static_at(speed) + motion[0].real
 
@@ -269,7 +279,8 @@ def torque_of_vibration(system: MeanSystem, speed: float, frequencies: Floats, m
 
     energies = frequencies**2 * (np.abs(motion) ** 2 @ np.abs(np.diag(system.mass)))
     energies[0] = 0.0
-    still, total = power(np.zeros(system.size, dtype=complex), 0.0), 0.0
+    still = power(np.zeros(system.size, dtype=complex), 0.0)
+    total = 0.0
     for line in np.flatnonzero(energies > LEAST_ENERGY * energies.sum()):
         for part in math.sqrt(2.0) * motion[line] * np.array([[1.0], [-1.0], [1j], [-1j]]):
             total += 0.5 * (power(part, float(frequencies[line])) - still)
@@ -331,7 +342,8 @@ def _check(assembly: Assembly) -> None:
 
 def _check_rows(assembly: Assembly) -> None:
     """Refuse rows of rolling elements that pass, or that turn against the load that they carry."""
-    rolling, bodies = assembly.connectors.rolling, {body.name: body for body in assembly.gearbox.bodies()}
+    rolling = assembly.connectors.rolling
+    bodies = {body.name: body for body in assembly.gearbox.bodies()}
     for n in np.flatnonzero(np.diff(rolling.first)):
         support = assembly.supports[n]
         if rolling.cage_ratio[n]:
@@ -351,7 +363,8 @@ def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:
 
     What the file locks is what keeps the speed: its torque is whatever balances the others.
     """
-    load, overall = assembly.gearbox.case.static_load, assembly.gearbox.case.overall
+    load = assembly.gearbox.case.static_load
+    overall = assembly.gearbox.case.overall
     locked = assembly.gearbox.locked
     keeper = locked[0] if locked else overall.input
     return assembly.torque_vector({keeper: 1.0}), assembly.torque_vector(load.torques_N_m)
@@ -392,12 +405,15 @@ def _stiffness(frame: RotatingFrame, psi: float, speed: float, u: Floats) -> Flo
 
 def place_step(assembly: Assembly) -> float:
     """Step of central differences of forces by places, m and rad."""
-    return ROWS_STEP if assembly.has_rows else PLACE_STEP
+    if assembly.has_rows:
+        return ROWS_STEP
+    return PLACE_STEP
 
 
 def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
     """Mass (size, size) in the frame: what accelerations need, which is linear in them."""
-    assembly, t = frame.assembly, frame.matrices(psi)[0]
+    assembly = frame.assembly
+    t = frame.matrices(psi)[0]
     q, v, a = frame.state(psi, 0.0, u)
     still = assembly.inertia_forces(q, v, a)
     columns = [assembly.inertia_forces(q, v, a + own) - still for own in t.T]
@@ -406,7 +422,8 @@ def _mass(frame: RotatingFrame, psi: float, u: Floats) -> Floats:
 
 def _residuals(frame: RotatingFrame, psi: float, speed: float, u: Floats, du: Floats | None) -> Floats:
     """Return `_residual` at several coordinates and velocities (n, size) at once: bearings have much in common."""
-    assembly, t = frame.assembly, frame.matrices(psi)[0]
+    assembly = frame.assembly
+    t = frame.matrices(psi)[0]
     states = [frame.state(psi, speed, own, None if du is None else du[n]) for n, own in enumerate(u)]
     q, v, _ = (np.array(values) for values in zip(*states, strict=True))
     needed = np.array([assembly.inertia_forces(*state) for state in states])
@@ -423,10 +440,12 @@ def _static(
     frame: RotatingFrame, speed: float, drive: Floats, load: Floats, u: Floats, torque: float, matrix: Floats | None
 ) -> tuple[Floats, float]:
     """Find the static state at a speed, and the torque that keeps it; `matrix` is the stiffness at another speed."""
-    n, assembly = len(u), frame.assembly
+    n = len(u)
+    assembly = frame.assembly
     pinned = assembly.spin[assembly.gearbox.case.overall.input]
     t0 = frame.matrices(0.0)[0]
-    drive, load = t0.T @ drive, t0.T @ load
+    drive = t0.T @ drive
+    load = t0.T @ load
     largest = max(1.0, float(np.abs(load).max()))
     best = before = np.inf
     bordered = np.zeros((n + 1, n + 1))
@@ -442,7 +461,8 @@ def _static(
         before = error
         bordered[:n, :n], bordered[:n, n], bordered[n, pinned] = matrix, -drive * largest, largest
         step = np.linalg.solve(bordered, -np.append(missing, largest * u[pinned]))
-        u, torque = u + step[:n], torque + largest * float(step[n])
+        u = u + step[:n]
+        torque = torque + largest * float(step[n])
     if not best < BALANCED:
         raise BalanceError(f"static state at {speed:.4g} rad/s: the residual stays at {best:.1e} of the load")
     return u, torque
@@ -461,7 +481,8 @@ def _mean_over_places(
         The stiffness changes as the carrier turns.
     """
     period = max(2.0 * math.pi / abs(planets.waves * planets.ratio) for planets in frame.sets)
-    more, largest = tuple(np.zeros_like(own) for own in here), 0.0
+    more = tuple(np.zeros_like(own) for own in here)
+    largest = 0.0
     curved = any(element.is_curved for element in frame.assembly.elements)
     most = ROWS_VARIATION if frame.assembly.has_rows or curved else VARIATION
     for psi in period * np.arange(1, PLACES) / PLACES:

@@ -60,16 +60,20 @@ class Family:
     @property
     def turns(self) -> int:
         """Largest multiple of the carrier's angle in products of two shapes."""
-        return 0 if self.carrier < 0 or self.planets is None else 2 * (self.planets.waves // 2)
+        if self.carrier < 0 or self.planets is None:
+            return 0
+        return 2 * (self.planets.waves // 2)
 
 
 def families(waves: MeshWaves) -> tuple[Family, ...]:
     """Families of all mesh waves, in their order."""
-    carriers, found = [name for name, _ in waves.carriers], []
+    carriers = [name for name, _ in waves.carriers]
+    found = []
     for first, wave in enumerate(waves.waves):
         if wave.wave != 0:
             continue
-        planets, count = waves.planets(wave), sum(other.first == wave.first for other in waves.waves)
+        planets = waves.planets(wave)
+        count = sum(other.first == wave.first for other in waves.waves)
         carrier = len(waves.base_orders) + carriers.index(planets.carrier) if planets and wave.ahead else -1
         found.append(Family(first, count, wave.base, carrier, planets, wave.ahead or (0.0,)))
     return tuple(found)
@@ -77,7 +81,8 @@ def families(waves: MeshWaves) -> tuple[Family, ...]:
 
 def group_of(family: Family, harmonics: int, forces: int, bases: int) -> Group:
     """Group of the forces of a family, which follow each other wave by wave, with harmonics up to a highest one."""
-    every, turns = np.arange(-harmonics, harmonics + 1), np.arange(-family.turns, family.turns + 1)
+    every = np.arange(-harmonics, harmonics + 1)
+    turns = np.arange(-family.turns, family.turns + 1)
     multiples = np.zeros((len(every), len(turns), bases), dtype=np.int64)
     multiples[..., family.base] = every[:, None]
     if family.carrier >= 0:

@@ -54,10 +54,13 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
     angles : (s, bases) array
         Of the bases, rad; those of carriers after those of the meshes.
     """
-    count, turning = len(waves.waves), bool(waves.carriers)
+    count = len(waves.waves)
+    turning = bool(waves.carriers)
     carriers = [name for name, _ in waves.carriers]
     means: list[int] = []
-    there, back, at = [], [], []
+    there = []
+    back = []
+    at = []
     for first, wave in enumerate(waves.waves):
         if wave.wave != 0:
             continue
@@ -67,7 +70,8 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
         position = positions[first] + sense * angles[:, [wave.base]] / (2.0 * math.pi)
         column = len(waves.base_orders) + carriers.index(planets.carrier) if planets and wave.ahead else None
         shapes = wave_shapes(planets, speed, None if column is None else angles[:, column])
-        rows, columns = np.zeros((*shapes.shape[:-1], count)), np.zeros((*shapes.shape[:-2], count, shapes.shape[-2]))
+        rows = np.zeros((*shapes.shape[:-1], count))
+        columns = np.zeros((*shapes.shape[:-2], count, shapes.shape[-2]))
         rows[..., own] = shapes
         columns[..., own, :] = np.swapaxes(shapes / (shapes**2).sum(axis=-2, keepdims=True), -1, -2)
         samples = (len(angles),) if turning else ()

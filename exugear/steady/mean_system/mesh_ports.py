@@ -86,9 +86,11 @@ def _row_rows(meshes: MeshArrays, wander: bool) -> tuple[list[Floats], list[Floa
     They are its deflection with the mean lever of the load and, where loads wander along the face, the misalignment
     against that of the contact's state; zeros of a mesh whose load stays.
     """
-    lever, nominal = meshes.tilt[:, TILT_LEVER], meshes.table.nominal
+    lever = meshes.tilt[:, TILT_LEVER]
+    nominal = meshes.table.nominal
     turned = nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST]
-    row, offset = meshes.deflection - lever[:, None] * meshes.table.misalignment, lever * turned
+    row = meshes.deflection - lever[:, None] * meshes.table.misalignment
+    offset = lever * turned
     if not wander:
         return [row], [nominal[:, NOMINAL_DEFLECTION] - offset]
     moves = meshes.way_pieces > 0

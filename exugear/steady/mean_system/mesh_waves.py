@@ -204,18 +204,19 @@ class MeshWaves:
         """Waves (m, size) of the gradients of rows (meshes, 12) by the frame's coordinates, at a speed (rad/s)."""
         frame = self.system.frame
         q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
-        found = np.array([_row(self.assembly, m, q, own)[1] for m, own in enumerate(rows)])
+        found = np.array([_row(self.assembly, m, q, row)[1] for m, row in enumerate(rows)])
         return self._waves_of(found @ frame.matrices(0.0)[0])
 
     def values(self, rows: Floats, speed: float) -> Floats:
         """Waves (m,) of the values of rows (meshes, 12) in the static state at a speed (rad/s)."""
         frame = self.system.frame
         q, _, _ = frame.state(0.0, speed, self.system.static_at(speed))
-        return self._waves_of(np.array([_row(self.assembly, m, q, own)[0] for m, own in enumerate(rows)]))
+        return self._waves_of(np.array([_row(self.assembly, m, q, row)[0] for m, row in enumerate(rows)]))
 
     def position_rows(self) -> Floats:
         """Rows of the position in the mesh cycle by the frame's coordinates, (m, size), cycles."""
-        assembly, gradients = self.assembly, np.zeros((len(self.assembly.elements), self.assembly.size))
+        assembly = self.assembly
+        gradients = np.zeros((len(self.assembly.elements), self.assembly.size))
         for m, index in enumerate(assembly.meshes.coordinates):
             for at, sign in ((SPIN, 1.0), (FRAME, -1.0)):
                 if index[at] >= 0:
@@ -245,8 +246,10 @@ class MeshWaves:
 
     def _over_cycle(self, wave: MeshWave, quantity: CycleQuantity) -> Floats:
         """Sample a quantity over the cycle of a wave's mesh."""
-        meshes, mesh = self.assembly.meshes, wave.first
-        pieces, curved = int(meshes.pieces[mesh]), meshes.form[mesh] == CURVE_FORM
+        meshes = self.assembly.meshes
+        mesh = wave.first
+        pieces = int(meshes.pieces[mesh])
+        curved = meshes.form[mesh] == CURVE_FORM
         powers = np.vander(np.arange(SAMPLES) / SAMPLES, 4, increasing=True).T
         if quantity in ("way", "moment"):
             if meshes.way_pieces[mesh] == 0:
@@ -304,15 +307,15 @@ class MeshWaves:
         out: Floats = np.empty((len(self.waves), *values.shape[1:]))
         at = 0
         for meshes, planets in self.groups:
-            own = values[list(meshes)]
+            value = values[list(meshes)]
             if planets is None:
-                out[at] = own[0]
+                out[at] = value[0]
                 at += 1
                 continue
             count = sum(self.planets(wave) is planets and wave.first == meshes[0] for wave in self.waves)
             shapes = planets.shapes(0.0)[0][:, :count]
             norms = (shapes**2).sum(axis=0)
-            out[at : at + count] = np.tensordot(shapes / norms, own, axes=(0, 0))
+            out[at : at + count] = np.tensordot(shapes / norms, value, axes=(0, 0))
             at += count
         return out
 
@@ -344,7 +347,7 @@ def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
             label = f"{mesh.family} {wave_name(number, planets.waves)}" if number else mesh.family
             weight = float(norms[number])
             waves.append(MeshWave(label, mesh.family, *own, number, weight, base, sense, planets.ratio, ahead))
-    return MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(own) for own in names), passing)
+    return MeshWaves(system, tuple(waves), np.array(orders), tuple(", ".join(name) for name in names), passing)
 
 
 def _groups(frame: RotatingFrame) -> tuple[tuple[tuple[int, ...], PlanetSet | None], ...]:
@@ -384,7 +387,9 @@ def _phases_ahead(assembly: Assembly, meshes: tuple[int, ...]) -> tuple[float, .
     """Cycles by which each mesh is ahead of the first, empty where all are in phase."""
     phases = assembly.meshes.phase[list(meshes)]
     apart = (phases - phases[0] + 0.5) % 1.0 - 0.5
-    return tuple(float(own) for own in apart) if np.abs(apart).max() > IN_PHASE else ()
+    if np.abs(apart).max() > IN_PHASE:
+        return tuple(float(own) for own in apart)
+    return ()
 
 
 def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
@@ -393,7 +398,8 @@ def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
     Planets that are ahead by multiples of p / N of a cycle carry harmonic h into the wave h p; seen from the frame that
     wave turns back with the carrier.
     """
-    ahead, count = np.array(wave.ahead), planets.waves
+    ahead = np.array(wave.ahead)
+    count = planets.waves
     step = round(float(ahead[1]) * count)
     if np.abs((ahead - step * np.arange(count) / count + 0.5) % 1.0 - 0.5).max() > IN_PHASE:
         return None
@@ -402,14 +408,18 @@ def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
 
 def _one_of(steps: set[int | None]) -> tuple[int | None]:
     """Tell the step that all meshes of a carrier have, None where they differ."""
-    return (next(iter(steps)),) if len(steps) == 1 else (None,)
+    if len(steps) == 1:
+        return (next(iter(steps)),)
+    return (None,)
 
 
 def _row(assembly: Assembly, mesh: int, q: Floats, row: Floats) -> tuple[float, Floats]:
     """Value of a row (12,) of a mesh, and its gradient (size,) by the coordinates."""
     meshes = assembly.meshes
-    index, out = meshes.coordinates[mesh], np.zeros(assembly.size)
-    local, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    index = meshes.coordinates[mesh]
+    out = np.zeros(assembly.size)
+    local = np.empty(ROW_SIZE)
+    turning = np.empty(ROW_SIZE)
     value = frame_row(q, index, meshes.axis[mesh], row, local, turning)
     for at in range(2 * BODY_SIZE + 1):
         if index[at] >= 0:

@@ -75,10 +75,14 @@ class PlanetSet:
 
         The first three are the mean, the cosine and the sine.
         """
-        theta, rate = self.ratio * psi + self.angles, self.ratio
-        value, slope, bend = [np.ones_like(theta)], [np.zeros_like(theta)], [np.zeros_like(theta)]
+        theta = self.ratio * psi + self.angles
+        rate = self.ratio
+        value = [np.ones_like(theta)]
+        slope = [np.zeros_like(theta)]
+        bend = [np.zeros_like(theta)]
         for m in range(1, (self.waves - 1) // 2 + 1):
-            c, s = np.cos(m * theta), np.sin(m * theta)
+            c = np.cos(m * theta)
+            s = np.sin(m * theta)
             value += [c, s]
             slope += [-m * rate * s, m * rate * c]
             bend += [-((m * rate) ** 2) * c, -((m * rate) ** 2) * s]
@@ -102,7 +106,8 @@ def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
     speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     sets = []
     for planets in planet_families(assembly.bodies):
-        carrier, family = str(planets[0].carrier), planets[0].family
+        carrier = str(planets[0].carrier)
+        family = planets[0].family
         elastic = [name for name in (carrier, *(p.name for p in planets)) if name in assembly.elastic_bodies]
         if elastic:
             raise SteadyError(
@@ -210,19 +215,22 @@ class RotatingFrame:
     def _with_directions(self, planets: PlanetSet, coordinates: Integers, psi: float, waves: Jet) -> Jet:
         """Turn displacements and tilts along radius and tangent of each planet: R w and its derivatives."""
         turning = self._unit()
-        for angle, own in zip(planets.ratio * psi + planets.angles, coordinates, strict=True):
-            c, s, rate = math.cos(angle), math.sin(angle), planets.ratio
+        for angle, coordinate in zip(planets.ratio * psi + planets.angles, coordinates, strict=True):
+            c = math.cos(angle)
+            s = math.sin(angle)
+            rate = planets.ratio
             plane = np.array([[c, -s], [s, c]])
             around = rate * np.array([[-s, -c], [c, -s]])
             for first in (0, TILT):
-                place = np.ix_(own[first : first + 2], own[first : first + 2])
+                place = np.ix_(coordinate[first : first + 2], coordinate[first : first + 2])
                 for matrix, values in zip(turning, (plane, around, -(rate**2) * plane), strict=True):
                     matrix[place] = values
         (r, r1, r2), (w, w1, w2) = turning, waves
         return r @ w, r1 @ w + r @ w1, r2 @ w + 2.0 * r1 @ w1 + r @ w2
 
     def _rolling(self, psi: float) -> Jet:
-        assembly, still = self.assembly, np.zeros(self.assembly.size)
+        assembly = self.assembly
+        still = np.zeros(self.assembly.size)
         place = psi * assembly.rolling_velocity(still, self.speeds)
         rate = assembly.rolling_velocity(still, self.speeds)
         bend = assembly.rolling_acceleration(still, self.speeds, dict.fromkeys(self.speeds, 0.0))
@@ -230,13 +238,14 @@ class RotatingFrame:
             if coordinates[0, 0] < 0:
                 continue
             angle = planets.ratio * psi
-            c, s = math.cos(angle), math.sin(angle)
+            c = math.cos(angle)
+            s = math.sin(angle)
             plane = np.array([[c, -s], [s, c]])
-            for own in coordinates[:, :2]:
+            for coordinate in coordinates[:, :2]:
                 # The centripetal acceleration points back along the radius.
-                radius = -bend[own] / planets.ratio**2 if planets.ratio else np.zeros(2)
-                place[own] = plane @ radius - radius
-                rate[own], bend[own] = plane @ rate[own], plane @ bend[own]
+                radius = -bend[coordinate] / planets.ratio**2 if planets.ratio else np.zeros(2)
+                place[coordinate] = plane @ radius - radius
+                rate[coordinate], bend[coordinate] = plane @ rate[coordinate], plane @ bend[coordinate]
         return place, rate, bend
 
     def state(self, psi: float, speed: float, u: Floats, du: Floats | None = None, ddu: Floats | None = None) -> Jet:
@@ -246,7 +255,8 @@ class RotatingFrame:
         v = speed * (rate + t1 @ u)
         a = speed**2 * (bend + t2 @ u)
         if du is not None:
-            v, a = v + t @ du, a + 2.0 * speed * (t1 @ du)
+            v = v + t @ du
+            a = a + 2.0 * speed * (t1 @ du)
         if ddu is not None:
             a = a + t @ ddu
         return q, v, a

@@ -35,7 +35,8 @@ def sample_rolling(rolling: RollingArrays, law: int, readings: Floats) -> tuple[
     slope : (s, 5, 5) array
         Its derivatives by the readings.
     """
-    force, slope = np.empty(readings.shape), np.empty((*readings.shape, readings.shape[1]))
+    force = np.empty(readings.shape)
+    slope = np.empty((*readings.shape, readings.shape[1]))
     _fill(law, np.ascontiguousarray(readings), np.zeros(6), kept_bundle(rolling), rolling_memory(rolling), force, slope)
     return force, slope
 

@@ -40,7 +40,8 @@ TOUCHING = 0.25e-6
 By the law itself it jumps at first touch, by 4 % of the load in the GRC: no balance of smooth lines ends there. The
 ramp costs a thousandth of the response, mostly in its phase.
 """
-TABLE_READINGS, TABLE_FORCES = 6, 5
+TABLE_READINGS = 6
+TABLE_FORCES = 5
 
 
 class LawSamples(NamedTuple):
@@ -154,7 +155,8 @@ def sample_wandering_curve(curve: Floats, readings: Floats, load: float) -> LawS
     deflection, tilt, moved = readings.T
     (way, way_slope), (beyond, beyond_slope) = _moved(curve[6:9], moved), _moved(curve[9:], moved)
     own = sample_curve(curve[:6], np.stack([deflection - way * tilt, moved], axis=1), load)
-    force, k = own.force[:, 0], own.slope[:, 0, 0]
+    force = own.force[:, 0]
+    k = own.slope[:, 0, 0]
     by_position = own.slope[:, 0, 1] - k * way_slope * tilt
     along = np.stack([k, -way * k, by_position], axis=1)
     across = -way[:, None] * along
@@ -197,30 +199,38 @@ def _fill_flank(
     position = readings.shape[1] - 1
     sense = side * tables.sense[m]
     time = tables.damping_time[m]
-    memory, second, sizes = scratch_memory(), np.empty((4, 4)), np.empty(DAMPING_SIZE)
-    along, moving = np.ones(3), np.empty(3)
+    memory = scratch_memory()
+    second = np.empty((4, 4))
+    sizes = np.empty(DAMPING_SIZE)
+    along = np.ones(3)
+    moving = np.empty(3)
     places = np.array([own, CENTRE, tilt, position])
     signs = np.array([1.0, 1.0, sense, side])
     piece = 0
     for s in range(readings.shape[0]):
-        delta, rate = readings[s, own], rates[s, own]
+        delta = readings[s, own]
+        rate = rates[s, own]
         if delta <= tables.lowest[m]:
             continue
         pmc = readings[s, position] if side > 0.0 else turned - readings[s, position]
-        centre, misalignment = readings[s, CENTRE], sense * readings[s, tilt]
+        centre = readings[s, CENTRE]
+        misalignment = sense * readings[s, tilt]
         piece, t = surface_law(delta, pmc, centre, misalignment, m, tables, piece, ORDERS.shape[0], memory)
         if t < 0.0:
             continue
         surface_tangent(t, piece, m, tables, memory, second)
-        law, cubic = memory.law, memory.cubic
+        law = memory.law
+        cubic = memory.cubic
         stiffness = law[LAW_STIFFNESS]
         # Damping fades in over the approach after first touch; a piece beyond the first is well behind it.
-        ramp, ramp_slope = 1.0, 0.0
+        ramp = 1.0
+        ramp_slope = 0.0
         if piece == 0:
             whole = min(TOUCHING, cubic[0, 1] + cubic[0, 2] + cubic[0, 3])
             x = (delta - cubic[0, 0]) / whole
             if x < 1.0:
-                ramp, ramp_slope = x * x * (3.0 - 2.0 * x), 6.0 * x * (1.0 - x) / whole
+                ramp = x * x * (3.0 - 2.0 * x)
+                ramp_slope = 6.0 * x * (1.0 - x) / whole
         surface_damping(t, piece, m, tables, memory, sizes)
         # Along the three that teeth push along, in the axes of the table: the own one of misalignment has a sense.
         along[1], along[2] = -sizes[BY_DISTANCE], -sizes[BY_MISALIGNMENT]

@@ -60,7 +60,8 @@ class SignalRows:
         """Coefficients (lines, signals) of the signals of a motion (lines, size) at angular frequencies."""
         w = 1j * frequencies[:, None]
         # Rows are real, and most have one part or two: products with the real numbers of the motion in those.
-        parts, lines = np.concatenate([motion.real, motion.imag]), len(motion)
+        parts = np.concatenate([motion.real, motion.imag])
+        lines = len(motion)
         found = np.zeros((lines, len(self.names)), dtype=np.complex128)
         for factor, rows in ((1.0, self.by_place), (w, self.by_rate), (w**2, self.by_acceleration)):
             own = np.flatnonzero(rows.any(axis=1))
@@ -78,11 +79,14 @@ def mesh_signal_names(waves: MeshWaves) -> tuple[SignalName, ...]:
 
 def signal_rows(system: MeanSystem, speed: float) -> SignalRows:
     """Rows of the signals that follow from the motion, at a speed of the input (rad/s)."""
-    frame, assembly = system.frame, system.frame.assembly
+    frame = system.frame
+    assembly = system.frame.assembly
     t, t1, t2 = frame.matrices(0.0)
     overall = overall_row(assembly)
     names = [SignalName("overall_dte", "overall_dte", "m")]
-    place, rate, acceleration = [overall @ t], [np.zeros(assembly.size)], [np.zeros(assembly.size)]
+    place = [overall @ t]
+    rate = [np.zeros(assembly.size)]
+    acceleration = [np.zeros(assembly.size)]
     if assembly.supports:
         q, v, _ = frame.state(0.0, speed, system.static_at(speed))
         turn, labels = _support_waves(assembly, frame.sets)
@@ -112,12 +116,14 @@ def carried_seats(assembly: Assembly) -> dict[str, bool]:
 
     It is where that is elastic, as a housing may be; else it is that of the shaft.
     """
-    return {own.family: carried for own, carried in zip(assembly.supports, _carried(assembly), strict=True)}
+    return {support.family: carried for support, carried in zip(assembly.supports, _carried(assembly), strict=True)}
 
 
 def _carried(assembly: Assembly) -> list[bool]:
     starts = assembly.connectors.bodies
-    return [bool(starts[n][0] >= 0 and own.on in assembly.elastic_bodies) for n, own in enumerate(assembly.supports)]
+    return [
+        bool(starts[n][0] >= 0 and support.on in assembly.elastic_bodies) for n, support in enumerate(assembly.supports)
+    ]
 
 
 def _seat_rows(assembly: Assembly) -> Floats:
@@ -125,43 +131,46 @@ def _seat_rows(assembly: Assembly) -> Floats:
 
     The seat is that in the housing where it is elastic, else that on the body.
     """
-    rows, carried = np.zeros((3 * len(assembly.supports), assembly.size)), _carried(assembly)
+    rows = np.zeros((3 * len(assembly.supports), assembly.size))
+    carried = _carried(assembly)
     for n, (starts, local) in enumerate(zip(assembly.connectors.bodies, assembly.connectors.local, strict=True)):
         end = 0 if carried[n] or starts[1] < 0 else 1
         if starts[end] < 0:
             continue
         x, y, z = local[end]
-        own = rows[3 * n : 3 * n + 3, starts[end] : starts[end] + TILT + 2]
-        own[:, :3] = np.eye(3)
-        own[:, TILT:] = [[0.0, z], [-z, 0.0], [y, -x]]
+        row = rows[3 * n : 3 * n + 3, starts[end] : starts[end] + TILT + 2]
+        row[:, :3] = np.eye(3)
+        row[:, TILT:] = [[0.0, z], [-z, 0.0], [y, -x]]
     return rows
 
 
 def _support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Floats, list[str]]:
     """Matrix from values along global axes (3 supports,) to waves along radius and tangent, and what they are."""
     count = len(assembly.supports)
-    turn, labels = np.eye(3 * count), [f"{support.name} {axis}" for support in assembly.supports for axis in AXES]
+    turn = np.eye(3 * count)
+    labels = [f"{support.name} {axis}" for support in assembly.supports for axis in AXES]
     for planets in sets:
         families = sorted({support.family for support in assembly.supports if support.body in planets.names})
         for family in families:
-            own = [
+            names = [
                 n
                 for body in planets.names
                 for n, support in enumerate(assembly.supports)
                 if support.body == body and support.family == family
             ]
-            if len(own) != planets.waves:
+            if len(names) != planets.waves:
                 continue
             shapes = planets.shapes(0.0)[0]
             inverse = np.linalg.inv(shapes)
-            c, s = np.cos(planets.angles), np.sin(planets.angles)
+            c = np.cos(planets.angles)
+            s = np.sin(planets.angles)
             radial = np.stack(
                 [np.stack([c, s, 0 * c], 1), np.stack([-s, c, 0 * c], 1), np.stack([0 * c, 0 * c, 1 + 0 * c], 1)], 1
             )
-            for wave, at in enumerate(own):
+            for wave, at in enumerate(names):
                 for axis in range(3):
                     row = np.zeros(3 * count)
-                    for n, support in enumerate(own):
+                    for n, support in enumerate(names):
                         row[3 * support : 3 * support + 3] = inverse[wave, n] * radial[n, axis]
                     turn[3 * at + axis] = row
                     labels[3 * at + axis] = f"{family} {wave_name(wave, planets.waves)} {PLANET_AXES[axis]}"

@@ -20,7 +20,8 @@ def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
     psi : (s,) array
         Angles of the overall input, rad.
     """
-    assembly, still = frame.assembly, np.zeros(frame.assembly.size)
+    assembly = frame.assembly
+    still = np.zeros(frame.assembly.size)
     u = q - np.outer(psi, assembly.rolling_velocity(still, frame.speeds))
     bend = assembly.rolling_acceleration(still, frame.speeds, dict.fromkeys(frame.speeds, 0.0))
     for planets in frame.sets:
@@ -50,5 +51,6 @@ def _turn_back(u: Floats, q: Floats, planets: PlanetSet, own: Integers, psi: Flo
 
 def _rotated(plane: Floats, angle: Floats) -> Floats:
     """Vectors (s, 2) turned by angles (s,)."""
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     return np.stack([c * plane[:, 0] - s * plane[:, 1], s * plane[:, 0] + c * plane[:, 1]], axis=1)

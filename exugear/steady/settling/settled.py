@@ -92,8 +92,10 @@ class SettlingRun:
         self, system: MeanSystem, lines: LineSet, rows: Floats, bases: Floats, speed: float, motion: Complexes
     ) -> None:
         self._system, self._lines, self._rows = system, lines, rows
-        frame, assembly = system.frame, system.frame.assembly
-        slowest, fastest = float(bases.min()) * abs(speed), float(bases.max()) * abs(speed)
+        frame = system.frame
+        assembly = system.frame.assembly
+        slowest = float(bases.min()) * abs(speed)
+        fastest = float(bases.max()) * abs(speed)
         rate = float(np.abs(system.eigenvalues(speed)).max())
         self._step = min(2.0 * np.pi / fastest / STEPS_PER_PERIOD, 1.0 / (STEPS_PER_RADIAN * rate))
         self._steps = min(MOST_STEPS, int(PERIODS * 2.0 * np.pi / slowest / self._step))
@@ -113,10 +115,12 @@ class SettlingRun:
 
     def leg(self) -> Leg | None:
         """Run on, and fit the lines over the second half; None where the motion is not finite."""
-        assembly, pinned = self._system.frame.assembly, self._system.pinned
+        assembly = self._system.frame.assembly
+        pinned = self._system.pinned
         q, v = self._state
         rate = self._held * self._slowest
-        stiffness, damping = self._inertia * rate**2, 1.4 * self._inertia * rate
+        stiffness = self._inertia * rate**2
+        damping = 1.4 * self._inertia * rate
         law = (float(q[pinned]), self._speed, 0.0)
         drive = DriveLaw(assembly.gearbox.case.overall.input, stiffness, damping, law)
         run = CompiledSystem(assembly, q, v, LoadTable(self._torques, drive=drive), self._step)
@@ -126,7 +130,8 @@ class SettlingRun:
             return None
         self._state = states[-1].copy(), speeds[-1].copy()
         half = self._steps // 2
-        time, spin = self._step * np.arange(1.0 + half, 1.0 + self._steps), states[half:, pinned]
+        time = self._step * np.arange(1.0 + half, 1.0 + self._steps)
+        spin = states[half:, pinned]
         # What the drive carried, and what would have been needed to keep the speed, goes to the torque from now on.
         bend, slope, _ = np.polyfit(time - time.mean(), spin, 2)
         carried = stiffness * float(np.mean(law[0] + law[1] * time - spin)) + damping * (self._speed - slope)

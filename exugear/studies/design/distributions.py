@@ -118,7 +118,9 @@ def correlated(independent: Floats, correlation: float) -> Floats:
     """
     members = independent.shape[1]
     if correlation in (0.0, 1.0) or members == 1:
-        return np.repeat(independent[:, :1], members, axis=1) if correlation == 1.0 else independent
+        if correlation == 1.0:
+            return np.repeat(independent[:, :1], members, axis=1)
+        return independent
     matrix = np.full((members, members), correlation) + (1.0 - correlation) * np.eye(members)
     normal = ndtri(np.clip(independent, _OPEN, 1.0 - _OPEN)) @ np.linalg.cholesky(matrix).T
     return np.asarray(ndtr(normal), dtype=np.float64)

@@ -111,7 +111,7 @@ def _known_keys(location: list[str]) -> list[str]:
     for part in location:
         fields = getattr(section, "model_fields", {})
         kind = fields[part].annotation if part in fields else section
-        section = next((found for found in _models(kind)), section)
+        section = next((model for model in _models(kind)), section)
     return list(getattr(section, "model_fields", {}))
 
 

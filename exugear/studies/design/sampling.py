@@ -202,7 +202,9 @@ def units_of(parameter: ParameterSection) -> str:
     if parameter.acts == "scales":
         return "1"
     units = {unit_of(path.rpartition(".")[2]) for path in parameter.targets}
-    return units.pop() if len(units) == 1 else ""
+    if len(units) == 1:
+        return units.pop()
+    return ""
 
 
 def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox) -> _Levels:
@@ -243,7 +245,8 @@ def drawn_values(
 
 def _drawn_axes(name: str, parameter: ParameterSection, values: Floats) -> dict[str, Axis]:
     """Coordinates of a drawn parameter: over the draws, and over its paths where these are drawn by themselves."""
-    units, paths = units_of(parameter), ", ".join(parameter.targets)
+    units = units_of(parameter)
+    paths = ", ".join(parameter.targets)
     if values.shape[1] == 1:
         return {name: Axis((SAMPLE,), values[:, 0], units, paths)}
     member = f"{name}_path"
@@ -264,9 +267,9 @@ def distribution_of(parameter: ParameterSection, gearbox: Gearbox) -> Distributi
     if parameter.uniform is not None:
         return Uniform(parameter.uniform.least, parameter.uniform.most)
     if parameter.normal is not None:
-        own = parameter.normal
-        limits = (-np.inf if own.least is None else own.least, np.inf if own.most is None else own.most)
-        return Normal(own.mean, own.deviation, *limits)
+        normal = parameter.normal
+        limits = (-np.inf if normal.least is None else normal.least, np.inf if normal.most is None else normal.most)
+        return Normal(normal.mean, normal.deviation, *limits)
     assert parameter.iso1328 is not None
     wanted = parameter.iso1328
     if wanted.gear not in gearbox.gears:
@@ -285,7 +288,8 @@ def distribution_of(parameter: ParameterSection, gearbox: Gearbox) -> Distributi
 
 def _derivatives(study: StudyFile, gearbox: Gearbox) -> Design:
     """Two points for each parameter, a step below and a step above the case."""
-    points, steps = [], []
+    points = []
+    steps = []
     for number, parameter in enumerate(study.parameters.values()):
         step = parameter.step or 0.0
         steps.append(step)

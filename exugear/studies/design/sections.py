@@ -125,7 +125,9 @@ class ParameterSection(StudyPart):
         """Keys of the case that it sets."""
         if self.settings is not None:
             return tuple(dict.fromkeys(path for setting in self.settings.values() for path in setting))
-        return (self.path,) if self.path is not None else tuple(self.paths or ())
+        if self.path is not None:
+            return (self.path,)
+        return tuple(self.paths or ())
 
     @property
     def is_drawn(self) -> bool:

@@ -63,10 +63,10 @@ def tolerances_of(study: StudyFile, gearbox: Gearbox) -> Tolerances | None:
     if not study.tolerances:
         return None
     axes, draws = drawn_values(study, study.tolerances, gearbox)
-    acting = {path: one for one in study.tolerances.values() for path in one.targets}
-    found = Tolerances(axes, tuple(draws), acting)
-    found.produced(gearbox, {})
-    return found
+    acting = {path: tolerance for tolerance in study.tolerances.values() for path in tolerance.targets}
+    tolerances = Tolerances(axes, tuple(draws), acting)
+    tolerances.produced(gearbox, {})
+    return tolerances
 
 
 def percentile_of(values: Floats, percent: float) -> Floats:

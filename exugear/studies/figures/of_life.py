@@ -107,7 +107,11 @@ def life_hours(results: PointResults) -> float:
 
     largest = max((damage for _, _, damage in limits(results.life)), default=math.nan)
     hours = float(results.life["hours"].sum())
-    return hours / largest if largest > 0.0 else math.nan if math.isnan(largest) else math.inf
+    if largest > 0.0:
+        return hours / largest
+    if math.isnan(largest):
+        return math.nan
+    return math.inf
 
 
 def shortfalls(results: PointResults) -> float:
@@ -131,7 +135,9 @@ def _of_bearings(results: PointResults, key: str, by: str, worst: Worst) -> dict
 
 
 def _name_of(kind: str, key: str) -> str:
-    return "bearing_damage" if (kind, key) == ("basic", "damage") else f"bearing_{kind}_{key}"
+    if (kind, key) == ("basic", "damage"):
+        return "bearing_damage"
+    return f"bearing_{kind}_{key}"
 
 
 def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
@@ -145,4 +151,6 @@ def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
 
 def _number_of(holder: str) -> float:
     number = holder.rpartition("_")[2]
-    return float(number) if number.isdecimal() else math.nan
+    if number.isdecimal():
+        return float(number)
+    return math.nan

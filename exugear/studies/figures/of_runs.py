@@ -18,7 +18,9 @@ OVERALL = "overall_dte"
 def _settled(results: PointResults, signal: str) -> Floats:
     """Values of a signal over time, the beginning left out."""
     if signal not in results.run.variables or results.run[signal].dims[:1] != ("time",):
-        known = ", ".join(str(name) for name, own in results.run.variables.items() if own.dims[:1] == ("time",))
+        known = ", ".join(
+            str(name) for name, variable in results.run.variables.items() if variable.dims[:1] == ("time",)
+        )
         raise PointError(f"no signal {signal!r} over time; signals are {known}")
     values = results.run[signal].to_numpy()
     return np.asarray(values[int(SETTLING * len(values)) :], dtype=np.float64)
@@ -71,7 +73,8 @@ def _at_orders(results: PointResults, signal: str, orders: list[float], spacing:
 
     Hann's window over a whole number of periods of the spacing, at least two: its zeros then fall on all neighbours.
     """
-    values, time = _settled(results, signal), results.run["time"].to_numpy()
+    values = _settled(results, signal)
+    time = results.run["time"].to_numpy()
     if values.ndim > 1:
         raise PointError(f"signal {signal!r} is one of each mesh or support; orders are read of single signals")
     speed = np.abs(_settled(results, "input_speed"))

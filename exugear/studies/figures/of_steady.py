@@ -42,7 +42,9 @@ def loudest_peak(results: PointResults, *, signal: str = OVERALL) -> float:
 def loudest_speed(results: PointResults, *, signal: str = OVERALL) -> float:
     """Speed of the input at which a line of a signal is loudest."""
     found = peaks(results.steady, signal)
-    return float(abs(found[0].speed)) if found else float("nan")
+    if found:
+        return float(abs(found[0].speed))
+    return float("nan")
 
 
 def harmonics(

@@ -40,7 +40,7 @@ def life_loads(gearbox: Gearbox, choice: Choice) -> CountedLoads:
         Loads that cannot be used, or that go far beyond the tables; strengths that do not fit the gears.
     """
     counted = checked_loads(gearbox)
-    largest = {one.name: max(one.wanted.torque) for one in _requests(gearbox, choice, Path())}
+    largest = {request.name: max(request.wanted.torque) for request in _requests(gearbox, choice, Path())}
     check_reach(gearbox, counted, largest)
     return counted
 
@@ -72,7 +72,8 @@ def point_life(
         See `exugear.life.life.compute_life`.
     """
     gearbox = assembly.gearbox
-    counted, rating = life_loads(gearbox, choice), rating_of(gearbox)
+    counted = life_loads(gearbox, choice)
+    rating = rating_of(gearbox)
     static = []
     for request in _requests(gearbox, choice, shared.folder):
         shared.table(gearbox, request.name, _has_axes(choice), progress)

@@ -223,7 +223,8 @@ class PointResults:
 
         if pair not in self.gearbox.pairs:
             raise PointError(f"no gear pair {pair!r}; pairs are {', '.join(self.gearbox.pairs)}")
-        wanted, width = wanted_table(self.gearbox, pair, positions), self.gearbox.pairs[pair].pair.face_width
+        wanted = wanted_table(self.gearbox, pair, positions)
+        width = self.gearbox.pairs[pair].pair.face_width
         return static_transmission_error(
             prepared_compliance(wanted),
             [factor * wanted.torque[0] for factor in torque_factors],

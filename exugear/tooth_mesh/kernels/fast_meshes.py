@@ -167,7 +167,10 @@ def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:
         parts[..., ALONG_COSINE + o], parts[..., ALONG_COSINE + o + 1] = gears[..., i], gears[..., i + 1]
         parts[..., ALONG_SINE + o], parts[..., ALONG_SINE + o + 1] = -gears[..., i + 1], gears[..., i]
     offsets = np.zeros((count, kinds, 3))
-    x, y, px, py = gears[..., 0], gears[..., 1], axis[:, None, :, 0], axis[:, None, :, 1]
+    x = gears[..., 0]
+    y = gears[..., 1]
+    px = axis[:, None, :, 0]
+    py = axis[:, None, :, 1]
     offsets[..., 0], offsets[..., 1] = (x * px + y * py).sum(axis=2), (x * py - y * px).sum(axis=2)
     offsets[..., 2] = -gears[..., SPIN].sum(axis=2)
     return parts.reshape(count, kinds, 2 * SECOND), offsets
@@ -178,14 +181,23 @@ def row_motion(
     m: int, kind: int, psi: float, psi_rate: float, c: float, s: float, meshes: Meshes, places: Floats, gradient: Floats
 ) -> tuple[float, float]:
     """Value and rate of a row of mesh m; fills its gradient (17,). c and s are those of the frame's angle psi."""
-    row, offsets = meshes.rows[m, kind], meshes.offsets[m, kind]
-    first, second = places[meshes.ends[m, 0]], places[meshes.ends[m, 1]]
-    along, across = eight(row, ALONG_COSINE), eight(row, ALONG_SINE)
-    gradient_1, turning_1 = eight(row, FIXED) + along * c + across * s, across * c - along * s
-    along, across = eight(row, SECOND + ALONG_COSINE), eight(row, SECOND + ALONG_SINE)
-    gradient_2, turning_2 = eight(row, SECOND + FIXED) + along * c + across * s, across * c - along * s
-    place_1, place_2 = eight(first, 0), eight(second, 0)
-    level, lever, spins = offsets[0], offsets[1], offsets[2]
+    row = meshes.rows[m, kind]
+    offsets = meshes.offsets[m, kind]
+    first = places[meshes.ends[m, 0]]
+    second = places[meshes.ends[m, 1]]
+    along = eight(row, ALONG_COSINE)
+    across = eight(row, ALONG_SINE)
+    gradient_1 = eight(row, FIXED) + along * c + across * s
+    turning_1 = across * c - along * s
+    along = eight(row, SECOND + ALONG_COSINE)
+    across = eight(row, SECOND + ALONG_SINE)
+    gradient_2 = eight(row, SECOND + FIXED) + along * c + across * s
+    turning_2 = across * c - along * s
+    place_1 = eight(first, 0)
+    place_2 = eight(second, 0)
+    level = offsets[0]
+    lever = offsets[1]
+    spins = offsets[2]
     # What the frame's turning does to all of the above at once.
     turning = sum_of(turning_1 * place_1 + turning_2 * place_2) + (c * lever - s * level) + spins
     value = sum_of(gradient_1 * place_1 + gradient_2 * place_2) + ((c * level + s * lever - level) + spins * psi)
@@ -204,9 +216,13 @@ def tilt_motion(
 
     These are those by both tilts of gear 1, whose negatives belong to gear 2, and by the frame's angle.
     """
-    row, first, second = meshes.tilt[m], places[meshes.ends[m, 0]], places[meshes.ends[m, 1]]
-    x, y = c * row[TILT_ROW_X] - s * row[TILT_ROW_Y], s * row[TILT_ROW_X] + c * row[TILT_ROW_Y]
-    a, b = first[PADDED_TILT] - second[PADDED_TILT], first[PADDED_TILT + 1] - second[PADDED_TILT + 1]
+    row = meshes.tilt[m]
+    first = places[meshes.ends[m, 0]]
+    second = places[meshes.ends[m, 1]]
+    x = c * row[TILT_ROW_X] - s * row[TILT_ROW_Y]
+    y = s * row[TILT_ROW_X] + c * row[TILT_ROW_Y]
+    a = first[PADDED_TILT] - second[PADDED_TILT]
+    b = first[PADDED_TILT + 1] - second[PADDED_TILT + 1]
     turning = x * b - y * a
     a_rate = first[PADDED + PADDED_TILT] - second[PADDED + PADDED_TILT]
     b_rate = first[PADDED + PADDED_TILT + 1] - second[PADDED + PADDED_TILT + 1]
@@ -218,24 +234,34 @@ def mesh_row(
     q: Floats, v: Floats, index: Integers, axis: Floats, row: Floats, c: float, s: float, gradient: Floats
 ) -> tuple[float, float]:
     """Value and rate of a row over the coordinates seen from its frame; fills its gradient (13,)."""
-    psi, psi_rate = q[index[FRAME]], v[index[FRAME]]
-    value, rate, turning = 0.0, 0.0, 0.0
+    psi = q[index[FRAME]]
+    psi_rate = v[index[FRAME]]
+    value = 0.0
+    rate = 0.0
+    turning = 0.0
     for end in range(2):
         o = BODY_SIZE * end
-        px, py = axis[end, 0], axis[end, 1]
+        px = axis[end, 0]
+        py = axis[end, 1]
         for pair in (0, TILT):
-            i, j = index[o + pair], index[o + pair + 1]
+            i = index[o + pair]
+            j = index[o + pair + 1]
             # Turned back by psi; the row turned forward is its gradient, whose product with v is the rate.
-            x, y = px + q[i], py + q[j]
-            lx, ly = c * x + s * y, c * y - s * x
-            wx, wy = row[o + pair], row[o + pair + 1]
-            gx, gy = c * wx - s * wy, s * wx + c * wy
+            x = px + q[i]
+            y = py + q[j]
+            lx = c * x + s * y
+            ly = c * y - s * x
+            wx = row[o + pair]
+            wy = row[o + pair + 1]
+            gx = c * wx - s * wy
+            gy = s * wx + c * wy
             value += wx * (lx - px) + wy * (ly - py)
             rate += gx * v[i] + gy * v[j]
             turning += wx * ly - wy * lx
             gradient[o + pair], gradient[o + pair + 1] = gx, gy
             px, py = 0.0, 0.0  # tilts have no lever
-        axial, spin = row[o + AXIAL], row[o + SPIN]
+        axial = row[o + AXIAL]
+        spin = row[o + SPIN]
         value += axial * q[index[o + AXIAL]] + spin * (q[index[o + SPIN]] - psi)
         rate += axial * v[index[o + AXIAL]] + spin * v[index[o + SPIN]]
         turning -= spin
@@ -266,11 +292,13 @@ def subtract_errors(
 
     The gradient has `size` places for each gear, the spin at `spin_place` of them, and the frame's angle at `frame`.
     """
-    delta, rate = 0.0, 0.0
+    delta = 0.0
+    rate = 0.0
     index = meshes.coordinates[m]
     for end in range(2):
         if meshes.error_pieces[m, end] > 0:
-            spin, psi = index[BODY_SIZE * end + SPIN], index[FRAME]
+            spin = index[BODY_SIZE * end + SPIN]
+            psi = index[FRAME]
             error, slope = error_at(m, end, q[spin] - q[psi], meshes)
             # A flank that stands back closes later; seen from the other flank it stands ahead (side -1).
             delta -= side * error

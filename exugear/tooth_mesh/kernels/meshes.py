@@ -38,7 +38,8 @@ from fe_ste.tools.compilation import compiled, kernel
 FRAME = 2 * BODY_SIZE
 """Local coordinates of a mesh: six of gear 1, six of gear 2, then the spin of the frame."""
 ROW_SIZE = FRAME + 1
-SPIN_1, SPIN_2 = SPIN, BODY_SIZE + SPIN
+SPIN_1 = SPIN
+SPIN_2 = BODY_SIZE + SPIN
 
 DEFLECTION, RATE, PMC, STIFFNESS, FORCE, ENERGY, DAMPED_POWER, CYCLE_POWER, OTHER_POWER, OUTSIDE = range(10)
 """Columns of `mesh_state`.
@@ -164,7 +165,8 @@ def way_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float,
 def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: Floats, turning: Floats) -> float:
     """Value of sum W . z with its gradient (13,) and the gradient's derivative to psi (13,) for one mesh."""
     psi = q[index[FRAME]] if index[FRAME] >= 0 else 0.0
-    c, s = math.cos(psi), math.sin(psi)
+    c = math.cos(psi)
+    s = math.sin(psi)
     value = 0.0
     gradient[:] = 0.0
     turning[:] = 0.0
@@ -175,9 +177,12 @@ def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: F
             if index[o + pair] < 0:
                 continue
             px, py = (axis[end, 0], axis[end, 1]) if pair == 0 else (0.0, 0.0)
-            x, y = px + q[index[o + pair]], py + q[index[o + pair + 1]]
-            lx, ly = c * x + s * y, c * y - s * x
-            wx, wy = row[o + pair], row[o + pair + 1]
+            x = px + q[index[o + pair]]
+            y = py + q[index[o + pair + 1]]
+            lx = c * x + s * y
+            ly = c * y - s * x
+            wx = row[o + pair]
+            wy = row[o + pair + 1]
             value += wx * (lx - px) + wy * (ly - py)
             # dz/dq = R^T, so the gradient is the row turned forward; its derivative to psi is that turned by 90 deg.
             gradient[o + pair] = c * wx - s * wy
@@ -278,7 +283,8 @@ def relative_spin(v: Floats, index: Integers, end: int) -> float:
 @compiled
 def gear_position(q: Floats, m: int, meshes: MeshArrays, row: Floats, nominal: float) -> float:
     """Centre distance (m) or misalignment (rad) of mesh m by its row."""
-    gradient, turning = np.empty(ROW_SIZE), np.empty(ROW_SIZE)
+    gradient = np.empty(ROW_SIZE)
+    turning = np.empty(ROW_SIZE)
     index = meshes.coordinates[m]
     value: float = nominal + frame_row(q, index, meshes.axis[m], row, gradient, turning)
     return value

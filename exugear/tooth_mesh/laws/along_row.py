@@ -93,8 +93,12 @@ def tilted(q: Floats, m: int, meshes: MeshArrays, memory: Floats) -> float:
 
     Rows of the deflection that stand there become those of e (`exugear.tooth_mesh.contact_state`).
     """
-    gradient, turning, tilting, tilt_turning = memory[GRADIENT], memory[TURNING], memory[TILTING], memory[TILT_TURNING]
-    table, lever = meshes.table, meshes.tilt[m, TILT_LEVER]
+    gradient = memory[GRADIENT]
+    turning = memory[TURNING]
+    tilting = memory[TILTING]
+    tilt_turning = memory[TILT_TURNING]
+    table = meshes.table
+    lever = meshes.tilt[m, TILT_LEVER]
     tilt: float = table.nominal[m, NOMINAL_MISALIGNMENT] - meshes.tilt[m, TILT_REST]
     tilt += frame_row(q, meshes.coordinates[m], meshes.axis[m], table.misalignment[m], tilting, tilt_turning)
     for i in range(ROW_SIZE):
@@ -106,18 +110,26 @@ def tilted(q: Floats, m: int, meshes: MeshArrays, memory: Floats) -> float:
 @kernel
 def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, out: Floats, acting: Floats) -> None:
     """Fill the state of a mesh with a law along a row, as in `mesh_state`, and its negative generalized force (13,)."""
-    gradient, turning, bend, tilting = memory[GRADIENT], memory[TURNING], memory[BEND], memory[TILTING]
-    index, resists = meshes.coordinates[m], meshes.tilt[m]
+    gradient = memory[GRADIENT]
+    turning = memory[TURNING]
+    bend = memory[BEND]
+    tilting = memory[TILTING]
+    index = meshes.coordinates[m]
+    resists = meshes.tilt[m]
     # What deflects, and how fast.
     delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
     rate = row_dot(index, gradient, v)
     out[DEFLECTION], out[RATE] = delta, rate
-    moment, turned, stored, lost = 0.0, 0.0, 0.0, 0.0
+    moment = 0.0
+    turned = 0.0
+    stored = 0.0
+    lost = 0.0
     if resists[TILT_STIFFNESS] > 0.0:
         turned = tilted(q, m, meshes, memory)
         tilt_rate = row_dot(index, tilting, v)
-        delta, rate = delta - resists[TILT_LEVER] * turned, rate - resists[TILT_LEVER] * tilt_rate
+        delta = delta - resists[TILT_LEVER] * turned
+        rate = rate - resists[TILT_LEVER] * tilt_rate
         moment = resists[TILT_MOMENT] - resists[TILT_STIFFNESS] * turned - resists[TILT_DAMPING] * tilt_rate
         stored = (0.5 * resists[TILT_STIFFNESS] * turned - resists[TILT_MOMENT]) * turned
         lost = resists[TILT_DAMPING] * tilt_rate * tilt_rate
@@ -153,12 +165,20 @@ def row_force(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, 
 @kernel
 def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Floats, jq: Floats, jv: Floats) -> None:
     """Add the derivatives of the negative force of a mesh with a law along a row, (13, 13)."""
-    gradient, turning, bend, slope = memory[GRADIENT], memory[TURNING], memory[BEND], memory[SLOPE]
-    acting, acting_turning, index = memory[ACTING], memory[ACTING_TURNING], meshes.coordinates[m]
-    tilting, tilt_turning, resists = memory[TILTING], memory[TILT_TURNING], meshes.tilt[m]
+    gradient = memory[GRADIENT]
+    turning = memory[TURNING]
+    bend = memory[BEND]
+    slope = memory[SLOPE]
+    acting = memory[ACTING]
+    acting_turning = memory[ACTING_TURNING]
+    index = meshes.coordinates[m]
+    tilting = memory[TILTING]
+    tilt_turning = memory[TILT_TURNING]
+    resists = meshes.tilt[m]
     delta = meshes.table.nominal[m, NOMINAL_DEFLECTION]
     delta += net_deflection(q, m, meshes, meshes.deflection[m], 1.0, gradient, turning, bend)
-    pmc, turned = mesh_pmc(q, m, meshes), 0.0
+    pmc = mesh_pmc(q, m, meshes)
+    turned = 0.0
     if resists[TILT_STIFFNESS] > 0.0:
         turned = tilted(q, m, meshes, memory)
         delta -= resists[TILT_LEVER] * turned
@@ -199,7 +219,9 @@ def add_way_tangent(across: float, way: float, moment: float, by_spin: float, me
     What the misalignment takes of the force's slope goes to `memory`; `across` is the stiffness times the way (N),
     `by_spin` the slope of the moment (N m) by the spin of gear 1.
     """
-    gradient, tilting, slope = memory[GRADIENT], memory[TILTING], memory[SLOPE]
+    gradient = memory[GRADIENT]
+    tilting = memory[TILTING]
+    slope = memory[SLOPE]
     straight = memory[STILL]
     straight[:] = 0.0
     for i in range(ROW_SIZE):
@@ -216,8 +238,12 @@ def add_tilt_tangent(
     v: Floats, index: Integers, turned: float, resists: Floats, memory: Floats, jq: Floats, jv: Floats
 ) -> None:
     """Add the derivatives of what the tilt stiffness and its damper give to the negative force, (13, 13)."""
-    tilting, tilt_turning, slope, straight = memory[TILTING], memory[TILT_TURNING], memory[SLOPE], memory[STILL]
-    k, c = resists[TILT_STIFFNESS], resists[TILT_DAMPING]
+    tilting = memory[TILTING]
+    tilt_turning = memory[TILT_TURNING]
+    slope = memory[SLOPE]
+    straight = memory[STILL]
+    k = resists[TILT_STIFFNESS]
+    c = resists[TILT_DAMPING]
     straight[:] = 0.0  # errors of wheels do not tilt
     rate_gradient(v, index, tilt_turning, straight, slope)
     for i in range(ROW_SIZE):
@@ -234,13 +260,17 @@ def add_tilt_tangent(
 def spinning_motion(q: Floats, v: Floats, m: int, meshes: Meshes) -> tuple[float, float, float]:
     """Deflection of mesh m of gears that only spin, without errors; its rate, and the rate along the force row."""
     index = meshes.coordinates[m]
-    lever_1, lever_2 = meshes.deflection[m, SPIN_1], meshes.deflection[m, SPIN_2]
-    i, j, k = index[SPIN_1], index[SPIN_2], index[FRAME]
+    lever_1 = meshes.deflection[m, SPIN_1]
+    lever_2 = meshes.deflection[m, SPIN_2]
+    i = index[SPIN_1]
+    j = index[SPIN_2]
+    k = index[FRAME]
     delta = meshes.nominal[m] + lever_1 * (q[i] - q[k]) + lever_2 * (q[j] - q[k])
     rate = lever_1 * (v[i] - v[k]) + lever_2 * (v[j] - v[k])
     if meshes.conjugate[m] == 1:
         return delta, rate, rate
-    lever_1, lever_2 = meshes.force[m, SPIN_1], meshes.force[m, SPIN_2]
+    lever_1 = meshes.force[m, SPIN_1]
+    lever_2 = meshes.force[m, SPIN_2]
     return delta, rate, lever_1 * (v[i] - v[k]) + lever_2 * (v[j] - v[k])
 
 
@@ -262,11 +292,13 @@ def mesh_law(q: Floats, v: Floats, m: int, delta: float, meshes: Meshes) -> tupl
 @kernel
 def add_spinning_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshWork) -> None:
     """Add the force of a mesh along a row between gears that only spin: two products instead of a whole row."""
-    index, state = meshes.coordinates[m], work.mesh.states[m]
+    index = meshes.coordinates[m]
+    state = work.mesh.states[m]
     delta, rate, acting = spinning_motion(q, v, m, meshes)
     elastic, _, _, energy, cycle_power = mesh_law(q, v, m, delta, meshes)
     force = elastic + meshes.damping[m] * rate
-    torque_1, torque_2 = force * meshes.force[m, SPIN_1], force * meshes.force[m, SPIN_2]
+    torque_1 = force * meshes.force[m, SPIN_1]
+    torque_2 = force * meshes.force[m, SPIN_2]
     work.force[index[SPIN_1]] -= torque_1
     work.force[index[SPIN_2]] -= torque_2
     # The frame that carries the gears takes what they leave.
@@ -295,7 +327,8 @@ def keep_state(
 @kernel
 def push_apart(m: int, force: float, gradient: Floats, meshes: Meshes, work: MeshWork) -> None:
     """Subtract a scalar force times its gradient from what acts on the gears of mesh m and on its frame."""
-    first, second = work.loads[meshes.ends[m, 0]], work.loads[meshes.ends[m, 1]]
+    first = work.loads[meshes.ends[m, 0]]
+    second = work.loads[meshes.ends[m, 1]]
     put(first, 0, eight(first, 0) - eight(gradient, 0) * force)
     put(second, 0, eight(second, 0) - eight(gradient, PADDED) * force)
     work.force[meshes.coordinates[m, FRAME]] -= force * gradient[PADDED_FRAME]
@@ -304,15 +337,19 @@ def push_apart(m: int, force: float, gradient: Floats, meshes: Meshes, work: Mes
 @kernel
 def add_row_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshWork) -> None:
     """Add the force of a mesh with a law along a row."""
-    index, gradient = meshes.coordinates[m], work.mesh.gradients[DEFLECTION_ROW]
-    psi, psi_rate = q[index[FRAME]], v[index[FRAME]]
-    c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+    index = meshes.coordinates[m]
+    gradient = work.mesh.gradients[DEFLECTION_ROW]
+    psi = q[index[FRAME]]
+    psi_rate = v[index[FRAME]]
+    c = work.turns[meshes.slot[m], COSINE]
+    s = work.turns[meshes.slot[m], SINE]
     clean = meshes.error_pieces[m, 0] + meshes.error_pieces[m, 1] == 0
     delta, rate = row_motion(m, DEFLECTION_ROW, psi, psi_rate, c, s, meshes, work.places, gradient)
     delta += meshes.nominal[m]
     if not clean:
         less, slower = subtract_errors(q, v, m, 1.0, meshes, gradient, PADDED, PADDED_SPIN, PADDED_FRAME)
-        delta, rate = delta + less, rate + slower
+        delta = delta + less
+        rate = rate + slower
     acting = rate
     if meshes.conjugate[m] == 0:  # a law that pushes along its deflection has one row
         gradient = work.mesh.gradients[FORCE_ROW]
@@ -333,21 +370,31 @@ def add_tilting_mesh(
     q: Floats, v: Floats, m: int, delta: float, rate: float, c: float, s: float, meshes: Meshes, work: MeshWork
 ) -> None:
     """Add force and moment of a mesh that resists misalignment; the gradient of its deflection is known."""
-    frame, resists, state = meshes.coordinates[m, FRAME], meshes.tilt[m], work.mesh.states[m]
+    frame = meshes.coordinates[m, FRAME]
+    resists = meshes.tilt[m]
+    state = work.mesh.states[m]
     turned, tilt_rate, x, y, turning = tilt_motion(m, v[frame], c, s, meshes, work.places)
-    arm, stiffness, lost = resists[TILT_ARM], resists[TILT_RESISTANCE], resists[TILT_DAMPER] * tilt_rate
-    way, moving, beyond, changing, cycling = 0.0, 0.0, 0.0, 0.0, 0.0
+    arm = resists[TILT_ARM]
+    stiffness = resists[TILT_RESISTANCE]
+    lost = resists[TILT_DAMPER] * tilt_rate
+    way = 0.0
+    moving = 0.0
+    beyond = 0.0
+    changing = 0.0
+    cycling = 0.0
     if meshes.way_pieces[m] > 0:
         pmc, cycling = mesh_cycle(q, v, m, meshes)
         way, moving, beyond, changing = way_at(meshes.way[m], meshes.way_pieces[m], pmc)
     # Where the load bears beside the middle of the face, it deflects with the misalignment.
-    approach, approaching = delta - arm * turned, rate - arm * tilt_rate
+    approach = delta - arm * turned
+    approaching = rate - arm * tilt_rate
     elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach - way * turned, meshes)
     cycle_power += (elastic * moving + changing) * cycling * turned
     force = elastic + meshes.damping[m] * approaching
     push_apart(m, force, work.mesh.gradients[DEFLECTION_ROW], meshes, work)
     moment = resists[TILT_PUSH] - stiffness * turned - lost + arm * force + way * elastic + beyond
-    first, second = work.loads[meshes.ends[m, 0]], work.loads[meshes.ends[m, 1]]
+    first = work.loads[meshes.ends[m, 0]]
+    second = work.loads[meshes.ends[m, 1]]
     first[PADDED_TILT] += moment * x
     first[PADDED_TILT + 1] += moment * y
     second[PADDED_TILT] -= moment * x

@@ -26,7 +26,8 @@ from fe_ste.tools.inner_kernels import bundle, kept_bundle
 
 STATE = ROW_MEMORY
 BY_Q = STATE + 1
-BY_V, OF_TABLE = BY_Q + ROW_SIZE, BY_Q + 2 * ROW_SIZE
+BY_V = BY_Q + ROW_SIZE
+OF_TABLE = BY_Q + 2 * ROW_SIZE
 MEMORY = OF_TABLE + TABLE_MEMORY
 """Rows of the memory of `pass_meshes`, (`MEMORY`, 13): vectors of a mesh, and derivatives of its force."""
 _NOTHING, _NO_ROWS = np.zeros(0), np.zeros((0, 0))
@@ -51,8 +52,11 @@ def pass_meshes(
     One function does all, so that the laws are compiled once. `table` is that of `acting_table`, and the memory
     of its law is there with it; `memory` is (`MEMORY`, 13).
     """
-    state, acting = memory[STATE], memory[ACTING]
-    local_q, local_v, of_table = memory[BY_Q:BY_V], memory[BY_V:OF_TABLE], memory[OF_TABLE:]
+    state = memory[STATE]
+    acting = memory[ACTING]
+    local_q = memory[BY_Q:BY_V]
+    local_v = memory[BY_V:OF_TABLE]
+    of_table = memory[OF_TABLE:]
     for m in range(meshes.coordinates.shape[0]):
         index = meshes.coordinates[m]
         if f.size > 0 or states.size > 0:
@@ -83,7 +87,9 @@ def pass_meshes(
 
 def acting_table(meshes: MeshArrays) -> TableArrays | None:
     """Tables of meshes, None if none of them follows one: nothing of their law is compiled then."""
-    return meshes.table if (meshes.form == TABLE_FORM).any() else None
+    if (meshes.form == TABLE_FORM).any():
+        return meshes.table
+    return None
 
 
 def _bundles(meshes: MeshArrays) -> tuple[MeshArrays, TableArrays | None]:

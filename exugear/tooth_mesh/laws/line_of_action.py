@@ -31,7 +31,8 @@ from fe_ste.transmission_error.gaps import GapError, complete_cycle
 from fe_ste.transmission_error.surface import SteSurface
 from fe_ste.transmission_error.table import TableError
 
-STIFFNESS_FORM, CURVE_FORM = 0, 2
+STIFFNESS_FORM = 0
+CURVE_FORM = 2
 STRAIGHT = 0.05
 """Deflection over that of the table's load below which the curve is a straight line."""
 _LOG_STRAIGHT = math.log(STRAIGHT)
@@ -133,7 +134,8 @@ def curve_law(
         tangent = (1.0 + n) * force / delta
     else:
         chord = k * math.exp(n * _LOG_STRAIGHT)
-        force, tangent = chord * delta, chord
+        force = chord * delta
+        tangent = chord
         rate = n_slope * _LOG_STRAIGHT + k_rate
         energy = 0.5 * chord * delta * delta
         by_pmc = energy * rate

@@ -58,7 +58,7 @@ def pack(
     # Its mean is in the lever; of gears that do not tilt it does nothing.
     resists = tilts[:, TILT_STIFFNESS] > 0.0
     moves = resists & (not averaged)
-    ways = [e.load_ways if own else np.zeros((2, 0)) for own, e in zip(moves, elements, strict=True)]
+    ways = [e.load_ways if move else np.zeros((2, 0)) for move, e in zip(moves, elements, strict=True)]
     tables = pack_tables(elements, index, averaged, linear)
     if tangent:
         tables.nominal[:, NOMINAL_DEFLECTION] -= [element.rest for element in elements]
@@ -74,7 +74,7 @@ def pack(
         stiffness=stiffness,
         damping=np.array([e.damping for e in elements]),
         tilt=tilts,
-        way_pieces=np.array([own.shape[1] for own in ways], dtype=np.int64),
+        way_pieces=np.array([way.shape[1] for way in ways], dtype=np.int64),
         way=_pack_ways(elements, ways),
         line_of_action=np.array([e.line_of_action for e in elements]),
         error_pieces=np.array([[len(error) for error in e.errors] for e in elements], dtype=np.int64).reshape(count, 2),
@@ -85,9 +85,11 @@ def pack(
 
 def _form(element: MeshElement, averaged: bool, linear: bool, straight: bool) -> tuple[int, Floats]:
     """Choose the form that an element's law has, by its number, and its coefficients (n, c)."""
-    secant, tangent = element.stiffness, element.tangent
+    secant = element.stiffness
+    tangent = element.tangent
     if averaged:
-        secant, tangent = np.array([np.mean(secant)]), np.array([np.mean(tangent)])
+        secant = np.array([np.mean(secant)])
+        tangent = np.array([np.mean(tangent)])
     if linear:
         return STIFFNESS_FORM, periodic_cubic(secant)
     if element.is_curved and straight:
@@ -101,10 +103,12 @@ def _pack_tilts(elements: tuple[MeshElement, ...], index: Integers, linear: bool
     """Fill `MeshArrays.tilt`: not of gears that do not tilt, nor of tables, which have a potential of their own."""
     tilts = np.zeros((len(elements), TILT_COLUMNS))
     for row, element, own in zip(tilts, elements, index, strict=True):
-        contact, still = element.contact, bool((own[[TILT, BODY_SIZE + TILT]] < 0).all())
+        contact = element.contact
+        still = bool((own[[TILT, BODY_SIZE + TILT]] < 0).all())
         if contact is None or still or (element.table is not None and not linear):
             continue
-        stiffness, lever = contact.tilt_stiffness, contact.tangent_load_centre
+        stiffness = contact.tilt_stiffness
+        lever = contact.tangent_load_centre
         moment = contact.force * (contact.load_centre - lever)
         row[:] = stiffness, element.damping_time * stiffness, lever, moment, contact.misalignment
     return tilts
@@ -125,7 +129,7 @@ def _indices(elements: tuple[MeshElement, ...], coordinates: Mapping[str, tuple[
 
 def _pack_ways(elements: tuple[MeshElement, ...], ways: list[Floats]) -> Floats:
     """Fill `MeshArrays.way` from ways (2, n) of each mesh; zeros behind shorter ones."""
-    coefficients = np.zeros((len(ways), max((own.shape[1] for own in ways), default=0), WAY_COLUMNS))
+    coefficients = np.zeros((len(ways), max((way.shape[1] for way in ways), default=0), WAY_COLUMNS))
     for block, element, (of_load, added) in zip(coefficients, elements, ways, strict=True):
         if added.size:
             moment = element.load * (of_load - added)

@@ -42,15 +42,19 @@ from fe_ste.tools.compilation import kernel
 @kernel
 def turn_between(values: Floats, n: int, bodies: Bodies, connectors: Connectors) -> float:
     """Spin of the second body of connector n less that of the first (rad), or their rates; the ground's stays zero."""
-    first, second = bodies.start[connectors.ends[n, 0]], bodies.start[connectors.ends[n, 1]]
+    first = bodies.start[connectors.ends[n, 0]]
+    second = bodies.start[connectors.ends[n, 1]]
     return float(values[second + SPIN] - values[first + SPIN])
 
 
 @kernel
 def place_pair(p: int, places: Floats, pairs: Pairs, ground: int, work: Work) -> None:
     """Fill `work.relative` with the second body's motion against the first, in the first one's axes."""
-    i, j = pairs.ends[p, 0], pairs.ends[p, 1]
-    out, place, frame = work.relative, places[j], work.frames[j]
+    i = pairs.ends[p, 0]
+    j = pairs.ends[p, 1]
+    out = work.relative
+    place = places[j]
+    frame = work.frames[j]
     # On the ground the first body's axes are the global ones: nothing has to be turned.
     if i == ground:
         for k in range(3):
@@ -60,17 +64,19 @@ def place_pair(p: int, places: Floats, pairs: Pairs, ground: int, work: Work) ->
         out[RELATIVE_TILT], out[RELATIVE_TILT + 1] = place[PADDED_TILT], place[PADDED_TILT + 1]
         out[RELATIVE_TILT + 2] = 0.0
         return
-    first, turn = places[i], work.frames[i]
+    first = places[i]
+    turn = work.frames[i]
     nodes = pairs.data[pairs.first[p]]
-    x, y, z = (
-        place[0] - first[0] + nodes[NODES],
-        place[1] - first[1] + nodes[NODES + 1],
-        place[2] - first[2] + nodes[NODES + 2],
-    )
-    ux, uy = place[PADDED] - first[PADDED], place[PADDED + 1] - first[PADDED + 1]
+    x = place[0] - first[0] + nodes[NODES]
+    y = place[1] - first[1] + nodes[NODES + 1]
+    z = place[2] - first[2] + nodes[NODES + 2]
+    ux = place[PADDED] - first[PADDED]
+    uy = place[PADDED + 1] - first[PADDED + 1]
     uz = place[PADDED + 2] - first[PADDED + 2]
     for k in range(3):
-        r, s, t = turn[k], turn[3 + k], turn[6 + k]
+        r = turn[k]
+        s = turn[3 + k]
+        t = turn[6 + k]
         out[RELATIVE_PLACE + k] = r * x + s * y + t * z
         out[RELATIVE_VELOCITY + k] = r * ux + s * uy + t * uz
         out[RELATIVE_AXIS + k] = r * frame[2] + s * frame[5] + t * frame[8]
@@ -86,7 +92,8 @@ def place_pair(p: int, places: Floats, pairs: Pairs, ground: int, work: Work) ->
 @kernel
 def twist_of(i: int, j: int, work: Work) -> float:
     """Angle about z of body j seen from body i (rad): it costs an arc tangent, and bearings rarely resist it."""
-    first, second = work.frames[i], work.frames[j]
+    first = work.frames[i]
+    second = work.frames[j]
     cosine = first[0] * second[0] + first[3] * second[3] + first[6] * second[6]
     sine = first[0] * second[1] + first[3] * second[4] + first[6] * second[7]
     return math.atan2(-sine, cosine)
@@ -95,11 +102,14 @@ def twist_of(i: int, j: int, work: Work) -> float:
 @kernel
 def second_arm(i: int, j: int, one: Floats, work: Work) -> tuple[float, float, float]:
     """Attachment in the second body j of a connector seen in the axes of the first, i (m)."""
-    x, y, z = one[SECOND_ARM], one[SECOND_ARM + 1], one[SECOND_ARM + 2]
+    x = one[SECOND_ARM]
+    y = one[SECOND_ARM + 1]
+    z = one[SECOND_ARM + 2]
     if one[OFF_AXIS] == 0.0:
         axis = work.relative
         return axis[RELATIVE_AXIS] * z, axis[RELATIVE_AXIS + 1] * z, axis[RELATIVE_AXIS + 2] * z
-    turn, first = work.frames[j], work.frames[i]
+    turn = work.frames[j]
+    first = work.frames[i]
     gx = turn[0] * x + turn[1] * y + turn[2] * z
     gy = turn[3] * x + turn[4] * y + turn[5] * z
     gz = turn[6] * x + turn[7] * y + turn[8] * z
@@ -119,16 +129,26 @@ def strain_connector(
     As Exudyn's RigidBodySpringDamper: second attachment (at b from its node) against the first in the first body's
     axes, the rate not corrected for the turning of these axes.
     """
-    ax, ay, az = one[FIRST_ARM], one[FIRST_ARM + 1], one[FIRST_ARM + 2]
-    x, y, z = motion[RELATIVE_PLACE], motion[RELATIVE_PLACE + 1], motion[RELATIVE_PLACE + 2]
+    ax = one[FIRST_ARM]
+    ay = one[FIRST_ARM + 1]
+    az = one[FIRST_ARM + 2]
+    x = motion[RELATIVE_PLACE]
+    y = motion[RELATIVE_PLACE + 1]
+    z = motion[RELATIVE_PLACE + 2]
     if on_ground:  # where nothing turns, small differences come before large places
         x += one[GAP] + (bx - one[SECOND_ARM])
         y += one[GAP + 1] + (by - one[SECOND_ARM + 1])
         z += one[GAP + 2] + (bz - one[SECOND_ARM + 2])
     else:
-        x, y, z = x + bx - ax, y + by - ay, z + bz - az
-    ox, oy, oz = motion[FIRST_TURNING], motion[FIRST_TURNING + 1], motion[FIRST_TURNING + 2]
-    wx, wy, wz = motion[SECOND_TURNING], motion[SECOND_TURNING + 1], motion[SECOND_TURNING + 2]
+        x = x + bx - ax
+        y = y + by - ay
+        z = z + bz - az
+    ox = motion[FIRST_TURNING]
+    oy = motion[FIRST_TURNING + 1]
+    oz = motion[FIRST_TURNING + 2]
+    wx = motion[SECOND_TURNING]
+    wy = motion[SECOND_TURNING + 1]
+    wz = motion[SECOND_TURNING + 2]
     support[0], support[1], support[2] = x, y, z
     support[BODY_SIZE] = motion[RELATIVE_VELOCITY] + (wy * bz - wz * by) - (oy * az - oz * ay)
     support[BODY_SIZE + 1] = motion[RELATIVE_VELOCITY + 1] + (wz * bx - wx * bz) - (oz * ax - ox * az)
@@ -143,8 +163,14 @@ def strain_connector(
 def load_connector(n: int, one: Floats, damping: Floats, support: Floats) -> None:
     """Fill force and moment of connector n on its first body from strain and rate."""
     # Two vectors of four sums in registers.
-    x, y, z, _x = one[OFFSET], one[OFFSET + 1], one[OFFSET + 2], one[OFFSET + 3]
-    a, b, c, _a = one[OFFSET + 4], one[OFFSET + 5], one[OFFSET + 6], one[OFFSET + 7]
+    x = one[OFFSET]
+    y = one[OFFSET + 1]
+    z = one[OFFSET + 2]
+    _x = one[OFFSET + 3]
+    a = one[OFFSET + 4]
+    b = one[OFFSET + 5]
+    c = one[OFFSET + 6]
+    _a = one[OFFSET + 7]
     time = one[LAG]
     for column in range(BODY_SIZE):
         # Damping in proportion to the stiffness acts as a strain that is ahead of itself.
@@ -186,7 +212,8 @@ def add_rolling(
     for i in range(BODY_SIZE):
         support[SUPPORT_LOAD + i] += work.rolling[ELASTIC_PART + i]
     ground = bodies.start.size - 1
-    first, second = connectors.ends[n, 0], connectors.ends[n, 1]
+    first = connectors.ends[n, 0]
+    second = connectors.ends[n, 1]
     if first != ground:
         work.force[bodies.start[first] + SPIN] += work.rolling[CAGE_TORQUE]
     if second != ground:
@@ -196,8 +223,12 @@ def add_rolling(
 @kernel
 def hand_to_body(frame: Floats, turned: bool, sign: float, sums: Floats, moment: int, load: Floats) -> None:
     """Add a force and the moment that stands at an entry of sums, in a body's axes, to a load in global axes."""
-    x, y, z = sign * sums[0], sign * sums[1], sign * sums[2]
-    a, b, c = sign * sums[moment], sign * sums[moment + 1], sign * sums[moment + 2]
+    x = sign * sums[0]
+    y = sign * sums[1]
+    z = sign * sums[2]
+    a = sign * sums[moment]
+    b = sign * sums[moment + 1]
+    c = sign * sums[moment + 2]
     if turned:
         x, y, z = (
             frame[0] * x + frame[1] * y + frame[2] * z,
@@ -227,21 +258,29 @@ def add_connectors(q: Floats, bodies: Bodies, connectors: Connectors, pairs: Pai
     ground = bodies.start.size - 1
     sums = work.sums
     for p in range(pairs.ends.shape[0]):
-        i, j = pairs.ends[p, 0], pairs.ends[p, 1]
+        i = pairs.ends[p, 0]
+        j = pairs.ends[p, 1]
         place_pair(p, work.places, pairs, ground, work)
         if pairs.twisting[p] == 1:
             work.relative[RELATIVE_TILT + 2] = twist_of(i, j, work)
         for k in range(9):
             sums[k] = 0.0
         for n in range(pairs.first[p], pairs.first[p + 1]):
-            one, support = pairs.data[n], work.supports[n]
+            one = pairs.data[n]
+            support = work.supports[n]
             bx, by, bz = second_arm(i, j, one, work)
             strain_connector(one, i == ground, bx, by, bz, work.relative, support)
             load_connector(n, one, connectors.damping, support)
             add_rolling(q, n, bodies, connectors, connectors.rolling, support, work)
-            fx, fy, fz = support[SUPPORT_LOAD], support[SUPPORT_LOAD + 1], support[SUPPORT_LOAD + 2]
-            ax, ay, az = one[FIRST_ARM], one[FIRST_ARM + 1], one[FIRST_ARM + 2]
-            mx, my, mz = support[SUPPORT_LOAD + 3], support[SUPPORT_LOAD + 4], support[SUPPORT_LOAD + 5]
+            fx = support[SUPPORT_LOAD]
+            fy = support[SUPPORT_LOAD + 1]
+            fz = support[SUPPORT_LOAD + 2]
+            ax = one[FIRST_ARM]
+            ay = one[FIRST_ARM + 1]
+            az = one[FIRST_ARM + 2]
+            mx = support[SUPPORT_LOAD + 3]
+            my = support[SUPPORT_LOAD + 4]
+            mz = support[SUPPORT_LOAD + 5]
             sums[0] += fx
             sums[1] += fy
             sums[2] += fz

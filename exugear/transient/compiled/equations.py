@@ -37,7 +37,8 @@ from fe_ste.tools.compilation import kernel
 def add_springs(q: Floats, v: Floats, springs: Springs, f: Floats) -> None:
     """Add the torques of the torsional springs to f."""
     for n in range(springs.ends.shape[0]):
-        i, j = springs.ends[n, 0], springs.ends[n, 1]
+        i = springs.ends[n, 0]
+        j = springs.ends[n, 1]
         torque = springs.stiffness[n] * (q[j] - q[i]) + springs.damping[n] * (v[j] - v[i])
         f[i] += torque
         f[j] -= torque
@@ -49,7 +50,8 @@ def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f:
     for i in range(loads.steady.size):
         f[i] = loads.steady[i]
     for n in range(loads.coordinate.size):
-        first, last = loads.first[n], loads.first[n + 1] - 1
+        first = loads.first[n]
+        last = loads.first[n + 1] - 1
         # Time mostly goes on: look from the line that was used last.
         line = series[n]
         while line < last - 1 and loads.time[line + 1] <= t:
@@ -61,7 +63,8 @@ def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f:
         share = min(1.0, max(0.0, share))
         f[loads.coordinate[n]] += loads.torque[line] + share * (loads.torque[line + 1] - loads.torque[line])
     for n in range(loads.drive.size):
-        i, law = loads.drive[n], loads.law[n]
+        i = loads.drive[n]
+        law = loads.law[n]
         angle = law[ANGLE] + t * (law[SPEED] + t * law[HALF_ACCELERATION])
         speed = law[SPEED] + 2.0 * t * law[HALF_ACCELERATION]
         f[i] += law[STIFFNESS] * (angle - q[i]) + law[DAMPING] * (speed - v[i])
@@ -70,15 +73,24 @@ def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f:
 @kernel
 def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
     """Solve the bodies' equations for `work.rate`; formula in `exugear.kernels.inertia.accelerations`."""
-    f, out = work.force, work.rate
+    f = work.force
+    out = work.rate
     for n in range(bodies.mass.size):
-        o, jt, ja = bodies.start[n], bodies.transverse[n], bodies.axial[n]
-        sb, cb = work.frames[n, SIN_B], work.frames[n, COS_B]
-        per_mass, per_jt, per_ja = bodies.shares[n, 0], bodies.shares[n, 1], bodies.shares[n, 2]
+        o = bodies.start[n]
+        jt = bodies.transverse[n]
+        ja = bodies.axial[n]
+        sb = work.frames[n, SIN_B]
+        cb = work.frames[n, COS_B]
+        per_mass = bodies.shares[n, 0]
+        per_jt = bodies.shares[n, 1]
+        per_ja = bodies.shares[n, 2]
         for i in range(3):
             out[o + i] = f[o + i] * per_mass
-        a, b, spin = o + TILT, o + TILT + 1, o + SPIN
-        da, db = v[a], v[b]
+        a = o + TILT
+        b = o + TILT + 1
+        spin = o + SPIN
+        da = v[a]
+        db = v[b]
         p = ja * (v[spin] + da * sb)  # angular momentum about the body's axis
         out[a] = (f[a] - f[spin] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) * (per_jt / (cb * cb))
         out[b] = (f[b] - jt * da * da * sb * cb + p * da * cb) * per_jt
@@ -99,7 +111,9 @@ def evaluate(t: float, q: Floats, v: Floats, with_power: bool, equations: Equati
     What bodies, meshes and connectors do there is left in `work.frames`, `work.mesh.states` and `work.supports`; what
     elastic bodies damp in `work.damped` if asked for with the power.
     """
-    bodies, places, force = equations.bodies, equations.places, work.force
+    bodies = equations.bodies
+    places = equations.places
+    force = work.force
     place_bodies(q, v, bodies, work)
     place_travelling(q, v, equations.travelling, work.shares)
     gather_places(q, v, places, work)

@@ -47,9 +47,13 @@ def take(q: Floats, v: Floats, work: Work) -> None:
 @kernel
 def predict(step: float, method: Method, past: Past, work: Work) -> None:
     """Fill the stage's state with the one a step ahead and `past.sums[0]` with its acceleration, both extrapolated."""
-    weights, ahead, none = method.weights, past.sums[0], all_eight(0.0)
+    weights = method.weights
+    ahead = past.sums[0]
+    none = all_eight(0.0)
     for i in range(0, ahead.size, SIZE):
-        of_x, of_u, of_a = none, none, none
+        of_x = none
+        of_u = none
+        of_a = none
         row = past.counts[LATEST]
         for k in range(weights.shape[1]):
             known = eight(past.accelerations[row], i)
@@ -77,7 +81,9 @@ def correct(step: float, method: Method, past: Past, work: Work) -> None:
 @kernel
 def corrected_by(i: int, past: Past, work: Work) -> float:
     """Difference of the acceleration of coordinate i from the extrapolated one; one that is missing has none."""
-    return float(work.rate[i] - past.sums[0, i]) if i < past.sums.shape[1] else 0.0
+    if i < past.sums.shape[1]:
+        return float(work.rate[i] - past.sums[0, i])
+    return 0.0
 
 
 @kernel
@@ -91,7 +97,8 @@ def correct_spinning_meshes(step: float, method: Method, past: Past, meshes: Mes
     for m in range(meshes.coordinates.shape[0]):
         if meshes.spinning[m] == 0:
             continue
-        index, state = meshes.coordinates[m], work.mesh.states[m]
+        index = meshes.coordinates[m]
+        state = work.mesh.states[m]
         frame = corrected_by(index[FRAME], past, work)
         change = meshes.deflection[m, SPIN_1] * (corrected_by(index[SPIN_1], past, work) - frame)
         change += meshes.deflection[m, SPIN_2] * (corrected_by(index[SPIN_2], past, work) - frame)
@@ -108,8 +115,13 @@ def runge_kutta_stage(stage: int, step: float, past: Past, work: Work) -> None:
     stage's state is the new one, as `work.q` and `work.v` are. `past.sums` collects accelerations: for the positions,
     which need the first three alone, and for the velocities.
     """
-    q, v, x, u, a = work.q, work.v, work.stage_q, work.stage_v, work.rate
-    known, sums = past.accelerations[past.counts[LATEST]], past.sums
+    q = work.q
+    v = work.v
+    x = work.stage_q
+    u = work.stage_v
+    a = work.rate
+    known = past.accelerations[past.counts[LATEST]]
+    sums = past.sums
     ahead = 0.5 * step if stage < 2 else step
     for i in range(sums.shape[1]):
         if stage == 0:
@@ -140,9 +152,11 @@ def keep_acceleration(as_new: bool, work: Work, past: Past) -> None:
 def copy_state(work: Work, q: Floats, v: Floats) -> bool:
     """Copy the state into q, v (size,); tell whether it is finite."""
     # Nothing is left of a number times zero, but of one that is not finite.
-    check, filled = all_eight(0.0), q.size - q.size % SIZE
+    check = all_eight(0.0)
+    filled = q.size - q.size % SIZE
     for i in range(0, filled, SIZE):
-        place, rate = eight(work.q, i), eight(work.v, i)
+        place = eight(work.q, i)
+        rate = eight(work.v, i)
         put(q, i, place)
         put(v, i, rate)
         check = check + (place + rate) * 0.0
@@ -187,7 +201,8 @@ def advance(
         multistep = points > 0 and past.counts[KNOWN] >= points
         at_once = given or n < 0 or multistep
         parts = START_PARTS if points > 0 and not at_once else 1
-        h, end = step / parts, times[n] if given else (first + n + 1) * step
+        h = step / parts
+        end = times[n] if given else (first + n + 1) * step
         due = n < out_signals.shape[0] and (given or (first + n + 1) % stride == 0)
         for part in range(parts):
             begin = (first + n) * step + part * h
@@ -219,7 +234,8 @@ def advance(
         if n < out_signals.shape[0]:
             if multistep and not given:
                 correct_spinning_meshes(step, method, past, equations.meshes, work)
-            q, v = work.stage_q, work.stage_v
+            q = work.stage_q
+            v = work.stage_v
             stood_for = stride if due else 0
             take_sample(end, q, v, equations, work, columns, stood_for, given, out_signals[n], out_energies[n])
     done: int = steps

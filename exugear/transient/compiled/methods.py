@@ -110,7 +110,9 @@ class Method(NamedTuple):
     @property
     def evaluations(self) -> int:
         """Evaluations of the accelerations in a step."""
-        return 1 if self.is_multistep else 4
+        if self.is_multistep:
+            return 1
+        return 4
 
     @property
     def name(self) -> str:
@@ -159,7 +161,8 @@ def stabilised() -> Method:
     >>> stabilised().name, stabilised().order, stabilised().points
     ('Adams of order 4, stabilised', 4, 8)
     """
-    four, free = adams(4), _FREE_SHARES.shape[1]
+    four = adams(4)
+    free = _FREE_SHARES.shape[1]
     differences = np.stack([np.pad([1.0, -4.0, 6.0, -4.0, 1.0], (n, free - 1 - n)) for n in range(free)])
     return Method(np.pad(four.weights, ((0, 0), (0, free))) + _FREE_SHARES @ differences, _FREE_CORRECTION)
 
@@ -209,7 +212,8 @@ def _recurrences(method: Method, angle: Floats, decay: Floats) -> Floats:
     The acceleration is -w^2 q - 2 d v; ``angle`` is w h, ``decay`` d h.
     """
     count = method.points
-    velocity, position = np.zeros(count + 2), np.zeros(count + 2)
+    velocity = np.zeros(count + 2)
+    position = np.zeros(count + 2)
     velocity[0], velocity[2:] = 1.0, method.weights[PREDICT_VELOCITY]
     position[:2], position[2:] = 1.0, method.weights[PREDICT_POSITION]
     acceleration = -(angle[:, None] ** 2) * position - 2.0 * decay[:, None] * velocity

@@ -90,7 +90,9 @@ class _Numbers:
 
     def body(self, start: int) -> int:
         """Find the number of the body that starts at a coordinate; the ground (-1) comes last."""
-        return len(self.starts) if start < 0 else self.starts.index(start)
+        if start < 0:
+            return len(self.starts)
+        return self.starts.index(start)
 
     def slot(self, coordinate: int) -> int:
         """Tell where a coordinate's sine stands, taking it up if it is new; 0 for none."""
@@ -113,7 +115,8 @@ def _connectors(numbers: _Numbers) -> tuple[Connectors, Integers]:
     matrices = np.zeros((2, len(ends), BODY_SIZE, BODY_SIZE))
     time = np.zeros(len(ends))
     for n, (i, j) in enumerate(ends):
-        stiffness, damping = _without_round_off(given.stiffness[n]), _without_round_off(given.damping[n])
+        stiffness = _without_round_off(given.stiffness[n])
+        damping = _without_round_off(given.damping[n])
         time[n] = _damping_time(stiffness, damping)
         matrices[:, n] = stiffness.T, damping.T * (time[n] == 0.0)
         twisting[(ends == ends[n]).all(axis=1)] |= stiffness[:, SPIN].any()
@@ -177,7 +180,8 @@ def _places(numbers: _Numbers) -> tuple[Places, Integers]:
             spins.append(int(spin))
     ends = np.full(gears.shape[:2], len(numbers.starts), dtype=np.int64)
     for (m, end), _ in np.ndenumerate(ends):
-        x, spin = gears[m, end, 0], gears[m, end, SPIN]
+        x = gears[m, end, 0]
+        spin = gears[m, end, SPIN]
         if x >= 0:
             ends[m, end] = starts.index(int(x))
         elif spin >= 0:
@@ -191,7 +195,9 @@ def _damping_time(stiffness: Floats, damping: Floats) -> float:
     if stiffness[largest] == 0.0:
         return 0.0
     time = float(damping[largest] / stiffness[largest])
-    return time if np.allclose(damping, time * stiffness, rtol=1e-12, atol=1e-14 * np.abs(damping).max()) else 0.0
+    if np.allclose(damping, time * stiffness, rtol=1e-12, atol=1e-14 * np.abs(damping).max()):
+        return time
+    return 0.0
 
 
 def _without_round_off(matrix: Floats) -> Floats:
@@ -257,7 +263,8 @@ def _joints(numbers: _Numbers) -> Joints | None:
     bodies = {body.name: body for body in assembly.gearbox.bodies(assembly.inertias)}
     number = {joint.body: n for n, joint in enumerate(joints)}
     ends = [[number.get(e.mesh.pinion, -1), number.get(e.mesh.gear, -1)] for e in assembly.elements]
-    planet, carrier = np.zeros((len(joints), 3)), np.full(len(joints), numbers.size)
+    planet = np.zeros((len(joints), 3))
+    carrier = np.full(len(joints), numbers.size)
     for n, joint in enumerate(joints):
         body = bodies[joint.body]
         if body.carrier is not None:
@@ -295,9 +302,11 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
     numbers = _Numbers(assembly)
     connectors, slots = _connectors(numbers)
     places, ends = _places(numbers)
-    meshes, joints = _meshes(numbers, ends), _joints(numbers)
+    meshes = _meshes(numbers, ends)
+    joints = _joints(numbers)
     nodes = assembly.connectors.node[connectors.number]
-    inertia, springs = assembly.inertia, assembly.springs
+    inertia = assembly.inertia
+    springs = assembly.springs
     # All sorts of elastic bodies together, so that few sorts of systems are compiled.
     elastic = bool(assembly.elastic_bodies)
     bodies = Bodies(
@@ -329,7 +338,8 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
 
 def _rolling_inverse(assembly: Assembly) -> Floats:
     """Inverse mass matrix of spins that only roll: B (B^T M B)^-1 B^T with the free motions B."""
-    free, mass = assembly.motions, assembly.mass_matrix
+    free = assembly.motions
+    mass = assembly.mass_matrix
     inverse = free @ np.linalg.solve(free.T @ mass @ free, free.T)
     return np.ascontiguousarray(inverse[np.ix_(assembly.inertia.spin, assembly.inertia.spin)])
 

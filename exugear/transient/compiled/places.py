@@ -58,7 +58,8 @@ def tilts_of_axis(x: float, y: float, z: float) -> tuple[float, float]:
     """
     if z <= 0.0 or abs(x) > SMALL_ANGLE or abs(y) > SMALL_ANGLE * z:
         return math.atan2(-y, z), math.asin(min(1.0, max(-1.0, x)))
-    t, s = -y / z, x * x
+    t = -y / z
+    s = x * x
     u = t * t
     a = t * (1.0 - u * (1.0 / 3.0 - u * (1.0 / 5.0 - u * (1.0 / 7.0 - u * (1.0 / 9.0 - u / 11.0)))))
     b = x * (1.0 + s * (1.0 / 6.0 + s * (3.0 / 40.0 + s * (5.0 / 112.0 + s * (35.0 / 1152.0 + s * 63.0 / 2816.0)))))
@@ -75,13 +76,16 @@ def place_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work) -> None:
         o = bodies.start[n]
         ca, sa = tilt_sines(q[o + TILT])
         cb, sb = tilt_sines(q[o + TILT + 1])
-        cg, sg = work.turns[bodies.slot[n], COSINE], work.turns[bodies.slot[n], SINE]
+        cg = work.turns[bodies.slot[n], COSINE]
+        sg = work.turns[bodies.slot[n], SINE]
         frame = work.frames[n]
         # Rx(a) Ry(b) Rz(spin), row by row; then the angular velocity in global axes.
         frame[0], frame[1], frame[2] = cb * cg, -cb * sg, sb
         frame[3], frame[4], frame[5] = ca * sg + sa * sb * cg, ca * cg - sa * sb * sg, -sa * cb
         frame[6], frame[7], frame[8] = sa * sg - ca * sb * cg, sa * cg + ca * sb * sg, ca * cb
-        da, db, dg = v[o + TILT], v[o + TILT + 1], v[o + SPIN]
+        da = v[o + TILT]
+        db = v[o + TILT + 1]
+        dg = v[o + SPIN]
         frame[W_X], frame[W_Y], frame[W_Z] = da + sb * dg, ca * db - sa * cb * dg, sa * db + ca * cb * dg
         frame[SIN_A], frame[COS_A], frame[SIN_B], frame[COS_B] = sa, ca, sb, cb
 
@@ -90,7 +94,9 @@ def place_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work) -> None:
 def gather_places(q: Floats, v: Floats, places: Places, work: Work) -> None:
     """Fill `work.places` from the state; nothing acts there yet."""
     for n in range(places.start.size):
-        place, load, o = work.places[n], work.loads[n], places.start[n]
+        place = work.places[n]
+        load = work.loads[n]
+        o = places.start[n]
         for i in range(3):
             place[i], place[PADDED_TILT + i] = q[o + i], q[o + TILT + i]
             place[PADDED + i], place[PADDED + PADDED_TILT + i] = v[o + i], v[o + TILT + i]
@@ -98,7 +104,9 @@ def gather_places(q: Floats, v: Floats, places: Places, work: Work) -> None:
         put(load, SIZE, all_eight(0.0))
     # Bodies with their spin alone stay where they are.
     for n in range(places.spin.size):
-        place, load, o = work.places[places.start.size + n], work.loads[places.start.size + n], places.spin[n]
+        place = work.places[places.start.size + n]
+        load = work.loads[places.start.size + n]
+        o = places.spin[n]
         place[PADDED_SPIN], place[PADDED + PADDED_SPIN] = q[o], v[o]
         load[PADDED_SPIN] = 0.0
 
@@ -108,14 +116,22 @@ def add_loads_of_places(bodies: Bodies, places: Places, work: Work) -> None:
     """Add what acts on all places to the generalized forces `work.force`."""
     f = work.force
     for n in range(places.start.size):
-        load, o = work.loads[n], places.start[n]
+        load = work.loads[n]
+        o = places.start[n]
         for i in range(3):
             f[o + i] += load[i]
             f[o + TILT + i] += load[PADDED_TILT + i]
     for n in range(bodies.start.size - 1):
-        load, o, frame = work.loads[n], bodies.start[n], work.frames[n]
-        sa, ca, sb, cb = frame[SIN_A], frame[COS_A], frame[SIN_B], frame[COS_B]
-        x, y, z = load[WRENCH + PADDED_TILT], load[WRENCH + PADDED_TILT + 1], load[WRENCH + PADDED_TILT + 2]
+        load = work.loads[n]
+        o = bodies.start[n]
+        frame = work.frames[n]
+        sa = frame[SIN_A]
+        ca = frame[COS_A]
+        sb = frame[SIN_B]
+        cb = frame[COS_B]
+        x = load[WRENCH + PADDED_TILT]
+        y = load[WRENCH + PADDED_TILT + 1]
+        z = load[WRENCH + PADDED_TILT + 2]
         for i in range(3):
             f[o + i] += load[WRENCH + i]
         # Moments about the axes that the three angles turn about: x, the tilted y, the body's z.

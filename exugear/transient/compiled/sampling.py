@@ -104,7 +104,8 @@ def observe_meshes(meshes: Meshes, work: Work, columns: Columns, sample: Floats,
 @kernel
 def true_rate(strain: Floats, rate: Floats, first_body: Floats, out: Floats) -> None:
     """Fill the derivative of a connector's strain: see `exugear.bearings.kernels.connectors.connector_motion`."""
-    d, w = strain, rate
+    d = strain
+    w = rate
     x = first_body[0] * first_body[W_X] + first_body[3] * first_body[W_Y] + first_body[6] * first_body[W_Z]
     y = first_body[1] * first_body[W_X] + first_body[4] * first_body[W_Y] + first_body[7] * first_body[W_Z]
     z = first_body[2] * first_body[W_X] + first_body[5] * first_body[W_Y] + first_body[8] * first_body[W_Z]
@@ -121,10 +122,13 @@ def true_rate(strain: Floats, rate: Floats, first_body: Floats, out: Floats) -> 
 def observe_supports(connectors: Connectors, work: Work, columns: Columns, sample: Floats) -> None:
     """Fill force (N) and moment (N m) of each bearing on its body, global axes."""
     for n in range(connectors.ends.shape[0]):
-        turn, support = work.frames[connectors.ends[n, 0]], work.supports[n]
+        turn = work.frames[connectors.ends[n, 0]]
+        support = work.supports[n]
         for part in range(2):
             place = SUPPORT_LOAD + 3 * part
-            x, y, z = support[place], support[place + 1], support[place + 2]
+            x = support[place]
+            y = support[place + 1]
+            z = support[place + 2]
             first = (columns.support_moment if part else columns.support_force) + 3 * connectors.number[n]
             sample[first] = -(turn[0] * x + turn[1] * y + turn[2] * z)
             sample[first + 1] = -(turn[3] * x + turn[4] * y + turn[5] * z)
@@ -149,12 +153,14 @@ def observe_rolling(
         return
     if rolling.first[n] == rolling.first[n + 1]:
         return
-    strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
+    strain = work.supports[n, :BODY_SIZE]
+    rate = work.supports[n, BODY_SIZE:SUPPORT_LOAD]
     rolling_forces(n, strain, rate, turn_between(q, n, bodies, connectors), rolling, work.rolling)
     energy[ELASTIC] += work.rolling[STORED]
     energy[DISSIPATED] += stride * work.rolling[CAGE_DAMPING] * turn_between(v, n, bodies, connectors)
     for i in range(BODY_SIZE):
-        elastic, damped = work.rolling[ELASTIC_PART + i], work.rolling[DAMPED_PART + i]
+        elastic = work.rolling[ELASTIC_PART + i]
+        damped = work.rolling[DAMPED_PART + i]
         energy[DISSIPATED] += stride * damped * rate[i]
         # The potential knows no angle about z, whose moment but keeps the others from working on the spin.
         energy[OF_BEARING_RATES] += stride * elastic * (rate[i] - (derivative[i] if i < SPIN else 0.0))
@@ -174,19 +180,25 @@ def observe_connectors(
     """Add energy and powers of all bearings, these for `stride` samples (see `take_sample`)."""
     derivative = work.motion
     for n in range(connectors.ends.shape[0]):
-        strain, rate = work.supports[n, :BODY_SIZE], work.supports[n, BODY_SIZE:SUPPORT_LOAD]
+        strain = work.supports[n, :BODY_SIZE]
+        rate = work.supports[n, BODY_SIZE:SUPPORT_LOAD]
         true_rate(strain, rate, work.frames[connectors.ends[n, 0]], derivative)
-        one, damping = pairs.data[n], all_eight(0.0)
+        one = pairs.data[n]
+        damping = all_eight(0.0)
         elastic = damping
         for column in range(BODY_SIZE):
             of_column = eight(one, PADDED * column)
-            elastic, damping = elastic + of_column * strain[column], damping + of_column * rate[column]
+            elastic = elastic + of_column * strain[column]
+            damping = damping + of_column * rate[column]
         put(work.motion, PADDED, elastic)
         put(work.motion, 2 * PADDED, damping * one[LAG])
-        stored, lost, turned = 0.0, 0.0, 0.0
+        stored = 0.0
+        lost = 0.0
+        turned = 0.0
         for row in range(BODY_SIZE):
             place = row if row < TILT else row - TILT + PADDED_TILT
-            force, damped = work.motion[PADDED + place], work.motion[2 * PADDED + place]
+            force = work.motion[PADDED + place]
+            damped = work.motion[2 * PADDED + place]
             offset = one[OFFSET + place]
             if one[DAMPED] == 1.0:
                 for column in range(BODY_SIZE):
@@ -203,7 +215,8 @@ def observe_connectors(
 @kernel
 def acting_row(m: int, meshes: Meshes, table: TableArrays | None, work: Work) -> tuple[float, Floats]:
     """Scalar force of mesh m (N) and the row that it acts along."""
-    force, row = work.mesh.states[m, LAST_FORCE], meshes.force[m]
+    force = work.mesh.states[m, LAST_FORCE]
+    row = meshes.force[m]
     if table is None:
         return force, row
     if force < 0.0 and meshes.form[m] == TABLE_FORM:  # the other flank pushes
@@ -227,18 +240,22 @@ def observe_joints(
     forces = sample[columns.support_force : columns.support_force + 3 * joints.host.size]
     forces[:] = 0.0
     for m in range(meshes.coordinates.shape[0]):
-        c, s = work.turns[meshes.slot[m], COSINE], work.turns[meshes.slot[m], SINE]
+        c = work.turns[meshes.slot[m], COSINE]
+        s = work.turns[meshes.slot[m], SINE]
         for end in range(2):
             j = joints.ends[m, end]
             if j >= 0:
                 force, row = acting_row(m, meshes, table, work)
-                x, y, z = row[BODY_SIZE * end], row[BODY_SIZE * end + 1], row[BODY_SIZE * end + AXIAL]
+                x = row[BODY_SIZE * end]
+                y = row[BODY_SIZE * end + 1]
+                z = row[BODY_SIZE * end + AXIAL]
                 forces[3 * j] += force * (c * x - s * y)
                 forces[3 * j + 1] += force * (s * x + c * y)
                 forces[3 * j + 2] += force * z
     for j in range(joints.host.size):
         if joints.planet[j, 0] > 0.0:  # held on its orbit
-            c, s = work.turns[joints.slot[j], COSINE], work.turns[joints.slot[j], SINE]
+            c = work.turns[joints.slot[j], COSINE]
+            s = work.turns[joints.slot[j], SINE]
             pull = joints.planet[j, 0] * v[joints.carrier[j]] * v[joints.carrier[j]]
             forces[3 * j] -= pull * (c * joints.planet[j, 1] - s * joints.planet[j, 2])
             forces[3 * j + 1] -= pull * (s * joints.planet[j, 1] + c * joints.planet[j, 2])
@@ -251,7 +268,9 @@ def observe_joints(
 def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Floats) -> None:
     """Add the kinetic energy of all bodies (see `take_sample`)."""
     for n in range(bodies.mass.size):
-        o, sb, cb = bodies.start[n], work.frames[n, SIN_B], work.frames[n, COS_B]
+        o = bodies.start[n]
+        sb = work.frames[n, SIN_B]
+        cb = work.frames[n, COS_B]
         square = v[o] * v[o] + v[o + 1] * v[o + 1] + v[o + 2] * v[o + 2]
         turning = v[o + TILT] * cb
         tilting = turning * turning + v[o + TILT + 1] * v[o + TILT + 1]
@@ -267,8 +286,10 @@ def observe_bodies(q: Floats, v: Floats, bodies: Bodies, work: Work, energy: Flo
 def observe_springs(q: Floats, v: Floats, stride: int, springs: Springs, energy: Floats) -> None:
     """Add elastic energy and damping power of the torsional springs (see `take_sample`)."""
     for n in range(springs.ends.shape[0]):
-        i, j = springs.ends[n, 0], springs.ends[n, 1]
-        twist, rate = q[j] - q[i], v[j] - v[i]
+        i = springs.ends[n, 0]
+        j = springs.ends[n, 1]
+        twist = q[j] - q[i]
+        rate = v[j] - v[i]
         energy[ELASTIC] += 0.5 * springs.stiffness[n] * twist * twist
         energy[DISSIPATED] += stride * springs.damping[n] * rate * rate
 

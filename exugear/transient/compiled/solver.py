@@ -46,7 +46,8 @@ def unsupported_reason(assembly: Assembly) -> str:
 
 def compile_loop_ahead(assembly: Assembly) -> None:
     """Let the loop over time, most of all that compiles, be compiled while a state to start from is looked for."""
-    rest, nothing = np.zeros(assembly.size), np.empty((0, 0))
+    rest = np.zeros(assembly.size)
+    nothing = np.empty((0, 0))
     system = CompiledSystem(assembly, rest, rest, LoadTable(), 1.0)
     compile_ahead(advance, *system.arguments(np.empty(0), 0, 1, nothing, nothing, nothing, nothing))
 

@@ -133,7 +133,8 @@ def fastest_motion(assembly: Assembly) -> str:
     basis, matrix = _free_motions(linear, assembly.motions)
     values, vectors = scipy.linalg.eig(matrix)
     fastest = int(np.argmax(np.abs(values)))
-    rate, shape = float(np.abs(values[fastest])), basis @ vectors[: basis.shape[1], fastest]
+    rate = float(np.abs(values[fastest]))
+    shape = basis @ vectors[: basis.shape[1], fastest]
     moving = int(np.argmax(np.abs(shape) ** 2 * np.diag(linear.mass)))
     strained = {
         name: abs(shape.conj() @ (k + values[fastest] * linear.damping[name]) @ shape)
@@ -254,7 +255,8 @@ def choose_integration(
     >>> choose_integration(assemble(gearbox, Choice("rigid"), stiffness), sample_rate=20e3, band=6.4e3)
     <Integration: Adams of order 5, step 16.67 us, margin 3>
     """
-    motions, methods = _Motions(assembly, band), methods_of(integrator)
+    motions = _Motions(assembly, band)
+    methods = methods_of(integrator)
     if step is not None:
         return _best(motions.with_step(method, step) for method in methods)
     steps = [motions.longest_step(method, 1.0 / sample_rate) for method in methods]
@@ -267,7 +269,9 @@ def _best(choices: Iterable[Integration]) -> Integration:
     """Return the cheapest that is stable with the margin and accurate; else the stable one of least error."""
     ranked = sorted(choices, key=lambda choice: (choice.margin < 1.0, choice.error))
     good = [choice for choice in ranked if choice.margin >= MARGIN and choice.is_accurate]
-    return min(good, key=lambda choice: choice.method.evaluations) if good else ranked[0]
+    if good:
+        return min(good, key=lambda choice: choice.method.evaluations)
+    return ranked[0]
 
 
 def unstable(integration: Integration) -> str:

@@ -76,10 +76,12 @@ def _add_rigid_node(parts: Parts, position: Floats, first: int, q: Floats, v: Fl
 def _add_elastic_body(parts: Parts, name: str, q: Floats, v: Floats) -> None:
     """Add an elastic body: a rigid-body node at each seat, one node for the modal coordinates, matrices on all."""
     assembly = parts.assembly
-    elastic, coordinates = assembly.elastic_bodies[name], assembly.elastic_slices[name]
+    elastic = assembly.elastic_bodies[name]
+    coordinates = assembly.elastic_slices[name]
     reduced = elastic.reduced
     for n, seat in enumerate(reduced.seats):
-        key, position = seat_key(name, seat.name), np.array(seat.position)
+        key = seat_key(name, seat.name)
+        position = np.array(seat.position)
         parts.nodes[key] = _add_rigid_node(parts, position, coordinates.start + 6 * n, q, v)
         parts.seat_positions[key] = position
     nodes = [parts.nodes[seat_key(name, seat.name)] for seat in reduced.seats]
@@ -97,7 +99,8 @@ def _add_elastic_body(parts: Parts, name: str, q: Floats, v: Floats) -> None:
     parts.elastic_nodes[name] = nodes
     parts.nodes[name] = parts.nodes[seat_key(name, elastic.main_seat)]
     for item, seat_name in elastic.shared_seats.items():
-        key, shared = seat_key(name, item), seat_key(name, seat_name)
+        key = seat_key(name, item)
+        shared = seat_key(name, seat_name)
         parts.nodes[key], parts.seat_positions[key] = parts.nodes[shared], parts.seat_positions[shared]
     if name in assembly.turning:
         _add_turning_laws(parts, assembly.turning[name], nodes)
@@ -121,7 +124,8 @@ def _add_turning_laws(parts: Parts, body: TurningBody, nodes: list[Any]) -> None
         return body.mass_matrix(np.array(q))
 
     def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
-        q, v = np.array(q), np.array(v)
+        q = np.array(q)
+        v = np.array(v)
         return np.asarray(body.forces(q, v) - body.inertia_forces(q, v, np.zeros_like(q)))
 
     parts.mbs.AddObject(

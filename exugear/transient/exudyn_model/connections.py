@@ -67,7 +67,8 @@ def _offset(connectors: ConnectorArrays, n: int) -> Floats:
 def _rolling_law(parts: Parts, n: int) -> Callable[..., Floats]:
     """User function of a support whose rolling law acts beside its linear one; it stands in for both."""
     offset = parts.assembly.connectors.offset[n]
-    bearing, rolling = parts.assembly.supports[n], parts.assembly.connectors.rolling
+    bearing = parts.assembly.supports[n]
+    rolling = parts.assembly.connectors.rolling
     first, second = (parts.support_spin(body, bearing.name) for body in (bearing.on, bearing.body))
     forces = rolling_memory(rolling)
 
@@ -83,7 +84,8 @@ def _rolling_law(parts: Parts, n: int) -> Callable[..., Floats]:
         damping: Any,
         *frames: Any,
     ) -> Floats:
-        strain, rate = np.array([*displacement, *rotation]), np.array([*velocity, *angular_velocity])
+        strain = np.array([*displacement, *rotation])
+        rate = np.array([*velocity, *angular_velocity])
         rolling_force(n, strain, rate, second() - first(), rolling, forces)
         load: Floats = offset + stiffness @ strain + damping @ rate
         load += forces[ELASTIC_PART : ELASTIC_PART + BODY_SIZE]

@@ -134,7 +134,8 @@ class FloatingSystem:
         spatial = (jacobian @ v).reshape(-1, 6)
         axes = turn[:, 2] + self._turns @ modal @ turn.T @ skew(turn[:, 2])
         axis_rates = (skew(spatial[:, 3:]) @ axes[..., None])[..., 0]
-        motion, velocity = np.empty_like(spatial), spatial.copy()
+        motion = np.empty_like(spatial)
+        velocity = spatial.copy()
         motion[:, :3] = q[:3] + arms - self._arms
         # A tilt about +x moves the tip of the axis towards -y.
         motion[:, TILT_X], motion[:, TILT_Y] = -axes[:, 1], axes[:, 0]
@@ -155,18 +156,21 @@ class FloatingSystem:
         return turn, rates, arms, jacobian.reshape(-1, len(q))
 
     def _force(self, mbs: Any, t: float, item: int, coordinates: Any, velocities: Any) -> Floats:
-        q, v = np.array(coordinates), np.array(velocities)
+        q = np.array(coordinates)
+        v = np.array(velocities)
         turn, rates, arms, jacobian = self._kinematics(q)
         force: Floats = self.law.force(t, *self._seat_motion(q, v, turn, arms, jacobian)) @ jacobian
         if self.stiffening:
-            speed, modal = self._speed(turn, rates, v), self._modal
+            speed = self._speed(turn, rates, v)
+            modal = self._modal
             force[modal] -= speed**2 * (self._spin_stiffness @ q[modal]) + speed * (self._spin_damping @ v[modal])
         return force
 
     def _jacobian(
         self, mbs: Any, t: float, item: int, coordinates: Any, velocities: Any, factor_q: float, factor_v: float
     ) -> Floats:
-        q, v = np.array(coordinates), np.array(velocities)
+        q = np.array(coordinates)
+        v = np.array(velocities)
         turn, rates, _, jacobian = self._kinematics(q)
         matrix: Floats = jacobian.T @ (factor_q * self.law.stiffness + factor_v * self.law.damping) @ jacobian
         if self.stiffening:
@@ -195,11 +199,13 @@ class FloatingSystem:
         integration.newton.useModifiedNewton = True
         settings.solutionSettings.writeSolutionToFile = False
         settings.displayStatistics = False
-        times, motions = [], []
+        times = []
+        motions = []
 
         def after_step(mbs: Any, t: float) -> bool:
             data = mbs.systemData
-            q, v = np.array(data.GetODE2Coordinates())[self._order], np.array(data.GetODE2Coordinates_t())[self._order]
+            q = np.array(data.GetODE2Coordinates())[self._order]
+            v = np.array(data.GetODE2Coordinates_t())[self._order]
             times.append(t)
             motions.append(self.seat_motion(q, v)[0])
             return True

@@ -70,7 +70,8 @@ class FloatingBodies:
         self._is_floating = np.zeros(assembly.size, dtype=bool)
         for name in self._coordinates:
             self._is_floating[assembly.elastic_slices[name]] = True
-        ends, pairs = assembly.connectors.bodies, assembly.springs.coordinates
+        ends = assembly.connectors.bodies
+        pairs = assembly.springs.coordinates
         self.connectors = np.flatnonzero(((ends >= 0) & self._is_floating[ends]).any(axis=1))
         self.couplings = np.flatnonzero(self._is_floating[pairs].any(axis=1))
         self.slices: dict[str, slice] = {}
@@ -93,7 +94,8 @@ class FloatingBodies:
 
     def _state(self, q: Floats, v: Floats) -> tuple[Floats, Floats, dict[str, FloatingMotion]]:
         """Coordinates and velocities of the assembly, and the motion of each floating body."""
-        assembly_q, assembly_v = np.empty(self._assembly.size), np.empty(self._assembly.size)
+        assembly_q = np.empty(self._assembly.size)
+        assembly_v = np.empty(self._assembly.size)
         motions: dict[str, FloatingMotion] = {}
         rigid = slice(0, self._rigid_count)
         assembly_q[rigid], assembly_v[rigid] = q[rigid], v[rigid]
@@ -134,7 +136,8 @@ class FloatingBodies:
             return f
 
         def force(mbs: Any, t: float, item: int, coordinates: Any, velocities: Any) -> Floats:
-            solver_q, solver_v = np.array(coordinates), np.array(velocities)
+            solver_q = np.array(coordinates)
+            solver_v = np.array(velocities)
             q, v, motions = self._state(solver_q, solver_v)
             f = supports(t, q, v)
             if meshes is not None:
@@ -147,7 +150,8 @@ class FloatingBodies:
         def derivatives(
             mbs: Any, t: float, item: int, coordinates: Any, velocities: Any, factor_q: float, factor_v: float
         ) -> Floats:
-            solver_q, solver_v = np.array(coordinates), np.array(velocities)
+            solver_q = np.array(coordinates)
+            solver_v = np.array(velocities)
             q, v, motions = self._state(solver_q, solver_v)
             matrix = -factor_q * by_coordinates - factor_v * by_rates
             if meshes is not None:
@@ -213,7 +217,8 @@ class FloatingBodies:
 def _differentiated(law: Callable[[Floats, Floats], Floats], q: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Differentiate forces that are nearly linear to q and to v, each (size, size)."""
     size = len(q)
-    by_q, by_v = np.empty((size, size)), np.empty((size, size))
+    by_q = np.empty((size, size))
+    by_v = np.empty((size, size))
     for n, step in enumerate(DIFFERENCE * np.eye(size)):
         by_q[:, n] = (law(q + step, v) - law(q - step, v)) / (2.0 * DIFFERENCE)
         by_v[:, n] = (law(q, v + step) - law(q, v - step)) / (2.0 * DIFFERENCE)

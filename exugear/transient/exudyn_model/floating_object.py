@@ -32,8 +32,10 @@ def frame_integrals(body: FloatingBody, kind: Any) -> Any:
 
     A skew matrix s(f) with s(f) v = f x v gives s(f)' s(g) = (f . g) 1 - g f' and s(f)' g = g x f.
     """
-    second_moments, first_moments = body.second_moments, body.first_moments
-    modes, seats = len(body.stiffness), len(body.seats)
+    second_moments = body.second_moments
+    first_moments = body.first_moments
+    modes = len(body.stiffness)
+    seats = len(body.seats)
     products = np.einsum("aafg,bc->bcfg", second_moments, np.eye(3)) - second_moments.transpose(1, 0, 2, 3)
     turned = np.stack([second_moments[a, b] - second_moments[b, a] for a, b in ((2, 1), (0, 2), (1, 0))])
 

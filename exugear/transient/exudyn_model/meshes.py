@@ -87,7 +87,10 @@ class _MeshVectors:
     def torque(self, mbs: Any, t: float, load: Any) -> list[float]:
         """Torque, N m, from the generalized moments Q of the Rxyz angles: G^T M = Q."""
         q, f = self._generalized(mbs)
-        ca, sa, cb, sb = np.cos(q[3]), np.sin(q[3]), np.cos(q[4]), np.sin(q[4])
+        ca = np.cos(q[3])
+        sa = np.sin(q[3])
+        cb = np.cos(q[4])
+        sb = np.sin(q[4])
         transposed = np.array([[1.0, 0.0, 0.0], [0.0, ca, sa], [sb, -sa * cb, ca * cb]])
         values: list[float] = np.linalg.solve(transposed, f[3:]).tolist()
         return values

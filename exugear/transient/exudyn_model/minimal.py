@@ -36,7 +36,8 @@ def add_minimal_system(
     steady = loading.generalized(assembly, 0.0, q, v) if loading.is_constant else None
 
     def force(mbs: Any, t: float, item: int, y: Any, rate: Any) -> Floats:
-        q, v = motions @ np.array(y), motions @ np.array(rate)
+        q = motions @ np.array(y)
+        v = motions @ np.array(rate)
         f = loading.generalized(assembly, t, q, v) if steady is None else steady.copy()
         if meshes is not None:
             f += assembly.mesh_forces(q, v, meshes)
@@ -60,7 +61,8 @@ def add_minimal_system(
 
 def _spring_matrices(size: int, springs: SpringArrays) -> tuple[Floats, Floats]:
     """Stiffness and damping (size, size) of torsional couplings."""
-    stiffness, damping = np.zeros((size, size)), np.zeros((size, size))
+    stiffness = np.zeros((size, size))
+    damping = np.zeros((size, size))
     pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
     for (i, j), k, d in zip(springs.coordinates, springs.stiffness, springs.damping, strict=True):
         stiffness[np.ix_([i, j], [i, j])] += k * pair

@@ -57,12 +57,15 @@ class Parts:
             return self.mbs.AddMarker(items.MarkerNodeRigid(nodeNumber=self.nodes[key]))
         if key in self.nodes:  # beside the seat's centre: a body without mass is the arm
             arm = items.ObjectRigidBody(physicsMass=0.0, physicsInertia=[0.0] * 6, nodeNumber=self.nodes[key])
-            number, local = self.mbs.AddObject(arm), position - self.seat_positions[key]
+            number = self.mbs.AddObject(arm)
+            local = position - self.seat_positions[key]
         elif body in self.bodies:
             carrying = next(b for b in self.assembly.bodies if b.name == body)
-            number, local = self.bodies[body], position - node_position(carrying)
+            number = self.bodies[body]
+            local = position - node_position(carrying)
         else:
-            number, local = self._ground_object(), position
+            number = self._ground_object()
+            local = position
         return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=np.asarray(local).tolist()))
 
     def support_spin(self, body: str, item: str) -> Callable[[], float]:

@@ -139,10 +139,12 @@ class ExudynSystem:
     def state(self) -> tuple[float, Floats, Floats]:
         """Time (s), coordinates and velocities now."""
         data = self.mbs.systemData
-        q, v = np.array(data.GetODE2Coordinates()), np.array(data.GetODE2Coordinates_t())
+        q = np.array(data.GetODE2Coordinates())
+        v = np.array(data.GetODE2Coordinates_t())
         if self._minimal:
             return float(data.GetTime()), self.assembly.motions @ q, self.assembly.motions @ v
-        q, v = q[self._order], v[self._order]
+        q = q[self._order]
+        v = v[self._order]
         if self.parts.floating is not None:
             q, v = self.parts.floating.state(q, v)
         return float(data.GetTime()), q, v

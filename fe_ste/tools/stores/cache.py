@@ -82,7 +82,9 @@ class Cache(Displayed, Generic[Value]):
 
     def _store(self, key: str) -> Store | None:
         folder = kept_folder()
-        return None if folder is None else Store(folder / f"{self._name}-{key}.npz", key)
+        if folder is None:
+            return None
+        return Store(folder / f"{self._name}-{key}.npz", key)
 
     def _remember(self, key: str, value: Value) -> None:
         with self._lock:
@@ -116,7 +118,9 @@ def kept_folder() -> Path | None:
     """Folder of what is computed once and kept for all results folders; None where nothing is to be kept."""
     asked = os.environ.get(FOLDER_VARIABLE, "")
     if asked:
-        return None if asked == "off" else Path(asked)
+        if asked == "off":
+            return None
+        return Path(asked)
     import platformdirs  # needed for a table only: not worth its time at each start
 
     user = platformdirs.user_cache_path("exugear", appauthor=False)

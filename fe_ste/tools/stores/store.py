@@ -65,7 +65,9 @@ class Store:
         """
         try:
             arrays = load_arrays(self.path)
-            return unpack(arrays) if str(arrays.pop(_KEY, "")) == self.key else None
+            if str(arrays.pop(_KEY, "")) == self.key:
+                return unpack(arrays)
+            return None
         except (OSError, ValueError, TypeError, LookupError, AttributeError) as error:
             self._tell_of(error)
             return None
@@ -89,7 +91,9 @@ class Store:
         except OSError as error:
             self._tell_of(error)
             return None
-        return dataset if dataset.attrs.get("input_hash") == self.key else None
+        if dataset.attrs.get("input_hash") == self.key:
+            return dataset
+        return None
 
     def write_dataset(self, dataset: xr.Dataset) -> None:
         """Write a dataset whose attribute ``input_hash`` is the key, whole or not at all; OSError as in `write`."""

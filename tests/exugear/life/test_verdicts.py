@@ -250,11 +250,15 @@ def test_l10_is_among_what_limits():
     assert limits(data) == [("hss_a", "L10", 2.6), ("hss_a", "L10r", 0.8)]
 
 
+@pytest.mark.validation
+@pytest.mark.validation
 def test_a_kept_life_is_summed_up_without_numbers_that_json_has_not(broken):
     _, out = broken
     json.dumps(summary(read_life(next(out.glob("*/*/life.nc")))), allow_nan=False)
 
 
+@pytest.mark.validation
+@pytest.mark.validation
 def test_what_a_kill_behind_the_last_file_left_is_removed(broken):
     """The life is written, its solved angles are not yet removed: the next call takes one and removes the others."""
     case, out = broken

@@ -25,10 +25,10 @@ def put_bearings(results: Results, gearbox: Gearbox, duties: Sequence[Mapping[st
         name = str(duty["bearing"])
         family = families.get(name, name)
         numbers = target.origins.bearings.get(family, ())
-        place = instance_of(name, family)
-        if place >= len(numbers):
+        instance = instance_of(name, family)
+        if instance >= len(numbers):
             continue
-        number = numbers[place]
+        number = numbers[instance]
         results.put_own(number, "radial_load", "kN", float(duty["radial_load_kN"]), case)
         results.put_own(number, "axial_load", "kN", float(duty["axial_load_kN"]), case)
         results.put(number, "contact_pressure", "MPa", duty["contact_pressure_MPa"], case)

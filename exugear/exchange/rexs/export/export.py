@@ -98,7 +98,7 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     if stored.loaded is not None:
         put_displacements(results, stored.loaded, target)
     content = with_additions(path, results.additions)
-    own = sum(one.name.startswith(OWN) for one in results.additions)
+    own = sum(addition.name.startswith(OWN) for addition in results.additions)
     return Exported(content, own, len(results.additions) - own, _replaced(model, results), tuple(stored.left_out))
 
 
@@ -121,10 +121,10 @@ def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
 def _replaced(model: Model, results: Results) -> tuple[str, ...]:
     """Results in the file that are replaced by others."""
     told = []
-    for one in results.additions:
-        part = model.components[one.component]
-        cases = {case.number: case.changes.get(one.component, {}) for case in model.load_cases}
-        there = part.attributes if one.load_case is None else cases[one.load_case]
-        if synonyms.ATTRIBUTES.get(one.name, one.name) in there and not one.name.startswith(OWN):
-            told.append(f"{part}: {one.name}")
+    for addition in results.additions:
+        part = model.components[addition.component]
+        cases = {case.number: case.changes.get(addition.component, {}) for case in model.load_cases}
+        there = part.attributes if addition.load_case is None else cases[addition.load_case]
+        if synonyms.ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
+            told.append(f"{part}: {addition.name}")
     return tuple(told)

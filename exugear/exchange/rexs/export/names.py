@@ -70,20 +70,20 @@ def name_in(key: str, version: Version) -> str:
     ('base_circle_diameter', 'base_diameter', 'custom_exugear_base_diameter')
     """
     known = [name for since, name in NAMES.get(key, ()) if since <= version]
-    return known[-1] if known else OWN + key
+    if known:
+        return known[-1]
+    return OWN + key
 
 
 def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, float]]:
     """Entries of a bearing's stiffness: name, row and column over (u, v, w) and angles about them, unit, SI to unit."""
-    forces, motions = (
-        (("f_u", 0), ("f_v", 1), ("f_w", 2), ("m_v", 4), ("m_w", 5)),
-        (
-            ("d_u", 0),
-            ("d_v", 1),
-            ("d_w", 2),
-            ("rot_v", 4),
-            ("rot_w", 5),
-        ),
+    forces = (("f_u", 0), ("f_v", 1), ("f_w", 2), ("m_v", 4), ("m_w", 5))
+    motions = (
+        ("d_u", 0),
+        ("d_v", 1),
+        ("d_w", 2),
+        ("rot_v", 4),
+        ("rot_w", 5),
     )
     for force, row in forces:
         for motion, column in motions:

@@ -42,7 +42,8 @@ class Origins(Displayed, line=" of {gears!n} gears, {pairs!n} pairs, {bearings!n
 
 def origins_of(found: Found) -> Origins:
     """Gather the components behind gears, pairs and bearings."""
-    model, places = found.model, found.places
+    model = found.model
+    places = found.places
     first = first_of_planets(model, places, found.bodies)
     gears = {
         name: (number, *(other for other, own in first.items() if own == number))
@@ -82,27 +83,29 @@ def _stages(
     for relation in model.relations_of("stage"):
         both = [relation.roles[role] for role in ("gear_1", "gear_2")]
         own = frozenset(first.get(number, number) for number in both)
-        place = max(gears[teeth.names[first.get(number, number)]].index(number) for number in both)
-        found[pairs[own]].append((place, relation.roles["stage"]))
+        index = max(gears[teeth.names[first.get(number, number)]].index(number) for number in both)
+        found[pairs[own]].append((index, relation.roles["stage"]))
     return {name: tuple(number for _, number in sorted(stages)) for name, stages in found.items()}
 
 
 def _bearings(found_in: Found, block: Block) -> tuple[int, ...]:
     """Bearing of a table, and those of the other planets that stand where it does."""
-    model, places, bodies = found_in.model, found_in.places, found_in.bodies
-    own = model.components[block.number]
-    body = next(one for one in bodies.members if one.name == block.entries["body"].value)
-    if not body.others or own.type not in BEARINGS:
-        return (own.number,)
+    model = found_in.model
+    places = found_in.places
+    bodies = found_in.bodies
+    component = model.components[block.number]
+    body = next(member for member in bodies.members if member.name == block.entries["body"].value)
+    if not body.others or component.type not in BEARINGS:
+        return (component.number,)
     planets = [[part.number for part in parts] for parts in body.others]
     found: list[tuple[int, int]] = []
-    for part in model.of_type(own.type):
+    for part in model.of_type(component.type):
         place = next(
             (n for n, parts in enumerate(planets) for end in ends(model, part) or () if end.number in parts), -1
         )
-        if place >= 0 and math.isclose(_z(places, part), _z(places, own), abs_tol=PLACE_TOLERANCE):
+        if place >= 0 and math.isclose(_z(places, part), _z(places, component), abs_tol=PLACE_TOLERANCE):
             found.append((place, part.number))
-    return (own.number, *(number for _, number in sorted(found)))
+    return (component.number, *(number for _, number in sorted(found)))
 
 
 def _z(places: Places, part: Component) -> float:

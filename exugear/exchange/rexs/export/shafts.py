@@ -42,8 +42,8 @@ def put_displacements(results: Results, assembly: Assembly, target: Target) -> N
     q = static_state(assembly).q
     for body in assembly.bodies:
         members = target.origins.bodies.get(body.family, ())
-        place = instance_of(body.name, body.family)
-        shafts = [n for n in (members[place] if place < len(members) else ()) if _is_shaft(target, n)]
+        instance = instance_of(body.name, body.family)
+        shafts = [n for n in (members[instance] if instance < len(members) else ()) if _is_shaft(target, n)]
         nodes = sorted(_nodes(assembly, q, body), key=lambda node: node[0])
         if len(shafts) != 1 or not nodes or body.fixed:
             continue
@@ -64,7 +64,9 @@ def _is_shaft(target: Target, number: int) -> bool:
 def _sense(target: Target, number: int) -> int:
     """Sense of a component's u axis: 1 along +z, -1 against it."""
     axes = target.origins.axes.get(number)
-    return 1 if axes is None or axes[0, 2] > 0.0 else -1
+    if axes is None or axes[0, 2] > 0.0:
+        return 1
+    return -1
 
 
 def _nodes(assembly: Assembly, q: Floats, body: Body) -> Iterator[tuple[float, Floats]]:

@@ -81,8 +81,8 @@ class StoredResults:
     @property
     def loaded(self) -> Assembly | None:
         """The most complete variant with bearings of which results were read."""
-        found = [one for one in self._assemblies.values() if one.variant.on_bearings]
-        return max(found, key=lambda one: one.variant.is_elastic, default=None)
+        assemblies = [assembly for assembly in self._assemblies.values() if assembly.variant.on_bearings]
+        return max(assemblies, key=lambda one: one.variant.is_elastic, default=None)
 
     def _each(self, pattern: str, read: Callable[[Path], tuple[Choice, Result]]) -> Iterator[tuple[Choice, Result]]:
         """Read files one by one; what does not belong to the gearbox is noted."""

@@ -45,11 +45,12 @@ def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
                 f"as {', '.join(others)}; keep the names of the import"
             )
     for name in gearbox.gears.keys() & imported.gears.keys():
-        one, other = gearbox.gears[name], imported.gears[name]
+        gear = gearbox.gears[name]
+        other = imported.gears[name]
         for key in ("teeth", "normal_module", "internal"):
-            if not math.isclose(getattr(one, key), getattr(other, key), rel_tol=EQUAL):
+            if not math.isclose(getattr(gear, key), getattr(other, key), rel_tol=EQUAL):
                 faults.append(
-                    f"{gearbox.source}: gears.{name} has {key} = {getattr(one, key):g}, in this file it is "
+                    f"{gearbox.source}: gears.{name} has {key} = {getattr(gear, key):g}, in this file it is "
                     f"{getattr(other, key):g}: results of another gear do not belong into it"
                 )
     if faults:
@@ -108,14 +109,14 @@ def put_pairs(results: Results, gearbox: Gearbox, target: Target) -> None:
                 (pair.pinion, pair.pinion_tip_clearance, _active(pair, pair.pinion)),
                 (pair.gear, pair.gear_tip_clearance, _active(pair, pair.gear)),
             ):
-                place = _gear_data(target, stage, gear)
-                if place is None:
+                data = _gear_data(target, stage, gear)
+                if data is None:
                     continue
-                results.put(place, "pitch_diameter", "mm", 2e3 * pair.working_radius(gear))
-                results.put(place, "working_pressure_angle", "deg", math.degrees(pair.working_pressure_angle))
-                results.put(place, "active_root_diameter", "mm", 2e3 * ends[0])
-                results.put(place, "active_tip_diameter", "mm", 2e3 * ends[1])
-                results.put(place, "tip_clearance", "mm", 1e3 * clearance)
+                results.put(data, "pitch_diameter", "mm", 2e3 * pair.working_radius(gear))
+                results.put(data, "working_pressure_angle", "deg", math.degrees(pair.working_pressure_angle))
+                results.put(data, "active_root_diameter", "mm", 2e3 * ends[0])
+                results.put(data, "active_tip_diameter", "mm", 2e3 * ends[1])
+                results.put(data, "tip_clearance", "mm", 1e3 * clearance)
 
 
 def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
@@ -125,7 +126,9 @@ def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
         tangent = pair.base_tangent_length
         rolls = [roll + tangent if gear.internal else tangent - roll for roll in rolls]
     low, high = sorted(math.hypot(gear.base_radius, roll) for roll in rolls)
-    return (high, low) if gear.internal else (low, high)
+    if gear.internal:
+        return (high, low)
+    return (low, high)
 
 
 def _gear_data(target: Target, stage: int, gear: Gear) -> int | None:
@@ -142,8 +145,8 @@ def put_static_forces(results: Results, gearbox: Gearbox, target: Target) -> Non
     for mesh, force in gearbox.train.static_mesh_forces().items():
         one = next(each for each in gearbox.meshes if each.name == mesh)
         numbers = target.origins.pairs[one.pair.name]
-        place = instance_of(mesh, one.family)
-        stage = numbers[place] if place < len(numbers) else None
+        instance = instance_of(mesh, one.family)
+        stage = numbers[instance] if instance < len(numbers) else None
         if stage is not None:
             results.put(stage, "tangential_force_at_base_circle", "N", abs(force), target.load_case)
 
@@ -157,13 +160,16 @@ def instance_of(name: str, family: str) -> int:
     (2, 0)
     """
     number = name.removeprefix(family).removeprefix("_")
-    return int(number) - 1 if number.isdigit() else 0
+    if number.isdigit():
+        return int(number) - 1
+    return 0
 
 
 def put_tables(results: Results, gearbox: Gearbox, tables: Mapping[str, MeshTable], target: Target) -> None:
     """Put transmission error, mesh stiffness and load along the face of the static state."""
     for name, table in tables.items():
-        data, pair = table.static_state, gearbox.pairs[name].pair
+        data = table.static_state
+        pair = gearbox.pairs[name].pair
         case = target.load_case
         positions = tuple(data["pmc"].to_numpy().tolist())
         for stage in target.origins.pairs[name]:
@@ -190,5 +196,5 @@ def put_tables(results: Results, gearbox: Gearbox, tables: Mapping[str, MeshTabl
             for gear in (pair.pinion, pair.gear):
                 place = _gear_data(target, stage, gear)
                 if place is not None:
-                    turned = tuple(360.0 / gear.teeth * one for one in positions)
+                    turned = tuple(360.0 / gear.teeth * position for position in positions)
                     results.put(place, "mesh_positions", "deg", turned, case)

@@ -119,7 +119,9 @@ class _Union:
 def torsional_stiffness(connection: Component) -> float | None:
     """Torsional stiffness of a coupling or fit, N m/rad; None where the file gives none."""
     value = connection.quantity("rotational_stiffness", "N mm / rad")
-    return None if value is None else 1e-3 * value
+    if value is None:
+        return None
+    return 1e-3 * value
 
 
 def is_rigid_in_torsion(connection: Component) -> bool:
@@ -154,7 +156,9 @@ def ends(model: Model, connection: Component) -> tuple[Component, Component] | N
     """Inner and outer part of a bearing, coupling or fit; None if the file does not say both."""
     inner = model.related("side", "assembly", connection.number, "inner_part")
     outer = model.related("side", "assembly", connection.number, "outer_part")
-    return (inner[0], outer[0]) if inner and outer else None
+    if inner and outer:
+        return (inner[0], outer[0])
+    return None
 
 
 def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
@@ -176,13 +180,13 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
     names = _names(
         {root: parts for root, parts in groups.items() if root in working - planets}, _carriers(model, union)
     )
-    found: list[Body] = []
+    bodies: list[Body] = []
     for root, parts in groups.items():
         if root in names:
-            found.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), _is_fixed(parts)))
+            bodies.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), _is_fixed(parts)))
         elif root not in planets and not _is_fixed(parts):
             notes.ignored.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
-    by_root = {union.root(part.number): body for body in found for part in body.parts}
+    by_root = {union.root(part.number): body for body in bodies for part in body.parts}
     carried = [
         one for members in sets for one in _on_one_orbit(places, members, _carrier(model, union, by_root, members))
     ]
@@ -191,7 +195,7 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
         name = _lettered("planet", number, len(carried))
         placed = _beside_mates(model, groups, placed, planet_bodies)
         planet_bodies.append(_planet_body(places, carrier, placed, name, groups))
-    return Bodies([*found, *planet_bodies])
+    return Bodies([*bodies, *planet_bodies])
 
 
 def _joined(model: Model, notes: Notes) -> _Union:
@@ -202,7 +206,8 @@ def _joined(model: Model, notes: Notes) -> _Union:
         union.join(casings[0], casing)
     carriers: dict[int, int] = {}
     for relation in model.relations_of("assembly", "ordered_assembly"):
-        owner, part = relation.roles.get("assembly", -1), relation.roles.get("part", -1)
+        owner = relation.roles.get("assembly", -1)
+        part = relation.roles.get("part", -1)
         if owner in union and part in union and model.components[owner].type == "shaft":
             union.join(owner, part)
         elif part in union and owner in model.components and model.components[owner].type == "planet_carrier":
@@ -231,7 +236,7 @@ def _joined(model: Model, notes: Notes) -> _Union:
 
 def _working(model: Model, union: _Union) -> set[int]:
     """Roots of what meshes or carries planets, and of what connections with some stiffness tie to it."""
-    numbers = {one for relation in model.relations_of("stage") for one in relation.roles.values()}
+    numbers = {role for relation in model.relations_of("stage") for role in relation.roles.values()}
     working = {union.root(number) for number in numbers if number in union} | _carriers(model, union)
     ties = []
     for connection in model.of_type(*JOINING):
@@ -249,7 +254,7 @@ def _is_fixed(parts: Iterable[Component]) -> bool:
 
 def _carriers(model: Model, union: _Union) -> set[int]:
     relations = model.relations_of("planet_carrier_shaft", "planet_pin")
-    return {union.root(one.roles["shaft"]) for one in relations if one.roles.get("shaft", -1) in union}
+    return {union.root(relation.roles["shaft"]) for relation in relations if relation.roles.get("shaft", -1) in union}
 
 
 def _axial(parts: Iterable[Component]) -> list[Component]:
@@ -331,7 +336,8 @@ def _on_one_orbit(
     orbits: list[list[_Planet]] = []
     for root, shaft in members:
         x, y, _ = places.position(shaft)
-        dx, dy = x - carrier.axis[0], y - carrier.axis[1]
+        dx = x - carrier.axis[0]
+        dy = y - carrier.axis[1]
         angle = round(math.degrees(math.atan2(dy, dx)) % 360.0, 9) % 360.0
         planet = _Planet(angle, math.hypot(dx, dy), root, shaft)
         orbit = next((one for one in orbits if abs(one[0].radius - planet.radius) <= COAXIAL), None)
@@ -356,7 +362,9 @@ def _beside_mates(
     for body in earlier:
         for number, parts in enumerate((body.parts, *body.others)):
             if first & {part.number for part in parts} and len(body.angles) == len(placed):
-                return placed[-number:] + placed[:-number] if number else placed
+                if number:
+                    return placed[-number:] + placed[:-number]
+                return placed
     return placed
 
 
@@ -388,4 +396,6 @@ def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[in
 
 
 def _lettered(name: str, number: int, count: int) -> str:
-    return name if count == 1 else f"{name}_{chr(ord('a') + number % 26)}"
+    if count == 1:
+        return name
+    return f"{name}_{chr(ord('a') + number % 26)}"

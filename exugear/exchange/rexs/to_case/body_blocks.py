@@ -117,7 +117,8 @@ def _place(body: Body) -> dict[str, Entry]:
 
 
 def _tube(model: Model, body: Body, teeth: Teeth, number: int, sections: Sequence[Cylinder], notes: Notes) -> Cylinder:
-    gear, z = teeth.gears[number], teeth.z[number]
+    gear = teeth.gears[number]
+    z = teeth.z[number]
     seat = seat_diameter(sections, z, gear.face_width.value, gear.internal)
     return gear_tube(model, gear, z, seat, 0.0, notes)
 
@@ -139,22 +140,26 @@ def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
     """Tell whether the sections of a body make one elastic shaft."""
     shafts = [part for part in body.of_type("shaft") if part.given("support_vector")]
     rigid = any(is_rigid(material_of(model, shaft)) for shaft in shafts)
-    plain_shaft = not body.carrier and not body.of_type("side_plate") and all(one.aside == 0.0 for one in sections)
+    plain_shaft = (
+        not body.carrier and not body.of_type("side_plate") and all(section.aside == 0.0 for section in sections)
+    )
     materials = {_number(material_of(model, shaft)) for shaft in shafts}
     return plain_shaft and not rigid and len(materials) == 1 and is_continuous(sections)
 
 
 def _number(material: Component | None) -> int:
-    return -1 if material is None else material.number
+    if material is None:
+        return -1
+    return material.number
 
 
 def _shape(model: Model, body: Body, sections: Sequence[Cylinder], notes: Notes) -> Block:
     pieces = [
-        {"length_mm": one.length, "outer_diameter_mm": one.outer}
-        | ({"inner_diameter_mm": one.inner} if one.inner else {})
-        | ({"outer_diameter_end_mm": one.outer_end} if one.outer_end not in (None, one.outer) else {})
-        | ({"inner_diameter_end_mm": one.inner_end} if one.inner_end not in (None, one.inner) else {})
-        for one in sections
+        {"length_mm": section.length, "outer_diameter_mm": section.outer}
+        | ({"inner_diameter_mm": section.inner} if section.inner else {})
+        | ({"outer_diameter_end_mm": section.outer_end} if section.outer_end not in (None, section.outer) else {})
+        | ({"inner_diameter_end_mm": section.inner_end} if section.inner_end not in (None, section.inner) else {})
+        for section in sections
     ]
     entries = {
         "start_z_mm": read(sections[0].start, "support_vector of the shaft"),

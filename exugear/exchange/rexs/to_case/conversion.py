@@ -281,7 +281,9 @@ class _Draft:
         told = [
             f"{name} is {comment}" for name, comment in blocks.items() if name in words or name.split(".")[1] in words
         ]
-        return f"{fault} ({'; '.join(told)})" if told else fault
+        if told:
+            return f"{fault} ({'; '.join(told)})"
+        return fault
 
     def leave_stiff(self, source: str, path: str | Path) -> None:
         """Take bodies as rigid in all variants whose shape has no place for its seats, and say why."""
@@ -394,15 +396,15 @@ def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes:
     if gearbox.train.degrees_of_freedom != 1:
         return
     mode = dict(zip(gearbox.spinning, gearbox.train.kinematic_modes[:, 0].tolist(), strict=True))
-    for one in loads:
-        base = one.speeds.get(ends.input)
-        for body, speed in one.speeds.items():
+    for load in loads:
+        base = load.speeds.get(ends.input)
+        for body, speed in load.speeds.items():
             if not base or body == ends.input or body not in mode:
                 continue
             rolls = base * mode[body] / mode[ends.input]
-            notes.checked.append(f"{one.name}: {body} turns at {speed:.6g} rpm, the train rolls at {rolls:.6g} rpm")
+            notes.checked.append(f"{load.name}: {body} turns at {speed:.6g} rpm, the train rolls at {rolls:.6g} rpm")
             if abs(rolls - speed) > SPEED_TOLERANCE * max(abs(rolls), abs(speed)):
                 notes.faults.add(
-                    f"{one.name}: the file turns {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
+                    f"{load.name}: the file turns {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
                     f"train rolls at {rolls:g} rpm"
                 )

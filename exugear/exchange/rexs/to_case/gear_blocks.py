@@ -176,15 +176,19 @@ def _ordered(
 def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Toothing) -> Entry | None:
     """Face width that the gears share, where that is less than the narrower face."""
     least = min(pinion.face_width.value, gear.face_width.value)
-    low, high = -math.inf, math.inf
+    low = -math.inf
+    high = math.inf
     for one in (pinion, gear):
         z = places.position(one.part)[2]
-        low, high = max(low, z - 0.5 * one.face_width.value), min(high, z + 0.5 * one.face_width.value)
+        low = max(low, z - 0.5 * one.face_width.value)
+        high = min(high, z + 0.5 * one.face_width.value)
     stated = stage.quantity("common_face_width", "mm")
     overlap = tidy(round(high - low, 6))
     if stated is not None and stated < min(least, overlap) - FACE_TOLERANCE:
         return read(tidy(stated), "common_face_width")
-    return derived(overlap, "overlap of the faces as they stand") if 0.0 < overlap < least - FACE_TOLERANCE else None
+    if 0.0 < overlap < least - FACE_TOLERANCE:
+        return derived(overlap, "overlap of the faces as they stand")
+    return None
 
 
 def _size(gear: Toothing) -> tuple[bool, int]:
@@ -197,7 +201,8 @@ def _check_equal_planets(
     for number, own in first.items():
         if own not in gears:
             continue
-        other, mate = toothing_of(model, model.components[number], [], Notes()), gears[own]
+        other = toothing_of(model, model.components[number], [], Notes())
+        mate = gears[own]
         for key in ("module", "face_width", "helix_angle", "pressure_angle"):
             if abs(getattr(other, key).value - getattr(mate, key).value) > 1e-9:
                 notes.faults.add(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
@@ -225,7 +230,8 @@ def axes_to_move(
     while open_stages:
         stage = next((s for s in open_stages if settled & _names_of(teeth, s)), open_stages[0])
         open_stages.remove(stage)
-        one, other = teeth.bodies[stage.pinion], teeth.bodies[stage.gear]
+        one = teeth.bodies[stage.pinion]
+        other = teeth.bodies[stage.gear]
         base, moving = (one, other) if one.name in settled else (other, one)
         stands = axes[base.name], axes[moving.name]
         apart = math.dist(*stands)
@@ -252,7 +258,11 @@ def _coaxial(bodies: Bodies, body: Body) -> list[str]:
     """Names of the bodies that stand on one axis; planets stand for themselves."""
     if body.carrier:
         return [body.name]
-    return [one.name for one in bodies.members if not one.carrier and math.dist(one.axis, body.axis) <= PLACE_TOLERANCE]
+    return [
+        member.name
+        for member in bodies.members
+        if not member.carrier and math.dist(member.axis, body.axis) <= PLACE_TOLERANCE
+    ]
 
 
 def _moves(
@@ -263,8 +273,9 @@ def _moves(
     if not body.carrier:
         yield body.parts, (new[0] - body.axis[0], new[1] - body.axis[1])
         return
-    carrier = next(one for one in bodies.members if one.name == body.carrier)
-    centre, orbit = axes[carrier.name], math.dist(new, axes[carrier.name])
+    carrier = next(member for member in bodies.members if member.name == body.carrier)
+    centre = axes[carrier.name]
+    orbit = math.dist(new, axes[carrier.name])
     for parts, degrees in zip((body.parts, *body.others), body.angles, strict=True):
         angle = math.radians(degrees)
         target = centre[0] + orbit * math.cos(angle), centre[1] + orbit * math.sin(angle)
@@ -323,7 +334,9 @@ def gear_blocks(
 def _modification(model: Model, gear: Toothing, notes: Notes) -> dict[str, Block]:
     with notes.faults.gathered():
         entries = modification_of(model, gear, notes)
-        return {"modification": Block("", entries)} if entries else {}
+        if entries:
+            return {"modification": Block("", entries)}
+        return {}
     return {}
 
 

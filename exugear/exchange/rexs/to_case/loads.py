@@ -93,12 +93,14 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None) 
     changes = case.changes if case else {}
     speeds: dict[str, float] = {}
     for shaft in _changed(model.of_type("shaft"), changes):
-        body, speed = bodies.of_any(shaft), shaft.quantity("rotational_speed", "1 / min")
+        body = bodies.of_any(shaft)
+        speed = shaft.quantity("rotational_speed", "1 / min")
         if body is not None and speed is not None and not body.fixed:
             speeds.setdefault(body.name, tidy(places.sense(shaft) * speed))
     torques: dict[str, float] = {}
     for load in _changed(model.of_type("external_load"), changes):
-        body, torque = _owner(model, bodies, load), _torque(model, places, load, speeds, bodies)
+        body = _owner(model, bodies, load)
+        torque = _torque(model, places, load, speeds, bodies)
         if body is not None and torque and load.flag("transmits_torque") is not False:
             torques[body.name] = torques.get(body.name, 0.0) + torque
     share = None
@@ -116,24 +118,28 @@ def _shaft(model: Model, load: Component) -> Component | None:
     owners = [
         one for kind in ("assembly", "ordered_assembly") for one in model.related(kind, "part", load.number, "assembly")
     ]
-    return next((one for one in owners if one.type in ("shaft", "side_plate", "planet_carrier")), None)
+    return next((owner for owner in owners if owner.type in ("shaft", "side_plate", "planet_carrier")), None)
 
 
 def _owner(model: Model, bodies: Bodies, load: Component) -> Body | None:
     shaft = _shaft(model, load)
     body = bodies.of_any(shaft) if shaft else None
-    return None if body is None or body.fixed or body.carrier else body
+    if body is None or body.fixed or body.carrier:
+        return None
+    return body
 
 
 def _torque(model: Model, places: Places, load: Component, speeds: Mapping[str, float], bodies: Bodies) -> float | None:
     """Torque of a load about +z, N m; from its power and the speed of its body where the file gives no torque."""
-    shaft, body = _shaft(model, load), _owner(model, bodies, load)
+    shaft = _shaft(model, load)
+    body = _owner(model, bodies, load)
     if shaft is None or body is None:
         return None
     torque = load.quantity("torque_around_u_axis", "N m")
     if torque is not None:
         return tidy(places.sense(shaft) * torque)
-    power, speed = load.quantity("power", "kW"), speeds.get(body.name)
+    power = load.quantity("power", "kW")
+    speed = speeds.get(body.name)
     if power and speed:
         return tidy(1e3 * power / (speed * math.pi / 30.0))
     return None
@@ -165,7 +171,7 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
         for part in model.of_type("external_load")
         if part.flag("transmits_torque") is not False and (body := _owner(model, bodies, part)) is not None
     ]
-    given = [name for one in loads for name in one.torques]
+    given = [name for load in loads for name in load.torques]
     candidates = [name for name in given if name in defined] or given or [n for n in loaded if n in defined] or loaded
     candidates = candidates or [name for name in links if name in defined] or list(links)
     first = candidates[0]
@@ -181,7 +187,7 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
 
 def static_load(loads: Sequence[Loads], ends: Ends) -> Entry:
     """Torque of the static state: the largest of all load cases at the input."""
-    torques = [one.torques[ends.input] for one in loads if one.torques.get(ends.input)]
+    torques = [load.torques[ends.input] for load in loads if load.torques.get(ends.input)]
     if not torques:
         return assumed({ends.input: UNKNOWN_TORQUE}, "the file gives no torque: SET IT")
     source = "torque_around_u_axis, or power over speed" + ("; the largest of the load cases" if len(loads) > 1 else "")
@@ -200,16 +206,16 @@ def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: f
     """
     blocks = {}
     fastest = 0.0
-    for one in loads:
-        torque = one.torques.get(ends.input) or static
-        speed = _input_speed(one, ends, ratio)
+    for load in loads:
+        torque = load.torques.get(ends.input) or static
+        speed = _input_speed(load, ends, ratio)
         fastest = max(fastest, speed, key=abs)
-        entries = {"description": Entry(one.description)} if one.description else {}
+        entries = {"description": Entry(load.description)} if load.description else {}
         entries["torques_N_m"] = _balanced(ends, torque, ratio)
         if speed:
             entries["start_speed_rpm"] = read(tidy(speed), f"rotational_speed, at {ends.input}")
         entries["duration_s"] = assumed(1.0, "")
-        blocks[one.name] = Block("", entries)
+        blocks[load.name] = Block("", entries)
     if fastest:
         blocks["run_up"] = _run_up(ends, static, ratio, fastest)
     return blocks
@@ -300,9 +306,9 @@ def life_blocks(
 
 def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) -> tuple[str, Entry, list[str]] | None:
     """Body that is loaded, years, and lines of torque, speed and hours; None where the file does not tell them."""
-    body = next((end for end in (ends.input, ends.output) if all(one.torques.get(end) for one in loads)), None)
-    shares = [100.0] if len(loads) == 1 else [one.share or 0.0 for one in loads]
-    speeds = [_input_speed(one, ends, ratio) * (ratio if body == ends.output else 1.0) for one in loads]
+    body = next((end for end in (ends.input, ends.output) if all(load.torques.get(end) for load in loads)), None)
+    shares = [100.0] if len(loads) == 1 else [load.share or 0.0 for load in loads]
+    speeds = [_input_speed(load, ends, ratio) * (ratio if body == ends.output else 1.0) for load in loads]
     if body is None or not sum(shares) or not all(speeds):
         return None
     hours = next((h for unit in model.of_type("gear_unit") if (h := unit.quantity("operating_time", "h"))), None)
@@ -311,8 +317,8 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
         life = derived(_rounded(hours / HOURS_PER_YEAR), f"operating_time of {hours:g} h")
     each = [(hours or life.value * HOURS_PER_YEAR) * share / sum(shares) for share in shares]
     lines = [
-        f"{one.torques[body]!r},{tidy(speed)!r},{_rounded(duration)!r}\n"
-        for one, speed, duration in zip(loads, speeds, each, strict=True)
+        f"{load.torques[body]!r},{tidy(speed)!r},{_rounded(duration)!r}\n"
+        for load, speed, duration in zip(loads, speeds, each, strict=True)
     ]
     return body, life, lines
 

@@ -77,9 +77,11 @@ def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothi
     notes.checked.append(f"{stage}: centre distance {stated:.6g} mm, positions {apart:.6f} mm")
     if abs(stated - apart) <= PLACE_TOLERANCE:
         return Entry(tidy(stated), "center_distance")
-    rule, why = notes.rules.distances, "as asked for"
+    rule = notes.rules.distances
+    why = "as asked for"
     if rule == "agreeing" and stated > PLACE_TOLERANCE:
-        rule, why = _confirmed(pair, stated, apart), "with which the profile shifts agree"
+        rule = _confirmed(pair, stated, apart)
+        why = "with which the profile shifts agree"
     both = f"center_distance = {stated:g} mm, but its gears stand {apart:.4f} mm apart"
     if rule == "agreeing":
         raise RexsError(
@@ -105,7 +107,9 @@ def _confirmed(
     fits = [one is not None and abs(one - total) <= SHIFT_TOLERANCE for one in asked]
     if fits[0] == fits[1]:
         return "agreeing"
-    return "positions" if fits[0] else "file"
+    if fits[0]:
+        return "positions"
+    return "file"
 
 
 def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
@@ -150,9 +154,10 @@ def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: N
 
 def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int, Toothing]:
     """Give every gear a profile shift."""
-    solved, open_stages = dict(gears), list(stages)
+    solved = dict(gears)
+    open_stages = list(stages)
     while open_stages:
-        ready = [one for one in open_stages if _given(solved, one)] or open_stages[:1]
+        ready = [open_stage for open_stage in open_stages if _given(solved, open_stage)] or open_stages[:1]
         for stage in ready:
             open_stages.remove(stage)
             _complete(solved, stage)
@@ -167,7 +172,8 @@ def _beyond(gears: Mapping[int, Toothing], stage: Stage) -> bool:
 
 def _shift_sums(gears: Mapping[int, Toothing], stage: Stage) -> tuple[float, float]:
     """Sum of the shifts as they are, and that which the centre distance asks for."""
-    pinion, gear = gears[stage.pinion], gears[stage.gear]
+    pinion = gears[stage.pinion]
+    gear = gears[stage.gear]
     assert pinion.shift is not None and gear.shift is not None
     stated = pinion.shift.value + (-gear.shift.value if gear.internal else gear.shift.value)
     return stated, shift_sum(pinion, gear, stage.distance.value)
@@ -206,7 +212,8 @@ def _given(gears: Mapping[int, Toothing], stage: Stage) -> bool:
 
 def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
     """Give both gears of a stage a shift; where neither has one the gear gets none and the pinion all."""
-    pinion, gear = gears[stage.pinion], gears[stage.gear]
+    pinion = gears[stage.pinion]
+    gear = gears[stage.gear]
     sign = -1.0 if gear.internal else 1.0
     total = shift_sum(pinion, gear, stage.distance.value)
     if pinion.shift is None and gear.shift is None:
@@ -241,10 +248,13 @@ def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], not
     Involutes mesh if their base pitches are equal, whatever racks they were cut with. Base circle, base helix and tooth
     thickness stay, and so do diameters; the fillet is that of the other rack, which differs a little.
     """
-    same, open_stages = dict(gears), list(stages)
+    same = dict(gears)
+    open_stages = list(stages)
     settled: set[int] = set()
     while open_stages:
-        stage = next((one for one in open_stages if {one.pinion, one.gear} & settled), open_stages[0])
+        stage = next(
+            (open_stage for open_stage in open_stages if {open_stage.pinion, open_stage.gear} & settled), open_stages[0]
+        )
         open_stages.remove(stage)
         keep, other = (stage.gear, stage.pinion) if stage.gear in settled else (stage.pinion, stage.gear)
         settled |= {keep, other}
@@ -260,17 +270,17 @@ def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], not
     return same
 
 
-def _have_one_rack(one: Toothing, other: Toothing) -> bool:
-    pairs = ((one.module, other.module), (one.pressure_angle, other.pressure_angle))
+def _have_one_rack(toothing: Toothing, other: Toothing) -> bool:
+    pairs = ((toothing.module, other.module), (toothing.pressure_angle, other.pressure_angle))
     return all(abs(a.value - b.value) <= RACK_TOLERANCE * abs(b.value) for a, b in pairs)
 
 
-def _have_one_base_pitch(one: Toothing, other: Toothing) -> bool:
-    cosines = [math.cos(math.radians(gear.pressure_angle.value)) for gear in (one, other)]
-    pitches = [gear.module.value * cosine for gear, cosine in zip((one, other), cosines, strict=True)]
+def _have_one_base_pitch(toothing: Toothing, other: Toothing) -> bool:
+    cosines = [math.cos(math.radians(gear.pressure_angle.value)) for gear in (toothing, other)]
+    pitches = [gear.module.value * cosine for gear, cosine in zip((toothing, other), cosines, strict=True)]
     sines = [
         abs(math.sin(math.radians(gear.helix_angle.value))) * cosine
-        for gear, cosine in zip((one, other), cosines, strict=True)
+        for gear, cosine in zip((toothing, other), cosines, strict=True)
     ]
     return abs(pitches[0] - pitches[1]) <= PITCH_TOLERANCE * pitches[1] and abs(sines[0] - sines[1]) <= PITCH_TOLERANCE
 
@@ -340,7 +350,8 @@ def _cutter(gear: Toothing) -> PinionCutter | None:
     """Build the cutter of a ring."""
     if gear.cutter is None:
         return None
-    given, tip = gear.cutter.value, gear.cutter.value.get("tip_diameter_mm")
+    given = gear.cutter.value
+    tip = gear.cutter.value.get("tip_diameter_mm")
     if "addendum" in given:
         reference = given["teeth"] / math.cos(math.radians(gear.helix_angle.value))
         tip = gear.module.value * (reference + 2.0 * (given["profile_shift"] + given["addendum"]))
@@ -410,7 +421,9 @@ def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
         f"{gear.part}: root form diameter {gear.root_form.value:.6g} mm, its tool's rounding gives "
         f"{2e3 * bare.form_radius:.6g} mm"
     )
-    return gear if beyond > FORM_TOLERANCE * bare.normal_module else dataclasses.replace(gear, root_form=None)
+    if beyond > FORM_TOLERANCE * bare.normal_module:
+        return gear
+    return dataclasses.replace(gear, root_form=None)
 
 
 def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
@@ -437,7 +450,8 @@ def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: 
 
 def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float | None:
     """Tip diameter (mm) at which a gear keeps clear of its mate's form circle; None if it does so already."""
-    pinion, gear = unchecked("pinion", gears[stage.pinion]), unchecked("gear", gears[stage.gear])
+    pinion = unchecked("pinion", gears[stage.pinion])
+    gear = unchecked("gear", gears[stage.gear])
     pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=1e-3 * stage.distance.value)
     for one, of in ((pinion, stage.pinion), (gear, stage.gear)):
         if one.tip_radius <= one.base_radius:

@@ -48,7 +48,8 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
             notes.changed.append(f"{part} of {gear.part}: not imported; give it in [gears.NAME.modification]")
     entries: dict[str, Entry] = {}
     for kind in READ:
-        one, other = left.get(kind), right.get(kind)
+        one = left.get(kind)
+        other = right.get(kind)
         if one is None and other is None:
             continue
         if one is None or other is None or not _equal(one, other):
@@ -69,7 +70,7 @@ def _blanks(
         amounts = [one[kind].quantity(kind, "mm") for one in (left, right) if kind in one]
         if part is None or not any(amounts):
             continue
-        said = ", ".join(dict.fromkeys(f"{_um(one):g} um" for one in amounts if one))
+        said = ", ".join(dict.fromkeys(f"{_um(amount):g} um" for amount in amounts if amount))
         notes.changed.append(
             f"{part} of {gear.part}: its amount of {said} is not taken, as REXS does not say which end a positive one "
             f"takes material off; set {key} in [gears.NAME.modification], which does"
@@ -83,9 +84,9 @@ def _by_type(model: Model, gear: Component, side: str) -> dict[str, Component]:
     return {one.type: one for one in found if one.type in MODIFICATIONS}
 
 
-def _equal(one: Component, other: Component) -> bool:
-    keys = {key for part in (one, other) for key, value in part.attributes.items() if value.unit == "mm"}
-    pairs = ((one.quantity(key, "mm"), other.quantity(key, "mm")) for key in keys)
+def _equal(component: Component, other: Component) -> bool:
+    keys = {key for part in (component, other) for key, value in part.attributes.items() if value.unit == "mm"}
+    pairs = ((component.quantity(key, "mm"), other.quantity(key, "mm")) for key in keys)
     return all(a == b or (a is not None and b is not None and abs(a - b) < EQUAL) for a, b in pairs)
 
 
@@ -104,10 +105,10 @@ def _lead_crowning(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry
     """Crowning along the face, scaled to its ends: it grows with the square of the distance from the middle."""
     sides = ("datum_face", "non_datum_face")
     amounts = [part.quantity(f"helix_crowning_amount_{side}", "mm") for side in sides]
-    places = [part.quantity(f"coordinate_where_helix_crowning_is_specified_{side}", "mm") for side in sides]
-    if None in amounts or None in places:
+    quantities = [part.quantity(f"coordinate_where_helix_crowning_is_specified_{side}", "mm") for side in sides]
+    if None in amounts or None in quantities:
         return
-    (one, other), (low, high) = [[value or 0.0 for value in pair] for pair in (amounts, places)]
+    (one, other), (low, high) = [[value or 0.0 for value in pair] for pair in (amounts, quantities)]
     half = 0.5 * gear.face_width.value
     if abs(one - other) < EQUAL and abs(low + high) < EQUAL and abs(high) > 0.1 * half:
         amount = _um(one * (half / high) ** 2)

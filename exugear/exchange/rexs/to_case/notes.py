@@ -36,7 +36,9 @@ class Entry:
     @property
     def comment(self) -> str:
         """Comment after the value."""
-        return f"{self.kind}   {self.source}" if self.kind else self.source
+        if self.kind:
+            return f"{self.kind}   {self.source}"
+        return self.source
 
 
 def read(value: Any, source: str) -> Entry:
@@ -202,7 +204,9 @@ def toml_value(value: Any) -> str:
     '{ sun = 1.0, names = ["a", true] }'
     """
     if isinstance(value, bool):
-        return "true" if value else "false"
+        if value:
+            return "true"
+        return "false"
     if isinstance(value, int | float):
         return repr(value)
     if isinstance(value, str):

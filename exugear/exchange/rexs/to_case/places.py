@@ -64,7 +64,8 @@ class Places(Displayed):
             raise RexsError(f"{part}: support_vector is missing, so that it has no place")
         x, y, z = (self._axes @ self._frame(part, 0)[0]).tolist()
         by = self._moved.get(part.number, (0.0, 0.0))
-        x, y = x + by[0], y + by[1]
+        x = x + by[0]
+        y = y + by[1]
         return tidy(round(x, 9)), tidy(round(y, 9)), tidy(round(z, 9))
 
     def move(self, parts: Iterable[Component], by: tuple[float, float]) -> None:
@@ -74,7 +75,9 @@ class Places(Displayed):
 
     def sense(self, part: Component) -> int:
         """Sense of a component's u axis: 1 along +z, -1 against it."""
-        return 1 if self._frame(part, 0)[1][:, 0] @ self._axes[2] > 0.0 else -1
+        if self._frame(part, 0)[1][:, 0] @ self._axes[2] > 0.0:
+            return 1
+        return -1
 
     def axes(self, part: Component) -> Floats:
         """Axes u, v, w of a component as the rows of a (3, 3) array, in the axes of the gearbox file."""
@@ -87,7 +90,9 @@ class Places(Displayed):
     def _outermost(self, parts: list[Component]) -> Floats:
         """Axes u, v, w of the gear unit as columns; of the first part in a file without one."""
         first = [*self._model.of_type("gear_unit"), *parts][:1]
-        return self._frame(first[0], 0)[1] if first else np.eye(3)
+        if first:
+            return self._frame(first[0], 0)[1]
+        return np.eye(3)
 
     def _frame(self, part: Component, depth: int) -> tuple[Floats, Floats]:
         """Origin (3) and axes u, v, w as columns (3, 3), in the outermost frame."""
@@ -102,7 +107,8 @@ class Places(Displayed):
             if reference not in self._model.components:
                 raise RexsError(f"{part}: is placed by component {reference}, which is not there")
             base, turned = self._frame(self._model.components[reference], depth + 1)
-            origin, axes = base + turned @ origin, turned @ axes
+            origin = base + turned @ origin
+            axes = turned @ axes
         self._frames[part.number] = origin, axes
         return origin, axes
 
@@ -126,13 +132,15 @@ def _own_axes(part: Component) -> Floats:
     lengths = np.linalg.norm(u), np.linalg.norm(w)
     if min(lengths) < 1e-9 or abs(u @ w) > 1e-6 * lengths[0] * lengths[1]:
         raise RexsError(f"{part}: u_axis_vector and w_axis_vector are not at right angles")
-    u, w = u / lengths[0], w / lengths[1]
+    u = u / lengths[0]
+    w = w / lengths[1]
     return np.column_stack([u, np.cross(w, u), w])
 
 
 def _axes(directions: list[Floats], unit: Floats) -> Floats:
     """Axes x, y, z of the gearbox file as rows: v, w, u of the gear unit, or z along the first shaft and y near w."""
-    along, up = unit[:, 0], unit[:, 2]
+    along = unit[:, 0]
+    up = unit[:, 2]
     if directions and abs(directions[0] @ along) < 1.0 - PARALLEL:
         along = directions[0]
     across = up - (up @ along) * along

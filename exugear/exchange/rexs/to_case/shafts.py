@@ -108,8 +108,8 @@ def inertia_of(cylinders: Iterable[Cylinder]) -> Inertia:
     >>> round(disc.mass, 3), round(disc.axial, 5), round(disc.transverse, 5), round(disc.centre, 6)
     (24.662, 0.12331, 0.08221, 50.0)
     """
-    found = mass_properties(one.tube for one in cylinders)
-    return Inertia(found.mass, found.axial, found.transverse, 1e3 * found.centre)
+    properties = mass_properties(cylinder.tube for cylinder in cylinders)
+    return Inertia(properties.mass, properties.axial, properties.transverse, 1e3 * properties.centre)
 
 
 def sections_of(model: Model, places: Places, shaft: Component, body: Body, notes: Notes) -> list[Cylinder]:
@@ -129,7 +129,8 @@ def sections_of(model: Model, places: Places, shaft: Component, body: Body, note
     if not owned or not shaft.given("support_vector"):
         return []
     x, y, origin = places.position(shaft)
-    sense, density = places.sense(shaft), _density(model, shaft, notes)
+    sense = places.sense(shaft)
+    density = _density(model, shaft, notes)
     aside = math.dist((x, y), body.axis)
     pieces: list[Cylinder] = []
     for section in owned:
@@ -160,7 +161,8 @@ def _pieces(section: Component, count: int, notes: Notes) -> list[tuple[float, f
     end = section.quantity("outer_diameter_end", "mm")
     bore = section.quantity("inner_diameter_begin", "mm") or 0.0
     bore_end = section.quantity("inner_diameter_end", "mm")
-    end, bore_end = begin if end is None else end, bore if bore_end is None else bore_end
+    end = begin if end is None else end
+    bore_end = bore if bore_end is None else bore_end
     if length <= 0.0 or min(begin, end) <= 0.0 or bore >= begin or bore_end >= end:
         raise RexsError(f"{section}: length and diameters of {length:g}, {begin:g} and {bore:g} mm make no section")
     if begin == end and bore == bore_end:
@@ -185,13 +187,18 @@ def _density(model: Model, part: Component, notes: Notes) -> float:
 
 def seat_diameter(sections: Sequence[Cylinder], z: float, width: float, internal: bool) -> float | None:
     """Diameter that a gear sits on, mm: the largest of the shaft under it, of a ring the bore around it."""
-    low, high = z - 0.5 * width, z + 0.5 * width
-    under = [one for one in sections if one.start < high - TOUCHING and one.start + one.length > low + TOUCHING]
+    low = z - 0.5 * width
+    high = z + 0.5 * width
+    under = [
+        section
+        for section in sections
+        if section.start < high - TOUCHING and section.start + section.length > low + TOUCHING
+    ]
     if not under:
         return None
-    return (
-        min(end for one in under for end in one.inners) if internal else max(end for one in under for end in one.outers)
-    )
+    if internal:
+        return min(end for one in under for end in one.inners)
+    return max(end for one in under for end in one.outers)
 
 
 def gear_tube(model: Model, gear: Toothing, z: float, seat: float | None, aside: float, notes: Notes) -> Cylinder:
@@ -205,7 +212,8 @@ def gear_tube(model: Model, gear: Toothing, z: float, seat: float | None, aside:
 
 def plate(model: Model, places: Places, part: Component, notes: Notes) -> Cylinder | None:
     """Side plate of a carrier."""
-    length, outer = part.quantity("length", "mm"), part.quantity("outer_diameter", "mm")
+    length = part.quantity("length", "mm")
+    outer = part.quantity("outer_diameter", "mm")
     if not length or not outer:
         return None
     origin = places.position(part)[2]
@@ -225,14 +233,16 @@ def levelled(sections: Sequence[Cylinder], seats: Iterable[tuple[str, float, flo
     """
     pieces = list(sections)
     for name, z, width in seats:
-        low, high = z - 0.5 * width, z + 0.5 * width
+        low = z - 0.5 * width
+        high = z + 0.5 * width
         pieces = _lengthened(pieces, name, (low, high), notes)
         pieces = [part for piece in pieces for part in _cut(piece, (low, high))]
         under = [one for one in pieces if low - TOUCHING < one.start and one.start + one.length < high + TOUCHING]
         outers = [end for one in under for end in one.outers]
         if len(under) < 2 or len(set(outers)) < 2 or min(outers) < (1.0 - LEVELLED) * max(outers):
             continue
-        least, most = min(outers), max(outers)
+        least = min(outers)
+        most = max(outers)
         notes.changed.append(f"{name}: shaft of {least:g} to {most:g} mm under it taken as {most:g}")
         pieces = [dataclasses.replace(one, outer=most, outer_end=None) if one in under else one for one in pieces]
     return _merged(pieces)
@@ -240,9 +250,11 @@ def levelled(sections: Sequence[Cylinder], seats: Iterable[tuple[str, float, flo
 
 def _lengthened(pieces: list[Cylinder], name: str, seat: tuple[float, float], notes: Notes) -> list[Cylinder]:
     """Let the ends of a shaft reach as far as a seat that lies a little beyond them."""
-    first, last = pieces[0], pieces[-1]
+    first = pieces[0]
+    last = pieces[-1]
     most = OVERHANG * (seat[1] - seat[0])
-    before, beyond = first.start - seat[0], seat[1] - last.start - last.length
+    before = first.start - seat[0]
+    beyond = seat[1] - last.start - last.length
     if TOUCHING < before <= most:
         first = dataclasses.replace(first, start=tidy(seat[0]), length=tidy(first.length + before))
         notes.changed.append(f"{name}: reaches {before:.4g} mm beyond the shaft, which is made so much longer")

@@ -98,7 +98,7 @@ def _stiff_torsion(*bodies: Body) -> float:
         for body in bodies
         for gear in body.gears
     ]
-    radius = max([0.5e-3 * abs(one) for one in diameters], default=0.0) or LEAST_RADIUS
+    radius = max([0.5e-3 * abs(diameter) for diameter in diameters], default=0.0) or LEAST_RADIUS
     return float(f"{RIGID['radial_stiffness'] * radius**2:.2g}")
 
 
@@ -108,7 +108,9 @@ def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[s
     for body in bodies.members:
         if body.fixed:
             continue
-        held = [one.entries["z_mm"].value for one in bearings.values() if one.entries["body"].value == body.name]
+        held = [
+            bearing.entries["z_mm"].value for bearing in bearings.values() if bearing.entries["body"].value == body.name
+        ]
         place = sum(held) / len(held) if held else gear_places.get(body.name, 0.0)
         entries = {"body": Entry(body.name)}
         if body.carrier:
@@ -124,7 +126,8 @@ def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Compon
         both = ends(model, part)
         if both is None or is_one_piece(part) or not is_engaged(model, part):
             continue
-        inner, outer = bodies.of(both[0]), bodies.of(both[1])
+        inner = bodies.of(both[0])
+        outer = bodies.of(both[1])
         if inner is not None and outer is not None and inner is not outer:
             yield part, inner, outer
 
@@ -227,7 +230,8 @@ def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:
     distance = part.quantity("distance_between_bearing_rows", "mm")
     if distance:
         found["row_distance_mm"] = read(tidy(distance), "distance_between_bearing_rows")
-    preload, play = part.quantity("preload_distance", "mm"), part.quantity("operating_axial_bearing_clearance", "mm")
+    preload = part.quantity("preload_distance", "mm")
+    play = part.quantity("operating_axial_bearing_clearance", "mm")
     if found["arrangement"].value != "tandem" and (preload or play):
         key = "preload_distance" if preload else "operating_axial_bearing_clearance"
         found["axial_preload_um"] = read(tidy(1e3 * (preload or -(play or 0.0))), key)
@@ -254,12 +258,12 @@ def _sizes(part: Component, kind: str | None, notes: Notes) -> dict[str, Entry]:
     given = {ours: part.quantity(key, "mm") for key, ours in keys.items()}
     if all(given.values()):
         return {ours: read(given[ours], key) for key, ours in keys.items()}
-    found = boundary_of(_designation(part))
-    if found is None or found.type != kind:
+    boundary = boundary_of(_designation(part))
+    if boundary is None or boundary.type != kind:
         return {}
-    source = f"{found.source} by the designation {_designation(part)}: the file gives no dimensions"
-    notes.changed.append(f"{part}: {found.bore:g} x {found.outer:g} x {found.width:g} mm by {source}")
-    sizes = {"bore_mm": found.bore, "outer_diameter_mm": found.outer, "width_mm": found.width}
+    source = f"{boundary.source} by the designation {_designation(part)}: the file gives no dimensions"
+    notes.changed.append(f"{part}: {boundary.bore:g} x {boundary.outer:g} x {boundary.width:g} mm by {source}")
+    sizes = {"bore_mm": boundary.bore, "outer_diameter_mm": boundary.outer, "width_mm": boundary.width}
     return {key: assumed(value, source) for key, value in sizes.items()}
 
 

@@ -81,7 +81,8 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
     flank = _flank(model, gear)
     tool = _tool(model, gear)
     chamfer = (flank.quantity("tooth_tip_chamfer", "mm") if flank else None) or 0.0
-    angle, helix = _pressure_angle(gear, flank), _helix_angle(gear, mates)
+    angle = _pressure_angle(gear, flank)
+    helix = _helix_angle(gear, mates)
     allowances = _allowances(gear, math.radians(angle.value), math.radians(helix.value), internal)
     teeth = abs(gear.whole("number_of_teeth") or 0)
     if not teeth:
@@ -114,7 +115,8 @@ def _length(gear: Component, key: str) -> float:
 
 def _chamfer(gear: Component, stated: float) -> float:
     """Height of the tip's chamfer, mm: as stated, or from the tip form diameter."""
-    tip, form = gear.quantity("tip_diameter", "mm"), gear.quantity("tip_form_diameter", "mm")
+    tip = gear.quantity("tip_diameter", "mm")
+    form = gear.quantity("tip_form_diameter", "mm")
     if stated or not tip or not form:
         return tidy(stated)
     return tidy(max(0.0, round(0.5 * (abs(tip) - abs(form)) * (-1.0 if gear.type == "ring_gear" else 1.0), 9)))
@@ -130,10 +132,12 @@ def _flank(model: Model, gear: Component) -> Component | None:
         ("normal_pressure_angle", "deg"),
         ("tooth_tip_chamfer", "mm"),
     ):
-        one, other = left[0].quantity(key, unit), right[0].quantity(key, unit)
-        if one != other and (one is None or other is None or abs(one - other) > EQUAL):
+        quantity = left[0].quantity(key, unit)
+        other = right[0].quantity(key, unit)
+        if quantity != other and (quantity is None or other is None or abs(quantity - other) > EQUAL):
             raise RexsError(
-                f"{gear}: left and right flank differ in {key} ({one} and {other}); only equal flanks can be imported"
+                f"{gear}: left and right flank differ in {key} ({quantity} and {other}); "
+                "only equal flanks can be imported"
             )
     return left[0]
 
@@ -145,7 +149,7 @@ def _tool(model: Model, gear: Component) -> Component | None:
         tools = model.related("manufacturing_step", "workpiece", part.number, "tool")
         tools = tools or model.related("ordered_reference", "origin", part.number, "referenced")
         tools = tools or model.related("reference", "origin", part.number, "referenced")
-        tools = tuple(one for one in tools if one.type in ("rack_shaped_tool", "cutter_wheel_tool"))
+        tools = tuple(tool for tool in tools if tool.type in ("rack_shaped_tool", "cutter_wheel_tool"))
         if tools:
             return tools[-1]
     return None
@@ -183,7 +187,9 @@ def _shift(flank: Component | None, internal: bool) -> Entry | None:
 
 def _diameter(gear: Component, key: str) -> Entry | None:
     value = gear.quantity(key, "mm")
-    return read(tidy(abs(value)), key) if value else None
+    if value:
+        return read(tidy(abs(value)), key)
+    return None
 
 
 def _tip(gear: Component, reference: float, notes: Notes) -> Entry | None:
@@ -205,7 +211,8 @@ def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | N
     rounded = _rounded(assumed(LEAST_RADIUS, "none given") if factor is None else read(tidy(factor), ""))
     shift = tool.quantity("addendum_modification_coefficient")
     cutter = {"teeth": abs(teeth), "tip_radius": rounded.value, "profile_shift": tidy(shift or 0.0)}
-    tip, addendum = tool.quantity("tip_diameter", "mm"), tool.quantity("addendum_coefficient_reference_profile")
+    tip = tool.quantity("tip_diameter", "mm")
+    addendum = tool.quantity("addendum_coefficient_reference_profile")
     if not gear.quantity("root_diameter", "mm"):
         if tip:
             cutter["tip_diameter_mm"] = tidy(abs(tip))
@@ -285,4 +292,6 @@ def material_table(material: Component | None) -> Entry | None:
         "density_kg_per_m3": (material.quantity("density", "kg / m^3"), 1.0),
     }
     given = {key: tidy(value * factor) for key, (value, factor) in values.items() if value is not None}
-    return read(given, str(material)) if given else None
+    if given:
+        return read(given, str(material))
+    return None

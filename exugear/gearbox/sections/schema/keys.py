@@ -98,7 +98,8 @@ def keys() -> Iterator[Key]:
     """All keys, table by table; a key that holds a table is told by that table alone."""
     examples = tomllib.loads(files(__package__).joinpath("examples.toml").read_text(encoding="utf-8"))
     for table, model in tables().items():
-        texts, given = meanings(model), _at(examples, table)
+        texts = meanings(model)
+        given = _at(examples, table)
         for name, field in model.model_fields.items():
             if not _model_within(field.annotation):
                 yield _key(table, name, field, texts[name], given[name])
@@ -140,7 +141,9 @@ def _bare(kind: Any) -> Any:
         return _bare(get_args(kind)[0])
     if get_origin(kind) in (Union, UnionType):
         others = [part for part in get_args(kind) if part is not NoneType]
-        return _bare(others[0]) if len(others) == 1 else kind
+        if len(others) == 1:
+            return _bare(others[0])
+        return kind
     return kind
 
 
@@ -171,7 +174,8 @@ def _kind(kind: Any) -> str:
     simple = {bool: "true or false", int: "whole number", float: "number", str: "text"}
     if bare in simple:
         return simple[bare]
-    origin, parts = get_origin(bare), get_args(bare)
+    origin = get_origin(bare)
+    parts = get_args(bare)
     if origin is Literal:
         return ", ".join(f'"{choice}"' for choice in parts)
     if origin is dict:
@@ -202,9 +206,13 @@ def written(value: object) -> str:
         return str(value).lower()
     if isinstance(value, float):
         short = f"{value:g}"
-        return short if set(short) & set(".e") else f"{short}.0"
+        if set(short) & set(".e"):
+            return short
+        return f"{short}.0"
     if isinstance(value, Mapping):
         return f"{{ {', '.join(f'{key} = {written(entry)}' for key, entry in value.items())} }}"
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(written, value))}]"
-    return f'"{value}"' if isinstance(value, str) else str(value)
+    if isinstance(value, str):
+        return f'"{value}"'
+    return str(value)
