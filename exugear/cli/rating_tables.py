@@ -57,9 +57,16 @@ def _row(
     values = {f"{flank.gear} {flank.flank}": scale * figures(flank).get(name, math.nan) for flank in flanks}
     form = ".4g" if name == "N_L" else _DIGITS.get(unit, ".3f")
     return {"factor": f"{words}, {unit}" if unit else words} | {
-        label: "-" if math.isnan(value) else "infinite" if math.isinf(value) else format(value, form)
-        for label, value in values.items()
+        label: _number(value, form) for label, value in values.items()
     }
+
+
+def _number(value: float, form: str) -> str:
+    if math.isnan(value):
+        return "-"
+    if math.isinf(value):
+        return "infinite"
+    return format(value, form)
 
 
 def _told(sheet: FlankSheet) -> Iterator[str]:

@@ -33,7 +33,8 @@ class CaseError(ValueError):
     def __init__(self, *faults: str) -> None:
         self.faults = tuple(dict.fromkeys(faults))
         more = len(self.faults) - SHOWN_FAULTS
-        rest = [f"and {more} more fault{'s' if more > 1 else ''}"] if more > 0 else []
+        many = "s" if more > 1 else ""
+        rest = [f"and {more} more fault{many}"] if more > 0 else []
         super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
 
 

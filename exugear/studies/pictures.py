@@ -100,7 +100,12 @@ def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
     if len(labels) > 1:
         figure.set_size_inches(3.4 * min(len(labels), 2) + 1.6, 3.0 * -(-len(labels) // 2) + 0.6)
     grid = figure.subplots(-(-len(labels) // 2), min(len(labels), 2), squeeze=False, sharey=True, sharex=True)
-    draw = _draw_spread if along == SAMPLE else _draw_curves if along in numeric else _draw_bars
+    if along == SAMPLE:
+        draw = _draw_spread
+    elif along in numeric:
+        draw = _draw_curves
+    else:
+        draw = _draw_bars
     for axes, rows, label in zip(grid.flat, stacked, labels, strict=False):
         draw(axes, values, along, rows, _combinations(values, by))
         _tell_of_infinite(axes, rows)

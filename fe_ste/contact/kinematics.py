@@ -59,6 +59,7 @@ class FlankPair(NamedTuple):
         pinion = pair.pinion
         gear = pair.gear
         working_angle = pair.working_pressure_angle
+        inner_radius_2 = math.inf if gear.internal else 0.0
         return cls(
             base_radius_1=pinion.base_radius,
             base_radius_2=gear.base_radius,
@@ -78,7 +79,7 @@ class FlankPair(NamedTuple):
             if pinion.tip_form_diameter is not None
             else tip_roll,
             tip_radius_2=gear.tip_form_radius,
-            root_radius_2=gear.root_form_radius if gear.has_relieved_root else math.inf if gear.internal else 0.0,
+            root_radius_2=gear.root_form_radius if gear.has_relieved_root else inner_radius_2,
         )
 
 

@@ -73,5 +73,10 @@ def tolerance(
 
 def _rounded(micrometres: float) -> float:
     """Round as the standard does (5.2.3)."""
-    grain = 1.0 if micrometres > 10.0 else 0.5 if micrometres > 5.0 else 0.1
+    if micrometres > 10.0:
+        grain = 1.0
+    elif micrometres > 5.0:
+        grain = 0.5
+    else:
+        grain = 0.1
     return math.floor(micrometres / grain + 0.5) * grain

@@ -60,7 +60,12 @@ def pitch_running_in(deviation: float, hardening: Hardening, limit: float, veloc
     """
     if hardening == "case_hardened":
         return min(0.075 * deviation, 3e-6)
-    most = math.inf if velocity <= 5.0 else 12800.0 if velocity <= 10.0 else 6400.0
+    if velocity <= 5.0:
+        most = math.inf
+    elif velocity <= 10.0:
+        most = 12800.0
+    else:
+        most = 6400.0
     return min(160e6 / limit * deviation, 1e-6 * most * 1e6 / limit, deviation)
 
 
@@ -68,7 +73,12 @@ def helix_running_in(misalignment: float, hardening: Hardening, limit: float, ve
     """y_beta: what running in takes from the equivalent misalignment F_beta_x, m (ISO 6336-1, 7.5)."""
     if hardening == "case_hardened":
         return min(0.15 * misalignment, 6e-6)
-    most = math.inf if velocity <= 5.0 else 25600.0 if velocity <= 10.0 else 12800.0
+    if velocity <= 5.0:
+        most = math.inf
+    elif velocity <= 10.0:
+        most = 25600.0
+    else:
+        most = 12800.0
     return min(320e6 / limit * misalignment, 1e-6 * most * 1e6 / limit, misalignment)
 
 
@@ -160,7 +170,12 @@ def dynamic_factor(
 
 def _constants(eps: float) -> tuple[float, ...]:
     """C_v1 to C_v7 over the total contact ratio."""
-    last = 0.75 if eps <= 1.5 else 0.875 + 0.125 * math.sin(math.pi * (eps - 2.0)) if eps <= 2.5 else 1.0
+    if eps <= 1.5:
+        last = 0.75
+    elif eps <= 2.5:
+        last = 0.875 + 0.125 * math.sin(math.pi * (eps - 2.0))
+    else:
+        last = 1.0
     if eps <= 2.0:
         return 0.32, 0.34, 0.23, 0.90, 0.47, 0.47, last
     return (

@@ -100,7 +100,12 @@ def velocity_factor(limit: float, velocity: float) -> float:
 def roughness_factor(limit: float, roughness: float, radius: float) -> float:
     """Z_R of the softer gear's allowable stress number (Pa), the mean Rz of both gears and the reduced radius (m)."""
     related = 1e6 * roughness * (_REFERENCE_RADIUS / radius) ** (1.0 / 3.0)
-    exponent = 0.15 if limit < _SOFT else 0.08 if limit > _HARD else 0.32 - 0.2e-9 * limit
+    if limit < _SOFT:
+        exponent = 0.15
+    elif limit > _HARD:
+        exponent = 0.08
+    else:
+        exponent = 0.32 - 0.2e-9 * limit
     return float((3.0 / related) ** exponent)
 
 

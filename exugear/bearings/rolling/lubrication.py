@@ -113,7 +113,12 @@ def life_factor(ratio: float, cleanliness_load: float, bearing_type: BearingType
         (1.5859, (1.3993, 1.2348, 1.2348), 1.0) if roller else (2.5671, (2.2649, 1.9987, 1.9987), 0.83)
     )
     power, exponent = (0.4, -9.185) if roller else (1.0 / 3.0, -9.3)
-    place = 0 if kappa < 0.4 else 1 if kappa < 1.0 else 2
+    if kappa < 0.4:
+        place = 0
+    elif kappa < 1.0:
+        place = 1
+    else:
+        place = 2
     film = factors[place] / kappa ** (0.054381, 0.19087, 0.071739)[place]
     base = 1.0 - (constant - film) ** outer * max(cleanliness_load, 0.0) ** power
     if base <= 0.0:

@@ -90,7 +90,12 @@ def _load_row(duty: BearingDuty) -> dict[str, str]:
 
 
 def _life_row(duty: BearingDuty) -> dict[str, str]:
-    sign = "*" if duty.ratings.estimated else "+" if duty.ratings.makers else ""
+    if duty.ratings.estimated:
+        sign = "*"
+    elif duty.ratings.makers:
+        sign = "+"
+    else:
+        sign = ""
     return {
         "bearing": duty.name,
         "most loaded\nelement kN": f"{1e-3 * duty.element_load:.3g}",

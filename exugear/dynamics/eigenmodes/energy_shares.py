@@ -58,7 +58,12 @@ def _elastic_energies(body: ReducedBody, shapes: Floats) -> Floats:
     energies[:, RIGID_MOTIONS] = np.stack([spin, ux + uy, uz, tilt_x + tilt_y], axis=1)
     deformed = shapes - rigid @ velocities
     for block in body.blocks:
-        motion = TWIST if body.spin[block].any() else STRETCH if rigid[block, UZ].any() else BENDING
+        if body.spin[block].any():
+            motion = TWIST
+        elif rigid[block, UZ].any():
+            motion = STRETCH
+        else:
+            motion = BENDING
         if len(body.blocks) == 1:  # a solid, which falls into no planes
             motion = DEFORMATION
         mass = body.mass[np.ix_(block, block)]

@@ -246,7 +246,12 @@ def _mesh_row(material: Material, duty: MeshDuty) -> dict[str, object]:
 
 
 def _duty_row(material: Material, duty: BearingDuty) -> dict[str, object]:
-    sign = "*" if duty.ratings.estimated else "+" if duty.ratings.makers else ""
+    if duty.ratings.estimated:
+        sign = "*"
+    elif duty.ratings.makers:
+        sign = "+"
+    else:
+        sign = ""
     tilt = 0.5e-6 * float(duty.stiffness[3, 3] + duty.stiffness[4, 4])
     return {
         "bearing": material.words.of(duty.name),

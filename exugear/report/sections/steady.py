@@ -282,7 +282,7 @@ def _mode_rows(
             "fast / Hz": f"{fast:.1f}",
             "damping / %": f"{100.0 * diagram.damping[known[-1], mode]:.3f}",
             "type": diagram.kinds[mode],
-            "whirl": "forward" if whirl > WHIRLING else "backward" if whirl < -WHIRLING else "",
+            "whirl": _whirl_text(whirl),
             "strongest crossing": "",
             "share / %": "",
             "what moves": material.words.told(diagram.names[mode]),
@@ -428,6 +428,12 @@ def _unit_rate(run: VariantRun) -> float:
     return sweep_rate(stored["time"], stored["input_speed"], 1.0)
 
 
+def _whirl_text(whirl: float) -> str:
+    if abs(whirl) <= WHIRLING:
+        return ""
+    return "forward" if whirl > 0.0 else "backward"
+
+
 def _row(material: Material, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
     damping = _damping(peak, data)
     row: dict[str, object] = {
@@ -439,7 +445,12 @@ def _row(material: Material, peak: Peak, data: xr.Dataset, rates: dict[str, floa
     }
     for load_case, rate in rates.items():
         too_fast = damping is not None and sweep_severity(peak.frequency, damping, rate * peak.order) > TOO_FAST
-        row[f"run-up {load_case}"] = "–" if damping is None else TELL_FAST if too_fast else "slow enough"
+        if damping is None:
+            row[f"run-up {load_case}"] = "–"
+        elif too_fast:
+            row[f"run-up {load_case}"] = TELL_FAST
+        else:
+            row[f"run-up {load_case}"] = "slow enough"
     return row
 
 

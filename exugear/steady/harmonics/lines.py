@@ -166,7 +166,9 @@ class Modulator:
         if self.step is None or np.count_nonzero(line) == 1:
             return tuple(range(-(self.count // 2), self.count // 2 + 1))
         turns = (multiple * self.step) % self.count
-        return (0 if 2 * turns == self.count else turns - self.count if 2 * turns > self.count else turns,)
+        if 2 * turns == self.count:
+            return (0,)
+        return (turns - self.count if 2 * turns > self.count else turns,)
 
 
 def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> LineSet:

@@ -136,7 +136,8 @@ def _named(content: Any, pattern: list[str], before: str = "") -> Iterator[str]:
         yield before
         return
     first, *rest = pattern
-    names = (list(content) if isinstance(content, Mapping) else []) if first == "NAME" else [first]
+    every = list(content) if isinstance(content, Mapping) else []
+    names = every if first == "NAME" else [first]
     for name in names:
         inner = content.get(name) if isinstance(content, Mapping) else None
         yield from _named(inner, rest, f"{before}.{name}" if before else name)

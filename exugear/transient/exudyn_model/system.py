@@ -86,7 +86,8 @@ class ExudynSystem:
             raise VariantError("mesh_route 'loads' needs rigid bodies: use the variant jointed or bushing")
         if self._minimal and mesh_route != "element":
             raise VariantError("mesh_route 'loads' needs bodies: use the variant jointed or bushing")
-        at_work = (assembly.meshes if meshes is None else meshes) if with_meshes else None
+        chosen = assembly.meshes if meshes is None else meshes
+        at_work = chosen if with_meshes else None
         if self._minimal:
             add_minimal_system(self.mbs, assembly, q, v, loading, at_work)
         else:

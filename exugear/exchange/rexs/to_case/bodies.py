@@ -388,7 +388,12 @@ def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[in
     """Names of the bodies that are no planets, by role, numbered in the order of the file."""
     roles: dict[str, list[int]] = {}
     for root, parts in groups.items():
-        role = "housing" if _is_fixed(parts) else "carrier" if root in carriers else "shaft"
+        if _is_fixed(parts):
+            role = "housing"
+        elif root in carriers:
+            role = "carrier"
+        else:
+            role = "shaft"
         roles.setdefault(role, []).append(root)
     names = {root: _lettered("carrier", n, len(roles["carrier"])) for n, root in enumerate(roles.get("carrier", []))}
     names |= dict.fromkeys(roles.get("housing", []), "housing")

@@ -312,7 +312,8 @@ def _pair_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: 
     for number, stage in enumerate(stages, 1):
         planet = next((owners[one].name for one in (stage.pinion, stage.gear) if owners[one].carrier), "")
         both = owners[stage.pinion].carrier and owners[stage.gear].carrier
-        name = f"{'ring' if gears[stage.gear].internal else 'sun'}_{planet}" if planet and not both else ""
+        mate = "ring" if gears[stage.gear].internal else "sun"
+        name = f"{mate}_{planet}" if planet and not both else ""
         names.append(name if name and name not in names else f"stage_{number}")
     return names
 
