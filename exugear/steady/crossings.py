@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.linalg
 
 from exugear.steady.campbell.mode_tracks import ModeTracks
 from exugear.steady.excitation import Gearset, Interface
@@ -75,17 +76,17 @@ class Crossing:
 
 
 @dataclass(frozen=True, eq=False)
-class _Mode:
+class Mode:
     """A mode at a speed: eigenvalue, displacements (size,), and the left shape (size,), which loads meet."""
 
     value: complex
     shape: Complexes
     left: Complexes
 
-    def assurance(self, other: _Mode, mass: Floats, damping: Floats) -> float:
+    def assurance(self, other: Mode, mass: Floats, damping: Floats) -> float:
         """MAC of two modes, 1 for the same and 0 for different ones of the quadratic eigenvalue problem."""
 
-        def between(mode: _Mode, two: _Mode) -> complex:
+        def between(mode: Mode, two: Mode) -> complex:
             return complex(mode.left @ (((mode.value + two.value) * mass + damping) @ two.shape))
 
         own = between(self, self) * between(other, other)
@@ -219,12 +220,12 @@ def _passages(tracks: ModeTracks, orders: Floats) -> list[tuple[int, int, float]
     return found
 
 
-def _followed(system: MeanSystem, tracks: ModeTracks, mode: int, speed: float) -> _Mode:
+def _followed(system: MeanSystem, tracks: ModeTracks, mode: int, speed: float) -> Mode:
     """Mode at the followed speed that is nearest to another."""
     apart = np.where(np.isnan(tracks.eigenvalues[:, mode].imag), np.inf, np.abs(tracks.speeds - speed))
     n = int(np.argmin(apart))
     left = np.linalg.solve(system.mass.T, tracks.left[n, mode])
-    return _Mode(complex(tracks.eigenvalues[n, mode]), tracks.shapes[n, mode], left)
+    return Mode(complex(tracks.eigenvalues[n, mode]), tracks.shapes[n, mode], left)
 
 
 def _peak(gearset: Gearset, tracks: ModeTracks, mode: int, speed: float, force: Complexes) -> Floats:
@@ -247,9 +248,9 @@ def _met(system: MeanSystem, tracks: ModeTracks, orders: Floats, near: Crossing)
     order = float(orders[near.line])
     at = near.speed
     start = _followed(system, tracks, near.mode, at)
-    own = _Mode(complex(start.value.real, order * abs(at)), start.shape, start.left)
+    own = Mode(complex(start.value.real, order * abs(at)), start.shape, start.left)
     for _ in range(ROUNDS):
-        own = _improved(own, system.mass, system.damping_at(at), system.stiffness_at(at))
+        own = improved(own, system.mass, system.damping_at(at), system.stiffness_at(at))
         at = float(np.copysign(own.value.imag / order, at))
     if start.assurance(own, system.mass, system.damping_at(at)) < SAME:
         return near
@@ -257,13 +258,18 @@ def _met(system: MeanSystem, tracks: ModeTracks, orders: Floats, near: Crossing)
     return replace(near, speed=at, frequency=own.value.imag / 2.0 / np.pi, damping=damping)
 
 
-def _improved(mode: _Mode, mass: Floats, damping: Floats, stiffness: Floats) -> _Mode:
+def improved(mode: Mode, mass: Floats, damping: Floats, stiffness: Floats) -> Mode:
     """Improve a mode by inverse iteration of its shapes and the Rayleigh quotient of both."""
     slope = 2.0 * mode.value * mass + damping
     matrix = mode.value**2 * mass + mode.value * damping + stiffness
-    right: Complexes = np.linalg.solve(matrix, slope @ mode.shape).astype(np.complex128)
-    left: Complexes = np.linalg.solve(matrix.T, slope.T @ mode.left).astype(np.complex128)
+    # With few degrees of freedom the eigenvalue may be exact to the last bit, and the matrix exactly singular. A pivot
+    # of round-off in place of zero then gives the shape to full accuracy (Wilkinson 1965, as in LAPACK's xHSEIN).
+    factor, pivots, _ = scipy.linalg.lapack.zgetrf(matrix)
+    diagonal = np.einsum("ii->i", factor)
+    diagonal[diagonal == 0.0] = np.finfo(np.float64).eps * np.abs(matrix).max()
+    right: Complexes = scipy.linalg.lu_solve((factor, pivots), slope @ mode.shape)
+    left: Complexes = scipy.linalg.lu_solve((factor, pivots), slope.T @ mode.left, trans=1)
     right = right / np.linalg.norm(right)
     left = left / np.linalg.norm(left)
     value = mode.value - complex(left @ matrix @ right) / complex(left @ slope @ right)
-    return _Mode(value, right, left)
+    return Mode(value, right, left)

@@ -284,6 +284,29 @@ class SteSurface(Displayed):
         near = np.logical_or.accumulate(near, axis=-1)
         return np.concatenate([near[..., 1:], near[..., -1:]], axis=-1)
 
+    def acting_guesses(self) -> Booleans:
+        """Tell on which intervals, and at which nodes between them, a guess acts.
+
+        Nodes and intervals alternate along each axis: 2 n + 1 entries for the n intervals of `near_guesses`, node i at
+        2 i, the interval behind it at 2 i + 1. Values and slopes are continuous at a node, so a guess that acts on one
+        side of it only has no weight there.
+
+        Returns
+        -------
+        (2 p + 1, 2 max(1, c - 1) + 1, 2 max(1, a - 1) + 1, 2 l + 1) array
+        """
+        acting = self.near_guesses()
+        for axis in range(acting.ndim):
+            intervals = np.moveaxis(acting, axis, 0)
+            # The mesh cycle closes; beyond the ends of the other axes the surface goes on as beside them.
+            before, behind = (intervals[-1:], intervals[:1]) if axis == 0 else (intervals[:1], intervals[-1:])
+            padded = np.concatenate([before, intervals, behind])
+            both = np.empty((2 * len(intervals) + 1, *intervals.shape[1:]), dtype=np.bool_)
+            both[::2] = padded[:-1] & padded[1:]
+            both[1::2] = intervals
+            acting = np.moveaxis(both, 0, axis)
+        return acting
+
     def ste(self, force: float, pmc: float, centre_distance: float | None = None, misalignment: float = 0.0) -> float:
         """Return the static transmission error (m) at a force (N, from zero to the last of the axis).
 

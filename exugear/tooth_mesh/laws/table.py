@@ -486,7 +486,7 @@ def pack_tables(elements: tuple[MeshElement, ...], index: Integers, averaged: bo
     count = len(elements)
     size = max((s.coefficients.size // CUBIC_SIZE * NODE_SIZE for s in surfaces), default=0)
     loads = max((s.root_force.size for s in surfaces), default=0)
-    marks = [surface.near_guesses().ravel() if surface.guessed is not None else np.zeros(0) for surface in surfaces]
+    marks = [surface.acting_guesses().size if surface.guessed is not None else 0 for surface in surfaces]
     longest = max((len(knots) for s in surfaces for knots in (s.centre_distance, s.misalignment)), default=0)
     arrays = TableArrays(
         shape=np.zeros((count, 4), dtype=np.int64),
@@ -507,7 +507,7 @@ def pack_tables(elements: tuple[MeshElement, ...], index: Integers, averaged: bo
         damping_time=np.zeros(count),
         sense=np.array([e.flank for e in elements], dtype=np.float64),
         has_guesses=np.zeros(count, dtype=np.int64),
-        near_guesses=np.zeros((count, max((len(mark) for mark in marks), default=0)), dtype=np.int64),
+        acting_guesses=np.zeros((count, max(marks, default=0)), dtype=np.bool_),
     )
     for m, (element, surface) in enumerate(zip(elements, by_mesh, strict=True)):
         if surface is not None and element.table is not None:
@@ -544,8 +544,8 @@ def _fill_table(arrays: TableArrays, m: int, flanks: TableFlanks, surface: SteSu
     arrays.backlash[m], arrays.back_phase[m] = flanks.backlash, flanks.back_phase
     arrays.damping_time[m] = flanks.damping_time
     if surface.guessed is not None:
-        near = surface.near_guesses().ravel()
-        arrays.has_guesses[m], arrays.near_guesses[m, : near.size] = 1, near
+        acting = surface.acting_guesses().ravel()
+        arrays.has_guesses[m], arrays.acting_guesses[m, : acting.size] = 1, acting
 
 
 LAW = Table()

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.optimize
 import xarray as xr
 
 from exugear.dynamics.assemble import assemble
@@ -20,6 +21,15 @@ from exugear.dynamics.statics import locked_equilibrium
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.tooth_mesh.kernels.meshes import DAMPED_POWER
+from exugear.tooth_mesh.kernels.table_law import (
+    ENERGY_DERIVATIVES,
+    GUESSED,
+    LAW_FORCE,
+    LAW_OUTSIDE,
+    NOMINAL_DISTANCE,
+    scratch_memory,
+    surface_law,
+)
 from exugear.tooth_mesh.laws.forms import add_mesh_forces
 from exugear.tooth_mesh.laws.packing import pack
 from exugear.transient.compiled.observers import Observer
@@ -373,3 +383,30 @@ def test_resumed_run_is_bitwise_the_whole_one(grc: Gearbox, tables: dict, tmp_pa
     one, two = (xr.load_dataset(run.path, engine="h5netcdf") for run in (whole, parts))
     for name in ("overall_dte", "mesh_force", "misalignment", "state_q"):
         assert np.array_equal(one[name].to_numpy(), two[name].to_numpy()), name
+
+
+@pytest.mark.parametrize(
+    ("load", "expected"), [(3, (True, True, True)), (5, (False, False, True)), (0, (True, True, True))]
+)
+def test_an_unsolved_state_counts_by_its_weight_and_not_by_the_rounding_of_the_force(
+    grc: Gearbox, tables: dict, load: int, expected: tuple[bool, bool, bool]
+) -> None:
+    """Below, at and above the static load, which is the fourth load of the table to the last bits."""
+    marked = tables | {"high_speed": marked_at(tables["high_speed"], load)}
+    assembly = assembled(grc, Choice("rigid", "table"), marked)
+    table, m = assembly.mean_meshes.table, assembly.mesh_names.index("high_speed")
+    memory, centre = scratch_memory(), float(table.nominal[m, NOMINAL_DISTANCE])
+
+    def law(delta: float) -> np.ndarray:
+        surface_law(delta, 0.0, centre, 0.0, m, table, 0, ENERGY_DERIVATIVES, memory)
+        return memory.law.copy()
+
+    def counts(force: float, change: float = 0.0) -> bool:
+        delta = scipy.optimize.brentq(lambda d: law(d)[LAW_FORCE] - force, 1e-6, 2e-4, xtol=1e-18, rtol=1e-14)
+        return bool(law(delta * (1.0 + change))[LAW_OUTSIDE] == GUESSED)
+
+    static = float(table.root[m, 4]) ** 2
+    below, at, above = counts(0.99 * static), counts(static), counts(1.01 * static)
+    assert (below, at, above) == expected
+    for change in (-1e-9, -1e-15, 1e-15, 1e-9):
+        assert counts(static, change) == at, change

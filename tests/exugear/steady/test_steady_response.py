@@ -8,7 +8,7 @@ import pytest
 from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.steady.campbell.campbell import modes_over_speed
-from exugear.steady.crossings import crossings, with_crossings
+from exugear.steady.crossings import Mode, crossings, improved, with_crossings
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import (
     dissipated_and_given,
@@ -79,6 +79,14 @@ def test_crossings_lie_on_the_modes_that_were_followed(gearset, found):
         assert -nearest.real / abs(nearest) == pytest.approx(crossing.damping, rel=1e-6)
         followed = np.interp(crossing.speed, found[1].speeds, found[1].frequency[:, crossing.mode])
         assert crossing.frequency == pytest.approx(followed, rel=2e-3)
+
+
+def test_a_mode_whose_eigenvalue_is_exact_to_the_last_bit_is_found():
+    """The characteristic matrix of two masses of 1 kg on 4 and 9 N/m is exactly singular at 2 rad/s."""
+    near = Mode(2.0j, np.array([1.0, 0.1], dtype=complex), np.array([1.0, -0.2], dtype=complex))
+    own = improved(near, np.eye(2), np.zeros((2, 2)), np.diag([4.0, 9.0]))
+    assert own.value == pytest.approx(2.0j, rel=1e-15)
+    assert abs(own.shape[1]) < 1e-14 and abs(own.left[1]) < 1e-14
 
 
 def test_one_speed_is_added_where_a_line_meets_a_mode(gearset, found):

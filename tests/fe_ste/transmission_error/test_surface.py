@@ -130,6 +130,11 @@ def test_a_guess_is_told_wherever_it_acts(axes: str) -> None:
     near = one.near_guesses()
     assert near.shape == (12, max(1, len(centre) - 1), max(1, len(tilt) - 1), len(force))
     assert 0 < near.sum() < 0.9 * near.size
+    acting = one.acting_guesses()
+    assert np.array_equal(acting[1::2, 1::2, 1::2, 1::2], near)
+    # A node is marked where both intervals beside it are; the mesh cycle closes.
+    assert np.array_equal(acting[0:-1:2, 1::2, 1::2, 1::2], near & np.roll(near, 1, axis=0))
+    assert np.array_equal(acting[1::2, 1::2, 1::2, 2:-1:2], near[..., 1:] & near[..., :-1])
     differing = 0
     for p, c, a, piece in np.ndindex(near.shape):
         place = (
