@@ -10,12 +10,12 @@ from __future__ import annotations
 #: Reduced elastic bodies (`exugear.bodies`). Runs and modes rest on it.
 REDUCTION = 1
 #: Eigenmodes (`exugear.dynamics.eigenmodes.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
-MODES = 3
+MODES = 4
 #: Runs in time (`exugear.transient`, both solvers, the laws, signals and filters).
 RUN = 9
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 7
 #: Steady responses (`exugear.steady`, and all that modes rest on).
-STEADY = 10
+STEADY = 11
 #: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).
 STUDY = 1

@@ -211,11 +211,12 @@ def _passages(tracks: ModeTracks, orders: Floats) -> list[tuple[int, int, float]
     speed = tracks.speeds
     for at, order in enumerate(orders):
         above = tracks.eigenvalues.imag - order * np.abs(speed)[:, None]
-        passed = above[:-1] * above[1:] <= 0.0  # a comparison with NaN is false
+        # A line that meets a mode at one of the speeds to the last bit passes it once.
+        passed = ((above[:-1] < 0.0) != (above[1:] < 0.0)) & np.isfinite(above[:-1] + above[1:])
         for step, mode in zip(*np.nonzero(passed), strict=True):
             before = above[step, mode]
             after = above[step + 1, mode]
-            share = before / (before - after) if before != after else 0.0
+            share = before / (before - after)
             found.append((int(mode), at, float(speed[step] + share * (speed[step + 1] - speed[step]))))
     return found
 

@@ -98,7 +98,9 @@ class ParameterVariation(Displayed):
         for mode in range(self.frequency.shape[1]):
             distance = self.frequency[:, mode] - frequency
             share = self.share[:, mode]
-            for n in np.flatnonzero(distance[1:] * distance[:-1] < 0.0):
+            # A value that meets the frequency to the last bit is passed once.
+            passed = ((distance[1:] < 0.0) != (distance[:-1] < 0.0)) & np.isfinite(distance[1:] + distance[:-1])
+            for n in np.flatnonzero(passed):
                 if max(share[n], share[n + 1]) >= least_share:
                     part = distance[n] / (distance[n] - distance[n + 1])
                     crossing = float(scale[n] + part * (scale[n + 1] - scale[n]))

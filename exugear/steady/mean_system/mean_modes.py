@@ -41,7 +41,9 @@ def vibrations(mass: Floats, damping: Floats, stiffness: Floats) -> tuple[Comple
     order = np.flatnonzero(kept)[np.argsort(values[kept].imag)]
     right = right[:, order].T
     left = left[:, order].conj().T
-    return values[order], right, left / np.einsum("js,js->j", left, right)[:, None]
+    # Left shapes of a repeated eigenvalue are any basis of their space: they become the partners of the right ones.
+    partners: Complexes = np.linalg.solve(left @ right.T, left)
+    return values[order], right, partners
 
 
 def _eig(matrix: Floats) -> tuple[Complexes, Complexes, Complexes]:

@@ -71,6 +71,21 @@ def test_modes_of_one_system_are_told_apart_however_they_are_damped():
     assert abs(shapes[0].conj() @ np.diag([1.0, 2.0]) @ shapes[1]) > 0.01
 
 
+def test_modes_of_repeated_eigenvalues_add_up_to_the_response():
+    """Modes of one eigenvalue thrice and another twice, in coordinates turned at random, against a direct solution."""
+    size, w = 6, 15.0
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        turn, _ = np.linalg.qr(random.normal(size=(size, size)))
+        stiffness = turn @ np.diag([100.0, 100.0, 100.0, 400.0, 400.0, 900.0]) @ turn.T
+        load = random.normal(size=size)
+        values, right, left = vibrations(np.eye(size), 1e-3 * stiffness, stiffness)
+        with_partners = [(values, right, left), (values.conj(), right.conj(), left.conj())]
+        sums = [(r[:, :size].T * (p[:, size:] @ load / (1j * w - s))).sum(axis=1) for s, r, p in with_partners]
+        direct = np.linalg.solve((1.0 + 1e-3j * w) * stiffness - w**2 * np.eye(size), load)
+        assert np.abs(sums[0] + sums[1] - direct).max() < 1e-10 * np.abs(direct).max()
+
+
 def test_a_mode_that_leaves_the_range_of_frequencies_ends_and_others_go_on():
     def below(speed):
         values, right, left = uncoupled(0.0)(speed)
