@@ -78,7 +78,7 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: test-browser help demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test lock clean
+.PHONY: test-browser help demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
@@ -94,7 +94,8 @@ help:
 	@echo "make vendor-web  renew the libraries in the pages from npm, at the versions that web/package.json pins"
 	@echo "make docs        the documentation site, with its examples run, into $(SITE)"
 	@echo "make dist        sdist and wheel into dist; PROJECT_URL=https://... makes links and pictures absolute"
-	@echo "make wheel-test  the wheel installed and used on Python 3.11, 3.12 and 3.13, as far as they are found"
+	@echo "make wheel-test  the wheel installed and used on the Python of $(VENV)"
+	@echo "make wheel-test-all  the same on Python 3.11, 3.12 and 3.13, as far as they are found"
 	@echo "make lock        renew requirements.lock from what installs today"
 	@echo "make clean       remove all that make made, results and $(VENV) too"
 
@@ -133,7 +134,7 @@ validate: $(INSTALLED)
 	$(RUN)/python -m pytest -m "validation and not long" $(SIDE_BY_SIDE)
 
 # Each test tells its time and, as it goes, what it found.
-validate-long: $(INSTALLED)
+validate-long: $(INSTALLED) wheel-test-all
 	$(RUN)/python -m pytest -m long -rA --durations=0 $(SIDE_BY_SIDE)
 
 benchmarks: $(INSTALLED)
@@ -170,6 +171,9 @@ dist: $(INSTALLED)
 
 wheel-test: dist
 	$(RUN)/python packaging/try_wheel.py dist/exugear-*.whl --constraint requirements.lock
+
+wheel-test-all: dist
+	$(RUN)/python packaging/try_wheel.py dist/exugear-*.whl --all --constraint requirements.lock
 
 lock:
 	@python=$$($(FIND_PYTHON)) || exit 1; "$$python" -m venv --clear $(VENV)-lock

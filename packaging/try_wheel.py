@@ -1,8 +1,8 @@
-"""Install the wheel into a fresh environment of each Python that it is for, and use it away from the sources.
+"""Install the wheel into a fresh environment and use it away from the sources, on this Python or on each it is for.
 
-Says loudly which interpreters are missing: they are not tried. Ends with 1 if any that is there fails, or none is.
+Names the versions that are not tried. Ends with 1 if any that is tried fails, or none is.
 
-    python packaging/try_wheel.py dist/exugear-*.whl [--constraint requirements.lock]
+    python packaging/try_wheel.py dist/exugear-*.whl [--all] [--constraint requirements.lock]
 """
 
 from __future__ import annotations
@@ -22,9 +22,11 @@ LONGEST = 1800
 GRC = "share/exugear/cases/grc750/gearbox.toml"
 
 
-def interpreters() -> dict[str, str]:
-    """Path of a Python of each version that runs, by version."""
+def interpreters(every: bool) -> dict[str, str]:
+    """Path of a Python of each version that runs, by version; of this program's version alone unless `every`."""
     found: dict[str, str] = {}
+    if not every:
+        return {f"{sys.version_info[0]}.{sys.version_info[1]}": sys.executable}
     for version in VERSIONS:
         for candidate in _candidates(version):
             told = subprocess.run(
@@ -107,11 +109,12 @@ def _processor_time() -> float:
 
 def main() -> int:
     """Run from the command line."""
-    parser = argparse.ArgumentParser(description="Try a wheel on every Python that it is for.")
+    parser = argparse.ArgumentParser(description="Try a wheel on this Python, or on every one that it is for.")
     parser.add_argument("wheel", type=Path)
+    parser.add_argument("--all", action="store_true", help="on every Python that it is for, as far as they are found")
     parser.add_argument("--constraint", type=Path)
     given = parser.parse_args()
-    found, failed = interpreters(), []
+    found, failed = interpreters(given.all), []
     for version, python in found.items():
         begin = _processor_time()
         try:
@@ -123,7 +126,7 @@ def main() -> int:
             spent = _processor_time() - begin
             print(f"Python {version} ({python}): works, {spent:.0f} s of processor time", flush=True)
     for version in VERSIONS:
-        if version not in found:
+        if given.all and version not in found:
             print(f"*** Python {version} IS MISSING HERE: the wheel was NOT tried on it ***", flush=True)
     return 1 if failed or not found else 0
 

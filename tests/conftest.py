@@ -1,12 +1,16 @@
-"""What tests of all rooms share: the signals of a program in the foreground of a terminal."""
+"""What tests of all rooms share: signals as from a terminal, and failures that show what a command raised."""
 
 from __future__ import annotations
 
 import signal
+import traceback
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
+import typer.testing
 
+TRACEBACK = "traceback of a command"
 ASKING_TO_STOP = (signal.SIGINT, signal.SIGHUP, signal.SIGTERM, signal.SIGQUIT, signal.SIGPIPE)
 
 
@@ -26,3 +30,30 @@ def terminal_signals() -> Iterator[None]:
         for number, handler in before.items():
             signal.signal(number, handler)
         signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+
+
+@pytest.fixture(autouse=True)
+def commands_that_raise(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep the tracebacks of commands that a test runs in its own process.
+
+    The runner catches what a command raises, and standard error, which most tests print where they fail, stays empty.
+    """
+    invoke = typer.testing.CliRunner.invoke
+
+    def kept(runner: Any, app: Any, arguments: Any = None, *more: Any, **named: Any) -> Any:
+        outcome = invoke(runner, app, arguments, *more, **named)
+        if outcome.exception is not None and not isinstance(outcome.exception, SystemExit):
+            text = "".join(traceback.format_exception(outcome.exception))
+            request.node.user_properties.append((TRACEBACK, f"{arguments}\n{text}"))
+        return outcome
+
+    monkeypatch.setattr(typer.testing.CliRunner, "invoke", kept)
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item: pytest.Item) -> Iterator[None]:
+    """Add those tracebacks to the report of a test that fails."""
+    outcome = yield
+    report = outcome.get_result()
+    if report.failed:
+        report.sections += [("raised by the command", text) for name, text in item.user_properties if name == TRACEBACK]
