@@ -25,13 +25,13 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of a test marked `sample` the first set of parameters stays quick, the others are validation."""
+    """Of a test marked `sample` the first set of parameters stays where the test is, the others run before a release."""
     seen = set()
     for item in items:
         if item.get_closest_marker("sample") is not None:
             name = item.nodeid.partition("[")[0]
             if name in seen:
-                item.add_marker("validation")
+                item.add_marker("long")
             seen.add(name)
 
 
