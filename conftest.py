@@ -25,7 +25,7 @@ if "PYTEST_XDIST_WORKER" not in os.environ:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Of a test marked `sample` the first set of parameters stays where the test is, the others run before a release."""
+    """Of a test marked `sample` the first set of parameters stays where it is, the others run before a release."""
     seen = set()
     for item in items:
         if item.get_closest_marker("sample") is not None:

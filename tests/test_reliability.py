@@ -1,4 +1,4 @@
-"""Each promise of docs/reliability.md is held by a test that is there, where the page says it runs, and in each change."""
+"""Each promise of docs/reliability.md is held by tests that run where the page says, one at least in each change."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def vibrations(mass: Floats, damping: Floats, stiffness: Floats) -> tuple[Comple
     right = right[:, order].T
     left = left[:, order].conj().T
     # Left shapes of a repeated eigenvalue are any basis of their space: they become the partners of the right ones.
-    partners: Complexes = np.linalg.solve(left @ right.T, left)
+    partners: Complexes = np.linalg.solve(left @ right.T, left).astype(np.complex128)
     return values[order], right, partners
 
 
