@@ -299,8 +299,10 @@ class SteSurface(Displayed):
         for axis in range(acting.ndim):
             intervals = np.moveaxis(acting, axis, 0)
             # The mesh cycle closes; beyond the ends of the other axes the surface goes on as beside them.
-            before, behind = (intervals[-1:], intervals[:1]) if axis == 0 else (intervals[:1], intervals[-1:])
-            padded = np.concatenate([before, intervals, behind])
+            padded = np.concatenate([intervals[:1], intervals, intervals[-1:]])
+            if axis == 0:
+                padded[0] = intervals[-1]
+                padded[-1] = intervals[0]
             both = np.empty((2 * len(intervals) + 1, *intervals.shape[1:]), dtype=np.bool_)
             both[::2] = padded[:-1] & padded[1:]
             both[1::2] = intervals

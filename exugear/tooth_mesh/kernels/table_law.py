@@ -346,7 +346,9 @@ def node_or_interval(interval: int, t: float) -> int:
     """Index along an axis on which nodes and intervals alternate, at the share t of an interval."""
     if t < NODE_WIDTH:
         return 2 * interval
-    return 2 * interval + 2 if t > 1.0 - NODE_WIDTH else 2 * interval + 1
+    if t > 1.0 - NODE_WIDTH:
+        return 2 * interval + 2
+    return 2 * interval + 1
 
 
 @kernel
@@ -361,14 +363,18 @@ def guess_acts(
         scaled = (pmc - math.floor(pmc)) * shape[POSITIONS]
         interval = (node[AXIS_PMC] + 1) % shape[POSITIONS]
         place = node_or_interval(interval, scaled - interval)
+    x = centre
     for axis in range(2):
-        x = centre if axis == 0 else misalignment
-        knots, intervals = tables.knots[m, axis], max(1, tables.axes[m, axis] - 1)
+        knots = tables.knots[m, axis]
+        intervals = max(1, tables.axes[m, axis] - 1)
         i = 0
         while i < intervals - 1 and x >= knots[i + 1]:
             i += 1
-        share = (x - knots[i]) / (knots[i + 1] - knots[i]) if tables.axes[m, axis] > 1 else 0.5
+        share = 0.5
+        if tables.axes[m, axis] > 1:
+            share = (x - knots[i]) / (knots[i + 1] - knots[i])
         place = place * (2 * intervals + 1) + node_or_interval(i, share)
+        x = misalignment
     acting: bool = tables.acting_guesses[m, place * (2 * shape[LOAD_PIECES] + 1) + node_or_interval(piece, t)]
     return acting
 
@@ -435,7 +441,9 @@ def surface_law(
         return 0, -1.0
     end = c[0] + c[1] + c[2] + c[3]
     beyond = delta > end and piece == last
-    t = 2.0 if beyond else position_on_piece(delta, c, piece == 0)
+    t = 2.0
+    if not beyond:
+        t = position_on_piece(delta, c, piece == 0)
     if tables.has_guesses[m] == 1 and guess_acts(pmc, centre, misalignment, piece, t, m, tables, memory.node):
         law[LAW_OUTSIDE] = GUESSED
     if beyond:
