@@ -193,6 +193,7 @@ def test_a_gearbox_runs_alike_in_both_frames(floating: Assembly) -> None:
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_the_grc_runs_alike_in_both_frames(grc_shafts: Gearbox) -> None:
     # Rated torque and speed, ten milliseconds, equal steps. Asked: 0.2 % of the largest motion.
     mean = {"sun_planet": 3.77e9, "ring_planet": 4.85e9, "intermediate": 3.07e9, "high_speed": 1.93e9}

@@ -199,6 +199,7 @@ def test_power_of_each_mesh_and_of_the_whole(
 
 
 @pytest.mark.validation
+@pytest.mark.long
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_power_of_each_mesh_and_of_the_whole_up_to_full_speed(grc: Gearbox, stiffness: dict, variant: str) -> None:
     """Last ten seconds of the run-up, from 143 to 215 rpm."""

@@ -71,7 +71,9 @@ def around(state: StaticState) -> dict[str, tuple[float, float]]:
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("kind", ["grc", "relieved", "pair", "wind"])
+@pytest.mark.parametrize(
+    "kind", ["relieved", "pair", *(pytest.param(kind, marks=pytest.mark.long) for kind in ("grc", "wind"))]
+)
 def test_static_state_is_that_of_the_law_of_whole_tables(kind: str) -> None:
     """External, internal, relieved and crowned pairs; the grid has the same finite elements and positions."""
     state = solved(kind)

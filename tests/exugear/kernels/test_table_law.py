@@ -289,6 +289,7 @@ def test_misalignment_is_positive_where_it_opens_the_gap_at_the_plus_z_end(grc: 
 
 
 @pytest.mark.validation
+@pytest.mark.sample
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_both_solvers_write_the_same_run(grc: Gearbox, tables: dict, tmp_path: Path, variant: str) -> None:
     one, two = (

@@ -98,6 +98,7 @@ def test_the_loudest_peaks_are_those_of_a_dense_sweep(parallel):
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_the_sixty_loudest_peaks_of_the_grc_are_those_of_a_dense_sweep(grc, stiffness):
     """All speeds above a tenth: few peaks, which stand by 5 % on shoulders of others, lie between the speeds."""
     assembly = assemble(grc, BUSHING, stiffness)

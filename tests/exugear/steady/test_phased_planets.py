@@ -116,6 +116,7 @@ def test_branches_of_planets_out_of_phase_are_refused_with_the_reason(gearset):
 
 
 @pytest.mark.validation
+@pytest.mark.sample
 @pytest.mark.parametrize("speed", [8.0, 18.0])
 def test_planets_out_of_phase_started_on_their_steady_state_stay_there(four, stiffness, speed):
     """As for planets in phase; combinations beyond the third leave 1e-3 of signals that phasing makes small."""

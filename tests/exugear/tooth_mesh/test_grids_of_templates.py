@@ -67,17 +67,18 @@ def test_states_that_come_to_form_circles_are_solved(
 
 
 @pytest.mark.validation
-def test_the_default_grid_of_a_template_is_solved_whole(tmp_path: Path) -> None:
+@pytest.mark.parametrize("positions", [10, pytest.param(50, marks=pytest.mark.long)])
+def test_the_default_grid_of_a_template_is_solved_whole(positions: int, tmp_path: Path) -> None:
     case = case_of(tmp_path, "pair")
+    case.write_text(f"{template('pair')}\n[ste]\npositions = {positions}\n", encoding="utf-8")
     for table in check_verbs(case, tmp_path / "out"):
-        assert table["states"] == 7500 and table["not_converged"] == 0
+        assert table["states"] == 150 * positions and table["not_converged"] == 0
         assert table["static_share_cut_off"] == 0.0
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(
-    ("kind", "cut"), [("pair", 12), pytest.param("parallel", 101, marks=pytest.mark.long), ("planetary", 18)]
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("kind", "cut"), [("pair", 12), ("parallel", 101), ("planetary", 18)])
 def test_wide_grids_of_templates_are_solved_whole_and_count_what_is_cut_off(
     kind: str, cut: int, tmp_path: Path
 ) -> None:

@@ -65,9 +65,10 @@ def test_a_run_killed_at_some_writes_resumes_bitwise(case: Path, tmp_path: Path)
 
 
 @pytest.mark.validation
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("solver", "every"),
-    [("compiled", 7), *(pytest.param(*row, marks=pytest.mark.long) for row in (("compiled", 1), ("exudyn", 3)))],
+    [("compiled", 7), ("compiled", 1), ("exudyn", 3)],
 )
 def test_a_run_killed_at_any_write_resumes(case: Path, tmp_path: Path, solver: str, every: int) -> None:
     """Bitwise with the compiled solver; to round-off with Exudyn, whose clock starts anew from a rounded time."""

@@ -230,8 +230,9 @@ def test_the_reference_gearbox_runs_far_inside_the_limits(grc, stiffness, tmp_pa
 
 
 @pytest.mark.validation
+@pytest.mark.sample
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
-@pytest.mark.parametrize("inertias", ["assemblies", "gears"])
+@pytest.mark.parametrize("inertias", ["gears", "assemblies"])
 def test_whole_run_ups_of_the_reference_gearbox_are_trusted(grc, stiffness, tmp_path, variant, inertias):
     run = simulated(grc, Choice(variant, inertias=inertias), stiffness, tmp_path)
     data = xr.load_dataset(run.path, engine="h5netcdf")

@@ -226,15 +226,17 @@ def test_bushing_variant_follows_exudyn(grc: Gearbox, stiffness: dict) -> None:
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_bushing_variant_follows_exudyn_over_half_a_second(grc: Gearbox, stiffness: dict) -> None:
     assert_exudyn_agrees(grc, stiffness, 20000, 1e-6)
 
 
 @pytest.mark.validation
-def test_rigid_variant_follows_the_jointed_model_of_exudyn(grc: Gearbox, stiffness: dict) -> None:
-    """Over 0.2 s; generalized-alpha of second order, extrapolated from two steps to none."""
+@pytest.mark.parametrize("duration", [0.05, pytest.param(0.2, marks=pytest.mark.long)])
+def test_rigid_variant_follows_the_jointed_model_of_exudyn(grc: Gearbox, stiffness: dict, duration: float) -> None:
+    """Generalized-alpha of second order, extrapolated from two steps to none."""
     minimal, jointed = assemble(grc, Choice("rigid"), stiffness), assemble(grc, Choice("jointed"), stiffness)
-    speed, duration, interval = -4.8, 0.2, 5e-5
+    speed, interval = -4.8, 5e-5
     start = accelerating_start(minimal, LOAD, speed)
     speeds = {n: u * speed for n, u in grc.train.rolling_speeds("carrier", 1.0).items()}
     q = np.zeros(jointed.size)
@@ -408,7 +410,7 @@ def test_amplitude_error_of_the_chosen_step(
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("variant", ["rigid", "bushing"])
+@pytest.mark.parametrize("variant", ["rigid", pytest.param("bushing", marks=pytest.mark.long)])
 def test_order_cuts_of_the_run_up_stay_at_half_the_step(
     grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str
 ) -> None:

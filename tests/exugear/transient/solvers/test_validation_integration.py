@@ -65,8 +65,9 @@ def test_stored_signals_with_elastic_shafts_are_those_of_the_runge_kutta_method_
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("variant", ["rigid", "bushing", "shafts", pytest.param("flexible", marks=pytest.mark.long)])
-@pytest.mark.parametrize("rpm", [-60.0, -205.0])
+@pytest.mark.sample
+@pytest.mark.parametrize("variant", ["bushing", "rigid", "shafts", "flexible"])
+@pytest.mark.parametrize("rpm", [-205.0, -60.0])
 def test_stored_signals_are_those_of_the_runge_kutta_method_at_a_fine_step(
     grc: Gearbox, grc_shafts: Gearbox, stiffness: dict, tmp_path: Path, variant: str, rpm: float
 ) -> None:
@@ -85,7 +86,7 @@ def lines(data: xr.Dataset, name: str) -> NDArray:
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("variant", ["rigid", "bushing", "shafts", "flexible"])
+@pytest.mark.parametrize("variant", ["rigid", "bushing", "shafts", pytest.param("flexible", marks=pytest.mark.long)])
 def test_stored_amplitudes_at_6_khz_are_those_of_the_runge_kutta_method_at_a_fine_step(
     grc: Gearbox, grc_shafts: Gearbox, stiffness: dict, tmp_path: Path, variant: str
 ) -> None:
@@ -122,9 +123,29 @@ def unexplained_of(gearbox: Gearbox, tables: dict, folder: Path, integrator: str
     return unexplained(data)
 
 
+@pytest.fixture
+def swinging(grc: Gearbox, tmp_path: Path) -> Gearbox:
+    """30 % of the load, on a brake whose torque swings through zero at 30 Hz."""
+    carrier, times = 72e3, np.arange(0.0, 0.5, 0.005)
+    swing = 1.0 + 4.0 * np.sin(2.0 * np.pi * 30.0 * times)
+    lines = [f"{t:.4f},{carrier},{-carrier / grc.train.ratio * s:.6f}" for t, s in zip(times, swing, strict=True)]
+    (tmp_path / "swing.csv").write_text("\n".join(["time_s,carrier_N_m,hss_N_m", *lines]) + "\n", encoding="utf-8")
+    near = replace(grc, source=str(tmp_path / "gearbox.toml"))
+    return near.varied({"load_cases.reference": {"torque_series": "swing.csv"}})
+
+
 @pytest.mark.validation
+def test_energy_is_accounted_for_where_teeth_part_all_the_time(grc: Gearbox, swinging: Gearbox, tmp_path: Path) -> None:
+    """Two runs over six periods of the swing; what impacts leave unexplained is a few thousandths of what is damped."""
+    tables = surfaces(grc)
+    found = [unexplained_of(swinging, tables, tmp_path, "adams", rpm, 6.0 / 30.0) for rpm in (-60.0, -66.0)]
+    assert max(found) < 5e-3
+
+
+@pytest.mark.validation
+@pytest.mark.long
 def test_account_of_energy_with_teeth_that_part_is_as_good_as_by_the_runge_kutta_method(
-    grc: Gearbox, tmp_path: Path
+    grc: Gearbox, swinging: Gearbox, tmp_path: Path
 ) -> None:
     """The law table at 30 % of the load, whose brake swings through zero: teeth part and meet again all the time.
 
@@ -132,14 +153,9 @@ def test_account_of_energy_with_teeth_that_part_is_as_good_as_by_the_runge_kutta
     Whole periods of the swing, because a method that goes through the torques at its steps by a smooth curve takes
     their kinks as round: its work is another by h^2 / 12 of the rate of their power, and again the same after a period.
     """
-    carrier, times = 72e3, np.arange(0.0, 0.5, 0.005)
-    swing = 1.0 + 4.0 * np.sin(2.0 * np.pi * 30.0 * times)
-    lines = [f"{t:.4f},{carrier},{-carrier / grc.train.ratio * s:.6f}" for t, s in zip(times, swing, strict=True)]
-    (tmp_path / "swing.csv").write_text("\n".join(["time_s,carrier_N_m,hss_N_m", *lines]) + "\n", encoding="utf-8")
-    near = replace(grc, source=str(tmp_path / "gearbox.toml"))
-    gearbox, tables = near.varied({"load_cases.reference": {"torque_series": "swing.csv"}}), surfaces(grc)
+    tables = surfaces(grc)
     sizes = {}
     for integrator in ("adams", "rk4"):
-        found = [unexplained_of(gearbox, tables, tmp_path, integrator, -60.0 - 3.0 * n, 13.0 / 30.0) for n in range(6)]
+        found = [unexplained_of(swinging, tables, tmp_path, integrator, -60.0 - 3.0 * n, 13.0 / 30.0) for n in range(6)]
         sizes[integrator] = float(np.sqrt(np.mean(np.square(found))))
     assert sizes["adams"] < sizes["rk4"] < 2e-3
