@@ -24,6 +24,8 @@ from ..spur_case import SPUR_CASE
 pytestmark = pytest.mark.usefixtures("terminal_signals")
 ROOT = Path(__file__).parents[3]
 CASE = ROOT / "cases" / "grc750" / "gearbox.toml"
+SIGNALS_IN_EACH_CHANGE = {(signal.SIGKILL, 5), (signal.SIGKILL, 1), (signal.SIGINT, 3)}
+"""Signal and seed of its delay: workers killed at work and as they begin, and stopped; the others before a release."""
 PROGRAM = "from exugear.cli.app import main; main()"
 #: The same with few elements a tooth.
 COARSE_PROGRAM = f"""
@@ -160,7 +162,7 @@ def test_a_run_that_is_terminated_keeps_what_it_reached(case):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (0, *range(2, 10)))])
 def test_ctrl_c_at_any_time_of_a_run_ends_it_soon_with_130(case, seed):
     """Loading libraries and kernels, start, compiled loop, writing."""
     delay = random.Random(seed).uniform(0.0, 5.0)
@@ -172,8 +174,14 @@ def test_ctrl_c_at_any_time_of_a_run_ends_it_soon_with_130(case, seed):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("seed", range(7))
+@pytest.mark.parametrize(
+    ("number", "seed"),
+    [
+        pytest.param(number, seed, marks=() if (number, seed) in SIGNALS_IN_EACH_CHANGE else pytest.mark.long)
+        for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+        for seed in range(7)
+    ],
+)
 def test_no_worker_outlives_a_sweep(case, number, seed):
     """Workers begin, load libraries, work; they hold the program's standard error open while they live."""
     grid = "centre_distance_offsets_um = [0.0, 100.0, 200.0]"

@@ -77,6 +77,7 @@ def test_a_new_file_runs_and_has_modes_in_both_variants(case: Path) -> None:
 
 
 @pytest.mark.validation
+@pytest.mark.sample
 def test_a_new_file_goes_through_all_verbs_with_tables_of_its_teeth(case: Path) -> None:
     out = case.parent / "out"
     assert exugear("ste", case, "--positions", 10, "--out", out).exit_code == 0
