@@ -1,4 +1,4 @@
-"""Each promise of docs/reliability.md is held by a test that is there, where the page says it runs, and in each change."""
+"""Each promise of docs/reliability.md has a test that is there, runs where the page says, and runs in each change."""
 
 from __future__ import annotations
 
