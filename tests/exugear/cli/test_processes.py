@@ -24,8 +24,8 @@ from ..spur_case import SPUR_CASE
 pytestmark = pytest.mark.usefixtures("terminal_signals")
 ROOT = Path(__file__).parents[3]
 CASE = ROOT / "cases" / "grc750" / "gearbox.toml"
-SIGNALS_IN_EACH_CHANGE = {(signal.SIGKILL, 5), (signal.SIGKILL, 1), (signal.SIGINT, 3)}
-"""Signal and seed of its delay: workers killed at work and as they begin, and stopped; the others before a release."""
+SIGNALS_IN_EACH_CHANGE = {(signal.SIGKILL, 5), (signal.SIGINT, 3)}
+"""Signal and seed of its delay: killed while workers work, stopped while they begin; the others before a release."""
 PROGRAM = "from exugear.cli.app import main; main()"
 #: The same with few elements a tooth.
 COARSE_PROGRAM = f"""
@@ -235,7 +235,10 @@ needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="a
 
 @pytest.mark.validation
 @needs_full_device
-@pytest.mark.parametrize("arguments", [["check", CASE], ["check", CASE, "--json"], ["--version"], ["--help"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["check", CASE], pytest.param(["check", CASE, "--json"], marks=pytest.mark.long), ["--version"], ["--help"]],
+)
 def test_a_full_standard_output_is_a_sentence_and_code_1(arguments):
     with open("/dev/full", "w") as full:
         outcome = outcome_into(full, *arguments)
@@ -244,6 +247,7 @@ def test_a_full_standard_output_is_a_sentence_and_code_1(arguments):
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_a_closed_standard_output_is_a_sentence_and_code_1():
     outcome = outcome_into(None, "check", CASE, "--json", preexec_fn=close_standard_output)
     assert said(outcome) == "Failed: standard output: Bad file descriptor\n"

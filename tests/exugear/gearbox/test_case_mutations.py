@@ -105,8 +105,8 @@ def test_the_cases_to_start_from_have_no_fault(starts: tuple[Path, dict[str, dic
 @pytest.mark.validation
 def test_damaged_files_are_refused_in_words_or_pass(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
     file, cases = starts
-    passed = [survives_check(cases, seed, file) is not None for seed in range(30)]
-    assert 2 < sum(passed) < 22  # else the mutants are no test of anything
+    passed = [survives_check(cases, seed, file) is not None for seed in range(20)]
+    assert 2 < sum(passed) < 16  # else the mutants are no test of anything
 
 
 def test_what_check_passes_modes_takes(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
