@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -60,20 +59,15 @@ def test_a_verb_has_the_options_that_are_shown(words: list[str]) -> None:
 
 
 @pytest.mark.validation
-def test_a_gearbox_of_ones_own_goes_from_file_to_report(tmp_path: Path) -> None:
+def test_a_gearbox_of_ones_own_goes_from_file_to_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The lines with a path of the environment, as a user types them; a moment of the run-up."""
+    monkeypatch.chdir(tmp_path)
     lines = [line.split()[1:] for line in COMMANDS if line.startswith(".venv/bin/exugear")]
     assert [words[0] for words in lines] == ["new", "run", "report"]
     for words in lines:
-        more = ["--duration", "0.5"] if words[0] == "run" else []
-        command = [
-            sys.executable,
-            "-c",
-            "import sys; from exugear.cli.app import main; sys.exit(main())",
-            *words,
-            *more,
-        ]
-        subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+        more = ["--duration", "0.05"] if words[0] == "run" else []
+        outcome = CliRunner().invoke(app, [*words, *more])
+        assert outcome.exit_code == 0, outcome.output
     assert (tmp_path / "results" / "my" / "report.html").is_file()
 
 

@@ -72,7 +72,7 @@ def test_both_routes_give_the_same_run_and_each_file_says_which_it_was(case, tmp
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("law", ["seed", "table"])
+@pytest.mark.parametrize("law", ["seed", pytest.param("table", marks=pytest.mark.long)])
 def test_both_routes_give_the_same_run_of_a_whole_gearbox(grc, stiffness, tmp_path, law):
     """By the law whose force is not along its deflection, and by that which knows how gears stand."""
     data = surfaces(grc) if law == "table" else stiffness

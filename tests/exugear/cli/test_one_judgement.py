@@ -124,6 +124,7 @@ def test_the_case_behind_the_doubtful_ones_is_beyond_doubt():
 
 
 @pytest.mark.validation
+@pytest.mark.sample
 @pytest.mark.usefixtures("coarse")
 @pytest.mark.parametrize("name", DOUBTFUL)
 def test_every_verb_accepts_a_doubtful_case_with_the_same_remark(name, tmp_path):

@@ -24,6 +24,8 @@ from ..spur_case import SPUR_CASE
 pytestmark = pytest.mark.usefixtures("terminal_signals")
 ROOT = Path(__file__).parents[3]
 CASE = ROOT / "cases" / "grc750" / "gearbox.toml"
+SIGNALS_IN_EACH_CHANGE = {(signal.SIGKILL, 5), (signal.SIGINT, 3)}
+"""Signal and seed of its delay: killed while workers work, stopped while they begin; the others before a release."""
 PROGRAM = "from exugear.cli.app import main; main()"
 #: The same with few elements a tooth.
 COARSE_PROGRAM = f"""
@@ -160,7 +162,7 @@ def test_a_run_that_is_terminated_keeps_what_it_reached(case):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (0, *range(2, 10)))])
 def test_ctrl_c_at_any_time_of_a_run_ends_it_soon_with_130(case, seed):
     """Loading libraries and kernels, start, compiled loop, writing."""
     delay = random.Random(seed).uniform(0.0, 5.0)
@@ -172,8 +174,14 @@ def test_ctrl_c_at_any_time_of_a_run_ends_it_soon_with_130(case, seed):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("seed", range(7))
+@pytest.mark.parametrize(
+    ("number", "seed"),
+    [
+        pytest.param(number, seed, marks=() if (number, seed) in SIGNALS_IN_EACH_CHANGE else pytest.mark.long)
+        for number in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+        for seed in range(7)
+    ],
+)
 def test_no_worker_outlives_a_sweep(case, number, seed):
     """Workers begin, load libraries, work; they hold the program's standard error open while they live."""
     grid = "centre_distance_offsets_um = [0.0, 100.0, 200.0]"
@@ -227,7 +235,10 @@ needs_full_device = pytest.mark.skipif(not Path("/dev/full").exists(), reason="a
 
 @pytest.mark.validation
 @needs_full_device
-@pytest.mark.parametrize("arguments", [["check", CASE], ["check", CASE, "--json"], ["--version"], ["--help"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [["check", CASE], pytest.param(["check", CASE, "--json"], marks=pytest.mark.long), ["--version"], ["--help"]],
+)
 def test_a_full_standard_output_is_a_sentence_and_code_1(arguments):
     with open("/dev/full", "w") as full:
         outcome = outcome_into(full, *arguments)
@@ -236,6 +247,7 @@ def test_a_full_standard_output_is_a_sentence_and_code_1(arguments):
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_a_closed_standard_output_is_a_sentence_and_code_1():
     outcome = outcome_into(None, "check", CASE, "--json", preexec_fn=close_standard_output)
     assert said(outcome) == "Failed: standard output: Bad file descriptor\n"

@@ -105,8 +105,8 @@ def test_the_cases_to_start_from_have_no_fault(starts: tuple[Path, dict[str, dic
 @pytest.mark.validation
 def test_damaged_files_are_refused_in_words_or_pass(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
     file, cases = starts
-    passed = [survives_check(cases, seed, file) is not None for seed in range(30)]
-    assert 2 < sum(passed) < 22  # else the mutants are no test of anything
+    passed = [survives_check(cases, seed, file) is not None for seed in range(20)]
+    assert 2 < sum(passed) < 16  # else the mutants are no test of anything
 
 
 def test_what_check_passes_modes_takes(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
@@ -116,16 +116,17 @@ def test_what_check_passes_modes_takes(starts: tuple[Path, dict[str, dict[str, A
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("seeds", [range(1000, 1150), pytest.param(range(1000, 1600), marks=pytest.mark.long)])
+@pytest.mark.long
 def test_hundreds_of_damaged_files_are_refused_in_words_or_pass(
-    starts: tuple[Path, dict[str, dict[str, Any]]], seeds: range
+    starts: tuple[Path, dict[str, dict[str, Any]]],
 ) -> None:
     file, cases = starts
-    for seed in seeds:
+    for seed in range(1000, 1600):
         survives_check(cases, seed, file)
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_what_check_passes_modes_takes_of_many(starts: tuple[Path, dict[str, dict[str, Any]]]) -> None:
     file, cases = starts
     for seed in range(100, 120):

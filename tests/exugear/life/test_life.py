@@ -170,7 +170,8 @@ def test_a_life_killed_late_is_called_again_to_the_same_bits_and_leaves_no_parti
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("every", [5, 1])
 def test_a_life_killed_at_any_write_is_called_again_to_the_same_bits(first, tmp_path, every):
     found = killed_lives(first, tmp_path, every)
     assert found["kills"] > 40 // every

@@ -38,6 +38,7 @@ def searched(folder, *minimise, **settings):
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_a_search_finds_the_optimum_that_is_known(tmp_path):
     """Squared distances fall by four a halving: 1e-2 is within 0.1 of both optima, of ranges of 0.9 and 8."""
     data = optimise(searched(tmp_path, "low", generations=20), tmp_path / "out", HERE).dataset

@@ -66,6 +66,7 @@ def test_points_are_those_of_gearboxes_varied_one_by_one(here, home):
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_one_process_and_two_give_the_same_bits(here, home, tmp_path):
     two = sweep(small_study(home), tmp_path / "two", processes(2))
     xr.testing.assert_identical(figures_of(two.dataset), figures_of(here.dataset))

@@ -111,6 +111,7 @@ def test_limits_of_both_sides_and_of_the_figure_itself_hold(tmp_path):
 
 
 @pytest.mark.validation
+@pytest.mark.sample
 @pytest.mark.parametrize(("percent", "height", "seat"), [(95.0, (0.75 * 0.19) ** 2, 0.4525), (100.0, 0.15**2, 0.45)])
 def test_the_optimum_over_tolerances_stands_off_the_wall(tmp_path, percent, height, seat):
     """Made within 0.1, evenly: 95 of 100 draws lie in a piece of 0.19 of the 0.2, all in 0.2.

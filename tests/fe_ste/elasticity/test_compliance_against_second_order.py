@@ -46,7 +46,10 @@ def test_helical_pinion(agreement: ModuleType) -> None:
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(("name", "gear"), CASES)
+@pytest.mark.parametrize(
+    ("name", "gear"),
+    [pytest.param(*case, marks=() if case == ("internal 0", 1) else pytest.mark.long) for case in CASES],
+)
 def test_every_stored_gear(agreement: ModuleType, name: str, gear: int) -> None:
     close(agreement, name, gear)
 

@@ -39,6 +39,7 @@ def mesh() -> SectorMesh:
 
 
 @pytest.mark.validation
+@pytest.mark.sample
 @pytest.mark.parametrize(("angle", "poissons_ratio"), [(67.5, 0.3), (82.0, 0.27), (107.5, 0.3)])
 def test_image_loads_make_a_wedge_of_a_half_space(wedge: ModuleType, angle: float, poissons_ratio: float) -> None:
     """At angles that were not fitted; seen 0.5 to 1.7 % rms of the mean."""

@@ -56,6 +56,7 @@ def test_root_stress_of_the_spur_reference_is_that_of_iso_6336_3(gauges, member,
 
 
 @pytest.mark.validation
+@pytest.mark.sample
 @pytest.mark.parametrize(("member", "radius"), [(0, 37.72e-3), (1, 55.95e-3)])
 def test_root_stress_has_converged_with_the_mesh_of_the_fillet(gauges, member, radius):
     gear = (fzg_c().pinion, fzg_c().gear)[member]

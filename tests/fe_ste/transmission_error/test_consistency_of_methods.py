@@ -114,7 +114,8 @@ def test_stored_cases_are_those_of_the_benchmark(agreement):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("name", ["helical 0.4", "internal 0.6"])
+@pytest.mark.sample
+@pytest.mark.parametrize("name", ["spur 0 coarse", "helical 0.4", "internal 0.6"])
 def test_the_nonlinear_analysis_still_gives_the_stored_value(agreement, name):
     entry = agreement.compare(agreement.CASES[name])
     # Converged to 1e-8; another version of the meshes or of the sparse solver may differ by rounding.

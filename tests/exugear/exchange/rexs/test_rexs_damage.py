@@ -109,6 +109,7 @@ def test_damaged_files_are_refused_in_words_or_imported():
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_a_thousand_damaged_files_are_refused_in_words_or_imported():
     for seed in range(1000, 2000):
         imports_or_is_refused_in_words(damaged(seed))

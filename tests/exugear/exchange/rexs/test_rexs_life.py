@@ -9,6 +9,7 @@ from exugear.cli.app import app
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.gearbox.gearbox import Gearbox
 
+from ...spur_case import COARSE_INPUT
 from .own_files import spur_pair
 
 LIMITS = {"endurance_limit_flank": 1500.0, "endurance_limit_root": 461.0}
@@ -100,8 +101,9 @@ def test_the_verbs_import_and_count_the_loads_and_never_write_over_a_table(tmp_p
 
 
 @pytest.mark.validation
-def test_life_runs_on_what_was_imported(tmp_path):
+def test_life_runs_on_what_was_imported(tmp_path, monkeypatch):
     """200 N m on 20 teeth of 3 mm and a face of 20 mm is too much for flanks: it ends with code 1 and says so."""
+    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
     path = tmp_path / "own.rexs"
     path.write_text(file_with_spectrum().text())
     assert exugear("import", path, "--out", tmp_path / "case").exit_code == 0

@@ -16,8 +16,12 @@ from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import KINDS
 
+from ...spur_case import COARSE_INPUT
+
 QUICKLY_REPORTED = ("pair", "planetary")
-"""Templates whose report is written by every run of the tests; those of all are by the verbs with tables below."""
+"""Templates whose report is written here as well; those of all are by the verbs with tables below."""
+RUN_IN_EACH_CHANGE = [pytest.param(kind, marks=() if kind == "wind" else pytest.mark.long) for kind in KINDS]
+"""The template of planets and of parallel stages; `pair` goes through all verbs in each change."""
 
 
 def exugear(*arguments: object):
@@ -64,6 +68,7 @@ def test_the_run_up_ends_at_the_speed_that_the_file_says(case: Path, checks: Cal
 
 
 @pytest.mark.validation
+@pytest.mark.parametrize("case", RUN_IN_EACH_CHANGE, indirect=True)
 def test_a_new_file_runs_and_has_modes_in_both_variants(case: Path) -> None:
     out = case.parent / "out"
     for variant in ("rigid", "bushing"):
@@ -77,12 +82,18 @@ def test_a_new_file_runs_and_has_modes_in_both_variants(case: Path) -> None:
 
 
 @pytest.mark.validation
-def test_a_new_file_goes_through_all_verbs_with_tables_of_its_teeth(case: Path) -> None:
+@pytest.mark.sample
+def test_a_new_file_goes_through_all_verbs_with_tables_of_its_teeth(
+    case: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The pair with few elements a tooth: what the README shows, in a test of its own, has the default mesh."""
+    if case.parent.name == "pair":
+        monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
     out = case.parent / "out"
-    assert exugear("ste", case, "--positions", 10, "--out", out).exit_code == 0
+    assert exugear("ste", case, "--positions", 8, "--out", out).exit_code == 0
     for variant in ("rigid", "bushing"):
         how = ("--variant", variant, "--out", out)
-        assert exugear("run", case, *how, "--duration", 1.0).exit_code == 0
+        assert exugear("run", case, *how, "--duration", 0.2).exit_code == 0
         assert exugear("modes", case, *how).exit_code == 0
     assert exugear("bearings", case, "--out", out).exit_code == 0
     assert exugear("view", case, "--out", out).exit_code == 0

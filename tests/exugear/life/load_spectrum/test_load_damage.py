@@ -23,8 +23,8 @@ from ...gearbox.test_case_mutations import at_most, is_refused_in_words
 from ...spur_case import SPUR_CASE
 
 LIMIT = 60.0
-#: Damage for each change of the program, and for a release.
-MANY = pytest.mark.parametrize("seeds", [range(1000, 1100), pytest.param(range(1000, 1500), marks=pytest.mark.long)])
+MANY = range(1000, 1500)
+"""Damage for a release."""
 SPUR = tomllib.loads(SPUR_CASE)
 TURBINE = {"torque": "RotTorq", "speed": "RotSpeed"}
 LOADS: dict[str, Any] = {
@@ -130,9 +130,9 @@ def test_damaged_keys_of_loads_are_refused_in_words_or_counted(case):
 
 
 @pytest.mark.validation
-@MANY
-def test_hundreds_of_cases_with_damaged_loads_are_refused_in_words_or_counted(case, seeds):
-    keys_survive(case, seeds)
+@pytest.mark.long
+def test_hundreds_of_cases_with_damaged_loads_are_refused_in_words_or_counted(case):
+    keys_survive(case, MANY)
 
 
 def damaged(content: bytes, rng: random.Random) -> bytes:
@@ -167,9 +167,9 @@ def test_damaged_files_of_many_are_refused_in_words_or_counted(case):
 
 
 @pytest.mark.validation
-@MANY
-def test_hundreds_of_damaged_files_of_many_are_refused_in_words_or_counted(case, seeds):
-    files_survive(case, seeds)
+@pytest.mark.long
+def test_hundreds_of_damaged_files_of_many_are_refused_in_words_or_counted(case):
+    files_survive(case, MANY)
 
 
 @pytest.mark.parametrize(

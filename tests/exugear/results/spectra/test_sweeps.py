@@ -27,7 +27,10 @@ def highest_share(severity):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(("severity", "low", "high"), [(0.1, 0.95, 1.02), (TOO_FAST, 0.88, 0.99), (20.0, 0.2, 0.5)])
+@pytest.mark.parametrize(
+    ("severity", "low", "high"),
+    [pytest.param(0.1, 0.95, 1.02, marks=pytest.mark.long), (TOO_FAST, 0.88, 0.99), (20.0, 0.2, 0.5)],
+)
 def test_a_sweep_builds_up_as_far_as_its_severity_says(severity, low, high):
     assert low < highest_share(severity) < high
 
