@@ -270,7 +270,7 @@ def test_ste_with_bad_options_writes_nothing(spur_case, tmp_path, options, said)
 
 @pytest.mark.validation
 def test_the_nonlinear_method_writes_a_table_of_its_own_and_goes_on_from_it(spur_case, tmp_path, monkeypatch):
-    mesh = ContactMesh(layers=3, contact_elements=3, growth=1.0, thickness=4, fillet=2, root=1, rim=3, far_flank=4)
+    mesh = ContactMesh(layers=3, contact_elements=2, growth=2.0, thickness=3, fillet=1, root=1, rim=3, far_flank=4)
     coarse = functools.partial(NonlinearInput, settings=NonlinearSettings(teeth=3, mesh=mesh))
     monkeypatch.setattr("exugear.tooth_mesh.reference_tables.NonlinearInput", coarse)
     command = ("ste", spur_case, "--method", "nonlinear", "--positions", 1, "--out", tmp_path)

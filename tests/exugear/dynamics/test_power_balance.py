@@ -187,7 +187,6 @@ def assert_balanced(account: Account, own_share: float) -> None:
     assert abs(whole - account.kinetic) < limit
 
 
-@pytest.mark.sample
 @pytest.mark.parametrize("teeth", ["straight", "curved"])
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_power_of_each_mesh_and_of_the_whole(

@@ -77,7 +77,6 @@ def cases(grc: Gearbox, tables: dict) -> Iterator[tuple[Assembly, np.ndarray, np
             yield assembly, *in_contact(assembly, 3, flank)
 
 
-@pytest.mark.sample
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("flank", [1, -1])
 def test_jacobian_equals_finite_differences(grc: Gearbox, tables: dict, variant: str, flank: int) -> None:
@@ -104,7 +103,6 @@ def test_jacobian_equals_finite_differences(grc: Gearbox, tables: dict, variant:
     assert np.abs(still - found_q).max() < 1e-6 * np.abs(still).max()
 
 
-@pytest.mark.sample
 @pytest.mark.parametrize("flank", [1, -1])
 def test_damping_is_a_time_times_the_tangent_along_all_that_moves(grc: Gearbox, flank: int) -> None:
     """Of teeth that resist tilting; of others the part of the tangent that pushes the wrong way does not damp."""
@@ -246,7 +244,6 @@ def asymmetric_surface(gearbox: Gearbox) -> SteSurface:
     return SteSurface.from_nodes([0.075], tilts, force, per_load * force, 1.0 / per_load * np.ones(3), slopes)
 
 
-@pytest.mark.sample
 @pytest.mark.parametrize(("size", "limit"), [(4e-6, 1e-8), (2e-5, 1e-7)], ids=["in contact", "through loss of contact"])
 def test_no_energy_is_gained_on_a_closed_path_at_frozen_position(
     grc: Gearbox, tables: dict, size: float, limit: float
@@ -362,7 +359,6 @@ def test_a_run_beside_states_that_are_not_solved_says_so(
     assert np.array_equal(data["mesh_force"].to_numpy(), other["mesh_force"].to_numpy())  # a mark moves nothing
 
 
-@pytest.mark.sample
 @pytest.mark.parametrize("load", [3, 5])
 def test_modes_beside_states_that_are_not_solved_say_so(grc: Gearbox, tables: dict, load: int) -> None:
     """Pieces of load: the static one ends at the fourth load and lies before the sixth, at twice the static load."""

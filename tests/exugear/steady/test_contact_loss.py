@@ -295,7 +295,7 @@ def test_a_branch_that_runs_out_of_points_says_where(monkeypatch):
 
 @pytest.mark.validation
 @pytest.mark.sample
-@pytest.mark.parametrize("teeth", [(20, 40, 20, 60), (21, 43, 25, 61), (21, 42, 24, 60)])
+@pytest.mark.parametrize("teeth", [(21, 43, 25, 61), (21, 42, 24, 60), (20, 40, 20, 60)])
 def test_a_gearbox_of_two_stages_stays_on_a_state_with_contact_loss(teeth):
     """Kinks join both mesh frequencies, so that combinations grow; the latter two have these as 7 : 4 and 2 : 1."""
     solver = train_solver(gear_trains.two_stage(teeth), 0.1, 5e-7, 1e-5, 3)

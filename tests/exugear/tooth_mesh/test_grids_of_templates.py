@@ -49,7 +49,7 @@ def check_verbs(case: Path, out: Path, *ste: object) -> list[dict[str, Any]]:
     return list(json.loads(invoked[0].stdout)["tables"])
 
 
-@pytest.mark.parametrize("kind", ["pair", pytest.param("planetary", marks=pytest.mark.validation)])
+@pytest.mark.parametrize("kind", ["pair", pytest.param("planetary", marks=pytest.mark.long)])
 def test_states_that_come_to_form_circles_are_solved(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -67,7 +67,7 @@ def test_states_that_come_to_form_circles_are_solved(
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("positions", [10, pytest.param(50, marks=pytest.mark.long)])
+@pytest.mark.parametrize("positions", [8, pytest.param(50, marks=pytest.mark.long)])
 def test_the_default_grid_of_a_template_is_solved_whole(positions: int, tmp_path: Path) -> None:
     case = case_of(tmp_path, "pair")
     case.write_text(f"{template('pair')}\n[ste]\npositions = {positions}\n", encoding="utf-8")

@@ -63,6 +63,7 @@ def test_spur_pair_shows_its_curve() -> None:
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_every_pair_of_the_grc_shows_its_curve(grc: Gearbox) -> None:
     tables = {}
     for name, spec in grc.pairs.items():

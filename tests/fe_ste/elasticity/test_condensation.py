@@ -116,7 +116,7 @@ def test_dissection_equals_one_sparse_factorisation(gear: Gear, settings: MeshSe
 
 
 @pytest.mark.validation
-@pytest.mark.sample
+@pytest.mark.long
 def test_dissection_equals_one_sparse_factorisation_on_the_default_mesh(any_grc_gear: Gear) -> None:
     assert_equal_to_one_factorisation(any_grc_gear, MeshSettings(), 1)
 

@@ -22,7 +22,7 @@ SETTINGS = NonlinearSettings(
     teeth=3,
     mesh=ContactMesh(layers=3, contact_elements=3, growth=1.0, thickness=5, fillet=2, root=2, rim=4, far_flank=4),
 )
-WANTED = NonlinearInput(pair=PAIR, torque=100.0, positions=3, settings=SETTINGS)
+WANTED = NonlinearInput(pair=PAIR, torque=100.0, positions=2, settings=SETTINGS)
 
 
 @pytest.fixture(scope="module")
@@ -37,22 +37,22 @@ def test_a_table_says_what_it_is_and_names_its_units(path):
     table = NonlinearTable.open(path, WANTED)
     data = table.dataset
     assert table.complete
-    assert data.sizes == {"pmc": 3, "torque": 1, "tooth": 3}
+    assert data.sizes == {"pmc": 2, "torque": 1, "tooth": 3}
     assert all("units" in data[name].attrs for name in data.variables)
     assert data.attrs["method"].startswith("non-linear finite elements on open sectors of 3 teeth")
     assert np.allclose(data["load_share"].sum("tooth"), 1.0)
     assert (data["mesh_stiffness"] * data["ste"] == data["line_of_action_force"]).all()
     assert (data["max_von_mises"] > 0).all() and (data["wall_time"] > 0).all()
     # A line for each iteration under a line for each position.
-    assert data.attrs["convergence"].count("position ") == 3
-    assert len(data.attrs["convergence"].splitlines()) == 3 * 2 + int(data["iterations"].sum())
+    assert data.attrs["convergence"].count("position ") == 2
+    assert len(data.attrs["convergence"].splitlines()) == 2 * 2 + int(data["iterations"].sum())
 
 
 def test_a_table_is_refused_for_another_input_and_as_one_of_the_superelement(path, tmp_path):
     with pytest.raises(TableError, match="another input"):
         NonlinearTable.open(path, dataclasses.replace(WANTED, torque=101.0))
     with pytest.raises(TableError, match="holds no static transmission error table"):
-        MeshTable.open(path, TableInput(pair=PAIR, torque=(100.0,), positions=3))
+        MeshTable.open(path, TableInput(pair=PAIR, torque=(100.0,), positions=2))
     with pytest.raises(TableError, match="no such file"):
         NonlinearTable.open(tmp_path / "none.nc")
     (tmp_path / "text.nc").write_text("no netCDF")
@@ -80,12 +80,12 @@ def test_what_converged_before_a_stop_is_kept_and_taken_up_again(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         NonlinearTable.compute(WANTED, path, stop_in_the_second)
     kept = NonlinearTable.open(path, WANTED)
-    assert kept.dataset["converged"].values[:, 0].tolist() == [True, False, False]
+    assert kept.dataset["converged"].values[:, 0].tolist() == [True, False]
     first = kept.dataset["ste"].values[0, 0], kept.dataset["wall_time"].values[0, 0]
     whole = NonlinearTable.compute(WANTED, path, lambda done, of, iteration: seen.append((done, of)))
     assert whole.complete
     assert (whole.dataset["ste"].values[0, 0], whole.dataset["wall_time"].values[0, 0]) == first
-    assert (0, 3) in seen and seen[-1] == (3, 3)
+    assert (0, 2) in seen and seen[-1] == (2, 2)
 
 
 @pytest.mark.validation

@@ -136,10 +136,14 @@ def swinging(grc: Gearbox, tmp_path: Path) -> Gearbox:
 
 @pytest.mark.validation
 def test_energy_is_accounted_for_where_teeth_part_all_the_time(grc: Gearbox, swinging: Gearbox, tmp_path: Path) -> None:
-    """Two runs over six periods of the swing; what impacts leave unexplained is a few thousandths of what is damped."""
+    """Two runs over six periods of the swing: what impacts leave unexplained is below 1.5e-3 of what is damped.
+
+    The runs are chaotic, so that single ones differ between processors: 2.9e-4 and 3.9e-4 were found on one, 2.8e-4 is
+    the rms of the six runs below.
+    """
     tables = surfaces(grc)
     found = [unexplained_of(swinging, tables, tmp_path, "adams", rpm, 6.0 / 30.0) for rpm in (-60.0, -66.0)]
-    assert max(found) < 5e-3
+    assert max(found) < 1.5e-3
 
 
 @pytest.mark.validation

@@ -176,6 +176,7 @@ def test_element_and_event_location_agree_cycle_by_cycle(oscillator: Oscillator)
 RISING = np.round(np.r_[0.40:0.84:0.04, 0.84:0.90:0.005, 0.92:1.5:0.06, 1.5:2.35:0.05], 4)
 FALLING = np.round(np.r_[2.3:1.45:-0.05, 1.4:0.88:-0.06, 0.86:0.68:-0.005, 0.66:0.39:-0.04], 4)
 """Frequency ratios, in steps of 0.005 about the folds of the first resonance."""
+HALVED = np.round(np.r_[2.3:1.6:-0.05], 4)
 FIRST_FOLD = np.round(np.r_[0.72:0.84:0.04, 0.84:0.90:0.005, 0.92:1.1:0.06], 4)
 
 
@@ -184,6 +185,7 @@ FIRST_FOLD = np.round(np.r_[0.72:0.84:0.04, 0.84:0.90:0.005, 0.92:1.1:0.06], 4)
     ("ratios", "least_jumps", "least_points"),
     [
         pytest.param(FIRST_FOLD, 1, 12, id="first fold"),
+        pytest.param(HALVED, 0, 8, id="half the mesh frequency"),
         pytest.param(RISING, 2, 30, id="rising", marks=pytest.mark.long),
         pytest.param(FALLING, 2, 30, id="falling", marks=pytest.mark.long),
     ],
@@ -205,8 +207,9 @@ def test_sweeps_jump_part_and_halve_as_the_reference_does(
     # Share of time apart, counted on 512 points of a cycle, two edges a passage.
     assert np.abs(ours[off, 1] - reference[off, 1]).max() < 5e-3
     assert np.array_equal(ours[off, 2] > 0.5, reference[off, 2] > 0.5)
-    if ratios is FALLING:
+    if ratios is FALLING or ratios is HALVED:
         assert (reference[:, 2] > 0.5).any()  # half the mesh frequency, near twice the natural one
+    if ratios is FALLING:
         assert reference[:, 3].min() < -oscillator.backlash  # the other flank is struck
 
 
