@@ -192,14 +192,10 @@ class Project(Displayed):
 
         Parameters
         ----------
-        names : iterable of str
-            Pairs; all that the file wants a table of by default.
-        positions : int, optional
-            Positions of the mesh cycle; without it what the file says.
-        grid : bool
-            Over load, centre distance and misalignment, too.
-        progress : callable, optional
-            Called with the number of finished states of the table at work, and of all its states.
+        names : pairs; all that the file wants a table of by default
+        positions : positions of the mesh cycle; without it what the file says
+        grid : over load, centre distance and misalignment, too
+        progress : called with the number of finished states of the table at work, and of all its states
         """
         self.keep_case()
         return self.computed(self.requested_tables(names, positions, grid=grid), progress)
@@ -243,8 +239,7 @@ class Project(Displayed):
 
         Parameters
         ----------
-        begin : callable, optional
-            Called with the name of each body before it is reduced.
+        begin : called with the name of each body before it is reduced
         """
         if not self.choice.variant.is_elastic:
             return {}
@@ -276,10 +271,8 @@ class Project(Displayed):
 
         Parameters
         ----------
-        settings : SteadySettings, optional
-            Speeds and level; those that the first load case passes, and `parametric`, by default.
-        progress : callable, optional
-            Called with the number of speeds that are solved, and of all.
+        settings : speeds and level; those that the first load case passes, and `parametric`, by default
+        progress : called with the number of speeds that are solved, and of all
         """
         from exugear.steady.settings import SteadySettings, usual_speeds  # which a run needs not
         from exugear.steady.steady_file import stored_or_computed
@@ -332,8 +325,7 @@ class Project(Displayed):
 
         Parameters
         ----------
-        progress : callable, optional
-            Called with the number of files of loads that are read, and of all.
+        progress : called with the number of files of loads that are read, and of all
 
         Raises
         ------
@@ -362,12 +354,9 @@ class Project(Displayed):
 
         Parameters
         ----------
-        begin : callable, optional
-            Called with the name of each pair before its root stress is computed.
-        progress : callable, optional
-            Called with the number of static states that are solved, and of all.
-        counted : CountedLoads, optional
-            What `checked_loads` gave; read anew without it.
+        begin : called with the name of each pair before its root stress is computed
+        progress : called with the number of static states that are solved, and of all
+        counted : what `checked_loads` gave; read anew without it
         """
         from exugear.life.dynamic_factors.response_factors import factors, source_hash
         from exugear.life.kept_angles import KeptAngles
@@ -410,10 +399,8 @@ class Project(Displayed):
 
         Parameters
         ----------
-        begin : callable, optional
-            Called with the name of each pair before its root stress is computed.
-        progress : callable, optional
-            Called with the number of static states that are solved, and of all.
+        begin : called with the name of each pair before its root stress is computed
+        progress : called with the number of static states that are solved, and of all
 
         Raises
         ------

@@ -151,9 +151,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
 
     Parameters
     ----------
-    point : OperatingPoint
-    reaction : (6,) array, optional
-        For a bearing whose load the file states: what the statics find, N and N m.
+    reaction : (6,) for a bearing whose load the file states: what the statics find, N and N m
     """
     bearing = point.bearing
     rows = point.rows

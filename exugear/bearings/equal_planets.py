@@ -68,11 +68,6 @@ def planet_supports(supports: Sequence[Bearing], planets: Sequence[str], angles:
 def with_equal_planets(connectors: ConnectorArrays, sets: Iterable[PlanetSupports]) -> tuple[ConnectorArrays, float]:
     """Connectors whose planets are equal, and the largest change of stiffness that this took, over it.
 
-    Parameters
-    ----------
-    connectors : ConnectorArrays
-    sets : iterable of PlanetSupports
-
     Notes
     -----
     Cages that turn stay where they are.

@@ -16,13 +16,11 @@ def axially_symmetric(stiffness: Floats) -> Floats:
 
     Parameters
     ----------
-    stiffness : (6, 6) array
-        In the frame of the bearing.
+    stiffness : (6, 6) in the frame of the bearing
 
     Returns
     -------
-    (6, 6) array
-        Unchanged by any turn about z, for models that want one radial and one tilting stiffness.
+    (6, 6) unchanged by any turn about z, for models that want one radial and one tilting stiffness
 
     Examples
     --------
@@ -50,15 +48,12 @@ def regularised(stiffness: Floats, floor: ArrayLike) -> Floats:
 
     Parameters
     ----------
-    stiffness : (6, 6) array
-        Symmetric stiffness.
-    floor : array_like, shape (6,)
-        Least diagonal entries, N/m and N m/rad; zero leaves a direction free.
+    stiffness : (6, 6) symmetric stiffness
+    floor : (6,) least diagonal entries, N/m and N m/rad; zero leaves a direction free
 
     Returns
     -------
-    (6, 6) array
-        The diagonal raised to the floor where it lies below, everything else as before.
+    (6, 6) the diagonal raised to the floor where it lies below, everything else as before
 
     Examples
     --------
@@ -78,12 +73,11 @@ def in_series(first: Floats, second: Floats) -> Floats:
 
     Parameters
     ----------
-    first, second : (6, 6) array
-        Symmetric, positive semi-definite: for example bearing and housing seat, about the same point.
+    first, second : (6, 6) symmetric, positive semi-definite: for example bearing and housing seat, about the same point
 
     Returns
     -------
-    (6, 6) array
+    (6, 6)
         Parallel sum ``A (A + B)^+ B`` of the matrices: ``(A^-1 + B^-1)^-1`` where these exist; a direction
         that either leaves free is free.
 
@@ -108,14 +102,12 @@ def proportional_damping(stiffness: Floats, time_constant: float) -> Floats:
 
     Parameters
     ----------
-    stiffness : (6, 6) array
-        Stiffness.
-    time_constant : float
-        beta, s. A mode of frequency f with all its strain energy here gets the damping ratio ``pi f beta``.
+    stiffness : (6, 6) stiffness
+    time_constant : beta, s. A mode of frequency f with all its strain energy here gets the damping ratio ``pi f beta``.
 
     Returns
     -------
-    (6, 6) array
+    (6, 6)
 
     Examples
     --------

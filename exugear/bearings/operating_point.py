@@ -99,14 +99,11 @@ def operating_point(
 
     Parameters
     ----------
-    bearing : Bearing
-        One with catalogue dimensions.
-    displacement : (6,) array
-        Inner ring relative to outer ring, m and rad, in the axes of what the bearing sits on.
-    load_stands_still : bool
+    bearing : one with catalogue dimensions
+    displacement : (6,) inner ring relative to outer ring, m and rad, in the axes of what the bearing sits on
+    load_stands_still
         Whether the load keeps its direction in these axes; else the stiffness is the same in all directions.
-    first_roller_angle : float
-        Polar angle of the first rolling element at which the displacement holds the load, rad.
+    first_roller_angle : polar angle of the first rolling element at which the displacement holds the load, rad
 
     Notes
     -----

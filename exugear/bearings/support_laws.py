@@ -142,10 +142,8 @@ def linear_law(bearing: Bearing, damping_time: float, of_rows: Floats | None = N
 
     Parameters
     ----------
-    bearing : Bearing
-    damping_time : float
-        Damping over stiffness where the file gives no damping, s.
-    of_rows : (6, 6) array, optional
+    damping_time : damping over stiffness where the file gives no damping, s
+    of_rows : (6, 6)
         Stiffness of its rows of rolling elements; by default that at the load which the file states, or at
         `NOMINAL_LOAD`. Directions below the stiffness that the file gives beside a catalogue are raised to it.
 
@@ -169,14 +167,10 @@ def rolling_law(bearing: Bearing, damping_time: float, of_rows: Floats, directio
 
     Parameters
     ----------
-    bearing : Bearing
-        One with catalogue dimensions.
-    damping_time : float
-        Damping over stiffness where the file gives no damping, s.
-    of_rows : (6, 6) array
-        Stiffness of the rows at their load: the file's stiffness adds what lacks there.
-    direction : float
-        Polar angle of the load on the inner ring, rad: a cage that stands still is placed by it.
+    bearing : one with catalogue dimensions
+    damping_time : damping over stiffness where the file gives no damping, s
+    of_rows : (6, 6) stiffness of the rows at their load: the file's stiffness adds what lacks there
+    direction : polar angle of the load on the inner ring, rad: a cage that stands still is placed by it
     """
     rows = bearing_rows(bearing)
     if misplaced_factor(bearing):

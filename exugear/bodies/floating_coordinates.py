@@ -47,10 +47,6 @@ class FloatingCoordinates:
     A floating frame's coordinates are the displacement of its centre, the change of its Euler parameters from
     (1, 0, 0, 0), and the modal coordinates.
 
-    Parameters
-    ----------
-    body : FloatingBody
-
     Raises
     ------
     ReductionError

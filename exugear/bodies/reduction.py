@@ -73,11 +73,11 @@ def reduce_component(
 
     Parameters
     ----------
-    mass, stiffness : (n, n) sparse
+    mass, stiffness : (n, n)
     seats : (s, n) seat coordinates as averages of the unknowns
     rigid : (n, k) all rigid motions
     blanks : (s, s) rigid masses on the seats
-    band : float
+    band
         All free-interface normal modes up to this frequency (Hz) become exact; modes on bearings come out to 1e-4 up
         to two thirds of it.
     backend : {"superlu", "pardiso"}, optional

@@ -159,7 +159,6 @@ def reduce_solid(model: SolidModel, backend: Backend | None = None) -> ReducedBo
 
     Parameters
     ----------
-    model : SolidModel
     backend : {"pardiso", "superlu"}, optional
         Library that factorises; the fastest installed by default.
 

@@ -19,11 +19,8 @@ def load_or_reduce(path: Path, key: str, reduce: Callable[[], ReducedBody]) -> R
 
     Parameters
     ----------
-    path : Path
-    key : str
-        Hash of all that the reduction depends on.
-    reduce : callable
-        Called only where the file does not serve.
+    key : hash of all that the reduction depends on
+    reduce : called only where the file does not serve
     """
     store = Store(path, key)
     body = store.read(_from_arrays)

@@ -23,12 +23,7 @@ def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
 
 
 def refuse_unsolved(meshes: Sequence[str]) -> None:
-    """End with code 1 where meshes read their tables beside states that are not solved.
-
-    Raises
-    ------
-    FailedError
-    """
+    """End with code 1 where meshes read their tables beside states that are not solved."""
     if meshes:
         raise FailedError(
             f"not to be trusted: at the static load {', '.join(meshes)} come beside states of their tables that are "

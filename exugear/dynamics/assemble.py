@@ -48,17 +48,15 @@ def assemble(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    choice : Choice
-        Variant, mesh law and inertia set.
+    choice : variant, mesh law and inertia set
     stiffness : mapping of pair name to (n,) array, or to the table's surface
         Mesh stiffness over the cycle, N/m: see `exugear.tooth_mesh.element.mesh_elements`.
-    bodies : mapping of body name to ElasticBody, optional
+    bodies : by body name
         Reduced elastic bodies, which the variant `flexible` needs; `reduced_bodies` of
         `exugear.bodies.of_gearbox.elastic_bodies` gives them.
     flanks, angles, contact
         As in `exugear.tooth_mesh.element.mesh_elements`.
-    before_balance : callable, optional
+    before_balance
         Called with the assembly before the static load is looked for that bearings take their stiffness from.
 
     Raises

@@ -20,9 +20,7 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
 
     Parameters
     ----------
-    assembly : Assembly
-    load_case : str, optional
-        For a run: its load case, with the content of its torque series.
+    load_case : for a run: its load case, with the content of its torque series
 
     Examples
     --------

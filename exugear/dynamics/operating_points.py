@@ -78,8 +78,7 @@ def at_static_load(assembly: Assembly) -> Assembly:
 
     Parameters
     ----------
-    assembly : Assembly
-        One whose catalogue bearings have their nominal stiffness.
+    assembly : one whose catalogue bearings have their nominal stiffness
 
     Returns
     -------

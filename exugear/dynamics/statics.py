@@ -163,17 +163,13 @@ def locked_equilibrium(
 
     Parameters
     ----------
-    assembly : Assembly
     torques : mapping of body name to torque about +z, N m
     locked : names of the bodies whose spins are held; where they leave the train free to roll and the torques are in
         balance, it stays where it is
-    meshes : MeshArrays, optional
-        Mesh arrays to use instead of the assembly's, such as its `mean_meshes`.
-    about : (size,) array, optional
-        Coordinates of the train rolled to another position, at which spins are held instead of zero.
-    other_loads : (size,) array, optional
-        Generalized forces beside the torques, N and N m.
-    near : (size,) array, optional
+    meshes : mesh arrays to use instead of the assembly's, such as its `mean_meshes`
+    about : (size,) coordinates of the train rolled to another position, at which spins are held instead of zero
+    other_loads : (size,) generalized forces beside the torques, N and N m
+    near : (size,)
         Coordinates from which the search begins, such as those under a similar load; by default it begins with linear
         bearings and teeth, as it does where these lead nowhere.
 
@@ -398,13 +394,11 @@ def accelerating_start(
 
     Parameters
     ----------
-    assembly : Assembly
     torques : mapping of body name to torque about +z, N m
     speeds : float, or mapping of body name to float
         Speed of the overall input, rad/s, from which all others follow by rolling; or of several bodies, as
         `exugear.gearbox.train.train.Train.rolling` takes them.
-    driven : (body, spin rate), optional
-        A body whose spin rate (rad/s2) is prescribed; the torque that this takes is solved for.
+    driven : (body, spin rate) a body whose spin rate (rad/s2) is prescribed; the torque that this takes is solved for
 
     Raises
     ------

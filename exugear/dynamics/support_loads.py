@@ -31,10 +31,8 @@ def support_loads(assembly: Assembly, run: Mapping[str, Floats]) -> Floats:
 
     Parameters
     ----------
-    assembly : Assembly
-        Variant of the run.
-    run : mapping of str to array
-        Signals of a whole run by name: `support_force` and `support_moment`; of the variant `rigid` those of `NEEDED`.
+    assembly : variant of the run
+    run : signals of a whole run by name: `support_force` and `support_moment`; of the variant `rigid` those of `NEEDED`
 
     Raises
     ------

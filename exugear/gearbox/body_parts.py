@@ -31,9 +31,7 @@ def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
 
     Parameters
     ----------
-    origin : Origin
-    inertias : str
-        Inertia set.
+    inertias : inertia set
 
     Raises
     ------

@@ -125,8 +125,7 @@ def faults_of_size(bodies: int, elements: int) -> Iterator[str]:
 
     Parameters
     ----------
-    bodies, elements : int
-        Numbers of bodies, and of meshes, bearings, mounts and couplings together.
+    bodies, elements : numbers of bodies, and of meshes, bearings, mounts and couplings together
     """
     coordinates = 6 * bodies
     if 16.0 * elements * coordinates**2 > LARGEST_MATRICES:

@@ -309,11 +309,10 @@ def pair_specs(
     Parameters
     ----------
     sections, pairs : mappings of pair name
-    modifications : mapping of gear name to FlankModification
-    mesh_forces : mapping of pair name to list of float
+    modifications : by gear name
+    mesh_forces : by pair name
         Static force F_bt of each of the pair's meshes at work, N; the pair's own is the mean of their amounts.
-    stated : mapping of pair name to tuple of float
-        Mesh stiffness of pairs that need no table.
+    stated : by pair name, mesh stiffness of pairs that need no table
     """
     specs = {}
     for name, pair in pairs.items():

@@ -78,9 +78,7 @@ class Gearbox(Displayed):
 
         Parameters
         ----------
-        path : path-like
-        permissions : Permissions
-            Whether scripts that it names may run, and where else files that it names may lie.
+        permissions : whether scripts that it names may run, and where else files that it names may lie
 
         Raises
         ------

@@ -75,13 +75,9 @@ def named_file(name: str, folder: Path, permissions: Permissions, largest: int) 
 
     Parameters
     ----------
-    name : str
-        As the gearbox file gives it.
-    folder : Path
-        Folder of the gearbox file.
-    permissions : Permissions
-    largest : int
-        Bytes of the largest file that is read.
+    name : as the gearbox file gives it
+    folder : folder of the gearbox file
+    largest : bytes of the largest file that is read
 
     Raises
     ------
@@ -95,7 +91,7 @@ def named_file(name: str, folder: Path, permissions: Permissions, largest: int) 
     ...
     exugear.gearbox.named_files.NamedFileError: lies outside the gearbox file's folder; put it there, or permit its
     folder \
-by --files-below DIR or EXUGEAR_FILES_BELOW
+    by --files-below DIR or EXUGEAR_FILES_BELOW
     """
     path = folder / name
     try:

@@ -76,10 +76,8 @@ def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[
 
     Parameters
     ----------
-    parse : callable
-        Gives the content.
-    source, form : str
-        Name of the file and "TOML" or "JSON", for the message.
+    parse : gives the content
+    source, form : name of the file and "TOML" or "JSON", for the message
 
     Raises
     ------
@@ -122,8 +120,7 @@ def readable(content: Mapping[str, Any]) -> CaseFile:
 
     Returns
     -------
-    CaseFile
-        With the tables of gears, pairs, bodies, bearings and mounts alone; other keys that are needed are not there.
+    with the tables of gears, pairs, bodies, bearings and mounts alone; other keys that are needed are not there
 
     Examples
     --------

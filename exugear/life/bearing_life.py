@@ -105,13 +105,8 @@ def bearing_lives(
 
     Parameters
     ----------
-    supports : tuple of Bearing
-        In the order of the balance.
-    turns : mapping of bearing name to float
-        Revolutions per revolution of the loaded body.
-    acting : ActingLoads
-    balance : StaticBalance
-    oil : LubricantSection, optional
+    supports : in the order of the balance
+    turns : by bearing name, revolutions per revolution of the loaded body
     """
     lives = []
     for number, support in enumerate(supports):

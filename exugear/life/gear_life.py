@@ -125,12 +125,7 @@ class FlankLife:
 def check_strengths(
     gearbox: Gearbox, rating: RatingSection, teeth: Sequence[ToothExposure], reversed_too: bool
 ) -> None:
-    """Refuse strengths of unknown gears, and gears that bend both ways without Y_M.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse strengths of unknown gears, and gears that bend both ways without Y_M."""
     for name, strength in rating.gears.items():
         flanks = {one.flank for one in teeth if one.gear == name}
         if not flanks:
@@ -176,13 +171,8 @@ def flank_lives(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    rating : RatingSection
-    teeth : sequence of ToothExposure
-    acting : ActingLoads
-    balance : StaticBalance
-    stresses : mapping of pair name to MeshCycleStress
-    dynamic : mapping of mesh family to DynamicFactor
+    stresses : by pair name
+    dynamic : by mesh family
     """
     pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
     lives: dict[tuple[str, str, str], list[FlankLife]] = {}

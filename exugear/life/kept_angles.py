@@ -12,8 +12,7 @@ class KeptAngles(Displayed):
 
     Parameters
     ----------
-    store : Store
-        Of all that the life rests on.
+    store : of all that the life rests on
 
     Examples
     --------

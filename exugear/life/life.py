@@ -98,9 +98,7 @@ def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> Counted
 
     Parameters
     ----------
-    gearbox : Gearbox
-    progress : callable, optional
-        Called with the number of files that are read, and of all.
+    progress : called with the number of files that are read, and of all
 
     Raises
     ------
@@ -122,12 +120,8 @@ def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, st
 
     Parameters
     ----------
-    assembly : Assembly
-    counted : CountedLoads
-    tables : mapping of pair name to str
-        Hashes of the tables' inputs.
-    run : str
-        Hash of the input of the run or the steady response that gives K_v.
+    tables : by pair name, hashes of the tables' inputs
+    run : hash of the input of the run or the steady response that gives K_v
     """
     case = assembly.gearbox.content
     content = {
@@ -156,19 +150,12 @@ def compute_life(
 
     Parameters
     ----------
-    assembly : Assembly
-    counted : CountedLoads
-        Of `checked_loads`.
-    stresses : mapping of pair name to MeshCycleStress
-        Pairs without are not rated.
-    dynamic : mapping of mesh family to DynamicFactor
-        K_v.
-    digest : str
-        Of `life_hash`.
-    progress : callable, optional
-        Called with the number of solved static states, and of all.
-    store : AngleStore, optional
-        Keeps solved angles of the carrier.
+    counted : of `checked_loads`
+    stresses : by pair name, pairs without are not rated
+    dynamic : by mesh family, K_v
+    digest : of `life_hash`
+    progress : called with the number of solved static states, and of all
+    store : keeps solved angles of the carrier
 
     Raises
     ------

@@ -28,10 +28,8 @@ def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
 
     Parameters
     ----------
-    data : xarray.Dataset
-        As `exugear.life.life_file.read_life` gives it.
-    path : path-like, optional
-        Where to write the picture.
+    data : as `exugear.life.life_file.read_life` gives it
+    path : where to write the picture
     """
     shown = [limit for limit in limits(data) if limit[2] > LEAST_DAMAGE][:SHOWN]
     with drawing_style():
@@ -60,9 +58,7 @@ def damage_matrix(data: xr.Dataset, parts: list[tuple[str, str, float]]) -> tupl
 
     Parameters
     ----------
-    data : xarray.Dataset
-    parts : list of (part, kind, damage)
-        As `exugear.life.life_file.limits` gives them.
+    parts : (part, kind, damage) as `exugear.life.life_file.limits` gives them
     """
     torque = data["torque"].to_numpy()
     order = np.argsort(torque)

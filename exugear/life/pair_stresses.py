@@ -46,13 +46,9 @@ def pair_stresses(
 
     Parameters
     ----------
-    requests : iterable of TableRequest
-    folder : Path
-        Where they are kept: ``stress/<pair>.nc``.
-    begin : callable, optional
-        Called with the name of each pair before it is computed.
-    keep : bool
-        Whether what is computed is written.
+    folder : where they are kept: ``stress/<pair>.nc``
+    begin : called with the name of each pair before it is computed
+    keep : whether what is computed is written
     """
     known: dict[tuple[Gear, int], RootGauges] = {}
 

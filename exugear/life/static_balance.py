@@ -107,14 +107,11 @@ class StaticBalance(Displayed, line=": {torque!n} torques, {angle!n} angles, lin
 
         Parameters
         ----------
-        meshes : sequence of int
-        torque, hub : array (n,), (n, 5), optional
-            Torques and loads of a hub; without them the largest torque alone.
+        torque, hub : (n,), (n, 5) torques and loads of a hub; without them the largest torque alone
 
         Returns
         -------
-        float
-            Largest of all forces over the mean that the same torque gives without loads of a hub.
+        largest of all forces over the mean that the same torque gives without loads of a hub
         """
         if torque is None:
             torque = self.torque[[np.abs(self.torque).argmax()]]
@@ -181,19 +178,13 @@ def static_balance(
 
     Parameters
     ----------
-    assembly : Assembly
-    body : str
-    torques : array
-        N m; what is solved covers them.
-    angles : int
-        Angles of the carrier within its turn; without planets one is all.
-    progress : callable, optional
-        Called with the number of solved states, and of all.
-    hub : array (5,), optional
+    torques : N m; what is solved covers them
+    angles : angles of the carrier within its turn; without planets one is all
+    progress : called with the number of solved states, and of all
+    hub : (5,)
         Sizes of the force along x, y, z (N) and the moment about x and y (N m) on the body: those above zero are solved
         beside each torque.
-    store : AngleStore, optional
-        Where each angle goes when it is solved, and where those that were solved before are taken from.
+    store : where each angle goes when it is solved, and where those that were solved before are taken from
 
     Raises
     ------

@@ -45,11 +45,8 @@ def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], A
 
     Parameters
     ----------
-    gearbox : Gearbox
-        Case of the folder.
-    folder : Path
-    assembled : callable
-        Gives the equations of a choice.
+    gearbox : case of the folder
+    assembled : gives the equations of a choice
     """
     for path in sorted(folder.glob("*/*/life.nc")):
         try:

@@ -50,12 +50,8 @@ def stress_requests(
 
     Parameters
     ----------
-    assembly : Assembly
-    requests : iterable of TableRequest
-        Of the pairs; those with axes of the file stay as they are.
-    counted : CountedLoads
-    folder : Path
-        Results folder: wider tables are kept in ``stress/<pair>.states.nc``.
+    requests : of the pairs; those with axes of the file stay as they are
+    folder : results folder: wider tables are kept in ``stress/<pair>.states.nc``
 
     Raises
     ------

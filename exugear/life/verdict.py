@@ -33,10 +33,7 @@ def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, fl
 
     Parameters
     ----------
-    gearbox : Gearbox
-    counted : CountedLoads
-    tables : mapping of pair name to float
-        Largest torque on gear 1 of each table, N m.
+    tables : by pair name, largest torque on gear 1 of each table, N m
 
     Raises
     ------
@@ -84,12 +81,8 @@ def shortfalls(
 
     Parameters
     ----------
-    rating : RatingSection
-        Its `least_S_H`, `least_S_F` and `least_S_0`.
-    flanks : iterable of FlankLife
-    bearings : iterable of BearingLife
-    hours : float
-        Of operation in the life.
+    rating : its `least_S_H`, `least_S_F` and `least_S_0`
+    hours : of operation in the life
     """
     for flank in flanks:
         of_flank = (flank.contact_safety, flank.contact_static)

@@ -92,21 +92,13 @@ def write_report(
 
     Parameters
     ----------
-    folder : path
-        What ``exugear ste``, ``run``, ``modes`` and ``steady`` wrote into.
-    target : float, optional
-        Frequency to look for modes at, Hz; the case's reference frequency by default.
-    tell : callable, optional
-        Called with what is being done.
-    files_below : Path, optional
+    folder : what ``exugear ste``, ``run``, ``modes`` and ``steady`` wrote into
+    target : frequency to look for modes at, Hz; the case's reference frequency by default
+    tell : called with what is being done
+    files_below
         A further folder that files may lie in which the gearbox file names. Scripts among them never run: what they
         would make must be kept in the folder.
-    executor : Executor, optional
-        Works beside this process where that saves time, such as `fe_ste.tools.workers.Workers`.
-
-    Returns
-    -------
-    Report
+    executor : works beside this process where that saves time, such as `fe_ste.tools.workers.Workers`
 
     Raises
     ------

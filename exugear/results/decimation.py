@@ -59,13 +59,10 @@ def filter_rows(rows: Floats, taps: Floats, places: Integers, factor: int, out: 
 
     Parameters
     ----------
-    rows : (n, columns) array
-    taps : (blocks, length, 8) array
-        Of eight neighbouring columns each.
-    places : (blocks, 2) array
-        First column that a block reads, and first one that it adds to.
-    factor : int
-    out : (count, columns) array
+    rows : (n, columns)
+    taps : (blocks, length, 8) of eight neighbouring columns each
+    places : (blocks, 2) first column that a block reads, and first one that it adds to
+    out : (count, columns)
     """
     for begin in range(0, out.shape[0], AT_ONCE):
         end = min(begin + AT_ONCE, out.shape[0])
@@ -148,12 +145,9 @@ class Decimator:
 
     Parameters
     ----------
-    factor : int
-        Keep every so many rows; 1 passes everything.
-    count : int
-        Columns per row.
-    by : Filter, optional
-        Taps; the linear-phase low pass of all columns alike by default.
+    factor : keep every so many rows; 1 passes everything
+    count : columns per row
+    by : taps; the linear-phase low pass of all columns alike by default
 
     Examples
     --------

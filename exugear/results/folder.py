@@ -43,9 +43,7 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
 
     Parameters
     ----------
-    folder : Path
-    permissions : Permissions
-        Where else files that the gearbox file names may lie.
+    permissions : where else files that the gearbox file names may lie
 
     Raises
     ------

@@ -124,10 +124,8 @@ class RunPieces:
 
     Parameters
     ----------
-    folder : Path
-        Where the pieces lie.
-    layout : SignalLayout
-    attributes : mapping, optional
+    folder : where the pieces lie
+    attributes
         What is run: begins anew with these attributes. Without them the pieces that are there are gone on with.
 
     Attributes
@@ -174,12 +172,9 @@ class RunPieces:
 
         Parameters
         ----------
-        times, rows : (n,) and (n, columns) arrays
-            Decimated samples, s and as the layout says.
-        balance_times, balances : (k,) and (k, terms) arrays
-            Lines of the account of energy, s and J.
-        state : Checkpoint
-            State to go on from.
+        times, rows : (n,) (n, columns) decimated samples, s and as the layout says
+        balance_times, balances : (k,) (k, terms) lines of the account of energy, s and J
+        state : state to go on from
         """
         self.attributes |= {
             "state_step": state.step,

@@ -48,12 +48,9 @@ class RunFile:
 
     Parameters
     ----------
-    path : Path
-        Its place when it is finished; until then it is in the folder of the pieces.
-    pieces : RunPieces
-        Of the run; what a run that was stopped has left is taken over from their files.
-    samples : int
-        How many there are of each signal in the whole run.
+    path : its place when it is finished; until then it is in the folder of the pieces
+    pieces : of the run; what a run that was stopped has left is taken over from their files
+    samples : how many there are of each signal in the whole run
     """
 
     def __init__(self, path: Path, pieces: RunPieces, samples: int) -> None:
@@ -175,10 +172,8 @@ def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset
 
     Parameters
     ----------
-    path : path
-        ``run.nc``, or the folder ``run.partial`` of a run that goes on or was stopped.
-    names : iterable of str, optional
-        Variables; all by default.
+    path : ``run.nc``, or the folder ``run.partial`` of a run that goes on or was stopped
+    names : variables; all by default
 
     Raises
     ------
@@ -203,9 +198,7 @@ def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]],
 
     Parameters
     ----------
-    path : path
-        ``run.nc``, or the folder ``run.partial`` of a run that was stopped.
-    names : iterable of str
+    path : ``run.nc``, or the folder ``run.partial`` of a run that was stopped
 
     Raises
     ------

@@ -67,10 +67,8 @@ def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
 
     Parameters
     ----------
-    folder : Path
-        Results folder.
-    gearbox : Gearbox
-        Its case.
+    folder : results folder
+    gearbox : its case
     """
     for path in sorted((folder / STUDIES).glob(f"*/{DATASET}")):
         try:

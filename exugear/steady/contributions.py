@@ -53,12 +53,9 @@ def contributions(gearset: Gearset, speed: float, line: int) -> Contributions:
 
     Parameters
     ----------
-    gearset : Gearset
-        Of a law along a row, which has a first-order excitation.
-    speed : float
-        Of the input, rad/s.
-    line : int
-        Place in the line set, of one base alone: combinations are no sum over meshes.
+    gearset : of a law along a row, which has a first-order excitation
+    speed : of the input, rad/s
+    line : place in the line set, of one base alone: combinations are no sum over meshes
     """
     frequency = abs(speed) * float(gearset.lines.orders[line])
     row = gearset.row_of_overall(speed)

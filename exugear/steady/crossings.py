@@ -152,16 +152,11 @@ def missed_tops(
 
     Parameters
     ----------
-    speeds : (n,) array
-        Ascending, rad/s.
-    amplitude : (n, lines, signals) complex array
-        Of all signals, the mean as the first line.
-    smooth : (n,) array
-        Where the response is smooth over speed: not where teeth part.
-    quantities : sequence of Quantity
-        Whose peaks count.
-    operation : (float, float) or None
-        Speeds between which the loudest count by themselves, rad/s without sign.
+    speeds : (n,) ascending, rad/s
+    amplitude : (n, lines, signals) of all signals, the mean as the first line
+    smooth : (n,) where the response is smooth over speed: not where teeth part
+    quantities : whose peaks count
+    operation : speeds between which the loudest count by themselves, rad/s without sign
     known : dict, optional
         Tops that were found between the same speeds before, to which those found now are added.
     """

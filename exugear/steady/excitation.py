@@ -154,11 +154,8 @@ class Gearset:
 
     Parameters
     ----------
-    waves : MeshWaves
-    harmonics : int
-        Of each mesh frequency. The mesh stiffness has twice as many.
-    combinations : int
-        Largest sum of multiples of several mesh frequencies.
+    harmonics : of each mesh frequency. The mesh stiffness has twice as many.
+    combinations : largest sum of multiples of several mesh frequencies
 
     Notes
     -----

@@ -62,12 +62,9 @@ def follow_branch(
 
     Parameters
     ----------
-    solver : PointSolver
-        Of the level `nonlinear`.
-    first, last : float
-        rad/s, of one sense.
-    progress : callable, optional
-        Called with the speed of each point.
+    solver : of the level `nonlinear`
+    first, last : rad/s, of one sense
+    progress : called with the speed of each point
 
     Raises
     ------

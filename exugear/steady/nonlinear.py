@@ -271,14 +271,11 @@ class Balance:
 
         Parameters
         ----------
-        readings : (n, m, r) complex array
-        base : int
-        samples : int
+        readings : (n, m, r)
 
         Returns
         -------
-        (samples, m f, 2 m r) array
-            By the readings, then by their rates.
+        (samples, m f, 2 m r) by the readings, then by their rates
         """
         there = self.places.there
         back = self.places.back

@@ -82,11 +82,8 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
 
     Parameters
     ----------
-    data : Dataset
-        As `exugear.steady.steady_file.load_response` reads it.
-    signal : str
-    least : float
-        Share of the loudest below which a peak is left out.
+    data : as `exugear.steady.steady_file.load_response` reads it
+    least : share of the loudest below which a peak is left out
 
     Raises
     ------
@@ -153,13 +150,9 @@ def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: 
 
     Parameters
     ----------
-    data : Dataset
-        As `exugear.steady.steady_file.load_response` reads it.
-    peak : Peak
-        Of it.
-    signal : str
-    least : float
-        Share of the peak below which a line is left out.
+    data : as `exugear.steady.steady_file.load_response` reads it
+    peak : of it
+    least : share of the peak below which a line is left out
     """
     point, own = _place(data, peak)
     index = data["index"].to_numpy()
@@ -196,14 +189,11 @@ def planet_sidebands(
 
     Parameters
     ----------
-    data : Dataset
-        As `exugear.steady.steady_file.load_response` reads it.
-    peak : Peak
-        Of it.
+    data : as `exugear.steady.steady_file.load_response` reads it
+    peak : of it
     carriers : mapping of family of meshes to (str, float)
         Carrier of the planets and its turns per turn of the input.
-    least : float
-        Share of the force that all planets share, or of the largest line, below which a line is left out.
+    least : share of the force that all planets share, or of the largest line, below which a line is left out
     """
     point, line = _place(data, peak)
     names = [str(name) for name in data["signal"].to_numpy()]
@@ -274,8 +264,7 @@ def pulls(data: xr.Dataset) -> tuple[Pull, ...]:
 
     Parameters
     ----------
-    data : Dataset
-        As `exugear.steady.steady_file.load_response` reads it.
+    data : as `exugear.steady.steady_file.load_response` reads it
     """
     names = [str(name) for name in data["signal"].to_numpy()]
     places: dict[str, list[int]] = {}
@@ -337,8 +326,7 @@ def bearing_swings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
 
     Parameters
     ----------
-    data : Dataset
-        As `exugear.steady.steady_file.load_response` reads it.
+    data : as `exugear.steady.steady_file.load_response` reads it
     """
     names = [str(name) for name in data["signal"].to_numpy()]
     swings = []
@@ -390,11 +378,8 @@ def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -
 
     Parameters
     ----------
-    data : Dataset
-        As `exugear.steady.steady_file.load_response` reads it.
-    line : OrderLine
-        Of a single mesh frequency or a combination.
-    signal : str
+    data : as `exugear.steady.steady_file.load_response` reads it
+    line : of a single mesh frequency or a combination
 
     Raises
     ------
@@ -436,15 +421,10 @@ def compared_peaks(
 
     Parameters
     ----------
-    data : Dataset
-        Steady response of the same variant.
-    cut : callable
-        From an order to its cut out of the run-up, as `exugear.results.spectra.sweeps.run_up_cut` makes it.
-    rate : float
-        At which order one sweeps, Hz/s.
-    most : int
-        How many.
-    signal : str
+    data : steady response of the same variant
+    cut : from an order to its cut out of the run-up, as `exugear.results.spectra.sweeps.run_up_cut` makes it
+    rate : at which order one sweeps, Hz/s
+    most : how many
     """
     index = data["index"].to_numpy()
     orders = data["order"].to_numpy()

@@ -119,9 +119,7 @@ class PointSolver:
 
     Parameters
     ----------
-    gearset : Gearset
-        With linear bearings; the level `nonlinear` takes them by their laws.
-    settings : SteadySettings
+    gearset : with linear bearings; the level `nonlinear` takes them by their laws
     """
 
     def __init__(self, gearset: Gearset, settings: SteadySettings) -> None:

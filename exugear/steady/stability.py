@@ -93,14 +93,10 @@ def growth_at(balance: Balance, readings: Complexes, base: int, least: int = SMO
 
     Parameters
     ----------
-    balance : Balance
-        At the speed.
-    readings : (n, m, r) complex array
-        What the laws read in the steady state.
-    base : int
-        Base that varies.
-    least : int
-        Kicks per period at least.
+    balance : at the speed
+    readings : (n, m, r) what the laws read in the steady state
+    base : base that varies
+    least : kicks per period at least
     """
     gearset = balance.gearset
     interface = balance.interface

@@ -207,20 +207,15 @@ def steady_response(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    choice : Choice
-        Variant, mesh law and inertia set.
+    choice : variant, mesh law and inertia set
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness F_bt / STE over the cycle, N/m.
-    bodies : mapping of body name to ElasticBody, optional
-        Reduced elastic bodies, which the variant `flexible` needs.
-    settings : SteadySettings, optional
-        Speeds and level; those that the first load case passes, and `parametric`, by default.
+    bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
+    settings : speeds and level; those that the first load case passes, and `parametric`, by default
 
     Returns
     -------
-    Dataset
-        Labelled as that of `load_response`.
+    labelled as that of `load_response`
 
     Raises
     ------

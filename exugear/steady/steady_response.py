@@ -209,16 +209,11 @@ def response_of(
 
     Parameters
     ----------
-    assembly : Assembly
-    settings : SteadySettings
-    known : Solved, optional
-        Points that were solved before.
-    progress : callable, optional
-        Called with the number of points that are solved, and of all.
+    known : points that were solved before
+    progress : called with the number of points that are solved, and of all
     keep : callable, optional
         Called with the points that are solved, at times.
-    keep_every : float
-        Seconds between them.
+    keep_every : seconds between them
     """
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_law, settings.level)

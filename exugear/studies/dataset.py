@@ -32,8 +32,7 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
 
     Parameters
     ----------
-    study : Study
-    records : mapping of hash to Record
+    records : by hash
 
     Returns
     -------

@@ -61,10 +61,6 @@ def _here() -> Iterator[Pool]:
 def processes(workers: int | None = None) -> Opens:
     """Worker processes; all cores by default. One is this process itself.
 
-    Parameters
-    ----------
-    workers : int, optional
-
     Examples
     --------
     >>> with processes(1)() as pool:
@@ -88,8 +84,7 @@ def dask_cluster(address: str) -> Opens:
 
     Parameters
     ----------
-    address : str
-        Such as ``tcp://10.0.0.1:8786``.
+    address : such as ``tcp://10.0.0.1:8786``
     """
 
     @contextmanager
@@ -114,8 +109,7 @@ def given(executor: Submits, workers: int | None = None) -> Opens:
     Parameters
     ----------
     executor : object with the protocol of `concurrent.futures.Executor`
-    workers : int, optional
-        Batches that it computes at once; the cores of this machine by default.
+    workers : batches that it computes at once; the cores of this machine by default
     """
     opened_before = False
 

@@ -121,8 +121,7 @@ class Journal:
 
     Parameters
     ----------
-    folder : Path
-        Of the study.
+    folder : of the study
     """
 
     def __init__(self, folder: Path) -> None:
@@ -154,10 +153,8 @@ def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
 
     Parameters
     ----------
-    folder : Path
-        Of the study.
-    wanted : collection of str
-        Hashes.
+    folder : of the study
+    wanted : hashes
     """
     journals: dict[str, Record] = {}
     for path in sorted((folder / FOLDER).glob(f"*{_END}")):

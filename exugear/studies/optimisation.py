@@ -142,12 +142,9 @@ def optimise(
 
     Parameters
     ----------
-    study : Study
-    folder : path
-        Where points and the dataset are kept.
+    folder : where points and the dataset are kept
     opens : callable, optional
         Starts workers; processes on all cores by default.
-    progress : callable, optional
 
     Returns
     -------

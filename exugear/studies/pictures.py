@@ -43,16 +43,9 @@ def draw_study(dataset: xr.Dataset, folder: Path, minimised: tuple[str, ...] = (
 
     Parameters
     ----------
-    dataset : Dataset
-        As `exugear.studies.dataset.dataset_of` makes it.
-    folder : Path
-        Of the study.
-    minimised : tuple of str
-        Figures that a search made small, or their percentiles over tolerances.
-
-    Returns
-    -------
-    list of Path
+    dataset : as `exugear.studies.dataset.dataset_of` makes it
+    folder : of the study
+    minimised : figures that a search made small, or their percentiles over tolerances
     """
     drawn = []
     with drawing_style():

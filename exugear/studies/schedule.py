@@ -110,8 +110,6 @@ def compute_points(task: Task, points: Iterable[Work], opens: Opens, tell: Tell)
 
     Parameters
     ----------
-    task : Task
-    points : iterable of Work
     opens : callable
         Starts workers, as `exugear.studies.executors.processes`; called again when they are lost.
     tell : callable
@@ -119,8 +117,7 @@ def compute_points(task: Task, points: Iterable[Work], opens: Opens, tell: Tell)
 
     Returns
     -------
-    dict of str to Record
-        By the hash of the point.
+    by the hash of the point
 
     Raises
     ------

@@ -154,10 +154,7 @@ def searched_dataset(
 
     Parameters
     ----------
-    study : Study
-    criteria : Criteria
-    points : sequence of Looked
-    records : mapping of hash to Record
+    records : by hash
     """
     dataset = dataset_of(replace(study, design=_design(study, points)), records)
     judged = {side: _judged(dataset, study, criteria, *side) for side in criteria.sides}

@@ -97,11 +97,8 @@ class Study(Displayed):
 
         Parameters
         ----------
-        path : path-like
-        permissions : Permissions
-            What the gearbox file may do.
-        figures : mapping of str to Figure
-            Figures that may be named.
+        permissions : what the gearbox file may do
+        figures : figures that may be named
 
         Raises
         ------

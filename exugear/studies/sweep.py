@@ -100,18 +100,12 @@ def sweep(
 
     Parameters
     ----------
-    study : Study
-    folder : path
-        Where points, what they share and the dataset are kept.
+    folder : where points, what they share and the dataset are kept
     opens : callable, optional
         Starts workers, see `exugear.studies.executors`; processes on all cores by default.
-    shard : Shard
-        The part to compute.
-    retry : bool
-        Whether points that failed before are computed again.
-    merge : bool
-        Compute nothing; put together what is there.
-    progress : callable, optional
+    shard : the part to compute
+    retry : whether points that failed before are computed again
+    merge : compute nothing; put together what is there
 
     Raises
     ------

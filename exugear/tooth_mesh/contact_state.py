@@ -121,15 +121,13 @@ def changed_over_cycle(known: Floats, samples: Samples) -> Floats:
 
     Parameters
     ----------
-    known : (n,) array
-        At pmc = 0, 1/n, ...
+    known : (n,) at pmc = 0, 1/n, ..
     found : tuple of k floats
         At pmc = 0, 1/k, ...
 
     Returns
     -------
-    (n,) array
-        With the mean of `known`.
+    (n,) with the mean of `known`
 
     Examples
     --------
@@ -153,10 +151,8 @@ def even_contact(pair: GearPair, force: float, stiffness: float, tangent_stiffne
 
     Parameters
     ----------
-    pair : GearPair
-    force : float
-        N.
-    stiffness, tangent_stiffness : float
+    force : N
+    stiffness, tangent_stiffness
         Load over deflection, and the slope of the load: that is what a tilt at constant load works against, N/m.
     """
     tilt_stiffness = tangent_stiffness * pair.face_width**2 / 12.0

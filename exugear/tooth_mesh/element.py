@@ -187,22 +187,16 @@ def mesh_elements(
 
     Parameters
     ----------
-    gearbox : Gearbox
     stiffness : mapping of pair name to (n,) array, to a curve, or to the table's surface
         F_bt / STE at pmc = 0, 1/n, ..., N/m; a single value for a constant. The law `table` needs surfaces.
-    law : Law
-        `exugear.tooth_mesh.laws.registry.law_of` knows it by its name.
-    inertias : str, optional
-        Inertia set: it decides where the bodies' nodes (centres of mass) are.
-    flanks : mapping, optional
-        Loaded flank of each mesh; from the static load by default.
+    law : `exugear.tooth_mesh.laws.registry.law_of` knows it by its name
+    inertias : inertia set: it decides where the bodies' nodes (centres of mass) are
+    flanks : loaded flank of each mesh; from the static load by default
     angles : {"reference", "operating"}
         Angles of the law `seed`.
-    displaced : mapping, optional
-        Place of bodies at zero coordinates against their nominal one, x and y seen from the mesh's frame, m.
-    nodes : mapping, optional
-        Position (3,) of the node that carries a gear, by `seat_key` of body and gear; the body's own otherwise.
-    contact : mapping of mesh name to ContactState, optional
+    displaced : place of bodies at zero coordinates against their nominal one, x and y seen from the mesh's frame, m
+    nodes : position (3,) of the node that carries a gear, by `seat_key` of body and gear; the body's own otherwise
+    contact : by mesh name
         Contact at the static misalignment, in the axes of the pair's table (of the flank +1). A law that is curved has
         its stiffness from there, and how that and the place of the load change over the mesh cycle
         (`MeshElement.with_contact`). Meshes without one, or loaded on the other flank, bear evenly along the common

@@ -102,10 +102,7 @@ class Law:
 
         Parameters
         ----------
-        gearbox : Gearbox
-        pair : str
-        directory : Path
-            Results folder with ``tables/<pair>.nc``, for laws that need tables.
+        directory : results folder with ``tables/<pair>.nc``, for laws that need tables
 
         Raises
         ------

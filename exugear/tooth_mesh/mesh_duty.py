@@ -55,11 +55,8 @@ def with_contact(duty: MeshDuty, place: MeshPlace | None, flank: int) -> MeshDut
 
     Parameters
     ----------
-    duty : MeshDuty
-    place : MeshPlace, optional
-        Where its gears stand, if contact can be solved.
-    flank : int
-        Loaded flank of gear 1: the table's frame is that of +1.
+    place : where its gears stand, if contact can be solved
+    flank : loaded flank of gear 1: the table's frame is that of +1
     """
     if place is None:
         return duty

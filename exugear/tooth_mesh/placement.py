@@ -170,10 +170,8 @@ def tooth_places(gearbox: Gearbox, flanks: Mapping[str, int]) -> tuple[dict[str,
 
     Returns
     -------
-    phases : dict
-        Name of the mesh -> PMC at zero angles.
-    orientation : dict
-        Body and gear -> polar angle of a tooth's middle at zero body angle, rad.
+    phases : name of the mesh -> PMC at zero angles
+    orientation : body and gear -> polar angle of a tooth's middle at zero body angle, rad
 
     Raises
     ------

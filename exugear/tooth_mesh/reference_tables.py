@@ -48,13 +48,9 @@ def requested_references(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    out : Path
-        Results folder; a table lies in ``tables/<pair>-nonlinear.nc``.
-    names : iterable of str
-        Pairs; without any, those that the file wants a table of.
-    positions : int, optional
-        Positions of the mesh cycle.
+    out : results folder; a table lies in ``tables/<pair>-nonlinear.nc``
+    names : pairs; without any, those that the file wants a table of
+    positions : positions of the mesh cycle
 
     Raises
     ------

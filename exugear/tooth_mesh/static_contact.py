@@ -85,9 +85,8 @@ def static_contacts(places: Mapping[str, MeshPlace], positions: int = POSITIONS)
 
     Parameters
     ----------
-    places : mapping of mesh name to MeshPlace
-    positions : int
-        Of the mesh cycle.
+    places : by mesh name
+    positions : of the mesh cycle
     """
     groups: dict[str, list[MeshPlace]] = {}
     for place in places.values():

@@ -67,8 +67,7 @@ class TableRequest:
 
         Parameters
         ----------
-        progress : callable, optional
-            Called with the number of finished positions and of all positions.
+        progress : called with the number of finished positions and of all positions
         """
         partial = self.path.with_suffix(".partial.nc")
         table = MeshTable.compute(self.wanted, progress, partial=partial)
@@ -89,18 +88,12 @@ def requested_tables(
 
     Parameters
     ----------
-    gearbox : Gearbox
-        The case.
-    out : Path
-        Results folder; the tables lie in its folder ``tables``.
-    names : iterable of str
-        Pairs to list; without any, those that the file wants a table of.
-    positions : int, optional
-        Positions of the mesh cycle; without it what the file says.
-    grid : bool
-        Ask for the axes of the file even if its section ``ste`` does not.
-    axes : mapping of pair name to GridAxes, optional
-        Axes where the file names none; usual ones by default.
+    gearbox : the case
+    out : results folder; the tables lie in its folder ``tables``
+    names : pairs to list; without any, those that the file wants a table of
+    positions : positions of the mesh cycle; without it what the file says
+    grid : ask for the axes of the file even if its section ``ste`` does not
+    axes : by pair name, axes where the file names none; usual ones by default
 
     Raises
     ------
@@ -156,14 +149,9 @@ def wanted_table(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    name : str
-        Pair.
-    positions : int
-    grid : bool
-        Over the axes of the file's section ``ste``, else the static state alone.
-    axes : GridAxes, optional
-        Axes where the file names none; usual ones by default.
+    name : pair
+    grid : over the axes of the file's section ``ste``, else the static state alone
+    axes : axes where the file names none; usual ones by default
 
     Raises
     ------
@@ -208,16 +196,12 @@ def fitting_table(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    name : str
-        Pair.
-    out : Path
-        Results folder.
-    grid : bool
+    name : pair
+    out : results folder
+    grid
         Whether it must have exactly the axes that the file's section ``ste`` names, and the others at all; else any
         axes with the static state serve.
-    axes : GridAxes, optional
-        What axes must reach that the file does not name.
+    axes : what axes must reach that the file does not name
 
     Raises
     ------
@@ -285,13 +269,9 @@ def missing_tables(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    out : Path
-        Results folder.
-    grid : bool
-        Whether the mesh law interpolates over load, centre distance and misalignment.
-    axes : mapping of pair name to GridAxes, optional
-        What axes must reach that the file does not name.
+    out : results folder
+    grid : whether the mesh law interpolates over load, centre distance and misalignment
+    axes : by pair name, what axes must reach that the file does not name
     """
     work = tables_at_work(gearbox, out, grid, axes)
     requests = []

@@ -56,9 +56,7 @@ def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[WanderingLoad, ...]
 
     Parameters
     ----------
-    gearbox : Gearbox
-    folder : Path
-        Results folder.
+    folder : results folder
     """
     loads = []
     for name, pair in {mesh.pair.name: mesh.pair for mesh in gearbox.meshes}.items():

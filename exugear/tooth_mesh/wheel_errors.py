@@ -30,16 +30,12 @@ def contact_line_shares(pair: GearPair, pmc: Floats) -> tuple[Integers, Floats]:
 
     Parameters
     ----------
-    pair : GearPair
-    pmc : (n,) array
-        Positions in the mesh cycle, 0 to 1.
+    pmc : (n,) positions in the mesh cycle, 0 to 1
 
     Returns
     -------
-    teeth : (t,) array
-        Tooth pairs, counted ahead of the one that touches at the pitch point at pmc 0.
-    shares : (n, t) array
-        Adds up to one in each position.
+    teeth : (t,) tooth pairs, counted ahead of the one that touches at the pitch point at pmc 0
+    shares : (n, t) adds up to one in each position
 
     Examples
     --------
@@ -67,8 +63,6 @@ def wheel_errors(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    mesh : Mesh
     flank : +1 or -1, the loaded flank of gear 1
     phase : PMC at zero angles
     orientation : mapping of (body, gear) to the polar angle of a tooth's middle at zero body angle

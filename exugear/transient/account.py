@@ -18,12 +18,9 @@ class EnergyAccount:
 
     Parameters
     ----------
-    step : float
-        Time between two states, s.
-    balance : (terms,) array
-        Account at the state to start from, J.
-    powers : (powers,) array
-        Powers at that state, W.
+    step : time between two states, s
+    balance : (terms,) account at the state to start from, J
+    powers : (powers,) powers at that state, W
 
     Attributes
     ----------
@@ -57,17 +54,13 @@ class EnergyAccount:
 
         Parameters
         ----------
-        powers : (n, powers) array
-            Of `exugear.dynamics.signals.POWERS` at each state, W.
-        written : (k,) array
-            Numbers of the states whose lines are asked for, the last state's last.
-        energies : (k, energies) array
-            Of `exugear.dynamics.signals.ENERGIES` at these states, J.
+        powers : (n, powers) of `exugear.dynamics.signals.POWERS` at each state, W
+        written : (k,) numbers of the states whose lines are asked for, the last state's last
+        energies : (k, energies) of `exugear.dynamics.signals.ENERGIES` at these states, J
 
         Returns
         -------
-        (k, terms) array
-            Account at these states, J.
+        (k, terms) account at these states, J
         """
         # Whole sums up to each line; of the first and the last power in them half is too much or missing.
         starts = np.concatenate([[0], written[:-1] + 1])

@@ -31,10 +31,6 @@ def check_duration(
     """Refuse a simulated time (s; the load case's by default) that is no number or leaves too few samples.
 
     The anti-aliasing filter needs half its length of signal on both sides of each sample.
-
-    Raises
-    ------
-    CaseError
     """
     total, key = _span(gearbox, case, duration)
     if not math.isfinite(total):
@@ -56,12 +52,7 @@ def check_disk(
     *,
     sample_bytes: int,
 ) -> None:
-    """Refuse a simulated time (s) whose results do not fit on the disk of a folder, which need not be there yet.
-
-    Raises
-    ------
-    CaseError
-    """
+    """Refuse a simulated time (s) whose results do not fit on the disk of a folder, which need not be there yet."""
     total, key = _span(gearbox, case, duration)
     there = next(parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.is_dir())
     needed = total * sample_rate * sample_bytes
@@ -78,11 +69,8 @@ def sample_bytes(meshes: int, supports: int, tabled: bool, jointed: bool = False
 
     Parameters
     ----------
-    meshes, supports : int
-    tabled : bool
-        Whether its mesh law is `table`, which has further signals.
-    jointed : bool
-        Whether supports are ideal joints, which have fewer.
+    tabled : whether its mesh law is `table`, which has further signals
+    jointed : whether supports are ideal joints, which have fewer
 
     Examples
     --------
@@ -119,10 +107,8 @@ def buffer_rows(wanted: float, size: int, signals: int) -> int:
 
     Parameters
     ----------
-    wanted : float
-        Steps.
-    size, signals : int
-        Coordinates and signals of a step.
+    wanted : steps
+    size, signals : coordinates and signals of a step
 
     Examples
     --------

@@ -45,10 +45,8 @@ class ProgressMeter:
 
     Parameters
     ----------
-    begin, end : float
-        Simulated time at the start and at the end, s.
-    tell : callable, optional
-        Called with each `Progress`.
+    begin, end : simulated time at the start and at the end, s
+    tell : called with each `Progress`
     """
 
     def __init__(self, begin: float, end: float, tell: Callable[[Progress], None] | None) -> None:

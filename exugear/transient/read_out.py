@@ -44,13 +44,9 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
 
     Parameters
     ----------
-    assembly : Assembly
-    method : Method
-        Whose predicted states the signals are read off; those of the Runge-Kutta method are not predicted.
-    step : float
-        s.
-    factor : int
-        Steps for each stored sample.
+    method : whose predicted states the signals are read off; those of the Runge-Kutta method are not predicted
+    step : s
+    factor : steps for each stored sample
 
     Examples
     --------

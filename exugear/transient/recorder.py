@@ -44,8 +44,7 @@ class StateBuffer:
 
     Parameters
     ----------
-    rows, size, columns : int
-        Most states; coordinates and signals of a state.
+    rows, size, columns : most states; coordinates and signals of a state
 
     Attributes
     ----------
@@ -91,12 +90,8 @@ class Recorder:
 
     Parameters
     ----------
-    plan : RunPlan
-    start : RunStart
-    file : RunFile
-        The file that grows with the run.
-    progress : callable, optional
-        Called after each write, in the caller's thread, with the time that is on the disk, s.
+    file : the file that grows with the run
+    progress : called after each write, in the caller's thread, with the time that is on the disk, s
 
     Attributes
     ----------

@@ -36,12 +36,7 @@ def held(directory: Path) -> Iterator[None]:
 
 
 def refuse_if_busy(directory: Path) -> None:
-    """Raise what `simulate` would raise if another process is at work on a run; change nothing.
-
-    Raises
-    ------
-    FileError
-    """
+    """Raise what `simulate` would raise if another process is at work on a run; change nothing."""
     if (directory / LOCK_NAME).exists():
         with held(directory):
             pass

@@ -64,21 +64,14 @@ def simulate(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    choice : Choice
-        Variant, mesh law, inertia set and load case.
+    choice : variant, mesh law, inertia set and load case
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness over the cycle, see `exugear.tooth_mesh.laws.stiffness.mesh_stiffness`.
-    out : path
-        Results directory.
-    bodies : mapping of body name to ElasticBody, optional
-        Reduced elastic bodies, which the variant `flexible` needs.
-    duration : float, optional
-        Simulated time, s; the load case's by default.
-    step : float, optional
-        Integration step, s; chosen from `band` and the fastest eigenfrequency by default.
-    band, sample_rate : float
-        Highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps.
+    out : results directory
+    bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
+    duration : simulated time, s; the load case's by default
+    step : integration step, s; chosen from `band` and the fastest eigenfrequency by default
+    band, sample_rate : highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps
     solver : {"compiled", "exudyn"}, optional
         The compiled one where it applies by default; a body in a floating frame needs Exudyn.
     integrator : {"adams", "rk4"}, optional
@@ -87,10 +80,8 @@ def simulate(
         Angles of the law `seed`.
     mesh_route : {"element", "loads"}
         See `exugear.transient.exudyn_model.system`; "loads" is Exudyn's alone.
-    resume : bool
-        Go on with a run that was stopped.
-    progress : callable, optional
-        Called about every quarter of a simulated second.
+    resume : go on with a run that was stopped
+    progress : called about every quarter of a simulated second
 
     Returns
     -------

@@ -90,15 +90,12 @@ def energy_left_over(lines: Floats, start: float, scale: float) -> tuple[Floats,
 
     Parameters
     ----------
-    start : float
-        Kinetic and elastic energy at the start, J.
-    scale : float
-        Largest of work done, kinetic and elastic energy before these lines, J.
+    start : kinetic and elastic energy at the start, J
+    scale : largest of work done, kinetic and elastic energy before these lines, J
 
     Returns
     -------
-    share, scales : (n,) arrays
-        Without sign; and the largest energy up to each line, J, at least `LEAST_ENERGY`.
+    share, scales : (n,) without sign; and the largest energy up to each line, J, at least `LEAST_ENERGY`
 
     Examples
     --------
@@ -117,10 +114,7 @@ class Judge:
 
     Parameters
     ----------
-    assembly : Assembly
-    loads : LoadSummary
-        What the load case intends, over the time that is simulated.
-    limits : Limits
+    loads : what the load case intends, over the time that is simulated
 
     Attributes
     ----------
@@ -150,13 +144,10 @@ class Judge:
 
         Parameters
         ----------
-        times : (n,) array
-            s.
-        deflections : (n, meshes) array
-            m.
-        v : (n, size) array
-            Velocities.
-        account_times, account : (k,) and (k, terms) arrays
+        times : (n,) s
+        deflections : (n, meshes) m
+        v : (n, size) velocities
+        account_times, account : (k,) (k, terms)
             Lines of the account of energy, J, as in `exugear.dynamics.signals.BALANCE_TERMS`.
         """
         # A run that diverges passes through numbers whose sums overflow: infinite or not a number, they are too large.
@@ -211,10 +202,8 @@ class Judge:
 
         Parameters
         ----------
-        mesh_times : (times, meshes) array
-            Times of each mesh, s, as in `exugear.dynamics.signals.MESH_TIMES`.
-        simulated : float
-            Time so far, s.
+        mesh_times : (times, meshes) times of each mesh, s, as in `exugear.dynamics.signals.MESH_TIMES`
+        simulated : time so far, s
         """
         return (
             *self._energy_words(),

@@ -27,12 +27,9 @@ class ContactSettings:
 
     Parameters
     ----------
-    slices : int
-        Slices along the common face width.
-    cells : int
-        Cells of a slice across the window that travels with the contact line.
-    window : float
-        Half width of that window in Hertzian half widths at the largest mean line load.
+    slices : slices along the common face width
+    cells : cells of a slice across the window that travels with the contact line
+    window : half width of that window in Hertzian half widths at the largest mean line load
     """
 
     slices: int = 48

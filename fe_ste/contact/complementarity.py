@@ -67,20 +67,11 @@ def solve_complementarity(
 
     Parameters
     ----------
-    compliance : ndarray (n, n)
-        Symmetric positive definite, m/N. What is above the diagonal is not read.
-    gap : ndarray (n,)
-        m.
-    load : float
-        Sum of the forces, N, positive.
-    guess : ndarray (n,)
-        Cells taken to be in contact at the start.
-    max_iterations : int
-        Block steps allowed.
-
-    Returns
-    -------
-    ContactSolution
+    compliance : (n, n) symmetric positive definite, m/N. What is above the diagonal is not read.
+    gap : (n,) m
+    load : sum of the forces, N, positive
+    guess : (n,) cells taken to be in contact at the start
+    max_iterations : block steps allowed
 
     Raises
     ------

@@ -32,19 +32,13 @@ def compliance_matrix(
 
     Parameters
     ----------
-    cells : Cells
-    pair : FlankPair
-    axial : ndarray (slices,)
-        Middle of the contact slices, m.
-    flanks : tuple of FlankCompliance
-        Gear 1, gear 2.
-    regular : tuple of RegularCompliance
-        Of these flanks.
+    axial : (slices,) middle of the contact slices, m
+    flanks : gear 1, gear 2
+    regular : of these flanks
 
     Returns
     -------
-    ndarray (n, n)
-        m/N; symmetric, of which the lower triangle is given and what is above it is not.
+    (n, n) m/N; symmetric, of which the lower triangle is given and what is above it is not
     """
     matrix = np.zeros((len(cells.tooth), len(cells.tooth)))
     starts = np.flatnonzero(np.diff(cells.tooth * len(axial) + cells.layer)) + 1

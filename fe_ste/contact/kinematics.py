@@ -104,22 +104,15 @@ def rigid_gap(pair: FlankPair, roll: float, axial: float, tooth: int, rotation: 
 
     Parameters
     ----------
-    pair : FlankPair
-    roll : float
-        Roll angle of the point on gear 1, rad.
-    axial : float
-        Its axial position, m.
-    tooth : int
-        Tooth pair.
-    rotation : float
-        Rotation of gear 1, rad; gear 2 is where it rolls with it.
+    roll : roll angle of the point on gear 1, rad
+    axial : its axial position, m
+    tooth : tooth pair
+    rotation : rotation of gear 1, rad; gear 2 is where it rolls with it
 
     Returns
     -------
-    gap : float
-        m; infinite inside the base circle of gear 2.
-    gear_roll : float
-        Roll angle on gear 2 at the point's radius, rad.
+    gap : m; infinite inside the base circle of gear 2
+    gear_roll : roll angle on gear 2 at the point's radius, rad
     """
     radius, angle = _polar_on_gear_2(pair, roll, axial, tooth, rotation)
     # r = r_b sqrt(1 + roll^2), solved for the roll angle.

@@ -52,15 +52,12 @@ def mean_inverse_distance(across: float, along: float, half_across: float, half_
 
     Parameters
     ----------
-    across, along : float
-        Position of the point from the middle of the rectangle, m.
-    half_across, half_along : float
-        Half sides of the rectangle, m.
+    across, along : position of the point from the middle of the rectangle, m
+    half_across, half_along : half sides of the rectangle, m
 
     Returns
     -------
-    float
-        1/m.
+    1/m
     """
     square = across * across + along * along
     if square > (_FAR * max(half_across, half_along)) ** 2:
@@ -82,16 +79,10 @@ def add_near_field(
 
     Parameters
     ----------
-    matrix : ndarray (n, n)
-        m/N; above the diagonal anything may be added.
-    groups : ndarray (g + 1,)
-        Bounds of the runs of cells of one tooth pair and slice.
-    cells : Cells
-    pair : FlankPair
-    axial : ndarray (slices,)
-        Middle of the contact slices, m.
-    flanks : tuple of FlankCompliance
-        Gear 1, gear 2.
+    matrix : (n, n) m/N; above the diagonal anything may be added
+    groups : (g + 1,) bounds of the runs of cells of one tooth pair and slice
+    axial : (slices,) middle of the contact slices, m
+    flanks : gear 1, gear 2
     """
     materials = [flank.gear.material for flank in flanks]
     surface = np.array([(1 - m.poissons_ratio**2) / (np.pi * m.youngs_modulus) for m in materials])

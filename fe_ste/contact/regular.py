@@ -63,13 +63,9 @@ class RegularCompliance(Displayed):
 
         Parameters
         ----------
-        flank : FlankCompliance
-        sense : int
-            Sense in which this gear's tooth numbers run with the tooth pairs.
-        teeth : ndarray
-            Consecutive tooth pairs that may touch.
-        reach : int
-            Largest difference of tooth pairs in contact at once.
+        sense : sense in which this gear's tooth numbers run with the tooth pairs
+        teeth : consecutive tooth pairs that may touch
+        reach : largest difference of tooth pairs in contact at once
         """
         arc = flank.gear.base_radius * flank.roll**2 / 2.0
         knots = cubic_knots(arc)
@@ -93,15 +89,10 @@ class RegularCompliance(Displayed):
 
         Parameters
         ----------
-        matrix : ndarray (n, n)
-            m/N; above the diagonal anything may be added.
-        groups : ndarray (g + 1,)
-            Bounds of the runs of cells of one tooth pair and slice.
-        cells : Cells
-        roll : ndarray (n,)
-            Roll angles of the cells on this gear, rad.
-        axial : ndarray (slices,)
-            Middle of the contact slices, m.
+        matrix : (n, n) m/N; above the diagonal anything may be added
+        groups : (g + 1,) bounds of the runs of cells of one tooth pair and slice
+        roll : (n,) roll angles of the cells on this gear, rad
+        axial : (slices,) middle of the contact slices, m
         """
         arc = np.clip(self.base_radius * roll**2 / 2.0, self.knots[0], self.knots[-1])
         own = cells.tooth[groups[:-1]] - self.first_tooth, cells.layer[groups[:-1]], self.number

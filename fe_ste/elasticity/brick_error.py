@@ -37,16 +37,13 @@ def brick_error(mesh: SectorMesh, side: int, incompatible_modes: bool = True) ->
 
     Parameters
     ----------
-    mesh : SectorMesh
-        With layers of one thickness.
-    side : int
-        Loaded flank: +1 counter-clockwise, -1 clockwise.
-    incompatible_modes : bool
-        See `fe_ste.elasticity.bricks.stiffness_matrix`.
+    mesh : with layers of one thickness
+    side : loaded flank: +1 counter-clockwise, -1 clockwise
+    incompatible_modes : see `fe_ste.elasticity.bricks.stiffness_matrix`
 
     Returns
     -------
-    ndarray (f, 2 r + 1, f)
+    (f, 2 r + 1, f)
         By flank node read, layers from the load to it, -r to r with r = `ERROR_REACH`, and flank node loaded, m/N.
 
     Raises

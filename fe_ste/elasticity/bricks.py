@@ -31,18 +31,13 @@ def stiffness_matrix(
 
     Parameters
     ----------
-    points : ndarray (n, 3)
-        Nodes, m.
-    hexahedra : ndarray (m, 8)
-        Connectivity in VTK order.
-    material : Material
-    incompatible_modes : bool
-        False gives the plain brick, for comparison.
+    points : (n, 3) nodes, m
+    hexahedra : (m, 8) connectivity in VTK order
+    incompatible_modes : False gives the plain brick, for comparison
 
     Returns
     -------
-    csr_matrix (3 n, 3 n)
-        Stiffness, N/m; unknown ``3 node + direction``.
+    (3 n, 3 n) stiffness, N/m; unknown ``3 node + direction``
 
     Raises
     ------
@@ -68,10 +63,8 @@ def element_stiffness(
 
     Returns
     -------
-    nodes : ndarray (m, 8)
-        Nodes of each element in the order of its matrix.
-    stiffness : ndarray (m, 24, 24)
-        N/m; unknown ``3 place of the node + direction``.
+    nodes : (m, 8) nodes of each element in the order of its matrix
+    stiffness : (m, 24, 24) N/m; unknown ``3 place of the node + direction``
     """
     nodes, gradients, volumes = brick_gradients(points, hexahedra)
     if incompatible_modes:
@@ -84,19 +77,15 @@ def brick_gradients(points: Floats, hexahedra: Integers) -> tuple[Integers, Floa
 
     Parameters
     ----------
-    points : ndarray (n, 3)
-        Nodes, m.
-    hexahedra : ndarray (m, 8)
-        Connectivity in VTK order.
+    points : (n, 3) nodes, m
+    hexahedra : (m, 8) connectivity in VTK order
 
     Returns
     -------
-    nodes : ndarray (m, 8)
-        Nodes of each element in the order of the gradients.
-    gradients : ndarray (11, 3, m, 8)
+    nodes : (m, 8) nodes of each element in the order of the gradients
+    gradients : (11, 3, m, 8)
         By function, direction, element and Gauss point; the last three functions are the incompatible modes, 1/m.
-    volumes : ndarray (m, 8)
-        Of the Gauss points, m^3.
+    volumes : (m, 8) of the Gauss points, m^3
 
     Raises
     ------
@@ -137,11 +126,8 @@ def gradient_products(gradients: Floats, volume: Floats, material: Material) -> 
 
     Parameters
     ----------
-    gradients : ndarray (m, 3, elements, points)
-        Of the shape functions at the integration points, 1/m.
-    volume : ndarray (elements, points)
-        Of the integration points, m^3.
-    material : Material
+    gradients : (m, 3, elements, points) of the shape functions at the integration points, 1/m
+    volume : (elements, points) of the integration points, m^3
     """
     count, _, elements, points = gradients.shape
     flat = np.ascontiguousarray(gradients.transpose(2, 0, 1, 3)).reshape(elements, 3 * count, points)

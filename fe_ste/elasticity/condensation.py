@@ -60,11 +60,8 @@ class CondensedSector:
 
         Parameters
         ----------
-        mesh : SectorMesh
-        side : int
-            Loaded flank: +1 counter-clockwise, -1 clockwise.
-        incompatible_modes : bool
-            See `fe_ste.elasticity.bricks.stiffness_matrix`.
+        side : loaded flank: +1 counter-clockwise, -1 clockwise
+        incompatible_modes : see `fe_ste.elasticity.bricks.stiffness_matrix`
         """
         # Loads press into the flank, and displacements into it are read: both are against the outward normal.
         halves = sector_halves(mesh, [-flank_functionals(mesh, side)], incompatible_modes)

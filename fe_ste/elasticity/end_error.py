@@ -39,18 +39,14 @@ def end_errors(mesh: SectorMesh, side: int, images: Floats, incompatible_modes: 
 
     Parameters
     ----------
-    mesh : SectorMesh
-        With layers of one thickness.
-    side : int
-        Loaded flank: +1 counter-clockwise, -1 clockwise.
-    images : ndarray (2, n, 3)
-        Image loads behind the lower and the upper end.
-    incompatible_modes : bool
-        See `fe_ste.elasticity.bricks.stiffness_matrix`.
+    mesh : with layers of one thickness
+    side : loaded flank: +1 counter-clockwise, -1 clockwise
+    images : (2, n, 3) image loads behind the lower and the upper end
+    incompatible_modes : see `fe_ste.elasticity.bricks.stiffness_matrix`
 
     Returns
     -------
-    lower, upper : ndarray (2 w - 1, r, l)
+    lower, upper : (2 w - 1, r, l)
         By nodes along the profile from the load to the place read, from -w + 1 to w - 1 with w = `WAVES`; by layer
         read and layer loaded, `END_LAYERS` each, counted from the end; m/N.
     """

@@ -143,21 +143,11 @@ def flank_compliance(
 
     Parameters
     ----------
-    gear : Gear
-        Held at ``gear.held_diameter``.
-    side : int
-        Loaded flank: +1 counter-clockwise, -1 clockwise.
-    settings : MeshSettings, optional
-    open_teeth : int, optional
-        Odd number of teeth of an open sector with free cut faces; without it the closed ring.
-    tooth_reach : int
-        Teeth on either side of the loaded one whose displacement is kept, of a closed ring that has as many.
-    incompatible_modes : bool
-        See `fe_ste.elasticity.bricks.stiffness_matrix`.
-
-    Returns
-    -------
-    FlankCompliance
+    gear : held at ``gear.held_diameter``
+    side : loaded flank: +1 counter-clockwise, -1 clockwise
+    open_teeth : odd number of teeth of an open sector with free cut faces; without it the closed ring
+    tooth_reach : teeth on either side of the loaded one whose displacement is kept, of a closed ring that has as many
+    incompatible_modes : see `fe_ste.elasticity.bricks.stiffness_matrix`
 
     Raises
     ------
@@ -220,16 +210,12 @@ def regular_part(mesh: SectorMesh, displacement: Floats, near: Floats) -> Floats
 
     Parameters
     ----------
-    mesh : SectorMesh
-    displacement : ndarray (f l, f l)
-        Of the flank nodes under tent loads, m/N.
-    near : ndarray (f l, f l)
-        See `flank_near_field`.
+    displacement : (f l, f l) of the flank nodes under tent loads, m/N
+    near : (f l, f l) see `flank_near_field`
 
     Returns
     -------
-    ndarray (f l, f l)
-        Of the flank nodes under loads at the flank nodes, m/N.
+    (f l, f l) of the flank nodes under loads at the flank nodes, m/N
     """
     roll = mesh.section.flank_roll
     means = tent_means(roll, mesh.gear.base_radius * roll**2 / 2.0)
@@ -243,16 +229,12 @@ def flank_near_field(mesh: SectorMesh, side: int, images: Floats, incompatible_m
 
     Parameters
     ----------
-    mesh : SectorMesh
-    side : int
-    images : ndarray (2, n, 3)
+    images : (2, n, 3)
         Image loads behind the lower and the upper end face, see `fe_ste.elasticity.halfspace.wedge_images`.
-    incompatible_modes : bool
 
     Returns
     -------
-    ndarray (f l, f l)
-        Normal displacement of the flank nodes per unit tent load, m/N.
+    (f l, f l) normal displacement of the flank nodes per unit tent load, m/N
     """
     gear = mesh.gear
     material = mesh.gear.material

@@ -73,17 +73,14 @@ def sector_halves(
 
     Parameters
     ----------
-    mesh : SectorMesh
-        Turned by 180 degrees about its middle line it must be the same; all layers have one section.
-    columns : sequence of sparse matrix (3 nodes, n)
+    mesh : turned by 180 degrees about its middle line it must be the same; all layers have one section
+    columns : (3 nodes, n)
         Loads and read-outs, one a column; those of a node of the flank, one a layer, follow each other.
-    incompatible_modes : bool
-        See `fe_ste.elasticity.bricks.stiffness_matrix`.
+    incompatible_modes : see `fe_ste.elasticity.bricks.stiffness_matrix`
 
     Returns
     -------
-    even, odd : SectorHalf
-        For loads that are joined by the same ones, turned; by their opposites.
+    even, odd : for loads that are joined by the same ones, turned; by their opposites
 
     Raises
     ------

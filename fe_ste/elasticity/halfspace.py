@@ -54,22 +54,15 @@ def interior_displacement(
 
     Parameters
     ----------
-    places : ndarray (n, 3)
-        x and y in the surface, z into it, m; no load's own place.
-    loads : ndarray (m, 2)
-        Places of the loads in the surface, m.
-    columns : ndarray (m,)
-        Load case of each load; it has a part in the one after that, too.
-    shares : ndarray (m, 2)
-        Force of the load in either.
-    count : int
-        Load cases.
-    poissons_ratio : float
+    places : (n, 3) x and y in the surface, z into it, m; no load's own place
+    loads : (m, 2) places of the loads in the surface, m
+    columns : (m,) load case of each load; it has a part in the one after that, too
+    shares : (m, 2) force of the load in either
+    count : load cases
 
     Returns
     -------
-    ndarray (n, 3, count)
-        1/m.
+    (n, 3, count) 1/m
 
     References
     ----------
@@ -104,14 +97,11 @@ def wedge_images(angle: float, poissons_ratio: float) -> Floats:
 
     Parameters
     ----------
-    angle : float
-        Between the faces, rad.
-    poissons_ratio : float
+    angle : between the faces, rad
 
     Returns
     -------
-    ndarray (2, 3)
-        Of each image its strength, b and c.
+    (2, 3) of each image its strength, b and c
 
     Examples
     --------
@@ -152,15 +142,12 @@ def rectangle_integral(across: float, along: float, half_across: float, half_alo
 
     Parameters
     ----------
-    across, along : float
-        Position of the point from the middle of the rectangle, m.
-    half_across, half_along : float
-        Half sides of the rectangle, m.
+    across, along : position of the point from the middle of the rectangle, m
+    half_across, half_along : half sides of the rectangle, m
 
     Returns
     -------
-    float
-        The integral, m.
+    the integral, m
 
     References
     ----------
@@ -193,20 +180,14 @@ def tent_integrals(
 
     Parameters
     ----------
-    roll, axial : ndarray (f,), (l,)
-        Roll angles (rad) and axial positions (m) of the flank grid.
-    base_radius : float
-    lead : float
-        d phi / d z along a generator, rad/m.
-    base_helix_cosine : float
-        cos(beta_b).
-    images : ndarray (2, n, 3)
-        Of the lower and the upper end: strength and place of each image load, see `wedge_images`.
+    roll, axial : (f,), (l,) roll angles (rad) and axial positions (m) of the flank grid
+    lead : d phi / d z along a generator, rad/m
+    base_helix_cosine : cos(beta_b)
+    images : (2, n, 3) of the lower and the upper end: strength and place of each image load, see `wedge_images`
 
     Returns
     -------
-    ndarray (f l, f l)
-        Row: read-out node, column: load node, both numbered ``flank node * l + layer``, 1/m.
+    (f l, f l) row: read-out node, column: load node, both numbered ``flank node * l + layer``, 1/m
     """
     n_roll = len(roll)
     n_axial = len(axial)
@@ -305,13 +286,11 @@ def tent_weights(roll: Floats, axial: Floats) -> Floats:
 
     Parameters
     ----------
-    roll, axial : ndarray (f,), (l,)
-        Flank grid.
+    roll, axial : (f,), (l,) flank grid
 
     Returns
     -------
-    ndarray (f l, f l)
-        Row: node, column: tent; columns sum to 1.
+    (f l, f l) row: node, column: tent; columns sum to 1
 
     Examples
     --------
@@ -331,15 +310,12 @@ def tent_means(nodes: Floats, places: Floats) -> Floats:
 
     Parameters
     ----------
-    nodes : ndarray (f,)
-        Roll angles.
-    places : ndarray (f,)
-        Arc lengths of the nodes, over which the splines are laid; squares of the roll angles but for a factor.
+    nodes : (f,) roll angles
+    places : (f,) arc lengths of the nodes, over which the splines are laid; squares of the roll angles but for a factor
 
     Returns
     -------
-    ndarray (f, f)
-        Row: node of the spline, column: tent.
+    (f, f) row: node of the spline, column: tent
 
     Examples
     --------

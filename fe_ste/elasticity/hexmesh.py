@@ -29,20 +29,13 @@ class MeshSettings:
 
     Parameters
     ----------
-    layers : int
-        Elements along the face width.
-    flank : int
-        Elements along the involute of one flank, equal in arc length.
-    thickness : int
-        Elements through the tooth, graded towards both flanks.
-    fillet : int
-        Elements along the upper part of the root fillet, which bounds the tooth core.
-    root : int
-        Elements along the lower fillet and half the root land.
-    rim : int
-        Elements from the held hub or rim to the root, graded towards the root.
-    grading : float
-        Ratio of the largest to the smallest element through the tooth.
+    layers : elements along the face width
+    flank : elements along the involute of one flank, equal in arc length
+    thickness : elements through the tooth, graded towards both flanks
+    fillet : elements along the upper part of the root fillet, which bounds the tooth core
+    root : elements along the lower fillet and half the root land
+    rim : elements from the held hub or rim to the root, graded towards the root
+    grading : ratio of the largest to the smallest element through the tooth
 
     Examples
     --------
@@ -202,15 +195,6 @@ class SectorMesh(Displayed, line=" of {gear.name!r}: {points!n} nodes, {hexahedr
 def sector_mesh(gear: Gear, settings: MeshSettings | None = None) -> SectorMesh:
     """Mesh one tooth sector of `gear`.
 
-    Parameters
-    ----------
-    gear : Gear
-    settings : MeshSettings, optional
-
-    Returns
-    -------
-    SectorMesh
-
     Raises
     ------
     GeometryError
@@ -253,19 +237,16 @@ def refined_sector_mesh(
 
     Parameters
     ----------
-    gear : Gear
-    settings : MeshSettings
-        Its numbers `flank` and `thickness` must be those of the fractions.
-    flank_fractions : ndarray (layers + 1, flank + 1)
+    settings : its numbers `flank` and `thickness` must be those of the fractions
+    flank_fractions : (layers + 1, flank + 1)
         Arc length of the flank nodes as part of the involute's from form to tip circle, ascending from 0 to 1.
-    across_fractions : ndarray (thickness + 1,)
+    across_fractions : (thickness + 1,)
         Distance through the tooth as part of its thickness, ascending from 0 on its clockwise to 1 on its
         counter-clockwise flank.
 
     Returns
     -------
-    SectorMesh
-        The cut faces and the held surface are those of `sector_mesh`, whatever the fractions.
+    the cut faces and the held surface are those of `sector_mesh`, whatever the fractions
 
     Raises
     ------

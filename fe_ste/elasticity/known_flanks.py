@@ -46,13 +46,8 @@ def known_flanks(
 
     Parameters
     ----------
-    wanted : sequence of (Gear, int)
-        Gears and sides: +1 counter-clockwise, -1 clockwise.
-    settings : MeshSettings, optional
-    open_teeth : int, optional
-    tooth_reach : int
-    incompatible_modes : bool
-        As in `fe_ste.elasticity.flank.flank_compliance`, all three.
+    wanted : gears and sides: +1 counter-clockwise, -1 clockwise
+    incompatible_modes : as in `fe_ste.elasticity.flank.flank_compliance`, all three
 
     Raises
     ------

@@ -63,14 +63,12 @@ class LayeredElements:
 
         Parameters
         ----------
-        elements : ndarray (e,)
+        elements : (e,)
 
         Returns
         -------
-        nodes : ndarray (n,)
-            Their section nodes.
-        stiffness : ndarray (n, s, n, s)
-            With s = 3 (layers + 1) unknowns a node, by layer and direction, N/m.
+        nodes : (n,) their section nodes
+        stiffness : (n, s, n, s) with s = 3 (layers + 1) unknowns a node, by layer and direction, N/m
         """
         nodes, local = np.unique(self.corners[elements], return_inverse=True)
         at = 2 * local.reshape(-1, 8) + self.above[elements]

@@ -48,9 +48,7 @@ def doubled(chain: Chain, signs: Floats) -> Chain:
 
     Parameters
     ----------
-    chain : Chain
-    signs : ndarray (m,)
-        Of the unknowns of a face.
+    signs : (m,) of the unknowns of a face
 
     Examples
     --------
@@ -78,16 +76,13 @@ def enclosed(inner: Floats, outer: Chain, signs: Floats) -> tuple[Floats, Floats
 
     Parameters
     ----------
-    inner : ndarray (m, m)
-        The even or the odd stiffness of the chain in the middle.
-    outer : Chain
-    signs : ndarray (m,)
+    inner : (m, m) the even or the odd stiffness of the chain in the middle
+    signs : (m,)
 
     Returns
     -------
-    stiffness : ndarray (m, m)
-        Of the whole, even or odd as `inner`.
-    factor, below : ndarray (m, m)
+    stiffness : (m, m) of the whole, even or odd as `inner`
+    factor, below : (m, m)
         ``-(below @ inv(factor)).T`` is the displacement of the inner plus face by that of the outer one.
     """
     return _condensed(inner + outer.own * signs * signs[:, None], outer.across * signs, outer.own)
@@ -118,15 +113,10 @@ def ring_faces(sector: Chain, load: Chain, signs: Floats, teeth: int, reach: int
 
     Parameters
     ----------
-    sector : Chain
-    load : Chain
-        Forces (m, k) on the plus face of sector 0 under even and odd loads: a load and the same turned, or reversed.
-    signs : ndarray (m,)
-        Of the unknowns of a face.
-    teeth : int
-        Sectors of the ring.
-    reach : int
-        Sectors on either side of sector 0 wanted; at least ``teeth - 2 reach`` 2.
+    load : forces (m, k) on the plus face of sector 0 under even and odd loads: a load and the same turned, or reversed
+    signs : (m,) of the unknowns of a face
+    teeth : sectors of the ring
+    reach : sectors on either side of sector 0 wanted; at least ``teeth - 2 reach`` 2
 
     Returns
     -------
@@ -167,17 +157,13 @@ def open_chain_faces(sector: Floats, load: Floats, teeth: int) -> list[list[Floa
 
     Parameters
     ----------
-    sector : ndarray (2 m, 2 m)
-        Both faces, minus face first; see `Chain.whole`.
-    load : ndarray (2 m, k)
-        Load columns on the faces of the loaded sector.
-    teeth : int
-        Sectors of the chain.
+    sector : (2 m, 2 m) both faces, minus face first; see `Chain.whole`
+    load : (2 m, k) load columns on the faces of the loaded sector
+    teeth : sectors of the chain
 
     Returns
     -------
-    list of list of ndarray (m, k)
-        By loaded sector, then by face 0 to `teeth`.
+    (m, k) by loaded sector, then by face 0 to `teeth`
     """
     half = len(sector) // 2
     matrix = np.zeros((half * (teeth + 1), half * (teeth + 1)))

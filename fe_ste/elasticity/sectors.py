@@ -29,18 +29,13 @@ class ContactMesh:
 
     Parameters
     ----------
-    layers : int
-        Elements along the face width.
-    contact_elements : float
-        Elements across the Hertzian contact width.
-    band : float
-        Half width of the uniformly fine band about the contact line, in Hertzian half widths.
-    growth : float
-        Growth of the element size per length beyond the band.
-    thickness, fillet, root, rim : int
+    layers : elements along the face width
+    contact_elements : elements across the Hertzian contact width
+    band : half width of the uniformly fine band about the contact line, in Hertzian half widths
+    growth : growth of the element size per length beyond the band
+    thickness, fillet, root, rim
         As in `fe_ste.elasticity.hexmesh.MeshSettings`; through the tooth, elements are graded towards the loaded flank.
-    far_flank : int
-        Elements along flanks that do not touch; others have no fewer.
+    far_flank : elements along flanks that do not touch; others have no fewer
 
     Examples
     --------
@@ -139,15 +134,7 @@ def placed_sectors(pair: GearPair, settings: MeshSettings, teeth: int, pmc: floa
 
     Parameters
     ----------
-    pair : GearPair
-    settings : MeshSettings
-    teeth : int
-        Odd number of teeth of each sector; tooth pair 0, in the middle, touches at the pitch point for ``pmc = 0``.
-    pmc : float
-
-    Returns
-    -------
-    OpenSector, OpenSector
+    teeth : odd number of teeth of each sector; tooth pair 0, in the middle, touches at the pitch point for ``pmc = 0``
     """
     pinion, gear = (
         _joined(placement, [sector_mesh(placement.gear, settings)] * teeth) for placement in _placements(pair, pmc)
@@ -162,17 +149,8 @@ def refined_sectors(
 
     Parameters
     ----------
-    pair : GearPair
-    settings : ContactMesh
-    teeth : int
-        Odd number of teeth of each sector.
-    pmc : float
-    half_width : float
-        Hertzian half width of the contact, m.
-
-    Returns
-    -------
-    OpenSector, OpenSector
+    teeth : odd number of teeth of each sector
+    half_width : Hertzian half width of the contact, m
     """
     sectors = []
     for placement in _placements(pair, pmc):

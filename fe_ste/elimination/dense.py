@@ -65,12 +65,7 @@ def subtract_square(target: Floats, left: Floats) -> None:
 
 
 def factorise_lower(matrix: Floats) -> None:
-    """Replace the lower triangle of a symmetric matrix, stored by columns, by its Cholesky factor.
-
-    Raises
-    ------
-    FactorisationError
-    """
+    """Replace the lower triangle of a symmetric matrix, stored by columns, by its Cholesky factor."""
     found = ctypes.c_int()
     _function("lapack", "dpotrf")(b"L", _integer(len(matrix)), *_place(matrix), ctypes.byref(found))
     if found.value:
@@ -93,10 +88,9 @@ def eliminate(matrix: Floats, count: int) -> None:
 
     Parameters
     ----------
-    matrix : ndarray (n, n)
+    matrix : (n, n)
         Stored by columns; its lower triangle counts. Left are the Cholesky factor L of the first `count` unknowns,
         below it B L^-T with B their coupling to the others, and in the rest the Schur complement, lower triangle.
-    count : int
 
     Raises
     ------

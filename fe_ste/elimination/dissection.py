@@ -51,21 +51,15 @@ def dissected(middles: Floats, cells: Sequence[Integers], sizes: Integers, kept:
 
     Parameters
     ----------
-    middles : ndarray (m, 2)
-        Middle of each cell.
-    cells : sequence of ndarray
-        Blocks that each of the m cells couples.
-    sizes : ndarray (b,)
-        Unknowns of each block.
-    kept : ndarray
-        Blocks that are never eliminated.
-    leaf_blocks : int
-        A set with at most so many blocks is not cut any more.
+    middles : (m, 2) middle of each cell
+    cells : blocks that each of the m cells couples
+    sizes : (b,) unknowns of each block
+    kept : blocks that are never eliminated
+    leaf_blocks : a set with at most so many blocks is not cut any more
 
     Returns
     -------
-    Front
-        The last one; its border are the blocks that are kept and that some cell couples.
+    the last one; its border are the blocks that are kept and that some cell couples
     """
     couples = np.zeros((len(cells), len(sizes)), dtype=bool)
     for number, blocks in enumerate(cells):
@@ -166,20 +160,16 @@ def schur_complement(
 
     Parameters
     ----------
-    front : Front
-        The last front of a dissection, or of a part of it.
-    sizes : ndarray
-        Unknowns of each block.
-    add_cells : callable
+    front : the last front of a dissection, or of a part of it
+    sizes : unknowns of each block
+    add_cells
         Adds to a matrix the symmetric matrices of cells, over the unknowns of blocks: given are the matrix, stored by
         columns, of which the lower triangle counts, cells and blocks.
-    known : mapping of Front to ndarray, optional
-        Results for parts of the dissection.
+    known : results for parts of the dissection
 
     Returns
     -------
-    ndarray (n, n)
-        Over the unknowns of the last front's border, stored by columns, lower triangle.
+    (n, n) over the unknowns of the last front's border, stored by columns, lower triangle
 
     Raises
     ------

@@ -58,13 +58,11 @@ class Factorisation(ABC):
 
         Parameters
         ----------
-        rhs : (n,) or (n, k) array, or (n, k) sparse matrix
-            Right-hand sides, one a column.
+        rhs : (n,) (n, k), (n, k) right-hand sides, one a column
 
         Returns
         -------
-        (n,) or (n, k) array
-            The solutions, as a dense array of the shape of `rhs`.
+        (n,) (n, k) the solutions, as a dense array of the shape of `rhs`
 
         Raises
         ------
@@ -192,15 +190,13 @@ def factorise(matrix: SparseMatrix, backend: Backend | None = None) -> Factorisa
 
     Parameters
     ----------
-    matrix : (n, n) sparse matrix
-        Symmetric positive definite, both triangles stored. That they agree is not checked.
+    matrix : (n, n) symmetric positive definite, both triangles stored. That they agree is not checked.
     backend : {"pardiso", "superlu"}, optional
         The library to use; without it the fastest one installed.
 
     Returns
     -------
-    Factorisation
-        Solves with any number of right-hand sides.
+    solves with any number of right-hand sides
 
     Raises
     ------

@@ -27,15 +27,13 @@ def pitch_gap(gear: Gear, deviation: Floats) -> Floats:
 
     Parameters
     ----------
-    gear : Gear
-    deviation : ndarray
+    deviation
         Arc by which a loaded flank lies inside its own tooth's material, m: the cumulative pitch deviation of
         ISO 1328-1, counted positive towards the tooth.
 
     Returns
     -------
-    ndarray
-        m on the transverse line of action.
+    m on the transverse line of action
 
     Notes
     -----
@@ -55,18 +53,15 @@ def gaps_of_pairs(pinion: Floats, gear: Floats, cycle: int, pairs: Iterable[int]
 
     Parameters
     ----------
-    pinion, gear : ndarray (z,)
+    pinion, gear : (z,)
         Gap of each tooth (see `pitch_gap`), in the order in which the teeth come into mesh; tooth 0 of both gears
         touches at the pitch point at the start of cycle 0.
-    cycle : int
-        Mesh cycles since then.
-    pairs : iterable of int
-        Numbers of tooth pairs as in a table: counted ahead of the one that touches at the pitch point at pmc 0.
+    cycle : mesh cycles since then
+    pairs : numbers of tooth pairs as in a table: counted ahead of the one that touches at the pitch point at pmc 0
 
     Returns
     -------
-    dict
-        Number of the pair -> gap, m.
+    number of the pair -> gap, m
 
     Notes
     -----
@@ -85,17 +80,13 @@ def runout_displacement(eccentricity: float, phase: float, rotation: float) -> t
 
     Parameters
     ----------
-    eccentricity : float
-        Distance of the two axes, m: half of the radial runout.
-    phase : float
-        Angle of the eccentricity at rotation zero, rad.
-    rotation : float
-        Rotation of the gear, rad.
+    eccentricity : distance of the two axes, m: half of the radial runout
+    phase : angle of the eccentricity at rotation zero, rad
+    rotation : rotation of the gear, rad
 
     Returns
     -------
-    tuple of float
-        Along two fixed directions at right angles, of which the first is angle zero, m.
+    along two fixed directions at right angles, of which the first is angle zero, m
 
     Examples
     --------
@@ -113,18 +104,14 @@ def displaced_axis(pair: GearPair, along: float, across: float) -> tuple[float, 
 
     Parameters
     ----------
-    pair : GearPair
-    along : float
-        Displacement of the axis of gear 2 away from that of gear 1, m.
-    across : float
+    along : displacement of the axis of gear 2 away from that of gear 1, m
+    across
         Displacement of the axis of gear 2 at right angles, m, positive in the sense in which gear 1, driving, pushes.
 
     Returns
     -------
-    centre_distance : float
-        m.
-    gap : float
-        m on the transverse line of action, positive where the loaded flanks part.
+    centre_distance : m
+    gap : m on the transverse line of action, positive where the loaded flanks part
 
     Notes
     -----

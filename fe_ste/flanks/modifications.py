@@ -33,12 +33,9 @@ class Relief:
 
     Parameters
     ----------
-    amount : float
-        Material removed at the tip, or at the form circle for a root relief, m.
-    start_radius : float
-        Radius at which the relief begins, m.
-    shape : ReliefShape
-        Growth from the start, in roll length; parabolic begins without a kink.
+    amount : material removed at the tip, or at the form circle for a root relief, m
+    start_radius : radius at which the relief begins, m
+    shape : growth from the start, in roll length; parabolic begins without a kink
 
     Raises
     ------
@@ -64,21 +61,15 @@ class FlankModification(Displayed):
 
     Parameters
     ----------
-    tip_relief, root_relief : Relief, optional
-        Reliefs towards the tip and towards the form circle.
-    profile_crowning : float
-        Parabola over the roll length from form to tip circle, zero in its middle, m at either end.
-    lead_crowning : float
-        Parabola over the face width, zero at mid-face, m at either end.
-    profile_slope : float
-        Linear over the roll length; m removed at the tip, or at the form circle if negative.
-    helix_slope : float
-        Linear over the face width; m removed at the +z end, or at the -z end if negative.
-    twist : float
+    tip_relief, root_relief : reliefs towards the tip and towards the form circle
+    profile_crowning : parabola over the roll length from form to tip circle, zero in its middle, m at either end
+    lead_crowning : parabola over the face width, zero at mid-face, m at either end
+    profile_slope : linear over the roll length; m removed at the tip, or at the form circle if negative
+    helix_slope : linear over the face width; m removed at the +z end, or at the -z end if negative
+    twist
         Helix slope that turns over along the profile: m removed at the tip of the +z end and at the form circle of the
         -z end, nothing at the other two corners, half at mid-flank; the other way round if negative.
-    topography : FlankTopography, optional
-        A measured or designed grid, which may also hold material that stands proud.
+    topography : a measured or designed grid, which may also hold material that stands proud
 
     Raises
     ------
@@ -121,16 +112,14 @@ class FlankModification(Displayed):
 
         Parameters
         ----------
-        gear : Gear
-            The modified gear.
-        radius, z : array
+        gear : the modified gear
+        radius, z
             Radius and axial position of the points, m, the middle of the face width at zero; broadcast
             against each other.
 
         Returns
         -------
-        array
-            Gap along the flank normal, m; divide by cos(beta_b) for the transverse line of action.
+        gap along the flank normal, m; divide by cos(beta_b) for the transverse line of action
 
         Raises
         ------
@@ -206,15 +195,12 @@ def radius_at_roll_length_from_tip(gear: Gear, roll_length: float) -> float:
 
     Parameters
     ----------
-    gear : Gear
-        The gear.
-    roll_length : float
-        Roll length from the tip circle into the flank, m.
+    gear : the gear
+    roll_length : roll length from the tip circle into the flank, m
 
     Returns
     -------
-    float
-        Radius, m.
+    radius, m
 
     Raises
     ------
@@ -235,15 +221,12 @@ def radius_at_roll_length_from_root(gear: Gear, roll_length: float) -> float:
 
     Parameters
     ----------
-    gear : Gear
-        The gear.
-    roll_length : float
-        Roll length from the form circle into the flank, m.
+    gear : the gear
+    roll_length : roll length from the form circle into the flank, m
 
     Returns
     -------
-    float
-        Radius, m.
+    radius, m
 
     Raises
     ------

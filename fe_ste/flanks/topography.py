@@ -35,10 +35,8 @@ class FlankTopography(Displayed):
 
     Parameters
     ----------
-    radius, axial : tuple of float
-        Rising, two values or more, m; axial positions from the middle of the face width.
-    removed : tuple of tuple of float
-        Along the flank normal, m, a row for each radius.
+    radius, axial : rising, two values or more, m; axial positions from the middle of the face width
+    removed : along the flank normal, m, a row for each radius
 
     Raises
     ------

@@ -43,8 +43,7 @@ def check_gear(gear: UncheckedGear) -> None:
 
     Parameters
     ----------
-    gear : UncheckedGear
-        The gear, possibly of nonsensical values.
+    gear : the gear, possibly of nonsensical values
 
     Raises
     ------
@@ -70,8 +69,7 @@ def check_gear_pair(pair: UncheckedPair) -> None:
 
     Parameters
     ----------
-    pair : UncheckedPair
-        Two gears that passed `check_gear`.
+    pair : two gears that passed `check_gear`
 
     Raises
     ------
@@ -471,10 +469,8 @@ def corner_to_fillet_gap(pair: UncheckedPair, tip: UncheckedGear, mate: Unchecke
 
     Parameters
     ----------
-    pair : UncheckedPair
-        The pair.
-    tip, mate : UncheckedGear
-        The gear whose tip corner moves and the gear whose fillet it passes.
+    pair : the pair
+    tip, mate : the gear whose tip corner moves and the gear whose fillet it passes
 
     Returns
     -------
@@ -532,13 +528,11 @@ def internal_tip_gap(pair: UncheckedPair) -> float:
 
     Parameters
     ----------
-    pair : UncheckedPair
-        An internal pair whose tip circles cross.
+    pair : an internal pair whose tip circles cross
 
     Returns
     -------
-    float
-        Arc along the gear's tip circle, m; negative if the corners collide.
+    arc along the gear's tip circle, m; negative if the corners collide
     """
     pinion = pair.pinion
     gear = pair.gear

@@ -26,13 +26,10 @@ class PinionCutter:
 
     Parameters
     ----------
-    teeth : int
-        Number of teeth, z_0.
-    tip_radius : float
-        Radius of the arc that rounds its tips, transverse section, in normal modules (rho_a0*).
-    profile_shift : float
-        x_0, in normal modules; falls as it is ground again.
-    tip_diameter : float, optional
+    teeth : number of teeth, z_0
+    tip_radius : radius of the arc that rounds its tips, transverse section, in normal modules (rho_a0*)
+    profile_shift : x_0, in normal modules; falls as it is ground again
+    tip_diameter
         d_a0, m: the root circle of the gear follows from it. If not given, the cutter reaches the gear's root circle.
     """
 
@@ -50,13 +47,9 @@ def cutting_distance(gear_teeth: int, cutter_teeth: int, thickness_sum: float, a
 
     Parameters
     ----------
-    gear_teeth, cutter_teeth : int
-    thickness_sum : float
-        Tooth thickness of both on their reference circles over the transverse module.
-    angle : float
-        Transverse pressure angle, rad.
-    module : float
-        Transverse module, m.
+    thickness_sum : tooth thickness of both on their reference circles over the transverse module
+    angle : transverse pressure angle, rad
+    module : transverse module, m
     """
     difference = gear_teeth - cutter_teeth
     value = involute(angle) + (math.pi - thickness_sum) / difference if difference > 0 else math.nan
@@ -71,16 +64,11 @@ class CutterTipCut:
 
     Parameters
     ----------
-    base_radius, cutter_base_radius : float
-        Of gear and cutter, m.
-    centre_distance : float
-        At which it cuts, m.
-    cutter_tip_radius, rounding : float
-        Radius of the cutter's tip circle and of the arc there, m.
-    cutter_base_half_angle : float
-        Polar half angle of the cutter's tooth at its base circle, rad.
-    half_pitch_angle : float
-        Half of the angle between the gear's teeth, rad.
+    base_radius, cutter_base_radius : of gear and cutter, m
+    centre_distance : at which it cuts, m
+    cutter_tip_radius, rounding : radius of the cutter's tip circle and of the arc there, m
+    cutter_base_half_angle : polar half angle of the cutter's tooth at its base circle, rad
+    half_pitch_angle : half of the angle between the gear's teeth, rad
     """
 
     base_radius: float
@@ -154,8 +142,7 @@ class CutterTipCut:
 
         Parameters
         ----------
-        parameter : array
-            0 where the involute ends, to 1 at the root circle.
+        parameter : 0 where the involute ends, to 1 at the root circle
         """
         flank = self._flank_normal
         centre_angle = self.arc_centre_angle
@@ -188,15 +175,12 @@ class CutterTipCut:
 
         Parameters
         ----------
-        tip_radius : float
-            Radius of the gear's tip circle, m.
-        tip_half_angle : float
-            Polar half angle of its tooth there, rad.
+        tip_radius : radius of the gear's tip circle, m
+        tip_half_angle : polar half angle of its tooth there, rad
 
         Returns
         -------
-        float
-            Arc about the cutter's axis, m; negative where the cutter trims the tips.
+        arc about the cutter's axis, m; negative where the cutter trims the tips
         """
         # The space whose middle stands on the line of centres at rotation zero, and the corner beside it; tips are
         # within reach between the points at which the tip circles cross.

@@ -13,16 +13,11 @@ class Tube:
 
     Parameters
     ----------
-    start, length : float
-        m.
-    outer, inner : float
-        Diameters at its start, m.
-    density : float
-        kg/m^3.
-    outer_end, inner_end : float, optional
-        Diameters at its end, m; those of its start if not given.
-    aside : float
-        Distance of its axis from the z axis, m; it stands for several that are spread evenly around.
+    start, length : m
+    outer, inner : diameters at its start, m
+    density : kg/m^3
+    outer_end, inner_end : diameters at its end, m; those of its start if not given
+    aside : distance of its axis from the z axis, m; it stands for several that are spread evenly around
     """
 
     start: float

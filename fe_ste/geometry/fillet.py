@@ -19,15 +19,12 @@ def root_fillet(gear: UncheckedGear, parameter: Floats) -> Floats:
 
     Parameters
     ----------
-    gear : UncheckedGear
-        The gear.
-    parameter : array, shape (n,)
-        0 at the form circle, exactly on the involute, to 1 at the root circle.
+    gear : the gear
+    parameter : (n,) 0 at the form circle, exactly on the involute, to 1 at the root circle
 
     Returns
     -------
-    array, shape (n, 2)
-        x, y in m.
+    (n, 2) x, y in m
     """
     if not gear.internal:
         return _generated_fillet(gear, parameter)

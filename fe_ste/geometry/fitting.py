@@ -24,15 +24,12 @@ def shift_sum(one: UncheckedGear, other: UncheckedGear, centre_distance: float) 
 
     Parameters
     ----------
-    one, other : UncheckedGear
-        The pair; of an internal one in either order.
-    centre_distance : float
-        m.
+    one, other : the pair; of an internal one in either order
+    centre_distance : m
 
     Returns
     -------
-    float or None
-        In normal modules; None if no line of action touches both base circles at this distance.
+    in normal modules; None if no line of action touches both base circles at this distance
 
     Examples
     --------

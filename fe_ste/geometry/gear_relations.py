@@ -43,12 +43,9 @@ class BasicRack:
 
     Parameters
     ----------
-    addendum : float
-        Addendum of the gear tooth, h_aP*.
-    dedendum : float
-        Dedendum of the gear tooth, h_fP*.
-    tip_radius : float
-        Tip radius of the generating rack, rho_fP*: fillet radius at the root of the basic rack.
+    addendum : addendum of the gear tooth, h_aP*
+    dedendum : dedendum of the gear tooth, h_fP*
+    tip_radius : tip radius of the generating rack, rho_fP*: fillet radius at the root of the basic rack
     """
 
     addendum: float = 1.0
@@ -62,12 +59,9 @@ class Material:
 
     Parameters
     ----------
-    youngs_modulus : float
-        Pa.
-    poissons_ratio : float
-        Dimensionless.
-    density : float
-        kg/m^3.
+    youngs_modulus : Pa
+    poissons_ratio : dimensionless
+    density : kg/m^3
     """
 
     youngs_modulus: float = 206e9
@@ -198,8 +192,7 @@ class UncheckedGear:
 
         Parameters
         ----------
-        teeth : int
-            How many are between the planes, k.
+        teeth : how many are between the planes, k
         """
         thickness = 2.0 * self.base_radius * self.half_angle(self.base_radius)
         return ((teeth - 1) * self.transverse_base_pitch + thickness) * math.cos(self.base_helix_angle)
@@ -390,13 +383,11 @@ class UncheckedGear:
 
         Parameters
         ----------
-        radius : float or array
-            m. There is no involute inside the base circle: the result is NaN there.
+        radius : m. There is no involute inside the base circle: the result is NaN there.
 
         Returns
         -------
-        float or array
-            rad; falls with the radius for external, grows for internal teeth. Thinning is included.
+        rad; falls with the radius for external, grows for internal teeth. Thinning is included.
         """
         with np.errstate(invalid="ignore"):
             profile_angle = np.arccos(self.base_radius / np.asarray(radius, dtype=np.float64))

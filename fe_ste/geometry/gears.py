@@ -116,10 +116,8 @@ class GearPair(UncheckedPair, Displayed):
     ----------
     name : str
         Name used in messages.
-    pinion : Gear
-        The smaller gear, always external.
-    gear : Gear
-        The larger gear, external or internal.
+    pinion : the smaller gear, always external
+    gear : the larger gear, external or internal
     centre_distance : float
         Operating centre distance, m, positive also for an internal pair.
     common_face_width : float, optional

@@ -23,13 +23,11 @@ def involute(angle: float | Floats) -> float | Floats:
 
     Parameters
     ----------
-    angle : float or array
-        Profile angle, rad.
+    angle : profile angle, rad
 
     Returns
     -------
-    float or array
-        Involute polar angle, rad.
+    involute polar angle, rad
 
     Examples
     --------
@@ -46,13 +44,11 @@ def inverse_involute(value: float) -> float:
 
     Parameters
     ----------
-    value : float
-        Involute polar angle, rad, not negative.
+    value : involute polar angle, rad, not negative
 
     Returns
     -------
-    float
-        Profile angle, rad.
+    profile angle, rad
 
     Raises
     ------

@@ -96,13 +96,11 @@ class UncheckedPair:
 
         Parameters
         ----------
-        gear_roll_length : float
-            ``r_b2 tan(alpha_2)``, m.
+        gear_roll_length : ``r_b2 tan(alpha_2)``, m
 
         Returns
         -------
-        float
-            ``r_b1 tan(alpha_1)``, m.
+        ``r_b1 tan(alpha_1)``, m
         """
         if self.gear.internal:
             return gear_roll_length - self.base_tangent_length

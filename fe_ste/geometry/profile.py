@@ -21,11 +21,9 @@ class ToothProfile(Displayed):
 
     Parameters
     ----------
-    gear : Gear
-        The gear it belongs to.
-    tip_radius, form_radius, root_radius : float
-        Radii at which flank and fillet begin and end, m.
-    fillet : array, shape (n, 2)
+    gear : the gear it belongs to
+    tip_radius, form_radius, root_radius : radii at which flank and fillet begin and end, m
+    fillet : (n, 2)
         Points x, y from the flank (first point, at the form radius, on the involute) to the root circle (last
         point), evenly spaced along the curve, m. From there to the polar angle pi/z the profile is the root
         circle.
@@ -42,13 +40,11 @@ class ToothProfile(Displayed):
 
         Parameters
         ----------
-        radius : array, shape (n,)
-            Radii between form and tip radius, m.
+        radius : (n,) radii between form and tip radius, m
 
         Returns
         -------
-        array, shape (n, 2)
-            x, y in m.
+        (n, 2) x, y in m
         """
         return cartesian(radius, self.gear.half_angle(radius))
 
@@ -62,13 +58,11 @@ def tooth_profile(gear: Gear) -> ToothProfile:
 
     Parameters
     ----------
-    gear : Gear
-        Checked geometry.
+    gear : checked geometry
 
     Returns
     -------
-    ToothProfile
-        Radii and fillet.
+    radii and fillet
 
     Examples
     --------

@@ -29,16 +29,12 @@ def cubic_values(places: Floats, knots: Floats) -> tuple[Integers, Floats]:
 
     Parameters
     ----------
-    places : ndarray (n,)
-        Within the knots.
-    knots : ndarray
+    places : (n,) within the knots
 
     Returns
     -------
-    first : ndarray (n,)
-        Number of the first of the four splines that are not zero at each place.
-    values : ndarray (n, 4)
-        Of these four.
+    first : (n,) number of the first of the four splines that are not zero at each place
+    values : (n, 4) of these four
 
     References
     ----------

@@ -21,18 +21,12 @@ class RackTipCut:
 
     Parameters
     ----------
-    reference_radius, base_radius, root_radius : float
-        m.
-    half_pitch_angle : float
-        Half of the angle between teeth, rad.
-    base_half_angle : float
-        Polar half angle of the tooth at the base circle, rad.
-    pressure_angle : float
-        Normal pressure angle, rad.
-    helix_angle : float
-        rad.
-    rounding, half_land : float
-        Radius of the rack's tip and half the flat land between two such radii, normal section, m.
+    reference_radius, base_radius, root_radius : m
+    half_pitch_angle : half of the angle between teeth, rad
+    base_half_angle : polar half angle of the tooth at the base circle, rad
+    pressure_angle : normal pressure angle, rad
+    helix_angle : rad
+    rounding, half_land : radius of the rack's tip and half the flat land between two such radii, normal section, m
     """
 
     reference_radius: float
@@ -54,8 +48,7 @@ class RackTipCut:
 
         Parameters
         ----------
-        parameter : array
-            0 where the rack's straight flank ends, to 1 at the root circle.
+        parameter : 0 where the rack's straight flank ends, to 1 at the root circle
         """
         slope = -(self.pressure_angle + parameter * (0.5 * math.pi - self.pressure_angle))
         stretch = 1.0 / math.cos(self.helix_angle)

@@ -25,13 +25,11 @@ def single_load_case(dataset: xr.Dataset) -> xr.Dataset:
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        With the dimension ``pmc``; torque, centre distance and misalignment may be there with length one.
+    dataset : with the dimension ``pmc``; torque, centre distance and misalignment may be there with length one
 
     Returns
     -------
-    xarray.Dataset
-        Without the dimensions of length one, `tooth` apart, ordered by ``pmc``.
+    without the dimensions of length one, `tooth` apart, ordered by ``pmc``
 
     Raises
     ------
@@ -55,10 +53,8 @@ def plot_ste_curves(datasets: Mapping[str, xr.Dataset], path: str | Path | None 
 
     Parameters
     ----------
-    datasets : mapping of str to xarray.Dataset
-        Title of the panel and table: ``ste`` (m) over ``pmc``, optionally ``converged``.
-    path : path-like, optional
-        Where to write the picture.
+    datasets : title of the panel and table: ``ste`` (m) over ``pmc``, optionally ``converged``
+    path : where to write the picture
 
     Returns
     -------
@@ -100,16 +96,9 @@ def plot_ripple(
 
     Parameters
     ----------
-    datasets : mapping of str to xarray.Dataset
-        Title of the curve and table: ``ste`` (m) over ``pmc`` and ``torque``.
-    path : path-like, optional
-        Where to write the picture.
-    design : mapping of str to float, optional
-        Torque (N m) for which a curve's flanks were designed: marked on it.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    datasets : title of the curve and table: ``ste`` (m) over ``pmc`` and ``torque``
+    path : where to write the picture
+    design : torque (N m) for which a curve's flanks were designed: marked on it
 
     Raises
     ------
@@ -213,12 +202,9 @@ def plot_load_share(dataset: xr.Dataset, path: str | Path | None = None, title: 
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        Table with ``load_share`` over ``pmc`` and ``tooth``, optionally ``converged``.
-    path : path-like, optional
-        Where to write the picture.
-    title : str
-        Name of the pair and its load.
+    dataset : table with ``load_share`` over ``pmc`` and ``tooth``, optionally ``converged``
+    path : where to write the picture
+    title : name of the pair and its load
 
     Returns
     -------

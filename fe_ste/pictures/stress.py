@@ -45,17 +45,11 @@ def draw_contact_stress(
 
     Parameters
     ----------
-    field : StressField
-    path : path-like, optional
-        Where to write the picture.
-    title : str
-        Name of the pair; load, position and method are added.
-    flank_of : int
-        Gear whose flank is shown from the front: 1 or 2.
-    magnification : float
-        Of the displacements in the view of the flank; the section shows them as they are.
-    size : (int, int)
-        Width and height of each rendered image, pixels.
+    path : where to write the picture
+    title : name of the pair; load, position and method are added
+    flank_of : gear whose flank is shown from the front: 1 or 2
+    magnification : of the displacements in the view of the flank; the section shows them as they are
+    size : width and height of each rendered image, pixels
 
     Returns
     -------

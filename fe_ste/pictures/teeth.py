@@ -70,25 +70,17 @@ def draw_tooth_contact(
 
     Parameters
     ----------
-    pinion, gear : HexahedraMesh
-        Some teeth of both gears in meshing position; the mating gear is drawn translucent.
-    quads : (k, 4, 3) array
-        Corners of the contact cells on the flanks of the pinion, m.
-    pressure : (k,) array
-        Contact pressure on the cells, Pa; cells without pressure are left out.
-    path : path-like, optional
-        Where to write the picture.
-    title : str
-        Name of the pair and its load.
-    highest_pressure : float, optional
-        Upper end of the colours, Pa, for peaks at tip edges that would darken all else.
-    size : (int, int)
-        Width and height of the rendered image, pixels.
+    pinion, gear : some teeth of both gears in meshing position; the mating gear is drawn translucent
+    quads : (k, 4, 3) corners of the contact cells on the flanks of the pinion, m
+    pressure : (k,) contact pressure on the cells, Pa; cells without pressure are left out
+    path : where to write the picture
+    title : name of the pair and its load
+    highest_pressure : upper end of the colours, Pa, for peaks at tip edges that would darken all else
+    size : width and height of the rendered image, pixels
 
     Returns
     -------
-    matplotlib.figure.Figure
-        Above the teeth, below the contact cells unrolled over face width and radius.
+    above the teeth, below the contact cells unrolled over face width and radius
 
     Raises
     ------
@@ -200,14 +192,10 @@ def meshed_teeth(
 
     Parameters
     ----------
-    pair : GearPair
-        The pair.
-    rotation : float
-        Rotation of gear 1, rad, from where tooth pair 0 touches at the pitch point; gear 2 rolls with it.
-    teeth : sequence of int
-        Tooth pairs to show.
-    settings : MeshSettings, optional
-        Elements per tooth.
+    pair : the pair
+    rotation : rotation of gear 1, rad, from where tooth pair 0 touches at the pitch point; gear 2 rolls with it
+    teeth : tooth pairs to show
+    settings : elements per tooth
 
     Returns
     -------
@@ -284,21 +272,15 @@ def contact_quads(pair: GearPair, cells: Cells, rotation: float, axial: Floats, 
 
     Parameters
     ----------
-    pair : GearPair
-        The pair.
-    cells : fe_ste.contact.cells.Cells
-        Cells of a contact analysis.
-    rotation : float
-        Rotation of gear 1, rad.
-    axial : (slices,) array
-        Middle of the slices, m.
-    slice_width : float
-        m.
+    pair : the pair
+    cells : cells of a contact analysis
+    rotation : rotation of gear 1, rad
+    axial : (slices,) middle of the slices, m
+    slice_width : m
 
     Returns
     -------
-    (k, 4, 3) array
-        m, in the frame of `meshed_teeth`.
+    (k, 4, 3) m, in the frame of `meshed_teeth`
     """
     pinion = pair.pinion
     # Along the profile the arc of an involute grows by r_b tan(alpha) per roll angle.

@@ -329,15 +329,10 @@ class Bricks(Displayed):
 
         Parameters
         ----------
-        points : ndarray (n, 3)
-            m.
-        hexahedra : ndarray (m, 8)
-            Connectivity in VTK order.
-        materials : sequence of Material
-        material_of : ndarray (m,), optional
-            Number of each brick's material; the first for all unless given.
-        finite : bool
-            Finite deformation; false gives the linear element.
+        points : (n, 3) m
+        hexahedra : (m, 8) connectivity in VTK order
+        material_of : (m,) number of each brick's material; the first for all unless given
+        finite : finite deformation; false gives the linear element
 
         Raises
         ------
@@ -373,10 +368,8 @@ class Bricks(Displayed):
 
         Parameters
         ----------
-        displacement : ndarray (n, 3)
-            m.
-        modes : ndarray (m, 3, 3)
-            Incompatible modes by mode and direction.
+        displacement : (n, 3) m
+        modes : (m, 3, 3) incompatible modes by mode and direction
 
         Raises
         ------

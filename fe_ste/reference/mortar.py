@@ -331,17 +331,9 @@ def weighted_gap(points: Floats, first: Surface, second: Surface, pairs: Integer
 
     Parameters
     ----------
-    points : ndarray (n, 3)
-        Positions of all nodes, m.
-    first : Surface
-        The one whose nodes carry the multipliers.
-    second : Surface
-    pairs : ndarray (p, 2)
-        Facets that may touch, see `facing_pairs`.
-
-    Returns
-    -------
-    WeightedGap
+    points : (n, 3) positions of all nodes, m
+    first : the one whose nodes carry the multipliers
+    pairs : (p, 2) facets that may touch, see `facing_pairs`
 
     Notes
     -----

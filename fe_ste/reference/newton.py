@@ -45,14 +45,10 @@ class NewtonSettings:
 
     Parameters
     ----------
-    load_steps : int
-        Equal steps in which the load is applied; a step that fails is halved.
-    most_iterations : int
-        Newton iterations of a step.
-    force_tolerance : float
-        Largest force out of balance, as part of the largest load.
-    gap_tolerance : float
-        Largest mean gap or overlap left where pressure is, as part of the largest displacement.
+    load_steps : equal steps in which the load is applied; a step that fails is halved
+    most_iterations : Newton iterations of a step
+    force_tolerance : largest force out of balance, as part of the largest load
+    gap_tolerance : largest mean gap or overlap left where pressure is, as part of the largest displacement
     """
 
     load_steps: int = 1
@@ -413,14 +409,7 @@ def solve_contact(
 
     Parameters
     ----------
-    model : ContactModel
-    settings : NewtonSettings, optional
-    report : callable, optional
-        Called after each iteration.
-
-    Returns
-    -------
-    Equilibrium
+    report : called after each iteration
 
     Raises
     ------

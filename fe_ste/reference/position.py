@@ -36,12 +36,8 @@ class NonlinearSettings(Displayed):
 
     Parameters
     ----------
-    teeth : int
-        Odd number of teeth of each open sector.
-    mesh : ContactMesh
-    finite_deformation : bool
-        False leaves geometric non-linearity out: small strains, contact on the undeformed flanks.
-    newton : NewtonSettings
+    teeth : odd number of teeth of each open sector
+    finite_deformation : False leaves geometric non-linearity out: small strains, contact on the undeformed flanks
     """
 
     teeth: int = 5
@@ -128,18 +124,9 @@ def nonlinear_position(
 
     Parameters
     ----------
-    pair : GearPair
-    torque : float
-        Static torque on gear 1, N m, positive.
-    pmc : float
-        Position in the mesh cycle.
-    settings : NonlinearSettings, optional
-    report : callable, optional
-        Called after each Newton iteration.
-
-    Returns
-    -------
-    NonlinearPosition
+    torque : static torque on gear 1, N m, positive
+    pmc : position in the mesh cycle
+    report : called after each Newton iteration
 
     Raises
     ------
@@ -184,11 +171,7 @@ def gear_model(
 
     Parameters
     ----------
-    pair : GearPair
-    torque : float
-        On gear 1, N m.
-    sectors : tuple of OpenSector
-    finite_deformation : bool
+    torque : on gear 1, N m
     """
     pinion_sector, gear_sector = sectors
     points = np.concatenate([pinion_sector.points, gear_sector.points])

@@ -100,18 +100,13 @@ def stress_of_state(
 
     Parameters
     ----------
-    compliance : PairCompliance
-    state : ContactState
-        Solved contact of the position.
-    torque : float
-        On gear 1, N m.
-    settings : NonlinearSettings, optional
-        Mesh and number of teeth.
+    state : solved contact of the position
+    torque : on gear 1, N m
+    settings : mesh and number of teeth
 
     Returns
     -------
-    StressField
-        Both hubs are held under the pressures; gear 2 is then turned until the flanks close in the mean over the load.
+    both hubs are held under the pressures; gear 2 is then turned until the flanks close in the mean over the load
     """
     pair = compliance.pair
     settings = settings or NonlinearSettings()

@@ -65,12 +65,8 @@ class NonlinearInput(Displayed, line=" of {pair.name!r}: {positions} positions, 
 
     Parameters
     ----------
-    pair : GearPair
-    torque : float
-        Static torque on gear 1, N m.
-    positions : int
-        Equally spaced positions of the mesh cycle.
-    settings : NonlinearSettings
+    torque : static torque on gear 1, N m
+    positions : equally spaced positions of the mesh cycle
 
     Examples
     --------
@@ -127,11 +123,10 @@ class NonlinearTable(Displayed):
 
         Parameters
         ----------
-        wanted : NonlinearInput
-        path : path, optional
+        path
             File to which each position is written once it is solved. If it holds positions of the same input, they
             are kept.
-        progress : callable, optional
+        progress
             Called with the number of finished positions, of all positions, and after a Newton iteration with that.
 
         Raises
@@ -168,9 +163,7 @@ class NonlinearTable(Displayed):
 
         Parameters
         ----------
-        path : path
-        wanted : NonlinearInput, optional
-            If given, the table must have been computed from exactly this input.
+        wanted : if given, the table must have been computed from exactly this input
 
         Raises
         ------

@@ -58,12 +58,10 @@ class MeshCycleStress(Displayed, line=": {torque!n} torques, {misalignment!n} mi
 
         Parameters
         ----------
-        values : ndarray (k, m, ...)
-            Of these fields.
-        power : float
+        values : (k, m, ...) of these fields
+        power
             With which the stress grows with torque at constant load sharing: 1/2 of Hertz, 1 of bending. What is left
             is linear between the torques and misalignments of the table, and constant beyond them.
-        torque, misalignment : arrays
         """
         torque, misalignment = np.broadcast_arrays(np.abs(torque), misalignment)
         scaled = values / (self.torque**power).reshape(-1, *(1,) * (values.ndim - 1))
@@ -95,11 +93,8 @@ def mesh_cycle_stress(pair: GearPair, states: xr.Dataset, gauges: tuple[RootGaug
 
     Parameters
     ----------
-    pair : GearPair
-    states : xarray.Dataset
-        Of a `fe_ste.transmission_error.table.MeshTable`; of several centre distances that of the pair counts.
-    gauges : tuple of RootGauges
-        Gear 1 with its flank +1, gear 2 with that which meets it: +1, or -1 of an internal gear.
+    states : of a `fe_ste.transmission_error.table.MeshTable`; of several centre distances that of the pair counts
+    gauges : gear 1 with its flank +1, gear 2 with that which meets it: +1, or -1 of an internal gear
     """
     distance = int(np.abs(states["centre_distance"].to_numpy() - pair.centre_distance).argmin())
     chosen = states.isel(centre_distance=distance)
@@ -132,11 +127,8 @@ def hertz_stress(pair: GearPair, line_load: Floats, path: Floats) -> Floats:
 
     Parameters
     ----------
-    pair : GearPair
-    line_load : array
-        Normal load per length of the contact line, N/m.
-    path : array
-        Place on the transverse line of action from gear 1's base point, m; broadcast against the loads.
+    line_load : normal load per length of the contact line, N/m
+    path : place on the transverse line of action from gear 1's base point, m; broadcast against the loads
 
     Notes
     -----

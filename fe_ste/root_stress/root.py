@@ -63,8 +63,7 @@ class RootGauges(Displayed, line=" of {gear.name!r}: {places.edges!n} edges, {ax
 
         Parameters
         ----------
-        loads : dict
-            Number of a tooth, counter-clockwise -> its node loads (f l,), N.
+        loads : number of a tooth, counter-clockwise -> its node loads (f l,), N
         """
         reach = max(self.stress)
         teeth = range(min(loads) - reach, max(loads) + reach + 1)
@@ -90,12 +89,9 @@ def root_gauges(gear: Gear, side: int, settings: MeshSettings | None = None) -> 
 
     Parameters
     ----------
-    gear : Gear
-        Held at ``gear.held_diameter``.
-    side : int
-        Loaded flank: +1 counter-clockwise, -1 clockwise.
-    settings : MeshSettings, optional
-        The fillet's elements rule the error: see the tests.
+    gear : held at ``gear.held_diameter``
+    side : loaded flank: +1 counter-clockwise, -1 clockwise
+    settings : the fillet's elements rule the error: see the tests
     """
     mesh = sector_mesh(gear, settings)
     places = gauge_places(mesh)

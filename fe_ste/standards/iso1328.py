@@ -38,10 +38,8 @@ def tolerance(
     ----------
     deviation : str
         One of `DEVIATIONS`.
-    tolerance_class : int
-        1 to 11.
-    reference_diameter, normal_module, face_width : float
-        m.
+    tolerance_class : 1 to 11
+    reference_diameter, normal_module, face_width : m
 
     Raises
     ------

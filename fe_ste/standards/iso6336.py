@@ -31,16 +31,11 @@ class MethodBStiffness(Displayed):
 
     Parameters
     ----------
-    theoretical_single_stiffness : float
-        c'_th of one pair of spur teeth, N/m per m.
-    single_stiffness : float
-        c': greatest stiffness of one pair of teeth, N/m per m.
-    mesh_stiffness : float
-        c_gamma_alpha: mean of the mesh, N/m per m.
-    face_width : float
-        Common face width, m.
-    outside_validity : tuple of str
-        Why the value is an extrapolation; empty if it is not.
+    theoretical_single_stiffness : c'_th of one pair of spur teeth, N/m per m
+    single_stiffness : c': greatest stiffness of one pair of teeth, N/m per m
+    mesh_stiffness : c_gamma_alpha: mean of the mesh, N/m per m
+    face_width : common face width, m
+    outside_validity : why the value is an extrapolation; empty if it is not
     """
 
     theoretical_single_stiffness: float
@@ -86,20 +81,16 @@ def mesh_stiffness(
 
     Parameters
     ----------
-    pair : GearPair
-        The pair. An internal gear counts as a rack: infinitely many teeth, no profile shift.
-    tangential_force : float, optional
+    pair : the pair. An internal gear counts as a rack: infinitely many teeth, no profile shift.
+    tangential_force
         F_t at the reference circle, N. Below 100 N/mm of face width the stiffness falls with the fourth root
         of the load; without a force that correction is left out.
-    application_factor : float
-        K_A, applied to the force.
-    blank_factor : float
-        C_R of the gear blanks, 1 for solid discs.
+    application_factor : K_A, applied to the force
+    blank_factor : C_R of the gear blanks, 1 for solid discs
 
     Returns
     -------
-    MethodBStiffness
-        Stiffnesses and what speaks against them.
+    stiffnesses and what speaks against them
 
     Raises
     ------

@@ -45,13 +45,10 @@ def pitch_running_in(deviation: float, hardening: Hardening, limit: float, veloc
 
     Parameters
     ----------
-    deviation : float
-        f_pb or f_f_alpha, m.
+    deviation : f_pb or f_f_alpha, m
     hardening : {"case_hardened", "through_hardened"}
-    limit : float
-        sigma_H_lim, Pa.
-    velocity : float
-        Of the pitch line, m/s: through-hardened flanks run in less when they are fast.
+    limit : sigma_H_lim, Pa
+    velocity : of the pitch line, m/s: through-hardened flanks run in less when they are fast
 
     Examples
     --------
@@ -87,10 +84,8 @@ def reduced_mass(pair: GearPair, meshes: tuple[int, int] = (1, 1)) -> float:
 
     Parameters
     ----------
-    pair : GearPair
-        External gears; solid between the held diameter and the middle of the teeth.
-    meshes : (int, int)
-        Teeth in mesh at once around gear 1 and gear 2: a sun has as many as planets.
+    pair : external gears; solid between the held diameter and the middle of the teeth
+    meshes : teeth in mesh at once around gear 1 and gear 2: a sun has as many as planets
     """
     masses = (_mass_on_base_circle(gear) for gear in (pair.pinion, pair.gear))
     return 1.0 / sum(count / mass for count, mass in zip(meshes, masses, strict=True))
@@ -108,12 +103,8 @@ def resonance_ratio(pair: GearPair, mesh_stiffness: float, speed: float, meshes:
 
     Parameters
     ----------
-    pair : GearPair
-    mesh_stiffness : float
-        c_gamma_alpha, N/m per m.
-    speed : float
-    meshes : (int, int)
-        As in `reduced_mass`.
+    mesh_stiffness : c_gamma_alpha, N/m per m
+    meshes : as in `reduced_mass`
     """
     return abs(speed) * pair.pinion.teeth / math.sqrt(mesh_stiffness / reduced_mass(pair, meshes))
 
@@ -130,18 +121,12 @@ def dynamic_factor(
 
     Parameters
     ----------
-    ratio : float
-        N, see `resonance_ratio`.
-    contact_ratio : float
-        eps_gamma, the total one.
-    single_stiffness : float
-        c', N/m per m.
-    line_load : float
-        F_t K_A K_gamma over the face width, N/m.
-    effective : FlankDeviations
-        What running in leaves of them.
-    tip_relief : float, optional
-        C_a of gears of class 5 or finer, m; coarser ones have B_k = 1.
+    ratio : N, see `resonance_ratio`
+    contact_ratio : eps_gamma, the total one
+    single_stiffness : c', N/m per m
+    line_load : F_t K_A K_gamma over the face width, N/m
+    effective : what running in leaves of them
+    tip_relief : C_a of gears of class 5 or finer, m; coarser ones have B_k = 1
 
     Examples
     --------
@@ -194,12 +179,9 @@ def face_load_factor(line_load: float, stiffness: float, misalignment: float) ->
 
     Parameters
     ----------
-    line_load : float
-        F_t K_A K_gamma K_v over the face width, N/m.
-    stiffness : float
-        c_gamma_beta, N/m per m.
-    misalignment : float
-        F_beta_y: opening over the face that running in leaves, m.
+    line_load : F_t K_A K_gamma K_v over the face width, N/m
+    stiffness : c_gamma_beta, N/m per m
+    misalignment : F_beta_y: opening over the face that running in leaves, m
 
     Examples
     --------
@@ -219,15 +201,10 @@ def transverse_load_factors(
 
     Parameters
     ----------
-    pair : GearPair
-    line_load : float
-        F_t K_A K_gamma K_v K_Hbeta over the face width, N/m.
-    mesh_stiffness : float
-        c_gamma_alpha, N/m per m.
-    deviation : float
-        Larger of f_pb and f_f_alpha, less y_alpha, m.
-    contact_factor : float
-        Z_eps, by which K_Halpha is limited.
+    line_load : F_t K_A K_gamma K_v K_Hbeta over the face width, N/m
+    mesh_stiffness : c_gamma_alpha, N/m per m
+    deviation : larger of f_pb and f_f_alpha, less y_alpha, m
+    contact_factor : Z_eps, by which K_Halpha is limited
     """
     total = pair.total_contact_ratio
     transverse = pair.transverse_contact_ratio

@@ -74,9 +74,7 @@ def nominal_contact_stress(pair: GearPair, force: float) -> float:
 
     Parameters
     ----------
-    pair : GearPair
-    force : float
-        F_t at the reference circle, N.
+    force : F_t at the reference circle, N
     """
     diameter = 2.0 * pair.pinion.reference_radius
     ratio = pair.gear.teeth / pair.pinion.teeth

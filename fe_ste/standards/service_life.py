@@ -77,13 +77,9 @@ def damages(curve: LifeCurve, stress: Floats, strength: Floats | float, cycles: 
 
     Parameters
     ----------
-    curve : LifeCurve
-    stress : array
-        Of each load, Pa.
-    strength : array or float
-        Stress at which the life factor is one, Pa.
-    cycles : array
-        Of each load.
+    stress : of each load, Pa
+    strength : stress at which the life factor is one, Pa
+    cycles : of each load
     """
     endured = curve.endured(np.asarray(stress / np.asarray(strength, dtype=np.float64)))
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -65,12 +65,10 @@ def root_stress_factors(
 
     Parameters
     ----------
-    pair : GearPair
     member : {0, 1}
         Gear 1 or gear 2.
-    tolerance_class : int, optional
-        Flank tolerance class: teeth of class 4 and finer share the load of deep teeth.
-    free_bore : bool
+    tolerance_class : flank tolerance class: teeth of class 4 and finer share the load of deep teeth
+    free_bore
         Whether the diameter at which an external gear is held is a bore that nothing fills, as in planets on rollers,
         and not a seat on a shaft: its rim then counts, as that of a ring does.
     """
@@ -133,9 +131,7 @@ def root_face_load_factor(face_load: Floats, pair: GearPair) -> Floats:
 
     Parameters
     ----------
-    face_load : array
-        K_Hbeta.
-    pair : GearPair
+    face_load : K_Hbeta
 
     Examples
     --------
@@ -159,11 +155,8 @@ def form_and_correction(gear: Gear, virtual: float, loaded: float) -> tuple[floa
 
     Parameters
     ----------
-    gear : Gear
-    virtual : float
-        Teeth z_n of the virtual spur gear.
-    loaded : float
-        Diameter at which the load acts on that gear, normal modules.
+    virtual : teeth z_n of the virtual spur gear
+    loaded : diameter at which the load acts on that gear, normal modules
     """
     teeth = virtual * gear.outward
     diameter = loaded * gear.outward

@@ -134,14 +134,9 @@ def kernel_folder(source: Path) -> Path | None:
     Beside the sources, or in ``NUMBA_CACHE_DIR`` if that is set. Where that cannot be written: in the user's cache
     folder, else in a folder for temporary files that no other user can fill, because what lies there is executed.
 
-    Parameters
-    ----------
-    source : Path
-
     Returns
     -------
-    Path or None
-        None if there is no source to tell the version by, or no place to write: nothing is kept then.
+    None if there is no source to tell the version by, or no place to write: nothing is kept then
     """
     if source.is_file():
         return _folder_of(_package_of(source))

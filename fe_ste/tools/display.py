@@ -83,15 +83,12 @@ def html_table(title: str, rows: Mapping[str, str]) -> str:
 
     Parameters
     ----------
-    title : str
-        Stands above the table.
-    rows : mapping of str to str
-        What is told -> its value as text, with its unit.
+    title : stands above the table
+    rows : what is told -> its value as text, with its unit
 
     Returns
     -------
-    str
-        One ``<table>`` without style, which takes that of the page.
+    one ``<table>`` without style, which takes that of the page
 
     Examples
     --------
@@ -112,12 +109,9 @@ def value_range(values: ArrayLike, unit: str, scale: float = 1.0) -> str:
 
     Parameters
     ----------
-    values : array_like
-        In any shape; those that are not a number are left out.
-    unit : str
-        Unit that is shown.
-    scale : float
-        What the values are multiplied by to have that unit.
+    values : in any shape; those that are not a number are left out
+    unit : unit that is shown
+    scale : what the values are multiplied by to have that unit
 
     Examples
     --------

@@ -34,10 +34,8 @@ def replacement(path: Path, folder: Path | None = None) -> Iterator[IO[bytes]]:
 
     Parameters
     ----------
-    path : Path
-        Its directory is made if need be.
-    folder : Path, optional
-        Where the file grows, in the same file system; beside its place by default.
+    path : its directory is made if need be
+    folder : where the file grows, in the same file system; beside its place by default
     """
     folder = path.parent if folder is None else folder
     with _named_after(path):
@@ -159,10 +157,8 @@ def exclusive(path: Path, work: str) -> Iterator[None]:
 
     Parameters
     ----------
-    path : Path
-        File of the lock, there while the work lasts; its directory is made if need be.
-    work : str
-        What is held, for the message.
+    path : file of the lock, there while the work lasts; its directory is made if need be
+    work : what is held, for the message
 
     Raises
     ------

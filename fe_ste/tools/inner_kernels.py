@@ -77,9 +77,7 @@ class Kernel(CPUDispatcher):
 
     Parameters
     ----------
-    function : callable
-    options : dict
-        Options of numba.
+    options : options of numba
     """
 
     def __init__(self, function: Callable[..., object], options: dict[str, Any]) -> None:

@@ -97,8 +97,7 @@ def rendered_image(plotter: pyvista.Plotter) -> tuple[Pixels, float]:
     Returns
     -------
     image : (height, width, 3) array of uint8
-    pixel : float
-        Size of a pixel in the units of the scene.
+    pixel : size of a pixel in the units of the scene
     """
     plotter.render()  # what has moved since the last picture
     image = np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)

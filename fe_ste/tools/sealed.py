@@ -139,12 +139,7 @@ class ErrorKeeper(io.RawIOBase):
         self._error: OSError | None = None
 
     def check(self) -> None:
-        """Raise the error that a writing met.
-
-        Raises
-        ------
-        OSError
-        """
+        """Raise the error that a writing met."""
         if self._error is not None:
             raise self._error
 
@@ -296,10 +291,7 @@ def load_dataset(path: Path, layout: Layout, names: Sequence[str] | None = None)
 
     Parameters
     ----------
-    path : Path
-    layout : Layout
-    names : sequence of str, optional
-        Variables; all by default.
+    names : variables; all by default
 
     Raises
     ------

@@ -21,10 +21,6 @@ class Workers(ProcessPoolExecutor):
 
     An exception that leaves the ``with`` of the executor drops what waits, and stops what asks `stop_if_asked`.
 
-    Parameters
-    ----------
-    workers : int
-
     Notes
     -----
     Workers are started afresh, not forked: a script that uses them needs the usual ``if __name__ == "__main__":``.
@@ -51,12 +47,7 @@ class StoppedError(RuntimeError):
 
 
 def stop_if_asked() -> None:
-    """End the work of a worker whose result is wanted no more; calls that take long ask between their steps.
-
-    Raises
-    ------
-    StoppedError
-    """
+    """End the work of a worker whose result is wanted no more; calls that take long ask between their steps."""
     if _asked is not None and _asked.is_set():
         raise StoppedError
 

@@ -94,7 +94,7 @@ class PairCompliance(Displayed):
 
         Parameters
         ----------
-        gaps : mapping of int to float
+        gaps
             Number of the tooth pair, counted ahead of the one that touches at the pitch point at pmc 0 -> gap of its
             flanks, m on the transverse line of action, negative where they touch before the others; see
             `fe_ste.flanks.deviations`.
@@ -158,16 +158,7 @@ def pair_compliance(
 
     Parameters
     ----------
-    pair : GearPair
-    mesh : MeshSettings, optional
-    contact : ContactSettings, optional
-    open_teeth : int, optional
-        Odd number of teeth of open sectors; without it closed rings.
-    incompatible_modes : bool
-
-    Returns
-    -------
-    PairCompliance
+    open_teeth : odd number of teeth of open sectors; without it closed rings
 
     See Also
     --------

@@ -13,8 +13,7 @@ def load_along_face(states: xr.Dataset) -> xr.DataArray:
 
     Parameters
     ----------
-    states : xarray.Dataset
-        Of `fe_ste.transmission_error.transmission_error.static_transmission_error`, or of a table.
+    states : of `fe_ste.transmission_error.transmission_error.static_transmission_error`, or of a table
     """
     line_load: xr.DataArray = states["line_load"].sum("tooth").mean("pmc")
     return line_load.assign_attrs(units="N/m", long_name="line load of all tooth pairs, mean of the mesh cycle")
@@ -28,13 +27,11 @@ def face_load_factor(states: xr.Dataset) -> xr.DataArray:
 
     Parameters
     ----------
-    states : xarray.Dataset
-        Of `fe_ste.transmission_error.transmission_error.static_transmission_error`, or of a table.
+    states : of `fe_ste.transmission_error.transmission_error.static_transmission_error`, or of a table
 
     Returns
     -------
-    xarray.DataArray
-        Over torque, centre_distance and misalignment.
+    over torque, centre_distance and misalignment
 
     Examples
     --------

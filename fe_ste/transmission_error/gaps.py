@@ -31,8 +31,7 @@ def complete_cycle(state: xr.Dataset) -> xr.Dataset:
 
     Parameters
     ----------
-    state : xarray.Dataset
-        One load, centre distance and misalignment of a table; variables over ``pmc``.
+    state : one load, centre distance and misalignment of a table; variables over ``pmc``
 
     Raises
     ------
@@ -70,17 +69,14 @@ def complete_loads(
 
     Parameters
     ----------
-    root : (l + 1,) array
-        Roots of the forces, sqrt(N), from zero.
-    nodes : (p, c, a, l + 1) array
-        Transmission error, m, from no load on.
-    tangent, centre : (p, c, a, l) arrays
-        Tangent stiffness, N/m, and slope of the transmission error by misalignment, m.
-    solved : (p, c, a, l) array
+    root : (l + 1,) roots of the forces, sqrt(N), from zero
+    nodes : (p, c, a, l + 1) transmission error, m, from no load on
+    tangent, centre : (p, c, a, l) tangent stiffness, N/m, and slope of the transmission error by misalignment, m
+    solved : (p, c, a, l)
 
     Returns
     -------
-    nodes, tangent, centre : ndarray
+    nodes, tangent, centre
 
     Raises
     ------

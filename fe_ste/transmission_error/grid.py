@@ -73,10 +73,8 @@ class Checkpoint:
 
     Parameters
     ----------
-    path : Path
-        Replaced as a whole at each writing, so that it can be read at any time, by xarray too.
-    input_hash : str
-        Hash of the grid's input; a file of another input is not taken up.
+    path : replaced as a whole at each writing, so that it can be read at any time, by xarray too
+    input_hash : hash of the grid's input; a file of another input is not taken up
     """
 
     path: Path
@@ -131,20 +129,15 @@ def solve_grid(
 
     Parameters
     ----------
-    compliance : PairCompliance
-    axes : StateAxes
-    executor : optional
-        Anything with ``submit`` of `concurrent.futures`; without it this process does the work.
-    checkpoint : Checkpoint, optional
-        Where finished positions are kept, and looked for first.
-    progress : callable, optional
+    executor : anything with ``submit`` of `concurrent.futures`; without it this process does the work
+    checkpoint : where finished positions are kept, and looked for first
+    progress
         Called with the number of finished states and of all states. What it raises, such as Ctrl-C, ends the grid
         after the finished positions are stored.
 
     Returns
     -------
-    xarray.Dataset
-        As of `fe_ste.static_transmission_error`.
+    as of `fe_ste.static_transmission_error`
 
     Raises
     ------
@@ -235,10 +228,7 @@ def solve_block(packed: bytes, axes: StateAxes, positions: tuple[int, ...]) -> S
 
     Parameters
     ----------
-    packed : bytes
-        Pickled pair, flanks, contact settings, modifications and gaps of the teeth.
-    axes : StateAxes
-    positions : tuple of int
+    packed : pickled pair, flanks, contact settings, modifications and gaps of the teeth
     """
     stop_if_asked()
     return solve_positions(_unpacked(packed), axes, positions, lambda solved: stop_if_asked())

@@ -13,9 +13,7 @@ def pitch_point_pressure(pair: GearPair, torque: float) -> float:
 
     Parameters
     ----------
-    pair : GearPair
-    torque : float
-        On gear 1, N m, positive.
+    torque : on gear 1, N m, positive
 
     Notes
     -----

@@ -31,7 +31,7 @@ def contacts_told(progress: Callable[[int, int], None]) -> Iterator[None]:
 
     Parameters
     ----------
-    progress : callable
+    progress
         Called with the number of contacts that are there, and of all that have to be solved. What it raises, such as
         Ctrl-C, ends the work.
     """
@@ -48,14 +48,9 @@ def known_contacts(wanted: Sequence[TableInput]) -> list[MeanContact | ContactEr
     Files are kept where `fe_ste.elasticity.known_flanks.known_flanks` keeps its own; each is written when it is solved,
     so that what is stopped goes on from there.
 
-    Parameters
-    ----------
-    wanted : sequence of TableInput
-
     Returns
     -------
-    list of MeanContact or ContactError
-        In the order asked for; why one could not be solved stands in its place.
+    in the order asked for; why one could not be solved stands in its place
     """
     keys = [_key(one) for one in wanted]
     asked = dict(zip(keys, wanted, strict=True))

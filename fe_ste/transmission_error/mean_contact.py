@@ -138,13 +138,9 @@ def contact_input(
 
     Parameters
     ----------
-    table : TableInput
-        Of the pair: its modifications and discretisation.
-    force : float
-        On the transverse line of action, N, positive.
-    misalignment, centre_distance : float
-        rad, m.
-    positions : int
+    table : of the pair: its modifications and discretisation
+    force : on the transverse line of action, N, positive
+    misalignment, centre_distance : rad, m
 
     Raises
     ------
@@ -192,8 +188,7 @@ def mean_contact(wanted: TableInput) -> MeanContact:
 
     Parameters
     ----------
-    wanted : TableInput
-        With one torque, one centre distance and two misalignments, as `contact_input` gives it.
+    wanted : with one torque, one centre distance and two misalignments, as `contact_input` gives it
 
     Raises
     ------

@@ -83,17 +83,10 @@ def contact_state(compliance: PairCompliance, torque: float, pmc: float, misalig
 
     Parameters
     ----------
-    compliance : PairCompliance
-    torque : float
-        Static torque on gear 1, N m, positive.
-    pmc : float
-        Position in the mesh cycle.
-    misalignment : float
+    torque : static torque on gear 1, N m, positive
+    pmc : position in the mesh cycle
+    misalignment
         Relative rotation of the axes in the plane of action, rad, positive where it opens the gap at the +z end.
-
-    Returns
-    -------
-    ContactState
 
     Raises
     ------
@@ -113,20 +106,14 @@ def contact_states(
 
     Parameters
     ----------
-    compliance : PairCompliance
-    torque : float
-        Static torque on gear 1, N m, positive.
-    pmc : float
-        Position in the mesh cycle.
-    misalignments : ndarray (m,)
-        rad.
-    starts : list of SearchStart
-        One for each misalignment; replaced in place by what was found.
+    torque : static torque on gear 1, N m, positive
+    pmc : position in the mesh cycle
+    misalignments : (m,) rad
+    starts : one for each misalignment; replaced in place by what was found
 
     Returns
     -------
-    list of ContactState or ContactError
-        For each misalignment the state, or why there is none.
+    for each misalignment the state, or why there is none
 
     Notes
     -----
@@ -357,8 +344,7 @@ def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
 
     Returns
     -------
-    xarray.Dataset
-        Over (pmc, centre_distance, misalignment): unloaded_ste (m) and unloaded_centre (m, axial position).
+    over (pmc, centre_distance, misalignment): unloaded_ste (m) and unloaded_centre (m, axial position)
     """
     import xarray as xr
 

@@ -268,8 +268,7 @@ class StateResults(Displayed):
 
         Parameters
         ----------
-        dataset : xarray.Dataset
-        solved : ndarray (positions, centre distances)
+        solved : (positions, centre distances)
         """
         chosen = np.broadcast_to(solved[:, None, :, None], self.shape)
         for name, values in self._arrays().items():

@@ -41,14 +41,12 @@ def axis_weights(knots: ArrayLike) -> tuple[Integers, Floats]:
 
     Parameters
     ----------
-    knots : (k,) array
-        Increasing; a single knot means that nothing depends on the axis.
+    knots : (k,) increasing; a single knot means that nothing depends on the axis
 
     Returns
     -------
-    first : (n,) array
-        First node that acts in each of the n = max(1, k - 1) intervals.
-    weights : (n, 4, 4) array
+    first : (n,) first node that acts in each of the n = max(1, k - 1) intervals
+    weights : (n, 4, 4)
         Coefficients c of the weight sum_j c[i, a, j] t^j of node first[i] + a in interval i, t from 0 to 1.
 
     Raises
@@ -195,11 +193,9 @@ class SteSurface(Displayed):
 
         Parameters
         ----------
-        centre_distance, misalignment : (c,), (a,) arrays
-            m, rad.
-        force : (l,) array
-            Line-of-action forces, N, positive and increasing.
-        ste, tangent_stiffness, tangent_load_centre : (p, c, a, l) arrays
+        centre_distance, misalignment : (c,), (a,) m, rad
+        force : (l,) line-of-action forces, N, positive and increasing
+        ste, tangent_stiffness, tangent_load_centre : (p, c, a, l)
             m, N/m, m: the last is the derivative of the first by misalignment.
         unloaded, unloaded_centre : (p, c, a) arrays or floats
             Transmission error at no load, and its derivative by misalignment, m.

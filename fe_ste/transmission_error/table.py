@@ -60,20 +60,11 @@ class TableInput(Displayed):
 
     Parameters
     ----------
-    pair : GearPair
-    torque : tuple of float
-        Static torques on gear 1, N m.
-    positions : int
-        Positions of the mesh cycle.
-    centre_distance : tuple of float
-        m; empty for the pair's own.
-    misalignment : tuple of float
-        rad.
-    mesh : MeshSettings
-    contact : ContactSettings
-    pinion_modification, gear_modification : FlankModification
-    static_torque : float, optional
-        Which of several torques is that of the static state.
+    torque : static torques on gear 1, N m
+    positions : positions of the mesh cycle
+    centre_distance : m; empty for the pair's own
+    misalignment : rad
+    static_torque : which of several torques is that of the static state
 
     Examples
     --------
@@ -151,14 +142,11 @@ class MeshTable(Displayed):
 
         Parameters
         ----------
-        wanted : TableInput
-        progress : callable, optional
-            Called with the number of finished states and of all states.
-        executor : optional
+        progress : called with the number of finished states and of all states
+        executor
             What the states are sent to, see `fe_ste.transmission_error.grid`; without it two processes share a grid
             of more than a thousand states, and this process solves fewer.
-        partial : Path, optional
-            File in which finished positions are kept; a computation that was stopped goes on from there.
+        partial : file in which finished positions are kept; a computation that was stopped goes on from there
 
         Raises
         ------
@@ -187,9 +175,7 @@ class MeshTable(Displayed):
 
         Parameters
         ----------
-        path : path
-        wanted : TableInput, optional
-            If given, the table must have been computed from exactly this input.
+        wanted : if given, the table must have been computed from exactly this input
 
         Raises
         ------
@@ -210,8 +196,7 @@ class MeshTable(Displayed):
 
         Parameters
         ----------
-        path : path
-            Its directory is made if need be.
+        path : its directory is made if need be
         """
         write_dataset(Path(path), self.dataset)
 

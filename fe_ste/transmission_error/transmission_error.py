@@ -46,20 +46,14 @@ def static_transmission_error(
 
     Parameters
     ----------
-    pair : GearPair or PairCompliance
-        A prepared `PairCompliance` saves the finite-element part.
-    torque : float or sequence
-        Static torque on gear 1, N m, positive.
-    positions : int
-        Equally spaced positions of the mesh cycle.
-    centre_distance : float or sequence, optional
-        Operating centre distances, m; the pair's own unless given.
-    misalignment : float or sequence
+    pair : a prepared `PairCompliance` saves the finite-element part
+    torque : static torque on gear 1, N m, positive
+    positions : equally spaced positions of the mesh cycle
+    centre_distance : operating centre distances, m; the pair's own unless given
+    misalignment
         Relative rotation of the axes in the plane of action, rad, positive where it opens the gap at the +z end.
-    mesh, contact : optional
-        Discretisation, if `pair` is a `GearPair`.
-    progress : callable, optional
-        Called with the number of finished positions and of all positions.
+    mesh, contact : discretisation, if `pair` is a `GearPair`
+    progress : called with the number of finished positions and of all positions
 
     Returns
     -------
@@ -129,17 +123,12 @@ def solve_positions(
 
     Parameters
     ----------
-    compliance : PairCompliance
-    axes : StateAxes
-    positions : iterable of int
-        Numbers of the positions; in a row they are solved fastest.
-    progress : callable, optional
-        Called with the number of finished states.
+    positions : numbers of the positions; in a row they are solved fastest
+    progress : called with the number of finished states
 
     Returns
     -------
-    StateResults
-        Of these positions alone.
+    of these positions alone
     """
     chosen = list(positions)
     moved = 0 if axes.positions >= _CLOSE_POSITIONS else 2

@@ -229,9 +229,7 @@ def rolling_strains(q: Floats, v: Floats, connectors: ConnectorArrays) -> Floats
 
     Parameters
     ----------
-    q, v : (..., size) arrays
-        Coordinates and velocities.
-    connectors : ConnectorArrays
+    q, v : (..., size) coordinates and velocities
     """
     places = _places(connectors, q.shape[-1])
     strain, rate = _strains(_ends(_local(q, places), _local(v, places), connectors))
@@ -247,8 +245,7 @@ def rolling_pushes(q: Floats, connectors: ConnectorArrays) -> Floats:
 
     Parameters
     ----------
-    q : (size,) array
-    connectors : ConnectorArrays
+    q : (size,)
     """
     places = _places(connectors, q.size)
     x = _local(q, places)
@@ -275,8 +272,7 @@ def add_connector_tangents(
 
     Parameters
     ----------
-    steps : (c,) array
-        Of the differences, m or rad, and per second; connectors with 0 are left out.
+    steps : (c,) of the differences, m or rad, and per second; connectors with 0 are left out
     """
     numbers = np.flatnonzero(steps)
     if not numbers.size:

@@ -436,11 +436,9 @@ def rolling_forces(n: int, strain: Floats, rate: Floats, turn: float, rolling: R
 
     Parameters
     ----------
-    n : int
     strain : (5 or 6,) displacement and tilts of the second body against the first in the first one's axes, m, rad
     rate : (6,) velocity and angular velocity likewise, m/s, rad/s
     turn : spin of the second body less that of the first, rad
-    rolling : RollingArrays
     out : (m,) elastic part from `ELASTIC_PART` and damped part from `DAMPED_PART` on, six each, of force and moment
         on the first body (N, N m); at `CAGE_TORQUE` the derivative of the energy by `turn` (N m), which acts on the
         first body's spin and against that of the second, at `CAGE_DAMPING` what damping adds to it; at `STORED` the
@@ -551,10 +549,9 @@ def rolling_loads(
 
     Parameters
     ----------
-    numbers : (k,) array
-    strain, rate : (..., k, 6) arrays
-    turn : (..., k) array
-    rolling : RollingArrays
+    numbers : (k,)
+    strain, rate : (..., k, 6)
+    turn : (..., k)
     """
     forces = np.empty(strain.shape)
     torques = np.empty(turn.shape)

@@ -52,13 +52,11 @@ def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:
 
     Parameters
     ----------
-    section : CatalogueSection
-        What the file says of the bearing.
+    section : what the file says of the bearing
 
     Returns
     -------
-    tuple of RollingRow
-        In the frame of the bearing, with z along the global one; from -z to +z.
+    in the frame of the bearing, with z along the global one; from -z to +z
 
     Raises
     ------
@@ -108,15 +106,8 @@ def with_estimate(section: CatalogueSection, estimate: Estimate, value: float) -
 
     Parameters
     ----------
-    section : CatalogueSection
-    estimate : Estimate
-        One of the section's.
-    value : float
-        In the unit of the estimate; counts are rounded.
-
-    Returns
-    -------
-    CatalogueSection
+    estimate : one of the section's
+    value : in the unit of the estimate; counts are rounded
 
     Examples
     --------

@@ -84,14 +84,8 @@ def lamina_arrays(rows: Sequence[tuple[RollerRow, int]], first_roller_angle: flo
 
     Parameters
     ----------
-    rows : sequence of (RollerRow, int)
-        Rows in the frame of the bearing, and the number of the first roller of each.
-    first_roller_angle : float
-        Polar angle of the first roller of each row, rad.
-
-    Returns
-    -------
-    LaminaArrays
+    rows : rows in the frame of the bearing, and the number of the first roller of each
+    first_roller_angle : polar angle of the first roller of each row, rad
     """
     parts = [_row_laminae(row, first, first_roller_angle) for row, first in rows]
     return LaminaArrays(
@@ -174,14 +168,8 @@ def row_contacts(rows: Sequence[RollingRow], first_roller_angle: float = 0.0) ->
 
     Parameters
     ----------
-    rows : sequence of RollingRow
-        Rows of rollers, of balls, or of both, in the frame of the bearing.
-    first_roller_angle : float
-        Polar angle of the first element of each row, rad.
-
-    Returns
-    -------
-    RowContacts
+    rows : rows of rollers, of balls, or of both, in the frame of the bearing
+    first_roller_angle : polar angle of the first element of each row, rad
     """
     return _placed(tuple(rows), float(first_roller_angle))
 
@@ -356,18 +344,10 @@ def equilibrium(
 
     Parameters
     ----------
-    bearing : RollingBearing
-        The bearing.
-    force : array_like, shape (3,)
-        Force of the shaft on the inner ring, N, z along the axis.
-    tilt : array_like, shape (2,)
-        Rotations of the inner ring about x and y, rad, held: shaft and housing decide about them.
-    first_roller_angle : float
-        Polar angle of the first element of each row, rad.
-
-    Returns
-    -------
-    BearingState
+    bearing : the bearing
+    force : (3,) force of the shaft on the inner ring, N, z along the axis
+    tilt : (2,) rotations of the inner ring about x and y, rad, held: shaft and housing decide about them
+    first_roller_angle : polar angle of the first element of each row, rad
 
     Raises
     ------
@@ -484,16 +464,13 @@ def pitch_averaged_tangent(bearing: RollingBearing, force: ArrayLike, positions:
 
     Parameters
     ----------
-    bearing : RollingBearing
-        The bearing.
-    force : array_like, shape (3,)
-        Force on the inner ring, N.
-    positions : int
-        Number of equally spaced cage positions.
+    bearing : the bearing
+    force : (3,) force on the inner ring, N
+    positions : number of equally spaced cage positions
 
     Returns
     -------
-    (6, 6) array
+    (6, 6)
 
     Examples
     --------

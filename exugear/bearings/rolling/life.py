@@ -39,15 +39,12 @@ def basic_rating_life(dynamic_rating: float, equivalent_load: float, bearing_typ
 
     Parameters
     ----------
-    dynamic_rating, equivalent_load : float
-        C_r and P_r, N. The formula is meant for P_r up to half of C_r.
-    bearing_type : BearingType
-        Balls have the exponent 3, rollers 10/3.
+    dynamic_rating, equivalent_load : C_r and P_r, N. The formula is meant for P_r up to half of C_r.
+    bearing_type : balls have the exponent 3, rollers 10/3
 
     Returns
     -------
-    float
-        Infinite without load.
+    infinite without load
 
     Examples
     --------
@@ -72,22 +69,18 @@ def reference_life(
 
     Parameters
     ----------
-    rows : sequence of RollingRow
-        Rows of the bearing.
-    loads : sequence of arrays
+    rows : rows of the bearing
+    loads
         For each row of rollers the lamina loads, shape (elements, laminae); for each row of balls the loads,
         shape (elements,); N. Several positions of the cage may stand one under another: (positions * elements, ...).
-    bearing_type : BearingType
-        Type of the bearing.
-    dynamic_rating : float, optional
-        C_r of the whole bearing, N, where the manufacturer states it; by default `basic_dynamic_rating`.
-    inner_ring_turns_against_load : bool
+    bearing_type : type of the bearing
+    dynamic_rating : C_r of the whole bearing, N, where the manufacturer states it; by default `basic_dynamic_rating`
+    inner_ring_turns_against_load
         Whether the load stands still against the outer ring, as usual, or against the inner ring, as in planets.
 
     Returns
     -------
-    float
-        Infinite where no element carries load.
+    infinite where no element carries load
 
     Raises
     ------

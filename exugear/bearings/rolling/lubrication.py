@@ -57,12 +57,9 @@ def viscosity_ratio(viscosity: float, speed: float, pitch_diameter: float) -> fl
 
     Parameters
     ----------
-    viscosity : float
-        Kinematic, in service, mm2/s.
-    speed : float
-        Of the rings against each other, rad/s.
-    pitch_diameter : float
-        m.
+    viscosity : kinematic, in service, mm2/s
+    speed : of the rings against each other, rad/s
+    pitch_diameter : m
 
     Examples
     --------
@@ -94,11 +91,8 @@ def life_factor(ratio: float, cleanliness_load: float, bearing_type: BearingType
 
     Parameters
     ----------
-    ratio : float
-        kappa; below 0.1 a_ISO is that of 0.1, the least that the standard has.
-    cleanliness_load : float
-        ``e_C C_u / P``.
-    bearing_type : BearingType
+    ratio : kappa; below 0.1 a_ISO is that of 0.1, the least that the standard has
+    cleanliness_load : ``e_C C_u / P``
 
     Examples
     --------

@@ -32,12 +32,7 @@ def elliptic_integrals(parameter: float) -> tuple[float, float]:
 
     Parameters
     ----------
-    parameter : float
-        Square of the modulus, at least 0 and below 1.
-
-    Returns
-    -------
-    (float, float)
+    parameter : square of the modulus, at least 0 and below 1
 
     Examples
     --------
@@ -102,14 +97,9 @@ def elliptic_contact(curvature_sum: float, curvature_difference: float) -> Ellip
 
     Parameters
     ----------
-    curvature_sum : float
-        Sum of the four principal curvatures, hollow ones negative, 1/m.
-    curvature_difference : float
+    curvature_sum : sum of the four principal curvatures, hollow ones negative, 1/m
+    curvature_difference
         Difference of the curvatures of both bodies over the sum, F(rho): 0 for a ball on a plane, 1 for lines.
-
-    Returns
-    -------
-    EllipticContact
 
     Notes
     -----
@@ -216,14 +206,8 @@ def ball_arrays(rows: Sequence[tuple[BallRow, int]], first_roller_angle: float =
 
     Parameters
     ----------
-    rows : sequence of (BallRow, int)
-        Rows in the frame of the bearing, and the number of the first ball of each.
-    first_roller_angle : float
-        Polar angle of the first ball of each row, rad.
-
-    Returns
-    -------
-    BallArrays
+    rows : rows in the frame of the bearing, and the number of the first ball of each
+    first_roller_angle : polar angle of the first ball of each row, rad
 
     Notes
     -----

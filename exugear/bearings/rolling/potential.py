@@ -187,14 +187,8 @@ def rolling_arrays(
 
     Parameters
     ----------
-    rows_per_connector : sequence of tuples of RollingRow
-        Rows of each connector in the frame of its bearing; none where it has no rolling law.
-    scale, time, cage_ratio, phase : sequences of float
-        One number a connector each: see `exugear.bearings.kernels.rolling.RollingArrays`.
-
-    Returns
-    -------
-    RollingArrays
+    rows_per_connector : rows of each connector in the frame of its bearing; none where it has no rolling law
+    scale, time, cage_ratio, phase : one number a connector each: see `exugear.bearings.kernels.rolling.RollingArrays`
 
     Raises
     ------

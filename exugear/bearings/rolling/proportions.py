@@ -131,18 +131,10 @@ def element_count(kind: str, diameter_ratio: float, spacing: float, full_complem
 
     Parameters
     ----------
-    kind : str
-        Type of the bearing.
-    diameter_ratio : float
-        Diameter of an element over that of the pitch circle.
-    spacing : float
-        Of `Proportions`; for rollers, and balls of bearings that are not filled eccentrically.
-    full_complement : bool
-        Without a cage.
-
-    Returns
-    -------
-    int
+    kind : type of the bearing
+    diameter_ratio : diameter of an element over that of the pitch circle
+    spacing : of `Proportions`; for rollers, and balls of bearings that are not filled eccentrically
+    full_complement : without a cage
 
     Examples
     --------
@@ -164,14 +156,8 @@ def standard_profile(kind: str, diameter: float, length: float) -> tuple[float, 
 
     Parameters
     ----------
-    kind : str
-        Type of the bearing.
-    diameter, length : float
-        Mean diameter and effective length of the roller, m.
-
-    Returns
-    -------
-    (float, float)
+    kind : type of the bearing
+    diameter, length : mean diameter and effective length of the roller, m
 
     Notes
     -----

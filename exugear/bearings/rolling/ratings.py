@@ -84,10 +84,8 @@ def basic_dynamic_rating(rows: Sequence[RollingRow], bearing_type: BearingType) 
 
     Parameters
     ----------
-    rows : sequence of RollingRow
-        Rows of the bearing, alike but for sign of contact angle, position and clearance.
-    bearing_type : BearingType
-        Decides on the material factor b_m, and for balls on the reduction factor in f_c.
+    rows : rows of the bearing, alike but for sign of contact angle, position and clearance
+    bearing_type : decides on the material factor b_m, and for balls on the reduction factor in f_c
 
     Returns
     -------
@@ -177,20 +175,16 @@ def equivalent_load(
 
     Parameters
     ----------
-    rows : sequence of RollingRow
-        Rows of the bearing.
-    bearing_type : BearingType
-        Decides on the factors. Four-point bearings take those of double rows.
-    radial, axial : float
+    rows : rows of the bearing
+    bearing_type : decides on the factors. Four-point bearings take those of double rows.
+    radial, axial
         Loads of the bearing, N. The sign of the axial load, positive where it pushes the inner ring towards +z,
         only tells which rows carry it.
-    static_rating : float
-        C_0r of the bearing, N: the contact angle of ball bearings grows with the axial load over it.
+    static_rating : C_0r of the bearing, N: the contact angle of ball bearings grows with the axial load over it
 
     Returns
     -------
-    float
-        Bearings of rollers without contact angle: the radial load, whatever ribs carry along the axis.
+    bearings of rollers without contact angle: the radial load, whatever ribs carry along the axis
 
     Examples
     --------
@@ -214,8 +208,7 @@ def equivalent_static_load(rows: Sequence[RollingRow], bearing_type: BearingType
 
     Returns
     -------
-    float
-        The static rating over it is the static safety S_0.
+    the static rating over it is the static safety S_0
     """
     x, y = _static_factors(rows, bearing_type)
     return max(abs(radial), x * abs(radial) + y * abs(axial))
@@ -265,12 +258,9 @@ def point_contact_factor(diameter_ratio: float, inner: float, outer: float, redu
 
     Parameters
     ----------
-    diameter_ratio : float
-        gamma of ISO 281.
-    inner, outer : float
-        Radii of the grooves over the ball's diameter; 0.52 both in the standard's table.
-    reduction : float
-        Reduction factor lambda, see `basic_dynamic_rating`.
+    diameter_ratio : gamma of ISO 281
+    inner, outer : radii of the grooves over the ball's diameter; 0.52 both in the standard's table
+    reduction : reduction factor lambda, see `basic_dynamic_rating`
     """
     ratio = (1.0 - diameter_ratio) / (1.0 + diameter_ratio)
     weaker = 1.04 * ratio**1.72 * groove_ratio(inner, outer)

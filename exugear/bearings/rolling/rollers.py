@@ -22,16 +22,12 @@ class CylindricalRollerBearing:
 
     Parameters
     ----------
-    bore, outside_diameter, width : float
-        Boundary dimensions d, D, B, m.
-    full_complement : bool
-        Without a cage.
-    element_diameter, effective_length, element_count : optional
-        Replace the estimates where they are known.
+    bore, outside_diameter, width : boundary dimensions d, D, B, m
+    full_complement : without a cage
+    element_diameter, effective_length, element_count : replace the estimates where they are known
     radial_clearance, laminae
         See `RollerRow`.
-    profile_factor : float, optional
-        See `RollerRow`; by default the standard profile of ISO/TS 16281.
+    profile_factor : see `RollerRow`; by default the standard profile of ISO/TS 16281
 
     Examples
     --------
@@ -72,12 +68,9 @@ class TaperedRollerBearing:
 
     Parameters
     ----------
-    bore, outside_diameter, width : float
-        Boundary dimensions d, D, T, m.
-    contact_angle : float
-        Nominal contact angle, rad, signed as in `RollerRow`.
-    full_complement, element_diameter, effective_length, element_count : optional
-        As in `CylindricalRollerBearing`.
+    bore, outside_diameter, width : boundary dimensions d, D, T, m
+    contact_angle : nominal contact angle, rad, signed as in `RollerRow`
+    full_complement, element_diameter, effective_length, element_count : as in `CylindricalRollerBearing`
     radial_clearance, profile_factor, laminae
         As in `CylindricalRollerBearing`.
 
@@ -122,16 +115,13 @@ class BearingPair:
 
     Parameters
     ----------
-    bearing : CylindricalRollerBearing or TaperedRollerBearing
-        One of the two.
-    arrangement : {"X", "O", "tandem"}
+    bearing : one of the two
+    arrangement
         X (face to face): pressure lines meet the axis towards the middle of the pair. O (back to back): away
         from it, stiff against tilting. Tandem: both rows take the same direction; also right for cylindrical
         rollers, where the three are the same.
-    row_distance : float, optional
-        Distance of the middles of the rows, m; by default the width of one bearing (mounted face to face).
-    axial_preload : float
-        Approach of the two rows along the axis against line-to-line contact, m; negative: axial clearance.
+    row_distance : distance of the middles of the rows, m; by default the width of one bearing (mounted face to face)
+    axial_preload : approach of the two rows along the axis against line-to-line contact, m; negative: axial clearance
 
     Examples
     --------

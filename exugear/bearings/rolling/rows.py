@@ -217,11 +217,9 @@ def rib_row(row: RollerRow, towards: int, contact_length: float) -> RollerRow:
 
     Parameters
     ----------
-    row : RollerRow
     towards : {1, -1}
         Direction along z in which the inner ring is pushed when these ribs hold it.
-    contact_length : float
-        Of the line contacts that stand for both ribs, m.
+    contact_length : of the line contacts that stand for both ribs, m
 
     Examples
     --------
@@ -264,15 +262,12 @@ def pair_rows(row: Row, arrangement: str, row_distance: float, axial_preload: fl
         X (face to face): pressure lines meet the axis towards the middle of the pair. O (back to back): away
         from it, stiff against tilting. Tandem: both rows take the same direction; also right for cylindrical
         rollers, where the three are the same.
-    row_distance : float
-        Distance of the middles of the rows, m.
-    axial_preload : float
-        Approach of the two rows along the axis against line-to-line contact, m; negative: axial clearance.
+    row_distance : distance of the middles of the rows, m
+    axial_preload : approach of the two rows along the axis against line-to-line contact, m; negative: axial clearance
 
     Returns
     -------
-    (RollingRow, RollingRow)
-        The row at -z, then the row at +z.
+    (RollingRow, RollingRow) the row at -z, then the row at +z
 
     Raises
     ------

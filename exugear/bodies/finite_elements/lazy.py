@@ -21,8 +21,7 @@ def at_first_use(name: str) -> Any:
 
     Parameters
     ----------
-    name : str
-        Of a module that is installed.
+    name : of a module that is installed
 
     Examples
     --------

@@ -28,9 +28,7 @@ class ShaftSection:
 
     Parameters
     ----------
-    length, outer_diameter, inner_diameter : float
-    outer_diameter_end, inner_diameter_end : float, optional
-        Where it ends, of a cone; those of its beginning if not given.
+    outer_diameter_end, inner_diameter_end : where it ends, of a cone; those of its beginning if not given
 
     Raises
     ------

@@ -43,12 +43,9 @@ def tetrahedra(build: Callable[[Any], None], size: float, curvature: int = 12) -
 
     Parameters
     ----------
-    build : callable
-        Is given `gmsh.model.occ` and adds volumes to it, in m. Fused pieces keep the edges between them.
-    size : float
-        Largest element, m.
-    curvature : int
-        Elements around a full circle, at least.
+    build : is given `gmsh.model.occ` and adds volumes to it, in m. Fused pieces keep the edges between them.
+    size : largest element, m
+    curvature : elements around a full circle, at least
 
     Returns
     -------
@@ -77,14 +74,10 @@ def mesh_geometry(path: Path, size: float, curvature: int = 12, unit: float = 1e
 
     Parameters
     ----------
-    path : Path
-        A script is one file: what it includes is not noticed when a reduction is looked up.
-    size, curvature : float, int
-        As in `tetrahedra`; m.
-    unit : float
-        Length of the file's unit, m. gmsh reads STEP in mm whatever its unit is.
-    scripts : bool
-        Whether a script may run. It can do all that the user can.
+    path : a script is one file: what it includes is not noticed when a reduction is looked up
+    size, curvature : as in `tetrahedra`; m
+    unit : length of the file's unit, m. gmsh reads STEP in mm whatever its unit is
+    scripts : whether a script may run. It can do all that the user can.
 
     Returns
     -------
@@ -164,9 +157,7 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
 
     Parameters
     ----------
-    path : Path
-    unit : float
-        Length of the file's unit, m; 1e-3 for a file in mm.
+    unit : length of the file's unit, m; 1e-3 for a file in mm
 
     Returns
     -------

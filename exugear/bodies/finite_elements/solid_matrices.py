@@ -76,7 +76,6 @@ def assemble(mesh: Any, material: Material, axis: tuple[float, float] = (0.0, 0.
     Parameters
     ----------
     mesh : skfem.MeshTet2 or skfem.MeshHex2
-    material : Material
     axis : (x, y) of the axis of turning, parallel to z, m
 
     Examples

@@ -39,8 +39,7 @@ class Tapers:
 
     Parameters
     ----------
-    sections : sequence of ShaftSection
-        From the beginning at z = 0 on.
+    sections : from the beginning at z = 0 on
 
     Attributes
     ----------

@@ -32,10 +32,8 @@ def turned_hexahedra(shaft: Shaft, around: int = 8) -> Any:
 
     Parameters
     ----------
-    shaft : Shaft
-        Its axis is the z axis, its beginning z = 0.
-    around : int
-        Elements around, a multiple of 8. The mass is 0.08 % short with 8, 0.005 % with 16.
+    shaft : its axis is the z axis, its beginning z = 0
+    around : elements around, a multiple of 8. The mass is 0.08 % short with 8, 0.005 % with 16.
 
     Returns
     -------

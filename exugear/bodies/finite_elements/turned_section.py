@@ -92,12 +92,8 @@ class Shaft:
 
     Parameters
     ----------
-    sections : sequence of ShaftSection
-        From the beginning at z = 0 on.
-    material : Material
-    seats : sequence of SeatBand
-        Element boundaries fall on the edges of each band.
-    size : MeshSize
+    sections : from the beginning at z = 0 on
+    seats : element boundaries fall on the edges of each band
 
     Raises
     ------

@@ -35,13 +35,9 @@ def reduced_bodies(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    inertias : str
-        Inertia set whose rigid inertias the bodies get that turn.
-    folder : Path, optional
-        Folder of a results folder in which reductions are stored; only the process remembers them otherwise.
-    begin : callable, optional
-        Called with the name of each body before it is reduced.
+    inertias : inertia set whose rigid inertias the bodies get that turn
+    folder : folder of a results folder in which reductions are stored; only the process remembers them otherwise
+    begin : called with the name of each body before it is reduced
 
     Raises
     ------

@@ -226,9 +226,7 @@ def check_solids(gearbox: Gearbox, folder: Path) -> None:
 
     Parameters
     ----------
-    gearbox : Gearbox
-    folder : Path
-        Where reductions are stored: a script whose reduction is there need not run.
+    folder : where reductions are stored: a script whose reduction is there need not run
 
     Raises
     ------

@@ -229,13 +229,10 @@ def eigenmodes(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    choice : Choice
-        Variant, mesh law and inertia set.
+    choice : variant, mesh law and inertia set
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness F_bt / STE over the cycle, N/m, for example from the STE tables.
-    bodies : mapping of body name to ElasticBody, optional
-        Reduced elastic bodies, which the variant `flexible` needs.
+    bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
     angles : {"reference", "operating"}
         Angles of the law `seed`.
 
@@ -345,7 +342,7 @@ def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats
 
     Parameters
     ----------
-    before, after : Modes
+    before, after
         Such as those of the variants `bushing` and `flexible` of one gearbox. The second has all bodies of the first;
         one that is elastic in both has one shape.
 
@@ -353,8 +350,7 @@ def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats
     -------
     place : (n,) array of int
         Its place among the modes of `after`, each used once; the sum of the shares is largest.
-    share : (n,) array
-        Squared overlap, 1 for the same motion: the kinetic energy that both shapes share.
+    share : (n,) squared overlap, 1 for the same motion: the kinetic energy that both shapes share
     """
     source = before.assembly
     target = after.assembly

@@ -113,9 +113,7 @@ def vary_parameter(parameter: Parameter, progress: Callable[[], None] | None = N
 
     Parameters
     ----------
-    parameter : Parameter
-    progress : callable, optional
-        Called after each value.
+    progress : called after each value
     """
     modes_of_values = []
     for value in parameter.values:
@@ -147,14 +145,11 @@ def follow_modes(before: Modes, after: Modes, followed: Integers) -> Integers:
 
     Parameters
     ----------
-    before, after : Modes
-    followed : (m,) array of int
-        Numbers of the followed modes in `before`.
+    followed : (m,) numbers of the followed modes in `before`
 
     Returns
     -------
-    (m,) array of int
-        Their numbers in `after`.
+    (m,) their numbers in `after`
     """
     roots = [np.linalg.cholesky(modes.assembly.mass_matrix) for modes in (before, after)]
     overlap = ((roots[0].T @ before.shapes[:, followed]).T @ (roots[1].T @ after.shapes)) ** 2
@@ -172,13 +167,10 @@ def assumed_parameters(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    choice : Choice
-        The model that is varied.
+    choice : the model that is varied
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness over the cycle, N/m.
-    bodies_of : callable, optional
-        Reduced elastic bodies of a varied gearbox, which the variant `flexible` needs.
+    bodies_of : reduced elastic bodies of a varied gearbox, which the variant `flexible` needs
 
     Returns
     -------
@@ -313,12 +305,9 @@ def frequency_matches(
 
     Parameters
     ----------
-    variations : iterable of ParameterVariation
-        Where they cross the frequency, the modes are computed anew.
-    frequency : float
-        Hz.
-    least_share : float
-        Of the overall transmission error's mobility, 0 to 1.
+    variations : where they cross the frequency, the modes are computed anew
+    frequency : Hz
+    least_share : of the overall transmission error's mobility, 0 to 1
     """
     for variation in variations:
         for value in variation.crossings(frequency, least_share):

@@ -77,10 +77,8 @@ class Channels(Displayed):
 
         Parameters
         ----------
-        name : str
-            Capitals do not matter; other names of OpenFAST for the same are found, too.
-        quantity : str
-            What it must measure: one of `exugear.exchange.load_files.units.SI_NAMES`.
+        name : capitals do not matter; other names of OpenFAST for the same are found, too
+        quantity : what it must measure: one of `exugear.exchange.load_files.units.SI_NAMES`
 
         Raises
         ------
@@ -94,8 +92,7 @@ class Channels(Displayed):
 
         Parameters
         ----------
-        wanted : sequence of (str, str)
-            Name and quantity of each channel, as of `channel`.
+        wanted : name and quantity of each channel, as of `channel`
 
         Raises
         ------

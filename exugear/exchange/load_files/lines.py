@@ -72,11 +72,8 @@ def numbers(path: Path, columns: int, skipped: int, separator: str | None) -> It
 
     Parameters
     ----------
-    path : Path
-    columns, skipped : int
-        Of each line; lines of headings.
-    separator : str or None
-        Between numbers; blanks where it is None.
+    columns, skipped : of each line; lines of headings
+    separator : between numbers; blanks where it is None
 
     Raises
     ------

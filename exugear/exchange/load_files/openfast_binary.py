@@ -98,10 +98,6 @@ class _Layout:
 def open_openfast_binary(path: Path) -> Channels:
     """Channels of an OpenFAST binary file; bytes behind its declared steps are left alone, as some files have them.
 
-    Parameters
-    ----------
-    path : Path
-
     Raises
     ------
     LoadFileError

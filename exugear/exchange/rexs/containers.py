@@ -74,11 +74,6 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
 
     An attribute that its component has already is replaced. Of an archive the other members stay.
 
-    Parameters
-    ----------
-    path : path-like
-    additions : iterable of Addition
-
     Raises
     ------
     RexsError

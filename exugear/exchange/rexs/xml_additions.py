@@ -24,8 +24,7 @@ def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Ma
 
     Parameters
     ----------
-    content : bytes
-        A file that `exugear.exchange.rexs.parsing.parse_model` reads.
+    content : a file that `exugear.exchange.rexs.parsing.parse_model` reads
     additions : mapping of (load case, component) to attributes by name
     """
     written = decoded(content)

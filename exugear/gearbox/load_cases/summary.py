@@ -105,12 +105,8 @@ def summarise_loads(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    case : LoadCase
-    inertias : str, optional
-        Inertia set; the file's default otherwise.
-    duration : float, optional
-        Simulated time, s; the load case's by default.
+    inertias : inertia set; the file's default otherwise
+    duration : simulated time, s; the load case's by default
     series : mapping, optional
         As `exugear.gearbox.load_cases.torque_series.torque_series` reads it, where it has been read.
 

@@ -18,8 +18,7 @@ def template(kind: str) -> str:
 
     Parameters
     ----------
-    kind : str
-        One of `KINDS`.
+    kind : one of `KINDS`
 
     Examples
     --------

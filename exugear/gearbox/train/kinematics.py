@@ -66,9 +66,7 @@ def mesh_row(spins: Sequence[str], mesh: MeshedBodies) -> Floats:
 
     Parameters
     ----------
-    spins : sequence of str
-        Bodies that can turn; all others stand still.
-    mesh : MeshedBodies
+    spins : bodies that can turn; all others stand still
 
     Returns
     -------
@@ -94,12 +92,11 @@ def kinematic_modes(rows: Floats) -> Floats:
 
     Parameters
     ----------
-    rows : array (constraints, spins)
-        Of any units; each row is scaled by its largest entry.
+    rows : (constraints, spins) of any units; each row is scaled by its largest entry
 
     Returns
     -------
-    array (spins, degrees of freedom)
+    (spins, degrees of freedom)
 
     Examples
     --------

@@ -17,10 +17,8 @@ def holding_forces(rows: Floats, torques: Floats) -> Floats | None:
 
     Parameters
     ----------
-    rows : array (constraints, spins)
-        Torques on the spins per unit force of each constraint.
-    torques : array (spins,)
-        N m.
+    rows : (constraints, spins) torques on the spins per unit force of each constraint
+    torques : (spins,) N m
 
     Returns
     -------
@@ -47,11 +45,8 @@ def without_round_off(forces: Floats, largest_torque: float, smallest_radius: fl
 
     Parameters
     ----------
-    forces : array (meshes,)
-        N.
-    largest_torque : float
-        Of the torques that they balance, N m.
-    smallest_radius : float
-        Of the base circles on which they act, m.
+    forces : (meshes,) N
+    largest_torque : of the torques that they balance, N m
+    smallest_radius : of the base circles on which they act, m
     """
     return np.where(np.abs(forces) > UNLOADED * largest_torque / smallest_radius, forces, 0.0)

@@ -119,8 +119,7 @@ class Train(
 
         Parameters
         ----------
-        speeds : mapping of body name to float
-            rad/s.
+        speeds : by body name, rad/s
 
         Raises
         ------
@@ -181,8 +180,7 @@ class Train(
 
         Parameters
         ----------
-        torques : mapping of body name to float, optional
-            N m, those of the static load by default; the same bodies are locked.
+        torques : by body name, N m, those of the static load by default; the same bodies are locked
 
         Raises
         ------

@@ -57,12 +57,9 @@ def load_duration(
 
     Parameters
     ----------
-    torque, speed, hours : array (samples,)
-        N m, rad/s, and how long each sample lasts in the whole of the life.
-    bins : int
-        Bins of either sign.
-    largest : float, optional
-        Torque at which the last bin ends, N m, where the samples stand for larger ones; their largest by default.
+    torque, speed, hours : (samples,) N m, rad/s, and how long each sample lasts in the whole of the life
+    bins : bins of either sign
+    largest : torque at which the last bin ends, N m, where the samples stand for larger ones; their largest by default
 
     Examples
     --------
@@ -137,14 +134,10 @@ def load_points(
     ----------
     found : DurationDistribution
         Of the same samples.
-    value : str
-        As in `DurationDistribution.torques`.
-    torque, speed, hours : array (samples,)
-        As in `load_duration`.
-    other : array (samples, n)
-        Loads beside the torque.
-    cells : int
-        Cells from the least to the largest of each of them.
+    value : as in `DurationDistribution.torques`
+    torque, speed, hours : (samples,) as in `load_duration`
+    other : (samples, n) loads beside the torque
+    cells : cells from the least to the largest of each of them
     """
     torques = distribution.torques(value)
     if not other.any():
@@ -176,11 +169,8 @@ def equivalent_load(load: Floats, cycles: Floats, exponent: float) -> float:
 
     Parameters
     ----------
-    load : array
-        Taken without sign.
-    cycles : array
-    exponent : float
-        Slope of the S-N curve.
+    load : taken without sign
+    exponent : slope of the S-N curve
 
     Examples
     --------

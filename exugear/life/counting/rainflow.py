@@ -101,12 +101,11 @@ def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
 
     Parameters
     ----------
-    series : array (samples,)
+    series : (samples,)
 
     Returns
     -------
-    ranges, means, counts : arrays (cycles,)
-        Counts are 1 or 0.5.
+    ranges, means, counts : (cycles,) counts are 1 or 0.5
 
     Examples
     --------
@@ -132,12 +131,9 @@ def equivalent_range(ranges: Floats, counts: Floats, exponent: float, cycles: fl
 
     Parameters
     ----------
-    ranges, counts : array (n,)
-        Of `rainflow`.
-    exponent : float
-        Slope of the S-N curve.
-    cycles : float
-        Such as the length of the series in seconds, for one cycle a second.
+    ranges, counts : (n,) of `rainflow`
+    exponent : slope of the S-N curve
+    cycles : such as the length of the series in seconds, for one cycle a second
 
     Notes
     -----

@@ -77,13 +77,9 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
 
     Parameters
     ----------
-    assembly : Assembly
-    rating : RatingSection
-        With the load case that the run is of, and the least factor.
-    path : Path
-        File of the run.
-    body : str
-        Loaded body, whose speed counts.
+    rating : with the load case that the run is of, and the least factor
+    path : file of the run
+    body : loaded body, whose speed counts
 
     Raises
     ------
@@ -120,8 +116,7 @@ def window_factors(time: Floats, frequency: Floats, force: Floats) -> tuple[Floa
 
     Parameters
     ----------
-    time, frequency, force : array (samples,)
-        s, mesh frequency in Hz, N.
+    time, frequency, force : (samples,) s, mesh frequency in Hz, N
 
     Notes
     -----

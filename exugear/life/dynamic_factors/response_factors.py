@@ -50,12 +50,8 @@ def factors(assembly: Assembly, rating: RatingSection, folder: Path, body: str) 
 
     Parameters
     ----------
-    assembly : Assembly
-    rating : RatingSection
-    folder : Path
-        Results folder.
-    body : str
-        Loaded body.
+    folder : results folder
+    body : loaded body
 
     Raises
     ------
@@ -95,13 +91,9 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
 
     Parameters
     ----------
-    assembly : Assembly
-    rating : RatingSection
-        With the level that the response is of, and the least factor.
-    path : Path
-        File of the response.
-    body : str
-        Loaded body, whose speed counts.
+    rating : with the level that the response is of, and the least factor
+    path : file of the response
+    body : loaded body, whose speed counts
 
     Raises
     ------

@@ -158,9 +158,7 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
 
     Parameters
     ----------
-    gearbox : Gearbox
-    progress : callable, optional
-        Called with the number of files that are read, and of all.
+    progress : called with the number of files that are read, and of all
 
     Raises
     ------

@@ -20,10 +20,8 @@ def draw_duration(distribution: DurationDistribution, body: str, path: str | Pat
     Parameters
     ----------
     found : DurationDistribution
-    body : str
-        For the labels.
-    path : path-like, optional
-        Where to write the picture.
+    body : for the labels
+    path : where to write the picture
     """
     with drawing_style():
         figure = new_figure(7.0, 3.2)

@@ -70,9 +70,7 @@ def condensed(samples: Samples, extreme: bool = False) -> Samples:
 
     Parameters
     ----------
-    samples : Samples
-    extreme : bool
-        Whether the largest loads of a cell stand for it, instead of means weighted by revolutions.
+    extreme : whether the largest loads of a cell stand for it, instead of means weighted by revolutions
 
     Examples
     --------

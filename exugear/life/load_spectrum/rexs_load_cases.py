@@ -23,10 +23,7 @@ def rexs_load_cases(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Fl
 
     Parameters
     ----------
-    gearbox : Gearbox
-        As `exugear import` makes it of the same REXS file: it gives bodies their names.
-    path : Path
-    body : str
+    gearbox : as `exugear import` makes it of the same REXS file: it gives bodies their names
 
     Raises
     ------

@@ -121,9 +121,7 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
 
     Parameters
     ----------
-    gearbox : Gearbox
-    progress : callable, optional
-        Called with the number of files that are read, and of all.
+    progress : called with the number of files that are read, and of all
 
     Raises
     ------

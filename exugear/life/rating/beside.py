@@ -50,12 +50,8 @@ def of_nominal_load(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    rating : RatingSection
-    counted : CountedLoads
-        The nominal load times K_A.
-    balance : StaticBalance
-    stresses : mapping of pair name to MeshCycleStress
+    counted : the nominal load times K_A
+    stresses : by pair name
     """
     dynamic = stated_factors(gearbox, rating.dynamic_factor or rating.least_dynamic_factor or 1.0)
     lives = flank_lives(gearbox, rating, counted.teeth, acting_loads(counted), balance, stresses, dynamic)

@@ -26,11 +26,8 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
 
     Parameters
     ----------
-    gearbox : Gearbox
-    rating : RatingSection
-        Its `nominal_hours`; without them the teeth that are loaded least often are loaded `LONGEST` times.
-    factor : float
-        On the torque.
+    rating : its `nominal_hours`; without them the teeth that are loaded least often are loaded `LONGEST` times
+    factor : on the torque
 
     Raises
     ------

@@ -63,14 +63,9 @@ def rated(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    counted : CountedLoads
-        Of `rated_loads`.
-    balance : StaticBalance
-        Of `balanced`.
-    finite_elements : mapping of (gear, family, flank) to mapping
-        What stands beside the standard, see `exugear.life.rating.beside`.
-    remarks : tuple of str
-        What is to be said of that.
+    counted : of `rated_loads`
+    balance : of `balanced`
+    finite_elements : (gear, family, flank) what stands beside the standard, see `exugear.life.rating.beside`
+    remarks : what is to be said of that
     """
     return rating_sheet(gearbox, rating_of(gearbox), counted, acting_loads(counted), balance, finite_elements, remarks)

@@ -132,17 +132,10 @@ def rating_sheet(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    rating : RatingSection
-    counted : CountedLoads
-        Of the file, or `exugear.life.rating.nominal.nominal_loads`.
-    acting : ActingLoads
-        Of these.
-    balance : StaticBalance
-        Over their torques.
-    finite_elements : mapping of (gear, family, flank) to mapping
-        What is known beside the standard.
-    assumptions : tuple of str
+    counted : of the file, or `exugear.life.rating.nominal.nominal_loads`
+    acting : of these
+    balance : over their torques
+    finite_elements : (gear, family, flank) what is known beside the standard
     """
     flanks = []
     for tooth in distinct(counted.teeth):

@@ -152,15 +152,9 @@ class FlankRules:
 def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
     """Factors, stresses and safeties of a flank and the root below it, by the field's symbols.
 
-    Parameters
-    ----------
-    rules : FlankRules
-    loads : MeshLoads
-
     Returns
     -------
-    dict of str to float
-        Stresses in Pa, F_t in N, v in m/s; what is not rated is NaN.
+    stresses in Pa, F_t in N, v in m/s; what is not rated is NaN
     """
     factors = [_load_factors(rules, loads, place) for place in range(len(loads.force))]
     stresses = [_stresses(rules, factor) for factor in factors]

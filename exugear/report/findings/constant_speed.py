@@ -109,8 +109,7 @@ def constant_speed_of(response: xr.Dataset) -> ConstantSpeed:
 
     Parameters
     ----------
-    response : Dataset
-        As `exugear.steady.steady_file.load_response` reads it.
+    response : as `exugear.steady.steady_file.load_response` reads it
     """
     speed = np.abs(response["speed"].to_numpy())
     rising = np.argsort(speed, kind="stable")
@@ -155,14 +154,10 @@ def response_spectra(
 
     Parameters
     ----------
-    response : Dataset
-        As `exugear.steady.steady_file.load_response` reads it, a function of speed.
-    signals : sequence of str
-        The root of the summed squares of their amplitudes is taken.
-    highest : float
-        Highest frequency that is drawn, Hz.
-    reference, unit : float, str
-        Amplitude of 0 dB, and the unit of the signals.
+    response : as `exugear.steady.steady_file.load_response` reads it, a function of speed
+    signals : the root of the summed squares of their amplitudes is taken
+    highest : highest frequency that is drawn, Hz
+    reference, unit : amplitude of 0 dB, and the unit of the signals
     """
     speed, places = np.unique(np.abs(response["speed"].to_numpy()), return_index=True)
     names = [str(name) for name in response["signal"].to_numpy()]

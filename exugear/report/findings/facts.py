@@ -94,9 +94,7 @@ def facts_of_response(words: Words, response: xr.Dataset) -> tuple[Fact, ...]:
 
     Parameters
     ----------
-    words : Words
-    response : Dataset
-        As `exugear.steady.steady_file.load_response` reads it.
+    response : as `exugear.steady.steady_file.load_response` reads it
     """
     top = next(iter(peaks(response)), None)
     if top is None:

@@ -107,8 +107,7 @@ def ranking_of(data: xr.Dataset) -> Ranking:
 
     Parameters
     ----------
-    data : Dataset
-        As `exugear.steady.steady_file.load_response` reads it.
+    data : as `exugear.steady.steady_file.load_response` reads it
 
     Notes
     -----

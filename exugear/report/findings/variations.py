@@ -112,11 +112,8 @@ def model_variations(
 
     Parameters
     ----------
-    context : Context
-    modes : mapping of Choice to xarray.Dataset
-        Of the models that there are.
-    begun : Future, optional
-        What `begin_variations` gave.
+    modes : of the models that there are
+    begun : what `begin_variations` gave
     """
     models = _models_to_vary(context, modes)
     for model in models:

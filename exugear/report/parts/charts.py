@@ -62,23 +62,16 @@ def chart(
 
     Parameters
     ----------
-    name : str
-        Identity in the page.
-    title, hint, words : str
-        What it shows; what can be done; what it says in words.
-    curves : sequence of Curve
-    axes : sequence of Axis
-        Below, on the left, and on the right if curves are there.
-    arrays : ArrayStore
-        Takes the curves.
-    marks : sequence of (float, str)
-        Upright lines at values of x, with words.
+    name : identity in the page
+    title, hint, words : what it shows; what can be done; what it says in words
+    axes : below, on the left, and on the right if curves are there
+    arrays : takes the curves
+    marks : upright lines at values of x, with words
 
     Returns
     -------
-    html : str
-    data : dict
-        Under the key ``charts`` of the page's data, by name.
+    html
+    data : under the key ``charts`` of the page's data, by name
     """
     spec = {
         "title": title,

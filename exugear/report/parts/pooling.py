@@ -21,19 +21,14 @@ def pooled(level: Floats, speed: Floats, columns: int, lines: int) -> Floats:
 
     Parameters
     ----------
-    level : (n, m) array
-        dB.
-    speed : (n,) array
-        rad/s.
-    columns : int
-        Cells over the speed.
-    lines : int
-        Spectral lines of a cell; what is left over at the top falls away.
+    level : (n, m) dB
+    speed : (n,) rad/s
+    columns : cells over the speed
+    lines : spectral lines of a cell; what is left over at the top falls away
 
     Returns
     -------
-    (columns, m // lines) array
-        Where frames are rarer than cells, that of the nearest frame.
+    (columns, m // lines) where frames are rarer than cells, that of the nearest frame
     """
     count = level.shape[1] // lines * lines
     narrow = level[:, :count:lines].copy()

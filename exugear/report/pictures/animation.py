@@ -41,12 +41,9 @@ def half_period_images(
 
     Parameters
     ----------
-    plotter : pyvista.Plotter
-        With all meshes, looking at them.
-    frames : int
-        Pictures per period, an even number.
-    move : callable
-        Moves the meshes to a part of the largest deflection, from 1 to -1.
+    plotter : with all meshes, looking at them
+    frames : pictures per period, an even number
+    move : moves the meshes to a part of the largest deflection, from 1 to -1
 
     Returns
     -------

@@ -77,13 +77,9 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
 
     Parameters
     ----------
-    assembly : Assembly
-        Of the variant `flexible`.
-    shape : (size,) array
-        Mode shape.
-    title : str
-    amplitude : float
-        Largest displacement drawn, as a share of the longest body.
+    assembly : of the variant `flexible`
+    shape : (size,) mode shape
+    amplitude : largest displacement drawn, as a share of the longest body
 
     Raises
     ------
@@ -160,11 +156,8 @@ def draw_elastic_bodies(
 
     Parameters
     ----------
-    scene : ElasticScene
-    path : path-like, optional
-        Where to write the picture.
-    size : (int, int)
-        Width and height of the rendered image, pixels.
+    path : where to write the picture
+    size : width and height of the rendered image, pixels
 
     Raises
     ------
@@ -190,15 +183,10 @@ def animate_elastic_bodies(
 
     Parameters
     ----------
-    scene : ElasticScene
-    path : path-like
-        Where to write; the suffix must be ``.gif``.
-    frames : int
-        Pictures per period, an even number.
-    duration : float
-        Length of a period, s.
-    size : (int, int)
-        Width and height of the rendered image, pixels.
+    path : where to write; the suffix must be ``.gif``
+    frames : pictures per period, an even number
+    duration : length of a period, s
+    size : width and height of the rendered image, pixels
 
     Raises
     ------

@@ -32,26 +32,14 @@ def plot_campbell(
 
     Parameters
     ----------
-    eigenfrequencies : array_like, shape (n,)
-        Hz.
-    lines : iterable of OrderLine
-        Orders that excite.
-    fastest : float
-        Highest speed of the carrier, rad/s.
-    path : path-like, optional
-        Where to write the picture.
-    names : sequence of str
-        Names of the modes, written on their lines.
-    weights : array_like, shape (n,), optional
-        How strongly the observed quantity sees each mode, 0 to 1: the size of its crossings.
-    highest_frequency : float, optional
-        End of the frequency axis, Hz.
-    title : str
-        Variant and inertia set.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    eigenfrequencies : (n,) Hz
+    lines : orders that excite
+    fastest : highest speed of the carrier, rad/s
+    path : where to write the picture
+    names : names of the modes, written on their lines
+    weights : (n,) how strongly the observed quantity sees each mode, 0 to 1: the size of its crossings
+    highest_frequency : end of the frequency axis, Hz
+    title : variant and inertia set
     """
     modes = np.asarray(eigenfrequencies, dtype=np.float64)
     size = np.ones(modes.size) if weights is None else np.asarray(weights, dtype=np.float64)

@@ -22,15 +22,12 @@ def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
 
     Parameters
     ----------
-    body : BodyShape
-        The body, n points.
-    motion : array_like, shape (6,)
-        Displacement (m) of the reference point and rotations (rad) about x, y, z.
+    body : the body, n points
+    motion : (6,) displacement (m) of the reference point and rotations (rad) about x, y, z
 
     Returns
     -------
-    (n, 3) array
-        m.
+    (n, 3) m
     """
     small = np.asarray(motion, dtype=np.float64)
     return small[:3] + np.cross(small[3:], body.surface.points - body.reference)
@@ -43,15 +40,12 @@ def placed(body: BodyShape, motion: ArrayLike) -> Floats:
 
     Parameters
     ----------
-    body : BodyShape
-        The body, n points.
-    motion : array_like, shape (6,)
-        As in `displacement_of`, the rotations as a rotation vector.
+    body : the body, n points
+    motion : (6,) as in `displacement_of`, the rotations as a rotation vector
 
     Returns
     -------
-    (n, 3) array
-        m.
+    (n, 3) m
     """
     matrix = motion_matrix(body.reference, motion)
     points: Floats = body.surface.points @ matrix[:3, :3].T + matrix[:3, 3]
@@ -108,18 +102,11 @@ def mode_scene(
 
     Parameters
     ----------
-    bodies : sequence of BodyShape
-        Shapes.
-    motions : mapping of body name to (6,) array
+    bodies : shapes
+    motions : by body name, (6,)
         Mode shape in any normalisation, as in `displacement_of`; bodies that are not named rest.
-    title : str
-        Frequency, damping and name of the mode.
-    amplitude : float
-        Largest displacement drawn, over the diagonal of the scene.
-
-    Returns
-    -------
-    ModeScene
+    title : frequency, damping and name of the mode
+    amplitude : largest displacement drawn, over the diagonal of the scene
 
     Raises
     ------
@@ -149,17 +136,14 @@ def motions_of(bodies: Iterable[Body], coordinates: Mapping[str, Sequence[int]],
 
     Parameters
     ----------
-    bodies : iterable of Body
-        Bodies of the model.
+    bodies : bodies of the model
     coordinates : mapping of body name to six int
         Indices of x, y, z and the rotations about them in the vector; -1 where there is none.
-    shape : array_like, shape (size,)
-        Mode shape or displacement.
+    shape : (size,) mode shape or displacement
 
     Returns
     -------
-    dict of body name to (6,) array
-        As in `displacement_of`. A planet that turns on an ideal pin goes where its carrier takes it.
+    by body name, (6,) as in `displacement_of`. A planet that turns on an ideal pin goes where its carrier takes it.
     """
     vector = np.append(np.asarray(shape, dtype=np.float64), 0.0)  # -1 reads the zero
     by_name = {body.name: body for body in bodies}

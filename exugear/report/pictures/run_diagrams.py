@@ -39,25 +39,17 @@ def plot_waterfalls(
 
     Parameters
     ----------
-    runs : mapping of str to Waterfall
-        Title and spectra of each panel.
-    lines : iterable of OrderLine
-        Order lines to draw and name.
-    path : path-like, optional
-        Where to write the picture.
-    marks : mapping of str to sequence of Pick, optional
-        Peaks to circle and number in a panel, such as those that only this run shows.
-    highest_frequency : float, optional
-        End of the frequency axis, Hz.
-    dynamic_range : float
-        Span of the colours below the highest level of all runs, dB.
-    quantity : str
-        What the level is of, for the colour bar.
+    runs : title and spectra of each panel
+    lines : order lines to draw and name
+    path : where to write the picture
+    marks : peaks to circle and number in a panel, such as those that only this run shows
+    highest_frequency : end of the frequency axis, Hz
+    dynamic_range : span of the colours below the highest level of all runs, dB
+    quantity : what the level is of, for the colour bar
 
     Returns
     -------
-    matplotlib.figure.Figure
-        Frequency over speed of the carrier, the level in colours.
+    frequency over speed of the carrier, the level in colours
 
     Raises
     ------
@@ -106,17 +98,13 @@ def pooled_levels(
 
     Parameters
     ----------
-    run : Waterfall
-        Spectra.
-    highest_frequency, fastest : float
-        Ends of both axes, Hz and rad/s; they begin at zero.
-    shape : (int, int)
-        At most so many cells along frequency and speed.
+    run : spectra
+    highest_frequency, fastest : ends of both axes, Hz and rad/s; they begin at zero
+    shape : at most so many cells along frequency and speed
 
     Returns
     -------
-    (frequencies, speeds) array
-        dB; NaN at speeds that the run does not reach.
+    (frequencies, speeds) dB; NaN at speeds that the run does not reach
     """
     shown = run.frequency <= highest_frequency
     rows = min(shape[0], max(1, int(np.count_nonzero(shown)) - 1))

@@ -40,18 +40,10 @@ def draw_gearbox(
 
     Parameters
     ----------
-    bodies : sequence of BodyShape
-        Shapes.
-    path : path-like, optional
-        Where to write the picture.
-    title : str
-        Name of the gearbox.
-    size : (int, int)
-        Width and height of the rendered image, pixels.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    bodies : shapes
+    path : where to write the picture
+    title : name of the gearbox
+    size : width and height of the rendered image, pixels
 
     Raises
     ------
@@ -82,16 +74,9 @@ def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[i
 
     Parameters
     ----------
-    scene : ModeScene
-        The mode.
-    path : path-like, optional
-        Where to write the picture.
-    size : (int, int)
-        Width and height of the rendered image, pixels.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
+    scene : the mode
+    path : where to write the picture
+    size : width and height of the rendered image, pixels
 
     Raises
     ------
@@ -113,20 +98,11 @@ def animate_mode(
 
     Parameters
     ----------
-    scene : ModeScene
-        The mode.
-    path : path-like
-        Where to write; the suffix must be ``.gif``.
-    frames : int
-        Pictures per period, an even number.
-    duration : float
-        Length of a period, s.
-    size : (int, int)
-        Width and height of the rendered image, pixels.
-
-    Returns
-    -------
-    pathlib.Path
+    scene : the mode
+    path : where to write; the suffix must be ``.gif``
+    frames : pictures per period, an even number
+    duration : length of a period, s
+    size : width and height of the rendered image, pixels
 
     Raises
     ------

@@ -46,13 +46,11 @@ def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
 
     Parameters
     ----------
-    gearbox : Gearbox
-        The gearbox; its teeth are turned so that they mesh.
+    gearbox : the gearbox; its teeth are turned so that they mesh
 
     Returns
     -------
-    tuple of BodyShape
-        Gears as they are, shafts and carrier as plain cylinders that only show what belongs together.
+    gears as they are, shafts and carrier as plain cylinders that only show what belongs together
 
     Examples
     --------
@@ -82,8 +80,7 @@ def tooth_angles(meshes: Sequence[Mesh]) -> dict[tuple[str, str], float]:
 
     Parameters
     ----------
-    meshes : sequence of Mesh
-        All meshes at work.
+    meshes : all meshes at work
 
     Returns
     -------

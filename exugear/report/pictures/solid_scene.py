@@ -26,11 +26,8 @@ def draw_free_vibration(body: ReducedBody, number: int, path: str | Path | None 
 
     Parameters
     ----------
-    body : ReducedBody
-    number : int
-        0 for the first elastic one.
-    path : path-like, optional
-        Where to write the picture.
+    number : 0 for the first elastic one
+    path : where to write the picture
 
     Raises
     ------

@@ -50,16 +50,9 @@ def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = No
 
     Parameters
     ----------
-    gear : Gear
-        The gear.
-    angle : float
-        Polar angle of the middle of a tooth at z = 0, rad.
-    rim_diameter : float, optional
-        Bore of an external, outside diameter of an internal gear, m; by default where it is held.
-
-    Returns
-    -------
-    Surface
+    gear : the gear
+    angle : polar angle of the middle of a tooth at z = 0, rad
+    rim_diameter : bore of an external, outside diameter of an internal gear, m; by default where it is held
 
     Examples
     --------
@@ -114,16 +107,9 @@ def tube_surface(
 
     Parameters
     ----------
-    diameter, bore : float
-        m.
-    start, end : float
-        z of both ends, m.
-    centre : array_like, shape (2,)
-        x and y of its axis, m.
-
-    Returns
-    -------
-    Surface
+    diameter, bore : m
+    start, end : z of both ends, m
+    centre : (2,) x and y of its axis, m
     """
     polar = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
     corners = [(bore, start), (diameter, start), (diameter, end), (bore, end), (bore, start)]

@@ -399,8 +399,7 @@ def branch_curves(speed: Floats, level: Floats, growth: Floats) -> list[Curve]:
 
     Parameters
     ----------
-    speed, level, growth : (n,) arrays
-        Along the branch; what grows (1/s) is unstable.
+    speed, level, growth : (n,) along the branch; what grows (1/s) is unstable
     """
     stable = ~(growth > 0.0)
     rising = np.diff(speed) >= 0.0

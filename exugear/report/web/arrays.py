@@ -34,10 +34,8 @@ class ArrayStore:
 
         Parameters
         ----------
-        values : array
-            Of a type in `KINDS`.
-        differences : bool
-            Whether to keep differences along the first axis, which pack better where neighbours are alike.
+        values : of a type in `KINDS`
+        differences : whether to keep differences along the first axis, which pack better where neighbours are alike
         """
         array = np.ascontiguousarray(values)
         kept = array

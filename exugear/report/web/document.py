@@ -30,17 +30,11 @@ def whole_page(
 
     Parameters
     ----------
-    title : str
-    body : str
-        HTML of its body.
-    script : str
-        Name of its main module.
-    data : mapping
-        What the scripts read as JSON.
-    arrays : ArrayStore
-        Arrays that the data refer to.
-    libraries : sequence of str
-        Files of vendored libraries that it needs.
+    body : HTML of its body
+    script : name of its main module
+    data : what the scripts read as JSON
+    arrays : arrays that the data refer to
+    libraries : files of vendored libraries that it needs
 
     Returns
     -------

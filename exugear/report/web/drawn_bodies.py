@@ -99,11 +99,8 @@ def drawn_mode(assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats,
 
     Parameters
     ----------
-    assembly : Assembly
-    bodies : tuple of DrawnBody
-    shape : (size,) array
-    with_fields : bool
-        Whether elastic bodies deform; else they move as their main seats do.
+    shape : (size,)
+    with_fields : whether elastic bodies deform; else they move as their main seats do
     """
     moving = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(shape))
     motions = np.zeros((len(bodies), 6))

@@ -36,24 +36,14 @@ def write_mode_page(
 
     Parameters
     ----------
-    assembly : Assembly
-        What vibrates.
-    shapes : (size, modes) array
-        Modes to choose from.
-    titles : sequence of (float, str)
-        Frequency (Hz) of each, and what moves.
-    path : path-like
-        Where to write the page.
-    heading : str
-        Gearbox, variant, mesh law and inertia set.
-    first : int
-        Mode that is shown when the page opens.
+    assembly : what vibrates
+    shapes : (size, modes) modes to choose from
+    titles : frequency (Hz) of each, and what moves
+    path : where to write the page
+    heading : gearbox, variant, mesh law and inertia set
+    first : mode that is shown when the page opens
     labels : mapping of name to words, optional
         Of bodies.
-
-    Returns
-    -------
-    pathlib.Path
 
     Raises
     ------

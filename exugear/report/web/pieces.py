@@ -22,10 +22,8 @@ def element(tag: str, content: str = "", **attributes: object) -> str:
 
     Parameters
     ----------
-    tag : str
-    content : str
-        HTML.
-    attributes : object
+    content : HTML
+    attributes
         By name, underscores for hyphens and one at the end to tell ``class_`` from the word of Python; True stands
         alone, None and False are left out.
 
@@ -98,20 +96,13 @@ def table(
 
     Parameters
     ----------
-    rows : sequence of mapping
-        None makes no table.
-    texts : iterable of str
-        Columns to align left; the first one always is.
-    caption : str
-        What the table shows, for those who have it read aloud.
-    name : str
-        Identity in the page; its data can be taken away under this name.
-    hidden : iterable of str
-        Columns that a phone leaves out.
-    sortable : bool
-        Whether its scripts may sort it.
-    choices : sequence of str
-        What clicking each row chooses in the scripts of the page.
+    rows : None makes no table
+    texts : columns to align left; the first one always is
+    caption : what the table shows, for those who have it read aloud
+    name : identity in the page; its data can be taken away under this name
+    hidden : columns that a phone leaves out
+    sortable : whether its scripts may sort it
+    choices : what clicking each row chooses in the scripts of the page
 
     Examples
     --------
@@ -183,13 +174,9 @@ def section(title: str, *content: str, level: int = 2, name: str = "") -> str:
 
     Parameters
     ----------
-    title : str
-    content : str
-        HTML.
-    level : int
-        Of the heading.
-    name : str
-        Identity in the page, which links lead to; the section is a landmark then.
+    content : HTML
+    level : of the heading
+    name : identity in the page, which links lead to; the section is a landmark then
     """
     joined = "".join(content)
     if not joined:
@@ -210,14 +197,10 @@ def figure(name: str, title: str, hint: str, words: str, kind: str = "") -> str:
 
     Parameters
     ----------
-    name : str
-        Identity in the page.
-    title, hint : str
-        What it shows, and what can be done with it.
-    words : str
-        What it shows in words, for those who cannot see it, and where scripts are off.
-    kind : str
-        What draws it: a key of the scripts.
+    name : identity in the page
+    title, hint : what it shows, and what can be done with it
+    words : what it shows in words, for those who cannot see it, and where scripts are off
+    kind : what draws it: a key of the scripts
     """
     caption = element("figcaption", f"<strong>{text(title)}</strong>" + element("span", text(hint), class_="hint"))
     drawn = element("div", "", class_="plot", tabindex=0, role="img", aria_label=f"{title}. {words}")

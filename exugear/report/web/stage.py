@@ -25,15 +25,11 @@ def stage_data(
 
     Parameters
     ----------
-    assembly : Assembly
-    shapes : (size, modes) array
-        Mode shapes.
+    shapes : (size, modes) mode shapes
     labels : mapping of name to words
         Of bodies and gears.
-    arrays : ArrayStore
-        Takes the points, triangles and motions.
-    deformed : collection of int
-        Modes in which elastic bodies deform; in the others they move as a whole, which takes less room.
+    arrays : takes the points, triangles and motions
+    deformed : modes in which elastic bodies deform; in the others they move as a whole, which takes less room
     """
     bodies = drawn_bodies(assembly)
     # A rotor of stated inertias has no shape to draw: the stage is empty then.

@@ -45,17 +45,13 @@ def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | N
 
     Parameters
     ----------
-    picks : iterable of Pick
-        Peaks of the first run.
-    other : Waterfall
-        The second run, with the same unit.
-    rule : AbsenceRule, optional
-        Stated thresholds.
+    picks : peaks of the first run
+    other : the second run, with the same unit
+    rule : stated thresholds
 
     Returns
     -------
-    tuple of Pick
-        Peaks that satisfy the rule; a peak where the second run has no data does not.
+    peaks that satisfy the rule; a peak where the second run has no data does not
     """
     stated = rule or AbsenceRule()
     asked = tuple(picks)

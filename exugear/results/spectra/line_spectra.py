@@ -68,19 +68,12 @@ def line_spectra(
 
     Parameters
     ----------
-    speed : (n,) array
-        Of the reference shaft, rad/s, ascending, three or more.
-    orders : (lines,) array
-        Periods per turn of the reference shaft.
-    amplitude : (n, lines) array
-        Peak amplitudes in `unit`.
-    highest : float
-        Highest frequency of the picture, Hz.
-    unknown : iterable of float
-        Speeds at which no state is known: nothing is drawn from the speed before to the speed behind.
-    reference : float
-        Amplitude of 0 dB, in `unit`.
-    unit : str
+    speed : (n,) of the reference shaft, rad/s, ascending, three or more
+    orders : (lines,) periods per turn of the reference shaft
+    amplitude : (n, lines) peak amplitudes in `unit`
+    highest : highest frequency of the picture, Hz
+    unknown : speeds at which no state is known: nothing is drawn from the speed before to the speed behind
+    reference : amplitude of 0 dB, in `unit`
 
     Returns
     -------

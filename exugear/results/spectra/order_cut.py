@@ -70,22 +70,12 @@ def order_cut(
 
     Parameters
     ----------
-    values, speed : array_like, shape (n,)
-        Signal and speed of the reference shaft (rad/s), uniformly sampled.
-    rate : float
-        Sampling rate, Hz.
-    line : OrderLine
-        The order to follow.
-    window_length : float
-        s; another order closer than about ``2 / window_length`` in Hz leaks in.
-    overlap : float
-        Share of each window that the next repeats, in [0, 1).
-    window : str
-        Name of a SciPy window.
-
-    Returns
-    -------
-    OrderCut
+    values, speed : (n,) signal and speed of the reference shaft (rad/s), uniformly sampled
+    rate : sampling rate, Hz
+    line : the order to follow
+    window_length : s; another order closer than about ``2 / window_length`` in Hz leaks in
+    overlap : share of each window that the next repeats, in [0, 1)
+    window : name of a SciPy window
 
     Examples
     --------

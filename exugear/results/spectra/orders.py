@@ -51,16 +51,9 @@ def harmonics(name: str, order: float, count: int) -> tuple[OrderLine, ...]:
 
     Parameters
     ----------
-    name : str
-        Name of the first.
-    order : float
-        Order of the first.
-    count : int
-        How many, the first included.
-
-    Returns
-    -------
-    tuple of OrderLine
+    name : name of the first
+    order : order of the first
+    count : how many, the first included
 
     Examples
     --------
@@ -77,9 +70,7 @@ def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
 
     Parameters
     ----------
-    gearbox : Gearbox
-    count : int
-        Harmonics of each mesh, the first included.
+    count : harmonics of each mesh, the first included
 
     Examples
     --------

@@ -15,17 +15,13 @@ def resample_uniform(time: ArrayLike, values: ArrayLike, rate: float) -> tuple[F
 
     Parameters
     ----------
-    time : array_like, shape (n,)
-        Increasing instants, s.
-    values : array_like, shape (n,)
-        Signal.
-    rate : float
-        Wanted sampling rate, Hz.
+    time : (n,) increasing instants, s
+    values : (n,) signal
+    rate : wanted sampling rate, Hz
 
     Returns
     -------
-    time, values : (m,) arrays
-        From the first instant on, at ``1 / rate``.
+    time, values : (m,) from the first instant on, at ``1 / rate``
 
     Raises
     ------

@@ -57,13 +57,10 @@ def pick_resonances(
 
     Parameters
     ----------
-    spectra : Waterfall
-        The run.
-    lines : iterable of OrderLine
-        Where to look.
-    prominence : float
-        Least height of a peak over the higher of the two valleys beside it, dB.
-    depth : float
+    spectra : the run
+    lines : where to look
+    prominence : least height of a peak over the higher of the two valleys beside it, dB
+    depth
         Peaks so far below the highest level on any of the lines, dB, are left out: where an order excites
         nothing, its line shows the ripple of the spectral floor.
     peaks : callable, optional
@@ -72,8 +69,7 @@ def pick_resonances(
 
     Returns
     -------
-    tuple of Pick
-        Line by line, in order of time. Of peaks closer than the resolution the higher one is kept.
+    line by line, in order of time. Of peaks closer than the resolution the higher one is kept.
 
     Examples
     --------
@@ -172,13 +168,11 @@ def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
 
     Parameters
     ----------
-    picks : iterable of Pick
-        Peaks of any lines.
+    picks : peaks of any lines
 
     Returns
     -------
-    tuple of Resonance
-        By frequency. The highest peak gathers those within the wider of both resolutions, then the next.
+    by frequency. The highest peak gathers those within the wider of both resolutions, then the next.
     """
     waiting = sorted(picks, key=lambda pick: -pick.level)
     groups: list[Resonance] = []
@@ -209,15 +203,12 @@ def match_eigenfrequencies(
 
     Parameters
     ----------
-    resonances : sequence of Pick or Resonance
-        As a waterfall shows them.
-    eigenfrequencies : array_like, shape (n,)
-        Hz.
+    resonances : as a waterfall shows them
+    eigenfrequencies : (n,) Hz
 
     Returns
     -------
-    tuple of int or None
-        Index of the nearest eigenfrequency, or None where none lies within the resolution of the resonance.
+    index of the nearest eigenfrequency, or None where none lies within the resolution of the resonance
 
     Examples
     --------

@@ -103,10 +103,8 @@ def run_waterfall(path: str | Path, window_length: float | None = None) -> Water
 
     Parameters
     ----------
-    path : path
-        ``run.nc`` of a run-up, or ``run.partial``.
-    window_length : float, optional
-        s; what suits the fastest first-order sweep by default. Runs to be compared need the same.
+    path : ``run.nc`` of a run-up, or ``run.partial``
+    window_length : s; what suits the fastest first-order sweep by default. Runs to be compared need the same.
 
     Raises
     ------
@@ -229,14 +227,10 @@ def read_run(
 
     Parameters
     ----------
-    path : path
-        ``run.nc``, or ``run.partial`` of a run that was stopped.
-    lines : sequence of OrderLine
-        Where to look for resonances.
-    modes : xarray.Dataset, optional
-        Modes of the same variant, law and inertia set.
-    window_length : float, optional
-        s; runs to be compared need the same.
+    path : ``run.nc``, or ``run.partial`` of a run that was stopped
+    lines : where to look for resonances
+    modes : modes of the same variant, law and inertia set
+    window_length : s; runs to be compared need the same
 
     Raises
     ------

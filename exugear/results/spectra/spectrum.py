@@ -15,21 +15,15 @@ def amplitude_spectrum(values: ArrayLike, rate: float, window: str = "hann", pad
 
     Parameters
     ----------
-    values : array_like, shape (..., n)
-        Signal, along the last axis. One in single precision is analysed so, in half the time.
-    rate : float
-        Sampling rate, Hz.
-    window : str
-        Name of a SciPy window. ``"flattop"`` reads amplitudes between bins to 0.1 %, ``"hann"`` to 15 %.
-    padding : int
-        Length after appending zeros over `n`: spectral lines in between, no finer resolution.
+    values : (..., n) signal, along the last axis. One in single precision is analysed so, in half the time.
+    rate : sampling rate, Hz
+    window : name of a SciPy window. ``"flattop"`` reads amplitudes between bins to 0.1 %, ``"hann"`` to 15 %.
+    padding : length after appending zeros over `n`: spectral lines in between, no finer resolution
 
     Returns
     -------
-    frequency : (padding n // 2 + 1,) array
-        Hz.
-    amplitude : (..., padding n // 2 + 1) array
-        Peak amplitude of a sine at that frequency; at frequency zero the mean.
+    frequency : (padding n // 2 + 1,) Hz
+    amplitude : (..., padding n // 2 + 1) peak amplitude of a sine at that frequency; at frequency zero the mean
 
     Examples
     --------

@@ -19,12 +19,9 @@ def sweep_severity(frequency: float, damping: float, rate: float) -> float:
 
     Parameters
     ----------
-    frequency : float
-        Of the resonance, Hz.
-    damping : float
-        Share of critical damping.
-    rate : float
-        Of the sweep, Hz/s.
+    frequency : of the resonance, Hz
+    damping : share of critical damping
+    rate : of the sweep, Hz/s
 
     Examples
     --------
@@ -52,9 +49,7 @@ def run_up_cut(time: Floats, values: Floats, speed: Floats, line: OrderLine) -> 
 
     Parameters
     ----------
-    time, values, speed : (n,) arrays
-        s, evenly sampled; the signal; speed of the reference shaft, rad/s.
-    line : OrderLine
+    time, values, speed : (n,) s, evenly sampled; the signal; speed of the reference shaft, rad/s
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
     sweeps = sweep_rate(time, speed, line.order)

@@ -129,26 +129,19 @@ def waterfall(
 
     Parameters
     ----------
-    values, speed : array_like, shape (n,)
+    values, speed : (n,)
         Signal and speed of the reference shaft (rad/s), uniformly sampled from time zero on. A signal in single
         precision is analysed so.
-    rate : float
-        Sampling rate, Hz.
-    window_length : float
-        s; `sweep_matched_window` of the fastest order of interest is the natural choice.
-    overlap : float
-        Share of each window that the next repeats, in [0, 1).
-    window : str
-        Name of a SciPy window.
-    reference : float
-        Amplitude of 0 dB, in `unit`.
-    unit : str
-        Unit of the signal.
+    rate : sampling rate, Hz
+    window_length : s; `sweep_matched_window` of the fastest order of interest is the natural choice
+    overlap : share of each window that the next repeats, in [0, 1)
+    window : name of a SciPy window
+    reference : amplitude of 0 dB, in `unit`
+    unit : unit of the signal
 
     Returns
     -------
-    Waterfall
-        The mean of each window is removed: the static deflection is no vibration.
+    the mean of each window is removed: the static deflection is no vibration
 
     Raises
     ------
@@ -199,14 +192,12 @@ def line_level(spectra: Waterfall, line: OrderLine) -> Floats:
 
     Parameters
     ----------
-    spectra : Waterfall
-        The run.
-    line : OrderLine
-        The order.
+    spectra : the run
+    line : the order
 
     Returns
     -------
-    (n,) array
+    (n,)
         Highest level within half the resolution to both sides of the line, dB; NaN where the line lies above
         the band or so low (four spectral widths) that the window cannot tell it from the mean.
     """

@@ -40,13 +40,9 @@ def other_windows(
 
     Parameters
     ----------
-    runs : sequence of VariantRun
-        Of different variants, analysed with one window.
-    lines : sequence of OrderLine
-    factors : iterable of float
-        Lengths over that of the window.
-    rule : AbsenceRule, optional
-        When a peak counts as absent.
+    runs : of different variants, analysed with one window
+    factors : lengths over that of the window
+    rule : when a peak counts as absent
 
     Raises
     ------

@@ -57,9 +57,7 @@ class ModeNamer:
 
     Parameters
     ----------
-    system : MeanSystem
-    speed : float
-        Of the input, rad/s.
+    speed : of the input, rad/s
     """
 
     def __init__(self, system: MeanSystem, speed: float) -> None:

@@ -78,10 +78,8 @@ def mode_tracks(modes_at: Callable[[float], Found], low: float, high: float) -> 
 
     Parameters
     ----------
-    modes_at : callable
-        From a speed (rad/s) to the modes there.
-    low, high : float
-        Ends of the range, rad/s.
+    modes_at : from a speed (rad/s) to the modes there
+    low, high : ends of the range, rad/s
 
     Examples
     --------

@@ -93,19 +93,13 @@ def trace(
     Parameters
     ----------
     residual : callable
-    start : complex array
-        Lines near a solution at `first`.
-    first, last : float
-        Of the parameter.
-    scales : Scales
-    step, longest : float
-        First and longest step along the branch, in scales.
-    most : int
-        Points at most.
+    start : lines near a solution at `first`
+    first, last : of the parameter
+    step, longest : first and longest step along the branch, in scales
+    most : points at most
     solve : callable, optional
         Solution of the linear equations; GMRES as it stands by default.
-    progress : callable, optional
-        Called with the parameter of each point.
+    progress : called with the parameter of each point
 
     Raises
     ------

@@ -71,12 +71,9 @@ def predicted_top(places: Floats, values: Complexes, highest: int) -> tuple[floa
 
     Parameters
     ----------
-    places : (n,) array
-        Ascending, five or more.
-    values : (n, signals) complex array
-        The height is the root of their summed squares; all have the same poles.
-    highest : int
-        Which is the highest, neither the first nor the last.
+    places : (n,) ascending, five or more
+    values : (n, signals) the height is the root of their summed squares; all have the same poles
+    highest : which is the highest, neither the first nor the last
 
     Notes
     -----

@@ -37,16 +37,11 @@ def exponents(
 
     Parameters
     ----------
-    constant : (n, n) array
-        A, 1/s.
-    pushes : (n, j) array
-        Columns b.
-    reads : (j, n) array
-        Rows c.
-    varying : (kicks, j, j) array
-        What multiplies the readings, at even instants of the period.
-    period : float
-        s.
+    constant : (n, n) A, 1/s
+    pushes : (n, j) columns b
+    reads : (j, n) rows c
+    varying : (kicks, j, j) what multiplies the readings, at even instants of the period
+    period : s
 
     Examples
     --------

@@ -30,18 +30,13 @@ def solve_lines(
 
     Parameters
     ----------
-    apply : callable
-        A times an array of the shape of `right`.
-    right : complex array
-    tolerance : float
-        Residual over the size of the right-hand side.
-    start : complex array, optional
+    apply : a times an array of the shape of `right`
+    tolerance : residual over the size of the right-hand side
 
     Returns
     -------
-    solution : complex array
-    products : int
-        Products with A that it took.
+    solution
+    products : products with A that it took
 
     Raises
     ------

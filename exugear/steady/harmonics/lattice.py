@@ -86,13 +86,10 @@ def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = Fals
 
     Parameters
     ----------
-    lines : LineSet
-        Lines of the signals.
-    larger : LineSet
-        Lines of the same bases; twice the harmonics and combinations keep products of two lines apart.
-    least : int
-        Samples at least.
-    shared : bool
+    lines : lines of the signals
+    larger : lines of the same bases; twice the harmonics and combinations keep products of two lines apart
+    least : samples at least
+    shared
         Whether lines that are in the larger set alone may share slots with each other: a third fewer samples, on which
         what lies beyond the larger set meets those of the lines more often.
 

@@ -176,12 +176,9 @@ def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> 
 
     Parameters
     ----------
-    orders : sequence of float
-        Frequency of each base over that of the reference, positive.
-    harmonics : int
-        Highest multiple of one base alone.
-    combinations : int
-        Largest sum of the magnitudes of a combination's multiples.
+    orders : frequency of each base over that of the reference, positive
+    harmonics : highest multiple of one base alone
+    combinations : largest sum of the magnitudes of a combination's multiples
 
     Examples
     --------
@@ -206,11 +203,6 @@ def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> 
 def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
     """Lines with those beside them that slow turns make, whose bases come after the others.
 
-    Parameters
-    ----------
-    lines : LineSet
-    modulators : sequence of Modulator
-
     Examples
     --------
     >>> lines = modulated(line_set([10.0, 47.0], 1), [Modulator(1.0, (0,), 3, 1)])
@@ -231,11 +223,8 @@ def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
 
     Parameters
     ----------
-    lines : LineSet
-    slow : sequence of Modulator
-        What turns, one at a time: after a turn over their `count` the things stand in each other's places.
-    most : int
-        Passings beside a line at most.
+    slow : what turns, one at a time: after a turn over their `count` the things stand in each other's places
+    most : passings beside a line at most
 
     Examples
     --------

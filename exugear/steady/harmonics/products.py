@@ -116,9 +116,9 @@ class Coupling:
 
         Parameters
         ----------
-        functions : sequence of (q, size, size) complex arrays
+        functions : (q, size, size)
             By group: coefficients at its harmonics, rows what signals take in and columns what they give.
-        values : (n, k) complex array
+        values : (n, k)
         """
         real, imaginary = self.memory()
         take_in(kept_bundle(self.terms), *flat(functions), np.ascontiguousarray(values, complex), real, imaginary)

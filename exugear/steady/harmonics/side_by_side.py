@@ -109,12 +109,10 @@ def solve_side_by_side(
 
     Parameters
     ----------
-    plan : Elimination
-        Of a pattern that holds all entries of the three matrices.
-    stiffness, damping, mass : (n, n) arrays
-    frequencies : (lines,) array
-        Angular frequencies w, rad/s.
-    loads : (n, loads) array
+    plan : of a pattern that holds all entries of the three matrices
+    stiffness, damping, mass : (n, n)
+    frequencies : (lines,) angular frequencies w, rad/s
+    loads : (n, loads)
     """
     places = (plan.row, plan.column)
     given = np.ascontiguousarray(loads[plan.order])

@@ -231,8 +231,7 @@ def bearing_waves(meshes: MeshWaves) -> BearingWaves | None:
 
     Parameters
     ----------
-    meshes : MeshWaves
-        Of the same gearbox: bearings of planets that mesh out of phase have all waves.
+    meshes : of the same gearbox: bearings of planets that mesh out of phase have all waves
 
     Raises
     ------
@@ -295,14 +294,9 @@ def places_with_bearings(
 
     Parameters
     ----------
-    places : MeshPlaces
-    bearings : BearingWaves
-    meshes : int
-        Number of bases of meshes, behind which those of carriers follow.
-    speed : float
-        Of the input, rad/s.
-    angles : (s, bases) array
-        Of the bases, rad.
+    meshes : number of bases of meshes, behind which those of carriers follow
+    speed : of the input, rad/s
+    angles : (s, bases) of the bases, rad
     """
     count = places.there.shape[-1]
     means = list(places.means)

@@ -25,7 +25,7 @@ def vibrations(mass: Floats, damping: Floats, stiffness: Floats) -> tuple[Comple
 
     Parameters
     ----------
-    mass, damping, stiffness : (size, size) arrays
+    mass, damping, stiffness : (size, size)
 
     Examples
     --------

@@ -190,9 +190,7 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
 
     Parameters
     ----------
-    assembly : Assembly
-    speeds : array_like
-        rad/s; the system holds between the lowest and the highest.
+    speeds : rad/s; the system holds between the lowest and the highest
 
     Raises
     ------
@@ -252,13 +250,9 @@ def torque_of_vibration(system: MeanSystem, speed: float, frequencies: Floats, m
 
     Parameters
     ----------
-    system : MeanSystem
-    speed : float
-        Of the input, rad/s.
-    frequencies : (lines,) array
-        Angular frequencies, rad/s.
-    motion : (lines, size) complex array
-        Coefficients about the static state, the mean first.
+    speed : of the input, rad/s
+    frequencies : (lines,) angular frequencies, rad/s
+    motion : (lines, size) coefficients about the static state, the mean first
 
     Notes
     -----
@@ -293,9 +287,7 @@ def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
 
     Parameters
     ----------
-    assembly : Assembly
-    elastic : collection of str
-        Bodies that another variant takes as elastic, which this one does not.
+    elastic : bodies that another variant takes as elastic, which this one does not
     """
     try:
         _check(assembly)

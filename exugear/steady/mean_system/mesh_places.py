@@ -47,12 +47,8 @@ def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Float
 
     Parameters
     ----------
-    waves : MeshWaves
-    speed : float
-    positions : (m,) array
-        In the mesh cycle at zero angle of the input.
-    angles : (s, bases) array
-        Of the bases, rad; those of carriers after those of the meshes.
+    positions : (m,) in the mesh cycle at zero angle of the input
+    angles : (s, bases) of the bases, rad; those of carriers after those of the meshes
     """
     count = len(waves.waves)
     turning = bool(waves.carriers)
@@ -89,12 +85,9 @@ def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None) 
 
     Parameters
     ----------
-    planets : PlanetSet or None
-        None of what does not travel.
-    speed : float
-        Of the input, rad/s.
-    turned : (s,) array or None
-        Angles of the base of the carrier, rad; None where it is none.
+    planets : None of what does not travel
+    speed : of the input, rad/s
+    turned : (s,) angles of the base of the carrier, rad; None where it is none
     """
     if planets is None:
         return np.ones((1, 1))

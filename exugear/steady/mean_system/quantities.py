@@ -68,8 +68,7 @@ def quantities_of(names: Sequence[str]) -> tuple[Quantity, ...]:
 
     Parameters
     ----------
-    names : sequence of str
-        Of the signals, as `exugear.steady.mean_system.signals.SignalName` has them.
+    names : of the signals, as `exugear.steady.mean_system.signals.SignalName` has them
 
     Examples
     --------

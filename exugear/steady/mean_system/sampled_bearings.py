@@ -22,18 +22,13 @@ def sample_rolling(rolling: RollingArrays, law: int, readings: Floats) -> tuple[
 
     Parameters
     ----------
-    rolling : RollingArrays
-    law : int
-        Which of them.
-    readings : (s, 5) array
-        Displacement and tilts, ahead by the time of the damping, m and rad.
+    law : which of them
+    readings : (s, 5) displacement and tilts, ahead by the time of the damping, m and rad
 
     Returns
     -------
-    force : (s, 5) array
-        N and N m.
-    slope : (s, 5, 5) array
-        Its derivatives by the readings.
+    force : (s, 5) N and N m
+    slope : (s, 5, 5) its derivatives by the readings
     """
     force = np.empty(readings.shape)
     slope = np.empty((*readings.shape, readings.shape[1]))

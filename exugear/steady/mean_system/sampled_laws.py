@@ -86,10 +86,10 @@ def sample_line(stiffness: Floats, readings: Floats) -> LawSamples:
 
     Parameters
     ----------
-    stiffness : (6, s) array
+    stiffness : (6, s)
         Stiffness where the mean speed alone has brought the mesh, N/m, and its two derivatives per cycle; the same of
         the force that it has less, N.
-    readings : (s, 2) array
+    readings : (s, 2)
         Deflection, m, and how far the vibration has moved the position, cycles. It is a thousandth of a cycle or less,
         so that a parabola serves.
     """
@@ -105,11 +105,9 @@ def sample_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
 
     Parameters
     ----------
-    curve : (6, s) array
-        Load over deflection at a load, N/m, and its exponent less one; each with two derivatives per cycle.
-    readings : (s, 2) array
-    load : float
-        N.
+    curve : (6, s) load over deflection at a load, N/m, and its exponent less one; each with two derivatives per cycle
+    readings : (s, 2)
+    load : N
     """
     deflection, moved = readings.T
     (k, k_slope), (n, n_slope) = _moved(curve[:3], moved), _moved(curve[3:], moved)
@@ -128,10 +126,10 @@ def sample_wandering_line(tangents: Floats, readings: Floats) -> LawSamples:
 
     Parameters
     ----------
-    tangents : (18, s) array
+    tangents : (18, s)
         Stiffness k (N/m), force that it has less p (N), with the way w of the load k w, p w and k w^2, and the moment
         beyond it (N m); each with two derivatives per cycle.
-    readings : (s, 3) array
+    readings : (s, 3)
         Deflection (m), misalignment against that of the contact's state (rad), and position as `sample_line` has it.
     """
     deflection, tilt, moved = readings.T

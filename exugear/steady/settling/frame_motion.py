@@ -14,11 +14,8 @@ def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
 
     Parameters
     ----------
-    frame : RotatingFrame
-    q : (s, size) array
-        Coordinates of the assembly, m and rad.
-    psi : (s,) array
-        Angles of the overall input, rad.
+    q : (s, size) coordinates of the assembly, m and rad
+    psi : (s,) angles of the overall input, rad
     """
     assembly = frame.assembly
     still = np.zeros(frame.assembly.size)

@@ -76,16 +76,10 @@ class SettlingRun:
 
     Parameters
     ----------
-    system : MeanSystem
-    lines : LineSet
-    rows : (m, size) array
-        Rows of the mesh deflections, in which it is judged whether a motion repeats.
-    bases : (bases,) array
-        Mesh frequencies over the frequency of the input's turns.
-    speed : float
-        Of the overall input, rad/s.
-    motion : (n, size) complex array
-        Lines of the motion to start from, in the rotating frame about the static state.
+    rows : (m, size) rows of the mesh deflections, in which it is judged whether a motion repeats
+    bases : (bases,) mesh frequencies over the frequency of the input's turns
+    speed : of the overall input, rad/s
+    motion : (n, size) lines of the motion to start from, in the rotating frame about the static state
     """
 
     def __init__(

@@ -81,9 +81,7 @@ def shares(sampling: Sampling, count: int, dimensions: int, seed: int) -> Floats
     Parameters
     ----------
     sampling : {"sobol", "latin_hypercube", "random"}
-    count : int
-        Of Sobol points a power of two.
-    dimensions, seed : int
+    count : of Sobol points a power of two
 
     Examples
     --------
@@ -105,10 +103,8 @@ def correlated(independent: Floats, correlation: float) -> Floats:
 
     Parameters
     ----------
-    independent : (count, members) array
-        Shares that are not correlated.
-    correlation : float
-        Of the normal variables behind any two members, 0 to 1.
+    independent : (count, members) shares that are not correlated
+    correlation : of the normal variables behind any two members, 0 to 1
 
     Examples
     --------

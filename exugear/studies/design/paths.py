@@ -21,10 +21,8 @@ def value_at(content: Mapping[str, Any], path: str) -> Any:
 
     Parameters
     ----------
-    content : mapping
-        Of a gearbox file.
-    path : str
-        Keys joined by dots; an entry of a list by its number from 0.
+    content : of a gearbox file
+    path : keys joined by dots; an entry of a list by its number from 0
 
     Examples
     --------

@@ -74,9 +74,8 @@ def percentile_of(values: Floats, percent: float) -> Floats:
 
     Parameters
     ----------
-    values : (..., draws) array
-    percent : float
-        50 and above; below it the mirrored one, which errs to the side of small values.
+    values : (..., draws)
+    percent : 50 and above; below it the mirrored one, which errs to the side of small values
 
     Notes
     -----

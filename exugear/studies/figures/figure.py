@@ -52,12 +52,7 @@ class Figure:
         return self.function(results, **options)
 
     def check(self, name: str, options: Mapping[str, Any]) -> None:
-        """Refuse options that it has not got, are of another type, or are missing.
-
-        Raises
-        ------
-        FigureError
-        """
+        """Refuse options that it has not got, are of another type, or are missing."""
         known = {
             key: parameter
             for key, parameter in inspect.signature(self.function).parameters.items()

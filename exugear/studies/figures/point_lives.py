@@ -52,14 +52,9 @@ def point_life(
 
     Parameters
     ----------
-    assembly : Assembly
-    choice : Choice
-    shared : Shared
-        Holds tables of pairs and the stresses from them.
-    folder : Path
-        Of the point: K_v of a run or a response lies there.
-    progress : callable
-        Called between steps, so that what is stopped ends.
+    shared : holds tables of pairs and the stresses from them
+    folder : of the point: K_v of a run or a response lies there
+    progress : called between steps, so that what is stopped ends
 
     Returns
     -------

@@ -94,10 +94,8 @@ def kept_figures(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, 
 
     Parameters
     ----------
-    sections : mapping
-        By the name in the dataset: ``figure`` and its options.
-    known : mapping
-        Figures that may be named.
+    sections : by the name in the dataset: ``figure`` and its options
+    known : figures that may be named
 
     Raises
     ------

@@ -148,15 +148,13 @@ def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:
 
     Parameters
     ----------
-    rows : (m, r, 12) array
-        Rows over the coordinates of both gears seen from the frame.
-    axis : (m, 2, 2) array
-        Axis of each gear relative to the frame's at zero angles, m; zero for gears without translations.
+    rows : (m, r, 12) rows over the coordinates of both gears seen from the frame
+    axis : (m, 2, 2) axis of each gear relative to the frame's at zero angles, m; zero for gears without translations
 
     Returns
     -------
-    rows : (m, r, 48) array
-    offsets : (m, r, 3) array
+    rows : (m, r, 48)
+    offsets : (m, r, 3)
     """
     count, kinds = rows.shape[:2]
     gears = rows.reshape(count, kinds, 2, BODY_SIZE)

@@ -113,13 +113,11 @@ def periodic_cubic(samples: Floats) -> Floats:
 
     Parameters
     ----------
-    samples : (n,) array
-        Values at pmc = 0, 1/n, ...; one sample means a constant.
+    samples : (n,) values at pmc = 0, 1/n, ...; one sample means a constant
 
     Returns
     -------
-    (n, 4) array
-        Coefficients c of sum_j c_j t^j on each piece, t from 0 to 1.
+    (n, 4) coefficients c of sum_j c_j t^j on each piece, t from 0 to 1
 
     Examples
     --------

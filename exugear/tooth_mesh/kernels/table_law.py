@@ -400,10 +400,8 @@ def surface_law(
 
     Returns
     -------
-    piece : int
-        Load piece of the solution, whose cubics are left in `memory.cubic`.
-    t : float
-        Position in it: below 0 where the flanks are apart, above 1 beyond the last load.
+    piece : load piece of the solution, whose cubics are left in `memory.cubic`
+    t : position in it: below 0 where the flanks are apart, above 1 beyond the last load
     """
     law, cubic, shape = memory.law, memory.cubic, tables.shape[m]
     for i in range(LAW_SIZE):
@@ -486,7 +484,7 @@ def surface_tangent(t: float, piece: int, m: int, tables: TableArrays, memory: S
 
     Parameters
     ----------
-    out : (4, 4) array
+    out : (4, 4)
         Derivatives of F, dU/da, dU/d gamma and of the tangent stiffness (rows) by delta, a, gamma and pmc (columns).
     """
     out[:] = 0.0
@@ -539,7 +537,7 @@ def surface_damping(t: float, piece: int, m: int, tables: TableArrays, memory: S
 
     Parameters
     ----------
-    out : (5,) array
+    out : (5,)
         s_a (m/m), s_gamma (m/rad); the tangent at constant load by a twice (N/m), a and gamma (N), gamma twice (N m).
     """
     for i in range(DAMPING_SIZE):

@@ -37,15 +37,12 @@ def pack(
 
     Parameters
     ----------
-    elements : tuple of MeshElement
     coordinates : mapping of body name, or of `seat_key`, to six state indices (-1 where there is none)
-    averaged : bool
-        Replace stiffness and tables by their mean over the cycle, as eigenmodes need it.
-    linear : bool
+    averaged : replace stiffness and tables by their mean over the cycle, as eigenmodes need it
+    linear
         Replace laws that are no stiffness, such as tables, by the stiffness they have at the static load: force over
         deflection.
-    tangent : bool
-        Replace curves by the straight line that touches them at the static load.
+    tangent : replace curves by the straight line that touches them at the static load
     """
     count = len(elements)
     forms = [_form(element, averaged, linear, tangent) for element in elements]

@@ -21,11 +21,8 @@ def mesh_stiffness(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    law : str
-        One of `exugear.tooth_mesh.laws.registry.MESH_LAWS`; it says whether it needs tables.
-    directory : path, optional
-        Results directory with ``tables/<pair>.nc``.
+    law : one of `exugear.tooth_mesh.laws.registry.MESH_LAWS`; it says whether it needs tables
+    directory : results directory with ``tables/<pair>.nc``
 
     Raises
     ------

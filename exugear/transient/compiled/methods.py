@@ -183,16 +183,13 @@ def growth(method: Method, eigenvalues: Complexes, step: float) -> Complexes:
 
     Parameters
     ----------
-    method : Method
-    eigenvalues : (n,) array
+    eigenvalues : (n,)
         Of the motions, 1/s. A real one counts as critically damped, which is more than what a real motion takes.
-    step : float
-        s.
+    step : s
 
     Returns
     -------
-    (n, m) array
-        Roots; the first belongs to the motion itself, the others are parasitic.
+    (n, m) roots; the first belongs to the motion itself, the others are parasitic
     """
     scaled = eigenvalues * step
     if not method.is_multistep:
@@ -265,10 +262,8 @@ def ahead_of_correction(method: Method, angle: Floats, lag: float = 0.0) -> Comp
 
     Parameters
     ----------
-    method : Method
-    angle : (n,) array
-        rad, up to pi.
-    lag : float
+    angle : (n,) rad, up to pi
+    lag
         What is read off is ahead by so many steps: position + lag * step * velocity, as the force of a spring with
         damping in proportion to its stiffness. A deflection has none.
 
@@ -296,11 +291,8 @@ def resonance_error(method: Method, eigenvalues: Complexes, step: float, band: f
 
     Parameters
     ----------
-    method : Method
-    eigenvalues : (n,) array
-        Of motions that oscillate, 1/s.
-    step, band : float
-        s and Hz.
+    eigenvalues : (n,) of motions that oscillate, 1/s
+    step, band : s and Hz
 
     Examples
     --------

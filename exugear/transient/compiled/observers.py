@@ -17,9 +17,7 @@ class Observer:
 
     Parameters
     ----------
-    assembly : Assembly
-    loads : LoadTable
-        What acts from outside, for its power.
+    loads : what acts from outside, for its power
 
     Attributes
     ----------
@@ -40,19 +38,14 @@ class Observer:
 
         Parameters
         ----------
-        time : (samples,) array
-            s.
-        q, v : (samples, size) arrays
-            Coordinates and velocities.
+        time : (samples,) s
+        q, v : (samples, size) coordinates and velocities
 
         Returns
         -------
-        signals : (samples, columns) array
-            See `layout`.
-        energies : (samples, 2) array
-            `exugear.dynamics.signals.ENERGIES`, J.
-        powers : (samples, 5) array
-            `exugear.dynamics.signals.POWERS`, W.
+        signals : (samples, columns) see `layout`
+        energies : (samples, 2) `exugear.dynamics.signals.ENERGIES`, J
+        powers : (samples, 5) `exugear.dynamics.signals.POWERS`, W
         """
         signals, energies = self._system.observe(time, q, v)
         self.complete(q, v, signals)

@@ -57,15 +57,10 @@ class CompiledSystem:
 
     Parameters
     ----------
-    assembly : Assembly
-    q, v : (size,) arrays
-        Initial coordinates and velocities.
-    loads : LoadTable
-    step : float
-        Time step, s; see `exugear.transient.compiled.step`.
-    method : Method
-        The classical Runge-Kutta method by default.
-    past : (n, size) array, optional
+    q, v : (size,) initial coordinates and velocities
+    step : time step, s; see `exugear.transient.compiled.step`
+    method : the classical Runge-Kutta method by default
+    past : (n, size)
         Accelerations at the steps before, the latest at the state itself. A multistep method goes on from them as if
         it had not stopped; without them it starts anew.
     """
@@ -112,14 +107,13 @@ class CompiledSystem:
 
         Parameters
         ----------
-        signals, energies : (steps, columns) and (steps, 7) arrays, optional
+        signals, energies : (steps, columns) (steps, 7)
             For what `exugear.transient.compiled.sampling.take_sample` fills. Powers but those of meshes stand for as
             many steps as make up the interval of powers; energies are not whole.
 
         Returns
         -------
-        int
-            Number of steps that stayed finite.
+        number of steps that stayed finite
         """
         none = np.empty((0, 0))
         outcome = q, v, none if signals is None else signals, none if energies is None else energies

@@ -232,18 +232,14 @@ def choose_integration(
 
     Parameters
     ----------
-    assembly : Assembly
-    sample_rate, band : float
-        Hz.
-    step : float, optional
-        Take this step, s, whatever its accuracy; the method is then the stable one of least error.
+    sample_rate, band : Hz
+    step : take this step, s, whatever its accuracy; the method is then the stable one of least error
     integrator : {"adams", "rk4"}, optional
         Kind of method; whichever is cheaper by default.
 
     Returns
     -------
-    Integration
-        Its margin is below 1 if the step asked for is not stable.
+    its margin is below 1 if the step asked for is not stable
 
     Examples
     --------

@@ -60,14 +60,10 @@ class FloatingSystem:
 
     Parameters
     ----------
-    body : FloatingBody
-    law : SeatLaw
-    speed : float
-        Spin about z at the beginning, rad/s.
+    speed : spin about z at the beginning, rad/s
     velocity : (3,) of the mass centre at the beginning, m/s
     modal_rates : (k,) rates of the modal coordinates at the beginning, m kg^0.5/s
-    stiffening : bool
-        Add the centrifugal tension that Exudyn leaves out. False shows what is missing.
+    stiffening : add the centrifugal tension that Exudyn leaves out. False shows what is missing.
     rotation : {"euler_parameters", "tait_bryan"}
         Tait-Bryan angles show what is wrong with them.
 

@@ -36,9 +36,7 @@ class FloatingBodies:
     Parameters
     ----------
     mbs : exudyn.MainSystem
-    assembly : Assembly
-    q, v : (size,) arrays
-        Initial coordinates and velocities of the assembly.
+    q, v : (size,) initial coordinates and velocities of the assembly
 
     Attributes
     ----------

@@ -42,16 +42,11 @@ class ExudynSystem:
 
     Parameters
     ----------
-    assembly : Assembly
-    q, v : (size,) arrays
-        Initial coordinates and velocities in the assembly's order.
-    loading : Loading
+    q, v : (size,) initial coordinates and velocities in the assembly's order
     mesh_route : {"element", "loads"}
         One element for all meshes, or user-function loads per mesh.
-    meshes : MeshArrays, optional
-        Mesh arrays other than the assembly's; None for the assembly's.
-    with_meshes : bool
-        False leaves the meshes out, for linearisation of the rest.
+    meshes : mesh arrays other than the assembly's; None for the assembly's
+    with_meshes : False leaves the meshes out, for linearisation of the rest
 
     Attributes
     ----------
@@ -155,14 +150,11 @@ class ExudynSystem:
 
         Parameters
         ----------
-        start : float
-            Time at the beginning, s.
-        steps, step : int, float
-            Number and length (s) of the steps.
+        start : time at the beginning, s
+        steps, step : number and length (s) of the steps
         observe : callable, optional
             Called at the start and after each step; returning False ends the run there.
-        explicit : bool
-            RK44; else generalized-alpha, which the variant `jointed` and floating frames need.
+        explicit : RK44; else generalized-alpha, which the variant `jointed` and floating frames need
 
         Raises
         ------

@@ -30,12 +30,9 @@ class Cache(Displayed, Generic[Value]):
 
     Parameters
     ----------
-    name : str
-        Of a value, in one word: files are ``<name>-<key>.npz`` in `kept_folder`.
-    in_memory : int
-        Values that are kept in memory.
-    in_files : int
-        Bytes that are kept in files.
+    name : of a value, in one word: files are ``<name>-<key>.npz`` in `kept_folder`
+    in_memory : values that are kept in memory
+    in_files : bytes that are kept in files
 
     Examples
     --------

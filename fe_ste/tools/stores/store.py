@@ -56,8 +56,7 @@ class Store:
 
         Parameters
         ----------
-        unpack : callable
-            Makes what is wanted of the arrays by name. What it misses, or cannot take, means a damaged file.
+        unpack : makes what is wanted of the arrays by name. What it misses, or cannot take, means a damaged file.
 
         Returns
         -------

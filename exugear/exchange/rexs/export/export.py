@@ -62,14 +62,10 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
 
     Parameters
     ----------
-    gearbox : Gearbox
-        Imported from the file; values may have been edited since, names may not.
-    folder : Path
-        Its results.
-    path : path-like
-        The REXS file; it is read only.
-    rules : Rules, optional
-        Those that it was imported with.
+    gearbox : imported from the file; values may have been edited since, names may not
+    folder : its results
+    path : the REXS file; it is read only
+    rules : those that it was imported with
 
     Raises
     ------

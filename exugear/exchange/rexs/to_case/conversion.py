@@ -168,13 +168,9 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
 
     Parameters
     ----------
-    model : Model
-    source : str
-        Name of the REXS file, for the comments.
-    path : path-like
-        Where the gearbox file is going to be, for messages.
-    rules : Rules, optional
-        What counts where the file contradicts itself.
+    source : name of the REXS file, for the comments
+    path : where the gearbox file is going to be, for messages
+    rules : what counts where the file contradicts itself
 
     Raises
     ------

@@ -150,8 +150,7 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
 
     Parameters
     ----------
-    links : mapping of body name to int
-        Number of meshes of each body that turns.
+    links : by body name, number of meshes of each body that turns
 
     Raises
     ------
@@ -199,10 +198,8 @@ def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: f
 
     Parameters
     ----------
-    static : float
-        Torque of the static state at the input, N m.
-    ratio : float
-        Speed of the output over that of the input.
+    static : torque of the static state at the input, N m
+    ratio : speed of the output over that of the input
     """
     blocks = {}
     fastest = 0.0
@@ -278,13 +275,8 @@ def life_blocks(
 
     Parameters
     ----------
-    model : Model
-    loads : sequence of Loads
-    ends : Ends
-    ratio : float
-        Speed of the output over that of the input.
-    gears : mapping of str to (Component, bool)
-        Gears by name, and whether their teeth bend both ways.
+    ratio : speed of the output over that of the input
+    gears : gears by name, and whether their teeth bend both ways
     """
     rated = max(loads, key=lambda one: abs(one.torques.get(ends.input, 0.0)))
     speed = abs(_input_speed(rated, ends, ratio))

@@ -159,10 +159,8 @@ def toml_text(head: Sequence[str], top: Mapping[str, Entry], groups: Sequence[tu
 
     Parameters
     ----------
-    head : sequence of str
-        Lines of comment before everything else.
-    top : mapping of str to Entry
-        Keys outside of tables.
+    head : lines of comment before everything else
+    top : keys outside of tables
     groups : sequence of (str, mapping of str to Block)
         Heading and tables, by their dotted name.
     """

@@ -226,10 +226,7 @@ def levelled(sections: Sequence[Cylinder], seats: Iterable[tuple[str, float, flo
 
     Parameters
     ----------
-    sections : sequence of Cylinder
-    seats : iterable of (str, float, float)
-        Name, middle and width of what sits there, mm.
-    notes : Notes
+    seats : name, middle and width of what sits there, mm
     """
     pieces = list(sections)
     for name, z, width in seats:
