@@ -13,6 +13,8 @@ sys.path[:0] = [str(ROOT), str(HERE / "tools")]
 
 import gallery  # noqa: E402  beside this file, found by the line above
 
+from fe_ste.tools import arrays  # noqa: E402
+
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Examples name files as the command line does, from the root of the project.
 os.chdir(ROOT)
@@ -50,7 +52,8 @@ smartquotes = False
 autosummary_generate = False
 autodoc_member_order = "bysource"
 autodoc_docstring_signature = False  # signatures stand in the code, not in first lines of docstrings
-autodoc_typehints = "none"  # numpydoc's sections tell them, with units
+autodoc_typehints = "signature"  # docstrings tell what annotations do not: shapes, units, meaning
+autodoc_type_aliases = {name: name for name in arrays.__all__}  # Floats, not its long form
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 

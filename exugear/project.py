@@ -65,14 +65,6 @@ class Project(Displayed):
     belong to this input and method. A run is made anew each time, or goes on (`resume`); what bearings and meshes bear,
     and a rating, are found anew.
 
-    Attributes
-    ----------
-    gearbox : Gearbox
-    folder : Path
-        Results folder; made when something is written.
-    choice : Choice
-        Variant, mesh law, inertia set and load case, nothing left open.
-
     Examples
     --------
     >>> project = Project.from_toml("cases/grc750/gearbox.toml", choice=Choice("bushing", "iso6336"))
@@ -84,7 +76,9 @@ class Project(Displayed):
 
     gearbox: Gearbox
     folder: Path
+    """Results folder; made when something is written."""
     choice: Choice = Choice()
+    """Variant, mesh law, inertia set and load case, nothing left open."""
 
     def __post_init__(self) -> None:
         """Fill in what the choice leaves open."""

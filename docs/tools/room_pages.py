@@ -47,7 +47,8 @@ def rooms() -> dict[str, list[Path]]:
 def _room(name: str, files: list[Path]) -> str:
     lines = [_title(name, "="), _about(ROOT.joinpath(*name.split("."), "__init__.py")), ""]
     for file in files:
-        lines += [_title(file.stem, "-"), f".. automodule:: {name}.{file.stem}", "   :members:", ""]
+        lines += [_title(file.stem, "-"), f".. automodule:: {name}.{file.stem}"]
+        lines += ["   :members:", "   :undoc-members:", ""]
     return "\n".join(lines)
 
 

@@ -39,89 +39,61 @@ the third power of the load."""
 
 @dataclass(frozen=True)
 class Ratings:
-    """Load ratings of a bearing, N.
-
-    Attributes
-    ----------
-    dynamic, static : float
-    estimated : bool
-        Whether they follow from the inside of the bearing, by ISO 281 and ISO 76.
-    makers : tuple of str
-        Whose catalogues they are the least of; empty if they are not.
-    """
+    """Load ratings of a bearing, N."""
 
     dynamic: float
     static: float
     estimated: bool
+    """Whether they follow from the inside of the bearing, by ISO 281 and ISO 76."""
     makers: tuple[str, ...] = ()
+    """Whose catalogues they are the least of; empty if they are not."""
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Radial stiffness (N/m) at both ends of what an estimated dimension may be, under the same load.
-
-    Attributes
-    ----------
-    key : str
-        Key of the file that would replace the estimate.
-    value, low, high : float
-        Estimate and its range, in the unit of the key.
-    at_low, at_high : float
-        Radial stiffness there, N/m; NaN where such a bearing cannot be built.
-    """
+    """Radial stiffness (N/m) at both ends of what an estimated dimension may be, under the same load."""
 
     key: str
+    """Key of the file that would replace the estimate."""
     value: float
     low: float
     high: float
+    """Estimate and its range, in the unit of the key."""
     at_low: float
     at_high: float
+    """Radial stiffness there, N/m; NaN where such a bearing cannot be built."""
 
 
 @dataclass(frozen=True)
 class BearingDuty:
-    """What a catalogue bearing bears.
-
-    Attributes
-    ----------
-    name, family, kind, law : str
-        Its name, that of its section, the type of bearing, and what its force follows.
-    radial_load, axial_load : float
-        Of the shaft on the inner ring, what its rows carry, N.
-    reaction : float, optional
-        Radial load that the statics find, N, where the loads before are those that the file states.
-    stiffness : (6, 6) array
-        Of the rows, mean over positions of the cage, N/m .. N m/rad.
-    radial_stiffness : float
-        Along the load, N/m.
-    misalignment : float
-        Tilt of the inner ring against the outer one, rad.
-    element_load, pressure : float
-        Load (N) and contact pressure at the inner ring (Pa) of the most loaded rolling element.
-    ratings : Ratings
-    basic_life, reference_life : float
-        L10 by ISO 281 and L10r by ISO/TS 16281 (basic: lubricant and cleanliness left out), million revolutions;
-        infinite without load.
-    remarks : tuple of str
-        What a reader should know before trusting the row.
-    """
+    """What a catalogue bearing bears."""
 
     name: str
     family: str
     kind: str
     law: str
+    """Its name, that of its section, the type of bearing, and what its force follows."""
     radial_load: float
     axial_load: float
+    """Of the shaft on the inner ring, what its rows carry, N."""
     reaction: float | None
+    """Radial load that the statics find, N, where the loads before are those that the file states."""
     stiffness: Floats
+    """(6, 6) of the rows, mean over positions of the cage, N/m .. N m/rad."""
     radial_stiffness: float
+    """Along the load, N/m."""
     misalignment: float
+    """Tilt of the inner ring against the outer one, rad."""
     element_load: float
     pressure: float
+    """Load (N) and contact pressure at the inner ring (Pa) of the most loaded rolling element."""
     ratings: Ratings
     basic_life: float
     reference_life: float
+    """L10 by ISO 281 and L10r by ISO/TS 16281 (basic: lubricant and cleanliness left out), million revolutions;
+    infinite without load."""
     remarks: tuple[str, ...]
+    """What a reader should know before trusting the row."""
 
 
 def ratings_of(section: CatalogueSection) -> Ratings:

@@ -41,18 +41,12 @@ def equally_spaced(planets: Sequence[Body]) -> bool:
 
 
 class PlanetSupports(NamedTuple):
-    """Supports of one family, one of each planet of a set.
-
-    Attributes
-    ----------
-    numbers : (N,) array of int
-        Among all supports, in the order of the planets.
-    angles : (N,) array
-        Of the planets in the carrier's axes, rad.
-    """
+    """Supports of one family, one of each planet of a set."""
 
     numbers: Integers
+    """(N,) among all supports, in the order of the planets."""
     angles: Floats
+    """(N,) of the planets in the carrier's axes, rad."""
 
 
 def planet_supports(supports: Sequence[Bearing], planets: Sequence[str], angles: Floats) -> list[PlanetSupports]:

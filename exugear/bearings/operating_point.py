@@ -30,34 +30,22 @@ CAGE_POSITIONS = 4
 
 @dataclass(frozen=True)
 class OperatingPoint(Displayed):
-    """A catalogue bearing under the static load of its gearbox.
-
-    Attributes
-    ----------
-    bearing : Bearing
-    rows : tuple of RollingRow
-    displacement : (6,) array
-        Inner ring relative to outer ring, m and rad, in the axes of what the bearing sits on.
-    load : (6,) array
-        Force and moment of the shaft on the inner ring that the rows carry, N and N m.
-    stiffness : (6, 6) array
-        Derivative of that load, mean over positions of the cage.
-    is_unloaded : bool
-        Whether it carries so little that its stiffness is that at the least load.
-    first_roller_angle : float
-        Polar angle of the first rolling element at which the displacement holds the load, rad.
-    load_stands_still : bool
-        Whether the load keeps its direction in these axes.
-    """
+    """A catalogue bearing under the static load of its gearbox."""
 
     bearing: Bearing
     rows: tuple[RollingRow, ...]
     displacement: Floats
+    """(6,) inner ring relative to outer ring, m and rad, in the axes of what the bearing sits on."""
     load: Floats
+    """(6,) force and moment of the shaft on the inner ring that the rows carry, N and N m."""
     stiffness: Floats
+    """(6, 6) derivative of that load, mean over positions of the cage."""
     is_unloaded: bool
+    """Whether it carries so little that its stiffness is that at the least load."""
     first_roller_angle: float = 0.0
+    """Polar angle of the first rolling element at which the displacement holds the load, rad."""
     load_stands_still: bool = True
+    """Whether the load keeps its direction in these axes."""
 
     def _line(self) -> str:
         radial = 1e-3 * self.radial_load

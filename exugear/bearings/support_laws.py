@@ -41,35 +41,24 @@ the second harmonic."""
 
 @dataclass(frozen=True)
 class SupportLaw:
-    """Law of one support, in the axes of what it sits on.
-
-    Attributes
-    ----------
-    stiffness, damping : (6, 6) arrays
-        Linear part, N/m .. N m/rad, and times s.
-    rows : tuple of RollingRow
-        Rows of rolling elements that act beside it; none for a linear support.
-    scale : float
-        Displacement of the inner ring against the outer one over that of the body against what it sits on.
-    damping_time : float
-        Damping over the stiffness of the rows, s.
-    cage_ratio : float
-        Turns of the cage per turn of the body against what it sits on; 0 for a cage that stands still.
-    phase : float
-        Polar angle of the first rolling element, rad.
-    point_strain, point_load : (6,) arrays
-        Displacement (m, rad) and load (N, N m) that the linear part passes; the origin by default.
-    """
+    """Law of one support, in the axes of what it sits on."""
 
     stiffness: Floats
     damping: Floats
+    """(6, 6) linear part, N/m .. N m/rad, and times s."""
     rows: tuple[RollingRow, ...] = ()
+    """Rows of rolling elements that act beside it; none for a linear support."""
     scale: float = 1.0
+    """Displacement of the inner ring against the outer one over that of the body against what it sits on."""
     damping_time: float = 0.0
+    """Damping over the stiffness of the rows, s."""
     cage_ratio: float = 0.0
+    """Turns of the cage per turn of the body against what it sits on; 0 for a cage that stands still."""
     phase: float = 0.0
+    """Polar angle of the first rolling element, rad."""
     point_strain: Floats = field(default_factory=lambda: np.zeros(6))
     point_load: Floats = field(default_factory=lambda: np.zeros(6))
+    """(6,) displacement (m, rad) and load (N, N m) that the linear part passes; the origin by default."""
 
 
 def load_stands_still(bearing: Bearing, bodies: Mapping[str, Body]) -> bool:

@@ -12,26 +12,22 @@ from fe_ste.tools.display import Displayed
 
 @dataclass(frozen=True)
 class ElasticBody(Displayed):
-    """A reduced body of a gearbox.
-
-    Attributes
-    ----------
-    reduced : with the rigid inertia of the body's inertia set
-    shape_inertia : rigid inertia of shape and blanks by themselves
-    main_seat : seat whose spin stands for the body: where torques act, else the first gear
-    sectors : seats on equal sectors by internal gear, an odd number, the first about +x, then on towards +y
-    shared_seats : seat that a second bearing sits on, by the bearing
-    floating : its modes in a frame that floats with it, for a body that moves so in Exudyn
-    file_digest : SHA-256 of the file of a solid
-    """
+    """A reduced body of a gearbox."""
 
     reduced: ReducedBody
+    """With the rigid inertia of the body's inertia set."""
     shape_inertia: RigidInertia
+    """Rigid inertia of shape and blanks by themselves."""
     main_seat: str
+    """Seat whose spin stands for the body: where torques act, else the first gear."""
     sectors: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Seats on equal sectors by internal gear, an odd number, the first about +x, then on towards +y."""
     shared_seats: Mapping[str, str] = field(default_factory=dict)
+    """Seat that a second bearing sits on, by the bearing."""
     floating: FloatingBody | None = None
+    """Its modes in a frame that floats with it, for a body that moves so in Exudyn."""
     file_digest: str | None = None
+    """SHA-256 of the file of a solid."""
 
     def _line(self) -> str:
         more = f", {len(self.sectors)} gears on sectors" if self.sectors else ""

@@ -13,35 +13,31 @@ from fe_ste.tools.display import Displayed
 
 @dataclass(frozen=True)
 class FloatingBody(Displayed, line=" {name}: {seats!n} seats, {stiffness!n} modes, {mass:.4g} kg"):
-    """A solid as modes in its own frame; n coordinates of the reduced body, k modes, s seats.
-
-    Attributes
-    ----------
-    name, seats : what it is, and names of its seats
-    places : (s, 3) of the seats, m
-    centre : (3,) where the frame is: mass centre of shape and rings, m
-    mass : kg
-    mode_coordinates : (n, k) coordinates of the reduced body by mode: seats' first, then modal coordinates
-    stiffness : (k,) of modes of unit mass, 1/s2
-    added_mass : (k,) by mass scaling beyond the unit mass of modes above the limit
-    first_moments : (3, 1 + k) int rho f of the place from the centre and of the modes, kg m and kg^0.5
-    second_moments : (3, 3, 1 + k, 1 + k) int rho f_a g_b
-    centrifugal_tension : (k, k) what times the square of the spin speed is the stiffness of centrifugal tension
-    turning : (k, k) antisymmetric S: a turn by psi takes modes into each other by exp(psi S)
-    """
+    """A solid as modes in its own frame; n coordinates of the reduced body, k modes, s seats."""
 
     name: str
     seats: tuple[str, ...]
+    """What it is, and names of its seats."""
     places: Floats
+    """(s, 3) of the seats, m."""
     centre: Floats
+    """(3,) where the frame is: mass centre of shape and rings, m."""
     mass: float
+    """In kg."""
     mode_coordinates: Floats
+    """(n, k) coordinates of the reduced body by mode: seats' first, then modal coordinates."""
     stiffness: Floats
+    """(k,) of modes of unit mass, 1/s2."""
     added_mass: Floats
+    """(k,) by mass scaling beyond the unit mass of modes above the limit."""
     first_moments: Floats
+    """(3, 1 + k) int rho f of the place from the centre and of the modes, kg m and kg^0.5."""
     second_moments: Floats
+    """(3, 3, 1 + k, 1 + k) int rho f_a g_b."""
     centrifugal_tension: Floats
+    """(k, k) what times the square of the spin speed is the stiffness of centrifugal tension."""
     turning: Floats
+    """(k, k) antisymmetric S: a turn by psi takes modes into each other by exp(psi S)."""
 
     @property
     def frequencies(self) -> Floats:

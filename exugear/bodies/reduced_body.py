@@ -29,16 +29,11 @@ class ReductionError(ValueError):
 
 @dataclass(frozen=True)
 class Seat:
-    """Where other things are fixed to a body.
-
-    Attributes
-    ----------
-    name : str
-    position : (3,) centre in the gearbox's coordinates at zero angles, m
-    """
+    """Where other things are fixed to a body."""
 
     name: str
     position: tuple[float, float, float]
+    """(3,) centre in the gearbox's coordinates at zero angles, m."""
 
 
 @dataclass(frozen=True)
@@ -52,22 +47,18 @@ class Blank:
 
 @dataclass(frozen=True)
 class Surface:
-    """The surface of a reduced body for pictures.
-
-    Attributes
-    ----------
-    points : (p, 3) at zero angles, m
-    quads : (f, 4) corners of each face; a triangle repeats its last
-    displacement : (p, 3, n) per coordinate
-    strain : (f, 6, n) per coordinate, in orthogonal axes (those of each face, or x y z), engineering shear strains
-    elasticity : (6, 6) stress by strain, Pa
-    """
+    """The surface of a reduced body for pictures."""
 
     points: Floats
+    """(p, 3) at zero angles, m."""
     quads: Integers
+    """(f, 4) corners of each face; a triangle repeats its last."""
     displacement: NDArray[np.float32]
+    """(p, 3, n) per coordinate."""
     strain: NDArray[np.float32]
+    """(f, 6, n) per coordinate, in orthogonal axes (those of each face, or x y z), engineering shear strains."""
     elasticity: Floats
+    """(6, 6) stress by strain, Pa."""
 
     def energy_density(self, coordinates: Floats) -> Floats:
         """Strain energy per volume on each face, (f,), J/m3, at coordinates (n,)."""
@@ -78,20 +69,16 @@ class Surface:
 
 @dataclass(frozen=True)
 class ReductionSummary:
-    """What a reduction took and which modes it kept, by harmonic, or under "whole" for a solid mesh.
-
-    Attributes
-    ----------
-    unknowns : number of unknowns
-    seconds : wall time
-    free_interface_frequencies : of the elastic normal modes that are kept, and the next one, Hz
-    mass_scaled_frequencies : of modes of the reduced body above the limit before mass scaling brought them to it, Hz
-    """
+    """What a reduction took and which modes it kept, by harmonic, or under "whole" for a solid mesh."""
 
     unknowns: Mapping[str, int]
+    """Number of unknowns."""
     seconds: float
+    """Wall time."""
     free_interface_frequencies: Mapping[str, tuple[float, ...]]
+    """Of the elastic normal modes that are kept, and the next one, Hz."""
     mass_scaled_frequencies: Mapping[str, tuple[float, ...]]
+    """Of modes of the reduced body above the limit before mass scaling brought them to it, Hz."""
 
 
 @dataclass(frozen=True)
@@ -103,31 +90,27 @@ class ReducedBody(
 
     Coordinates are six per seat (ux uy uz, tilts thx thy, and thz unwrapped; m and rad), then the modal coordinates
     of the modes inside (`exugear.bodies.reduction`).
-
-    Attributes
-    ----------
-    name, seats : what it is, and its seats in the order of the coordinates
-    mass, stiffness : (n, n)
-    gyroscopic : (n, n) antisymmetric G of M q'' + Omega G q' + K q = f
-    spin : (n,) rigid spin about the axis: 1 on every seat's thz, and how it displaces seats off the axis, m; 0 for a
-        body on the ground, which does not turn
-    frame : where the coordinates are seen from: a frame that does not turn, the carrier's, or the ground
-    modal_groups : what each modal coordinate describes: bending x, bending y, torsion or stretching; of a solid mesh,
-        inner
-    surface : for pictures
-    summary : what the reduction took and which modes it kept
     """
 
     name: str
     seats: tuple[Seat, ...]
+    """What it is, and its seats in the order of the coordinates."""
     mass: Floats
     stiffness: Floats
+    """(n, n)"""
     gyroscopic: Floats
+    """(n, n) antisymmetric G of M q'' + Omega G q' + K q = f."""
     spin: Floats
+    """(n,) rigid spin about the axis: 1 on every seat's thz, and how it displaces seats off the axis, m; 0 for a:
+    body on the ground, which does not turn."""
     frame: Frame
+    """Where the coordinates are seen from: a frame that does not turn, the carrier's, or the ground."""
     modal_groups: tuple[str, ...]
+    """What each modal coordinate describes: bending x, bending y, torsion or stretching; of a solid mesh,. inner."""
     surface: Surface
+    """For pictures."""
     summary: ReductionSummary
+    """What the reduction took and which modes it kept."""
 
     @property
     def size(self) -> int:

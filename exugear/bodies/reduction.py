@@ -45,19 +45,15 @@ INDEPENDENCE_TOLERANCE = 1e-8
 
 @dataclass(frozen=True)
 class ReducedComponent:
-    """One set of unknowns reduced: (s + m) coordinates, those of the seats first, then the modal ones.
-
-    Attributes
-    ----------
-    mass, stiffness : (s + m, s + m)
-    component_modes : (unknowns, s + m) displacement per coordinate
-    frequencies : of the elastic free-interface normal modes that are kept, and the next one, Hz
-    """
+    """One set of unknowns reduced: (s + m) coordinates, those of the seats first, then the modal ones."""
 
     mass: Floats
     stiffness: Floats
+    """(s + m, s + m)"""
     component_modes: Floats
+    """(unknowns, s + m) displacement per coordinate."""
     frequencies: tuple[float, ...]
+    """Of the elastic free-interface normal modes that are kept, and the next one, Hz."""
 
 
 def reduce_component(

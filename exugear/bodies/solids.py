@@ -61,30 +61,24 @@ ASYMMETRY_TOLERANCE = 5e-3
 
 @dataclass(frozen=True)
 class SolidModel:
-    """All that a reduced solid depends on.
-
-    Attributes
-    ----------
-    name : str
-    mesh : skfem.MeshTet2 or skfem.MeshHex2, in the gearbox's coordinates, m; or the file with it
-    material : Material
-    seats : where other things sit
-    frame : where its coordinates are seen from
-    band : free-interface normal modes up to here are exact, Hz
-    limit : modes of the reduced body above this are brought down to it by mass scaling, Hz
-    blanks : seat name -> rigid ring on it
-    axis : (x, y) of the axis of turning, parallel to z, m
-    """
+    """All that a reduced solid depends on."""
 
     name: str
     mesh: Any
+    """skfem.MeshTet2 or skfem.MeshHex2, in the gearbox's coordinates, m; or the file with it."""
     material: Material
     seats: tuple[SolidSeat, ...]
+    """Where other things sit."""
     frame: Frame
+    """Where its coordinates are seen from."""
     band: float
+    """free-interface normal modes up to here are exact, Hz."""
     limit: float
+    """Modes of the reduced body above this are brought down to it by mass scaling, Hz."""
     blanks: Mapping[str, Blank] = field(default_factory=dict)
+    """Seat name -> rigid ring on it."""
     axis: tuple[float, float] = (0.0, 0.0)
+    """(x, y) of the axis of turning, parallel to z, m."""
 
     @property
     def key(self) -> str:
@@ -112,18 +106,14 @@ class SolidModel:
 
 @dataclass(frozen=True)
 class ReducedSolid:
-    """A solid's matrices and their reduction, before anything is dropped.
-
-    Attributes
-    ----------
-    solid : the whole model
-    component : reduced; component modes (3 n, coordinates)
-    seconds : wall time that it took
-    """
+    """A solid's matrices and their reduction, before anything is dropped."""
 
     solid: Solid
+    """The whole model."""
     component: ReducedComponent
+    """Reduced; component modes (3 n, coordinates)."""
     seconds: float
+    """Wall time that it took."""
 
 
 def reduce_matrices(model: SolidModel, backend: Backend | None = None) -> ReducedSolid:

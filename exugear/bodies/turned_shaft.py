@@ -41,30 +41,24 @@ ANGLES = 24
 
 @dataclass(frozen=True)
 class ShaftModel:
-    """All that a reduced shaft depends on.
-
-    Attributes
-    ----------
-    name : str
-    sections : from the beginning at `origin` on
-    material : Material
-    origin : (3,) beginning of the shaft in the gearbox's coordinates, m
-    seats : bands, z from the beginning of the shaft
-    blanks : seat name -> rigid ring on it
-    band : free-interface normal modes up to here are exact, Hz
-    limit : modes of the reduced shaft above this are brought down to it by mass scaling, Hz
-    size : element sizes
-    """
+    """All that a reduced shaft depends on."""
 
     name: str
     sections: tuple[ShaftSection, ...]
+    """From the beginning at `origin` on."""
     material: Material
     origin: tuple[float, float, float]
+    """(3,) beginning of the shaft in the gearbox's coordinates, m."""
     seats: tuple[SeatBand, ...]
+    """Bands, z from the beginning of the shaft."""
     blanks: Mapping[str, Blank]
+    """Seat name -> rigid ring on it."""
     band: float
+    """free-interface normal modes up to here are exact, Hz."""
     limit: float
+    """Modes of the reduced shaft above this are brought down to it by mass scaling, Hz."""
     size: MeshSize = STANDARD_SIZE
+    """Element sizes."""
 
     @property
     def key(self) -> str:

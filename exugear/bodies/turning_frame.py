@@ -18,21 +18,14 @@ from fe_ste.tools.arrays import Floats
 
 @dataclass(frozen=True)
 class TurningBody:
-    """An elastic body in its own turning frame; n coordinates.
-
-    Attributes
-    ----------
-    reduced : ReducedBody
-        In the frame "carrier".
-    damping_time : float
-        Damping over stiffness, s.
-    gravity : (3,)
-        Acceleration, m/s2.
-    """
+    """An elastic body in its own turning frame; n coordinates."""
 
     reduced: ReducedBody
+    """In the frame "carrier"."""
     damping_time: float
+    """Damping over stiffness, s."""
     gravity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """(3,) acceleration, m/s2."""
 
     @cached_property
     def seat_count(self) -> int:

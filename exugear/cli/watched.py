@@ -38,12 +38,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class WatchedProject(Project):
-    """A project that shows what takes long in rows of one display, and ends with Ctrl-C between its steps.
-
-    Attributes
-    ----------
-    bars : Bars
-    """
+    """A project that shows what takes long in rows of one display, and ends with Ctrl-C between its steps."""
 
     bars: Bars = field(default_factory=Bars, compare=False)
 

@@ -66,53 +66,49 @@ from fe_ste.tools.display import Displayed
 
 @dataclass(frozen=True)
 class Assembly(Displayed):
-    """Equations of motion of a gearbox variant.
-
-    Attributes
-    ----------
-    gearbox, choice : what was assembled; the choice names its inertia set
-    bodies : moving bodies in the order of their coordinates, elastic fixed ones among them
-    coordinates : the six state indices of each body by name, -1 where there is none; of an elastic body those of
-        its main seat, and those of each seat under `exugear.gearbox.parts.seat_key`
-    size : number of coordinates
-    elements, meshes : mesh elements and their arrays
-    travelling : seats of meshes on an elastic ring; their coordinates follow those of the system
-    supports, connectors : bearings and mounts (none in the variant `rigid`)
-    spring_names, springs : torsional couplings
-    inertia : mass properties of rigid bodies; in the variant `rigid` the planets' orbit is in the carrier's
-    elastic_bodies : elastic bodies by name, in the order of their coordinates
-    elastic : matrices of those whose frame does not turn
-    motions : (size, n) motions that are free; the identity, but for the law `rigid` the rolling ones
-    rows_stiffness : (supports, 6, 6) stiffness of the rows of catalogue bearings at their static load, for methods
-        that begin with linear ones; zero for other supports
-    operating_points : of each support, None for those that are no catalogue bearings; empty where there are none
-    connectors_at_rest : connectors of static states, in which all catalogue bearings follow their rows; None where
-        they are those of motion
-    contacts : contact of meshes at the static misalignment, where it was solved
-    planet_spread : largest change of stiffness that made bearings of equal planets equal, over that stiffness
-    """
+    """Equations of motion of a gearbox variant."""
 
     gearbox: Gearbox
     choice: Choice
+    """What was assembled; the choice names its inertia set."""
     bodies: tuple[Body, ...]
+    """Moving bodies in the order of their coordinates, elastic fixed ones among them."""
     coordinates: Mapping[str, tuple[int, ...]]
+    """The six state indices of each body by name, -1 where there is none; of an elastic body those of. its main
+    seat, and those of each seat under `exugear.gearbox.parts.seat_key`."""
     size: int
+    """Number of coordinates."""
     elements: tuple[MeshElement, ...]
     meshes: MeshArrays
+    """Mesh elements and their arrays."""
     travelling: TravellingArrays
+    """Seats of meshes on an elastic ring; their coordinates follow those of the system."""
     supports: tuple[Bearing, ...]
     connectors: ConnectorArrays
+    """Bearings and mounts (none in the variant `rigid`)."""
     spring_names: tuple[str, ...]
     springs: SpringArrays
+    """Torsional couplings."""
     inertia: InertiaArrays
+    """Mass properties of rigid bodies; in the variant `rigid` the planets' orbit is in the carrier's."""
     elastic_bodies: Mapping[str, ElasticBody]
+    """Elastic bodies by name, in the order of their coordinates."""
     elastic: ElasticArrays
+    """Matrices of those whose frame does not turn."""
     motions: Floats
+    """(size, n) motions that are free; the identity, but for the law `rigid` the rolling ones."""
     rows_stiffness: Floats
+    """(supports, 6, 6) stiffness of the rows of catalogue bearings at their static load, for methods: that begin
+    with linear ones; zero for other supports."""
     operating_points: tuple[OperatingPoint | None, ...] = ()
+    """Of each support, None for those that are no catalogue bearings; empty where there are none."""
     connectors_at_rest: ConnectorArrays | None = None
+    """Connectors of static states, in which all catalogue bearings follow their rows; None where. they are those of
+    motion."""
     contacts: StaticContacts = StaticContacts()
+    """Contact of meshes at the static misalignment, where it was solved."""
     planet_spread: float = 0.0
+    """Largest change of stiffness that made bearings of equal planets equal, over that stiffness."""
 
     def _line(self) -> str:
         choice = f"{self.variant}, {self.mesh_law}, {self.inertias}"

@@ -27,17 +27,13 @@ RIGID_BODY_LIMIT = 0.1
 
 @dataclass(frozen=True)
 class Linearised(Displayed, line=": {mass!n} coordinates, {stiffness!n} elements"):
-    """Mass, and stiffness and damping by element, about a state; each matrix (size, size).
-
-    Attributes
-    ----------
-    mass : (size, size)
-    stiffness, damping : element name -> matrix; elements are meshes, bearings, couplings, elastic bodies
-    """
+    """Mass, and stiffness and damping by element, about a state; each matrix (size, size)."""
 
     mass: Floats
+    """(size, size)"""
     stiffness: Mapping[str, Floats]
     damping: Mapping[str, Floats]
+    """Element name -> matrix; elements are meshes, bearings, couplings, elastic bodies."""
 
     @property
     def total_stiffness(self) -> Floats:

@@ -13,36 +13,28 @@ from fe_ste.tools.arrays import Floats
 
 @dataclass(frozen=True)
 class Drive:
-    """A machine that turns one body at a prescribed angle, behind a torsional spring and damper.
-
-    Attributes
-    ----------
-    body : name of the driven body
-    stiffness, damping : N m/rad, N m s/rad
-    angle, speed : functions of time, rad and rad/s
-    """
+    """A machine that turns one body at a prescribed angle, behind a torsional spring and damper."""
 
     body: str
+    """Name of the driven body."""
     stiffness: float
     damping: float
+    """N m/rad, N m s/rad."""
     angle: Callable[[float], float]
     speed: Callable[[float], float]
+    """Functions of time, rad and rad/s."""
 
 
 @dataclass(frozen=True)
 class Loading:
-    """What acts from outside.
-
-    Attributes
-    ----------
-    constant : torque by body, N m
-    varying : torque by body as a function of time, N m
-    drive : machine that prescribes the angle of one body
-    """
+    """What acts from outside."""
 
     constant: Mapping[str, float] = field(default_factory=dict)
+    """Torque by body, N m."""
     varying: Mapping[str, Callable[[float], float]] = field(default_factory=dict)
+    """Torque by body as a function of time, N m."""
     drive: Drive | None = None
+    """Machine that prescribes the angle of one body."""
 
     @property
     def is_constant(self) -> bool:
@@ -63,34 +55,25 @@ class Loading:
 
 @dataclass(frozen=True)
 class DriveLaw:
-    """A machine that turns one body at an angle quadratic in time, behind a spring and damper.
-
-    Attributes
-    ----------
-    body : name of the driven body
-    stiffness, damping : N m/rad, N m s/rad
-    angle : coefficients of 1, t, t^2; rad, rad/s, rad/s2
-    """
+    """A machine that turns one body at an angle quadratic in time, behind a spring and damper."""
 
     body: str
+    """Name of the driven body."""
     stiffness: float
     damping: float
+    """N m/rad, N m s/rad."""
     angle: tuple[float, float, float]
+    """Coefficients of 1, t, t^2; rad, rad/s, rad/s2."""
 
 
 @dataclass(frozen=True)
 class LoadTable:
-    """What acts from outside, as numbers: constant torques, torques linear between lines, a drive.
-
-    Attributes
-    ----------
-    constant : torque by body about +z, N m
-    series : by body times (s) and torques (N m)
-    drive : optional
-    """
+    """What acts from outside, as numbers: constant torques, torques linear between lines, a drive."""
 
     constant: Mapping[str, float] = field(default_factory=dict)
+    """Torque by body about +z, N m."""
     series: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
+    """By body times (s) and torques (N m)."""
     drive: DriveLaw | None = None
 
     def as_functions(self) -> Loading:

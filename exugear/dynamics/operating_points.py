@@ -59,18 +59,13 @@ CONTACT_STEPS = 2
 
 
 class _State(NamedTuple):
-    """All supports in one static state; points only of those from a catalogue.
-
-    Attributes
-    ----------
-    strain, load : (supports, 6) arrays
-        Displacement (m, rad) and load (N, N m), in the axes of what each sits on.
-    points : operating points, None for supports that are not from a catalogue
-    """
+    """All supports in one static state; points only of those from a catalogue."""
 
     strain: Floats
     load: Floats
+    """(supports, 6) displacement (m, rad) and load (N, N m), in the axes of what each sits on."""
     points: tuple[OperatingPoint | None, ...]
+    """Operating points, None for supports that are not from a catalogue."""
 
 
 def at_static_load(assembly: Assembly) -> Assembly:

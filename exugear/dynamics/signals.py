@@ -29,27 +29,17 @@ AXES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable in the file of a run.
-
-    Attributes
-    ----------
-    name : str
-    dimensions : tuple of str
-    units : str
-    long_name : str
-        What it is, where the name does not say it.
-    sign_convention : str
-        What a positive value means, where it can have either sign.
-    kind : str
-        Type in the file, as NumPy writes it.
-    """
+    """A variable in the file of a run."""
 
     name: str
     dimensions: tuple[str, ...]
     units: str
     long_name: str = ""
+    """What it is, where the name does not say it."""
     sign_convention: str = ""
+    """What a positive value means, where it can have either sign."""
     kind: str = "f8"
+    """Type in the file, as NumPy writes it."""
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -64,31 +54,22 @@ class Signal(Variable):
 
     The first dimension says what kind of signal it is: ``time``, a value of each stored sample; ``mesh``, a time that
     is added up for each mesh; ``balance_time``, a term of the account of energy.
-
-    Attributes
-    ----------
-    filled_by : tuple of str
-        Functions of `exugear.transient.compiled.sampling` that fill its columns, or its part of the account; or
-        methods of `exugear.transient.compiled.observers`. Empty where `formula` gives it, or where it is a time itself.
-    formula : callable, optional
-        Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
-        that is added up: in which samples it passes.
-    laws : {"all", "table", "bilateral"}
-        Mesh laws that have it: all, the law `table`, or all others. A time that a law has not got is zero.
-    on_bearings : bool
-        Whether only variants on bearings have it; of ideal joints `exugear.dynamics.support_loads` derives it.
-    stored : bool
-        Whether it stands in the file; other signals are for the formulas alone.
-    is_power : bool
-        Of the account of energy: whether the observer gives its power (W), which the run integrates.
     """
 
     filled_by: tuple[str, ...] = ()
+    """Functions of `exugear.transient.compiled.sampling` that fill its columns, or its part of the account; or
+    methods of `exugear.transient.compiled.observers`. Empty where `formula` gives it, or where it is a time itself."""
     formula: Callable[[SignalLayout, Floats], Floats | Booleans] | None = None
+    """Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
+    that is added up: in which samples it passes."""
     laws: Literal["all", "table", "bilateral"] = "all"
+    """Mesh laws that have it: all, the law `table`, or all others. A time that a law has not got is zero."""
     on_bearings: bool = False
+    """Whether only variants on bearings have it; of ideal joints `exugear.dynamics.support_loads` derives it."""
     stored: bool = True
+    """Whether it stands in the file; other signals are for the formulas alone."""
     is_power: bool = False
+    """Of the account of energy: whether the observer gives its power (W), which the run integrates."""
 
     @property
     def is_sampled(self) -> bool:
@@ -336,15 +317,6 @@ def signals_of(tabled: bool, jointed: bool = False) -> tuple[Signal, ...]:
 class SignalLayout:
     """Which columns of a sample belong to which signal; ``layout[name]`` is their slice.
 
-    Attributes
-    ----------
-    signals : tuple of Signal
-        What a run holds of `SIGNALS`.
-    names : mapping of str to tuple of str
-        Names along the dimensions ``mesh`` and ``support``.
-    radius : float
-        Base radius of the overall output gear, m.
-
     Examples
     --------
     >>> names = {"mesh": ("first", "second"), "support": ("pin",), "axis": AXES}
@@ -359,8 +331,11 @@ class SignalLayout:
     """
 
     signals: tuple[Signal, ...]
+    """What a run holds of `SIGNALS`."""
     names: Mapping[str, tuple[str, ...]]
+    """Names along the dimensions ``mesh`` and ``support``."""
     radius: float
+    """Base radius of the overall output gear, m."""
 
     @cached_property
     def _slices(self) -> dict[str, slice]:

@@ -71,19 +71,15 @@ class _Solve(Protocol):
 
 @dataclass(frozen=True)
 class StartState(Displayed, line=": {q!n} coordinates, drive torque {drive_torque:.4g} N m"):
-    """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with.
-
-    Attributes
-    ----------
-    q, v : (size,) coordinates and velocities
-    rates : spin rate by body, rad/s2
-    drive_torque : torque that the driven body takes, N m; 0 where none is driven
-    """
+    """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with."""
 
     q: Floats
     v: Floats
+    """(size,) coordinates and velocities."""
     rates: Mapping[str, float]
+    """Spin rate by body, rad/s2."""
     drive_torque: float
+    """Torque that the driven body takes, N m; 0 where none is driven."""
 
 
 def _newton(
@@ -236,17 +232,11 @@ def rolled_coordinates(assembly: Assembly, body: str, angle: float) -> Floats:
 
 @dataclass(frozen=True)
 class StaticState(Displayed):
-    """A variant at rest under the static load of its gearbox file, mesh stiffness at its mean over the cycle.
-
-    Attributes
-    ----------
-    assembly : Assembly
-    q : (size,) array
-        Coordinates, m and rad.
-    """
+    """A variant at rest under the static load of its gearbox file, mesh stiffness at its mean over the cycle."""
 
     assembly: Assembly
     q: Floats
+    """(size,) coordinates, m and rad."""
 
     @property
     def centre_distance(self) -> Floats:

@@ -33,20 +33,13 @@ LARGEST_MATRICES = 2e9
 
 @dataclass(frozen=True)
 class Check:
-    """One check of a gearbox.
-
-    Attributes
-    ----------
-    name : str
-    run : callable
-        Raises `CaseError` where something is wrong.
-    needs : tuple of str
-        Checks without which this one makes no sense.
-    """
+    """One check of a gearbox."""
 
     name: str
     run: Callable[[], object]
+    """Raises `CaseError` where something is wrong."""
     needs: tuple[str, ...] = ()
+    """Checks without which this one makes no sense."""
 
 
 def check(checks: Iterable[Check]) -> None:

@@ -12,17 +12,6 @@ from exugear.gearbox.variant import Variant
 class Choice:
     """One way to compute a gearbox; what is None is chosen by the gearbox file.
 
-    Attributes
-    ----------
-    variant : Variant
-        How bodies are held; chosen by its name.
-    mesh_law : str
-        How teeth in mesh push each other; `exugear.tooth_mesh.laws.registry` lists the laws.
-    inertias : str, optional
-        Inertia set.
-    load_case : str, optional
-        Load case of a run.
-
     Raises
     ------
     VariantError
@@ -36,9 +25,13 @@ class Choice:
     """
 
     variant: Variant
+    """How bodies are held; chosen by its name."""
     mesh_law: str
+    """How teeth in mesh push each other; `exugear.tooth_mesh.laws.registry` lists the laws."""
     inertias: str | None
+    """Inertia set."""
     load_case: str | None
+    """Load case of a run."""
 
     def __init__(
         self,

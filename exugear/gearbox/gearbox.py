@@ -47,17 +47,6 @@ own."""
 class Gearbox(Displayed):
     """A checked gearbox. Build one with :meth:`from_toml` or :meth:`from_dict`.
 
-    Attributes
-    ----------
-    case : CaseFile
-        The file as it is written.
-    source : str
-        Its path or name.
-    content : mapping
-        What was read from it, before it was checked.
-    permissions : Permissions
-        What the file may do.
-
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
@@ -68,9 +57,13 @@ class Gearbox(Displayed):
     """
 
     case: CaseFile
+    """The file as it is written."""
     source: str
+    """Its path or name."""
     content: Mapping[str, Any]
+    """What was read from it, before it was checked."""
     permissions: Permissions = NOTHING_MORE
+    """What the file may do."""
 
     @classmethod
     def from_toml(cls, path: str | Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:

@@ -23,18 +23,12 @@ class NamedFileError(ValueError):
 
 @dataclass(frozen=True)
 class Permissions:
-    """What a gearbox file may do beyond reading files below its own folder.
-
-    Attributes
-    ----------
-    scripts : bool
-        Whether gmsh scripts that it names may run; they can do all that the user can.
-    below : Path, optional
-        A further folder whose files it may name.
-    """
+    """What a gearbox file may do beyond reading files below its own folder."""
 
     scripts: bool = False
+    """Whether gmsh scripts that it names may run; they can do all that the user can."""
     below: Path | None = None
+    """A further folder whose files it may name."""
 
 
 NOTHING_MORE = Permissions()

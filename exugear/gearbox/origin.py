@@ -22,18 +22,11 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True)
 class Origin(Displayed):
-    """A gearbox file as the builders of parts see it.
-
-    Attributes
-    ----------
-    case : CaseFile
-    source : str
-        Path or name of the file; files that it names lie beside it.
-    permissions : Permissions
-    """
+    """A gearbox file as the builders of parts see it."""
 
     case: CaseFile
     source: str
+    """Path or name of the file; files that it names lie beside it."""
     permissions: Permissions
 
     def _line(self) -> str:

@@ -22,44 +22,31 @@ RPM = math.pi / 30.0
 
 @dataclass(frozen=True)
 class Body(Displayed, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 about its axis"):
-    """A rigid body, its place at zero angles and its mass properties (about the centre of mass).
-
-    Attributes
-    ----------
-    name, family : str
-        Its name, and that of its section, which planets share.
-    axis : (2,) tuple of float
-        Position x, y of its axis at zero angles, m.
-    centre_of_mass_z : float
-        m.
-    mass, axial, transverse : float
-        Mass, and inertia about its axis and across it, kg, kg m2, kg m2; a spin-only body has inertia about its axis
-        alone.
-    carrier : str, optional
-        Carrier that a planet rides on; none while it is held: then its planets turn on axes that stand still.
-    orbit_angle : float
-        Its angle there, rad.
-    spin_only, fixed : bool
-        Whether it has no place in space, or does not turn.
-    wheels : mapping of gear name to float
-        Middle of the gear's face width, z, m.
-    planet_of : str, optional
-        Carrier of the set that a planet belongs to, held or not.
-    """
+    """A rigid body, its place at zero angles and its mass properties (about the centre of mass)."""
 
     name: str
     family: str
+    """Its name, and that of its section, which planets share."""
     axis: tuple[float, float]
+    """(2,) position x, y of its axis at zero angles, m."""
     centre_of_mass_z: float
+    """m."""
     mass: float
     axial: float
     transverse: float
+    """Mass, and inertia about its axis and across it, kg, kg m2, kg m2; a spin-only body has inertia about its axis
+    alone."""
     carrier: str | None
+    """Carrier that a planet rides on; none while it is held: then its planets turn on axes that stand still."""
     orbit_angle: float
+    """Its angle there, rad."""
     spin_only: bool
     fixed: bool
+    """Whether it has no place in space, or does not turn."""
     wheels: Mapping[str, float]
+    """By gear name, middle of the gear's face width, z, m."""
     planet_of: str | None = None
+    """Carrier of the set that a planet belongs to, held or not."""
 
     def _table(self) -> TitledRows:
         return f"body {self.name}", {
@@ -87,63 +74,42 @@ class Body(Displayed, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 abo
 
 @dataclass(frozen=True)
 class Joint:
-    """Ideal joint between `on` and `body` that leaves only the spin about z.
-
-    Attributes
-    ----------
-    name : str
-    body, on : str
-        Bodies that it joins.
-    position : (3,) tuple of float
-        At zero angles, m.
-    """
+    """Ideal joint between `on` and `body` that leaves only the spin about z."""
 
     name: str
     body: str
     on: str
+    """Bodies that it joins."""
     position: tuple[float, float, float]
+    """(3,) at zero angles, m."""
 
 
 @dataclass(frozen=True)
 class Bearing(Displayed):
-    """Compliant support: a 6x6 stiffness in the axes of `on`, order x y z rx ry rz.
-
-    Attributes
-    ----------
-    name, family : str
-        Its name, and that of its section, which planets share.
-    body, on : str
-        Body that is held, and what it sits on.
-    position : (3,) tuple of float
-        At zero angles, m.
-    stiffness : StiffnessSection, optional
-        As the file gives it; beside a catalogue the least stiffness of each direction.
-    catalogue : CatalogueSection, optional
-        Dimensions and loads from which its stiffness follows.
-    damping : StiffnessSection, optional
-        As the file gives it; in proportion to the stiffness otherwise.
-    factor : float
-        Factor of the housing on its stiffness, not yet multiplied in.
-    carries_outer_ring : bool
-        Whether the outer ring sits in the body, as in planets; else the inner ring does.
-    law : {"stiffness", "iso16281"}
-        Linear, or the law of the rolling elements themselves.
-    cage : {"averaged", "turning"}
-        Of a non-linear bearing: whether rolling elements move on as its rings turn.
-    """
+    """Compliant support: a 6x6 stiffness in the axes of `on`, order x y z rx ry rz."""
 
     name: str
     family: str
+    """Its name, and that of its section, which planets share."""
     body: str
     on: str
+    """Body that is held, and what it sits on."""
     position: tuple[float, float, float]
+    """(3,) at zero angles, m."""
     stiffness: StiffnessSection | None
+    """As the file gives it; beside a catalogue the least stiffness of each direction."""
     catalogue: CatalogueSection | None
+    """Dimensions and loads from which its stiffness follows."""
     damping: StiffnessSection | None
+    """As the file gives it; in proportion to the stiffness otherwise."""
     factor: float
+    """Factor of the housing on its stiffness, not yet multiplied in."""
     carries_outer_ring: bool = False
+    """Whether the outer ring sits in the body, as in planets; else the inner ring does."""
     law: Literal["stiffness", "iso16281"] = "stiffness"
+    """Linear, or the law of the rolling elements themselves."""
     cage: Literal["averaged", "turning"] = "averaged"
+    """Of a non-linear bearing: whether rolling elements move on as its rings turn."""
 
     def _line(self) -> str:
         return f" {self.name!r}: {self.body} on {self.on} at {_point(self.position)}, {self._source}"
@@ -170,63 +136,42 @@ class Bearing(Displayed):
 
 @dataclass(frozen=True)
 class Coupling:
-    """Torsional spring and damper between two spins.
-
-    Attributes
-    ----------
-    name : str
-    first, second : str
-        Bodies that it joins.
-    seat : str, optional
-        Bearing at whose seat it acts on elastic bodies.
-    stiffness, damping : float
-        N m/rad, N m s/rad.
-    """
+    """Torsional spring and damper between two spins."""
 
     name: str
     first: str
     second: str
+    """Bodies that it joins."""
     seat: str | None
+    """Bearing at whose seat it acts on elastic bodies."""
     stiffness: float
     damping: float
+    """N m/rad, N m s/rad."""
 
 
 @dataclass(frozen=True)
 class Mesh(Displayed):
-    """A gear pair at work.
-
-    Attributes
-    ----------
-    name, family : str
-        Its name, and that of its section, which meshes of planets share.
-    pair : GearPair
-    pinion, gear : str
-        Bodies that carry gear 1 and gear 2.
-    frame : str
-        Body whose spin carries the line of centres, or "ground".
-    z : float
-        Middle of the common face width, m.
-    offsets : (2,) tuple of float
-        z of that middle from the middle of gear 1 and of gear 2, m.
-    position_angle : float
-        Polar angle of the line from gear 1's axis to gear 2's axis at zero angles, rad.
-    centre_distance : float
-        From the bodies' positions, m; the pair's own value agrees within 20 um.
-    phase : float, optional
-        Position in the mesh cycle at zero angles, where the file overrides what geometry gives.
-    """
+    """A gear pair at work."""
 
     name: str
     family: str
+    """Its name, and that of its section, which meshes of planets share."""
     pair: GearPair
     pinion: str
     gear: str
+    """Bodies that carry gear 1 and gear 2."""
     frame: str
+    """Body whose spin carries the line of centres, or "ground"."""
     z: float
+    """Middle of the common face width, m."""
     offsets: tuple[float, float]
+    """(2,) z of that middle from the middle of gear 1 and of gear 2, m."""
     position_angle: float
+    """Polar angle of the line from gear 1's axis to gear 2's axis at zero angles, rad."""
     centre_distance: float
+    """From the bodies' positions, m; the pair's own value agrees within 20 um."""
     phase: float | None
+    """Position in the mesh cycle at zero angles, where the file overrides what geometry gives."""
 
     def _line(self) -> str:
         pinion = self.pair.pinion
@@ -250,24 +195,16 @@ class Mesh(Displayed):
 
 @dataclass(frozen=True)
 class WheelDeviation(Displayed):
-    """Errors of one wheel that return with each of its revolutions.
-
-    Attributes
-    ----------
-    teeth : int
-    pitch : array (teeth,)
-        By which each loaded flank stands back on the transverse line of action, m. Tooth 0 is the first at a positive
-        polar angle at zero body angle, the others follow in the positive sense.
-    eccentricity : float
-        Distance of the teeth's axis from the body's, m.
-    eccentricity_angle : float
-        Its polar angle at zero body angle, rad.
-    """
+    """Errors of one wheel that return with each of its revolutions."""
 
     teeth: int
     pitch: Floats
+    """(teeth,) by which each loaded flank stands back on the transverse line of action, m. Tooth 0 is the first at a
+    positive polar angle at zero body angle, the others follow in the positive sense."""
     eccentricity: float
+    """Distance of the teeth's axis from the body's, m."""
     eccentricity_angle: float
+    """Its polar angle at zero body angle, rad."""
 
     def _line(self) -> str:
         runout = value_range(2.0 * self.eccentricity, "um", 1e6)
@@ -284,39 +221,25 @@ class WheelDeviation(Displayed):
 
 @dataclass(frozen=True)
 class LoadCase(Displayed, line=" {name!r}: {duration:g} s, {_drive}, torques on {torques!n} bodies"):
-    """Loads of a run.
-
-    Attributes
-    ----------
-    name : str
-    torques : mapping of body name to float
-        N m.
-    torque_series : Path, optional
-        File of torques over time.
-    duration : float
-        s.
-    start_speed : float
-        Of the overall input, rad/s.
-    start_speeds : mapping of body name to float
-        Of further bodies, in a train of several degrees of freedom, rad/s.
-    driven_body : str, optional
-        Body whose speed a machine prescribes.
-    end_speed : float, optional
-        Its speed at the end, rad/s.
-    drive_stiffness : float, optional
-        Of the spring between it and the machine, N m/rad.
-    description : str
-    """
+    """Loads of a run."""
 
     name: str
     torques: Mapping[str, float]
+    """By body name, N m."""
     torque_series: Path | None
+    """File of torques over time."""
     duration: float
+    """s."""
     start_speed: float
+    """Of the overall input, rad/s."""
     start_speeds: Mapping[str, float]
+    """By body name, of further bodies, in a train of several degrees of freedom, rad/s."""
     driven_body: str | None
+    """Body whose speed a machine prescribes."""
     end_speed: float | None
+    """Its speed at the end, rad/s."""
     drive_stiffness: float | None
+    """Of the spring between it and the machine, N m/rad."""
     description: str
 
     def _table(self) -> TitledRows:
@@ -338,32 +261,21 @@ class LoadCase(Displayed, line=" {name!r}: {duration:g} s, {_drive}, torques on 
 
 @dataclass(frozen=True)
 class PairSpec(Displayed):
-    """What the STE table of a pair needs.
-
-    Attributes
-    ----------
-    name : str
-    pair : GearPair
-    static_torque : float
-        On gear 1, N m, positive.
-    table : bool
-        Whether the file wants a table of it.
-    flank : int
-        Loaded flank of gear 1 in the static state: +1 if it faces the sense of +z rotation, else -1. A table is that
-        of flank +1; turned about the line of centres it is that of flank -1, with the ends of the face exchanged.
-    modifications : tuple of FlankModification
-        Gear 1, gear 2, in the axes of the gearbox.
-    stiffness : tuple of float
-        Mesh stiffness of a pair that needs no table, at equal distances over the mesh cycle, N/m; empty of others.
-    """
+    """What the STE table of a pair needs."""
 
     name: str
     pair: GearPair
     static_torque: float
+    """On gear 1, N m, positive."""
     table: bool
+    """Whether the file wants a table of it."""
     flank: int
+    """Loaded flank of gear 1 in the static state: +1 if it faces the sense of +z rotation, else -1. A table is that
+    of flank +1; turned about the line of centres it is that of flank -1, with the ends of the face exchanged."""
     modifications: tuple[FlankModification, FlankModification]
+    """Gear 1, gear 2, in the axes of the gearbox."""
     stiffness: tuple[float, ...] = ()
+    """Mesh stiffness of a pair that needs no table, at equal distances over the mesh cycle, N/m; empty of others."""
 
     def _line(self) -> str:
         pinion = self.pair.pinion

@@ -23,12 +23,6 @@ class Trait(Flag):
 class Variant(StrEnum):
     """How bodies are held, from stiff to soft; files and the command line have its name.
 
-    Attributes
-    ----------
-    label : str
-        Reads on behind a noun: "resonances on bearings".
-    traits : Trait
-
     Examples
     --------
     >>> Variant.of("bushing").label
@@ -38,6 +32,7 @@ class Variant(StrEnum):
     """
 
     label: str
+    """Reads on behind a noun: "resonances on bearings"."""
     traits: Trait
 
     def __new__(cls, name: str, label: str = "", traits: Trait = Trait.none) -> Variant:

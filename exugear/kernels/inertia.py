@@ -14,22 +14,18 @@ from fe_ste.tools.compilation import compiled
 
 
 class InertiaArrays(NamedTuple):
-    """Inertias, axially symmetric with the centre of mass at the node.
-
-    Attributes
-    ----------
-    body : (b,) first coordinate of each body with six coordinates
-    mass, transverse, axial : (b,) kg, kg m2, kg m2
-    spin : (s,) coordinate of each body with its spin alone
-    spin_inertia : (s,) kg m2
-    """
+    """Inertias, axially symmetric with the centre of mass at the node."""
 
     body: Integers
+    """(b,) first coordinate of each body with six coordinates."""
     mass: Floats
     transverse: Floats
     axial: Floats
+    """(b,) kg, kg m2, kg m2."""
     spin: Integers
+    """(s,) coordinate of each body with its spin alone."""
     spin_inertia: Floats
+    """(s,) kg m2."""
 
 
 @compiled

@@ -13,27 +13,19 @@ from fe_ste.tools.arrays import Floats
 
 @dataclass(frozen=True, eq=False)
 class ActingLoads:
-    """Loads over a life.
-
-    Attributes
-    ----------
-    points : LoadPoints
-        What wears, with the loads of a hub beside the torque.
-    worst_torque, worst_hub : array (w,), (w, 5)
-        What counts for static safety: the ends of the distribution, and extreme sources with their partial factors;
-        N m, N and N m.
-    bins : int
-        Bins of the distribution that the points belong to.
-    slowest, fastest : float
-        Least and largest speed of the body under a torque, rad/s without sign, extreme sources among them.
-    """
+    """Loads over a life."""
 
     points: LoadPoints
+    """What wears, with the loads of a hub beside the torque."""
     worst_torque: Floats
     worst_hub: Floats
+    """(w,), (w, 5) what counts for static safety: the ends of the distribution, and extreme sources with their
+    partial factors; N m, N and N m."""
     bins: int
+    """Bins of the distribution that the points belong to."""
     slowest: float
     fastest: float
+    """Least and largest speed of the body under a torque, rad/s without sign, extreme sources among them."""
 
     @property
     def torques(self) -> Floats:

@@ -43,55 +43,37 @@ LARGEST_PRESSURE = 4000e6
 
 @dataclass(frozen=True)
 class BearingLife:
-    """What a bearing bears over the life of the gearbox.
-
-    Attributes
-    ----------
-    name : str
-    revolutions : float
-        Of its rings against each other in the life.
-    largest_load : float
-        Radial, N, extremes with their partial factors among them.
-    equivalent : float
-        Constant equivalent load of the same damage by ISO 281, N.
-    damage, basic_hours : float
-        Miner's sum, and hours of operation until it is one, by L10.
-    reference_damage, reference_hours : float
-        The same by L10r; NaN where no balance of the rollers was found.
-    modified_damage, modified_hours : float
-        The same by L10m, with a_ISO at each load and speed; NaN without oil.
-    viscosity_ratio : float
-        Least kappa of all speeds under load; NaN likewise.
-    minimum_load : float
-        Radial load below which elements may slide, N.
-    pressure : float
-        Largest of rollers or balls under the largest load, Pa; NaN likewise.
-    static_safety : float
-        C_0r over the largest static equivalent load.
-    ratings : Ratings
-    remarks : tuple of str
-    by_bin, reference_by_bin : array (bins,)
-        Parts of the damages by bin of torque, by L10 and by L10r.
-    """
+    """What a bearing bears over the life of the gearbox."""
 
     name: str
     revolutions: float
+    """Of its rings against each other in the life."""
     largest_load: float
+    """Radial, N, extremes with their partial factors among them."""
     equivalent: float
+    """Constant equivalent load of the same damage by ISO 281, N."""
     damage: float
     basic_hours: float
+    """Miner's sum, and hours of operation until it is one, by L10."""
     reference_damage: float
     reference_hours: float
+    """The same by L10r; NaN where no balance of the rollers was found."""
     modified_damage: float
     modified_hours: float
+    """The same by L10m, with a_ISO at each load and speed; NaN without oil."""
     viscosity_ratio: float
+    """Least kappa of all speeds under load; NaN likewise."""
     minimum_load: float
+    """Radial load below which elements may slide, N."""
     pressure: float
+    """Largest of rollers or balls under the largest load, Pa; NaN likewise."""
     static_safety: float
+    """C_0r over the largest static equivalent load."""
     ratings: Ratings
     remarks: tuple[str, ...]
     by_bin: Floats
     reference_by_bin: Floats
+    """(bins,) parts of the damages by bin of torque, by L10 and by L10r."""
 
 
 def bearing_lives(

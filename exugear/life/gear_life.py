@@ -52,74 +52,54 @@ PLAIN_TEST_GEAR = 2.0
 
 @dataclass(frozen=True)
 class FlankLife:
-    """What one flank of a gear's teeth, and the root below it, bear in one family of meshes; the worst of planets.
-
-    Attributes
-    ----------
-    gear, family, flank : str
-        Flank ``+`` faces the sense of +z rotation.
-    contact_holder, root_holder : str
-        Body whose teeth are worn most, where several have them: which of the planets.
-    cycles : float
-        In the life.
-    contact_stress, root_stress : float
-        Largest of the life, K_v in them, Pa.
-    compression : float
-        Least principal stress of the root, Pa.
-    contact_worn, root_worn : float
-        Largest stress of what wears, extremes left out, Pa.
-    contact_limit, root_limit : float
-        Stress that not even the first cycles of the S-N curve endure, Pa: a larger one makes the damage infinite; NaN
-        without strength.
-    reach : float
-        Largest torque, K_v in it, over the largest of the pair's table.
-    contact_damage, root_damage : float
-        Miner's sums; NaN without strength.
-    contact_safety, root_safety : float
-        Factors on stress at which they are one; NaN without strength.
-    contact_static, root_static : float
-        Safety under the largest load, extremes with their partial factors among them; NaN without strength.
-    nominal_contact, nominal_root : float
-        sigma_H0 of ISO 6336-2 and sigma_F0 of ISO 6336-3 at the largest load, for comparison.
-    standard_contact_safety, standard_root_safety : float
-        S_H and S_F over the life by the nominal stresses of ISO 6336-2 and -3 with K_gamma and K_v of each load,
-        K_Hbeta of the finite elements and K_Fbeta of it, K_Halpha = K_Falpha = 1; NaN without strength.
-    outside : float
-        Largest share of the load outside the path of contact: what tip relief would take away.
-    face_load : float
-        Highest over mean line load along the face at the largest load.
-    contact_by_bin, root_by_bin : array (bins,)
-        Parts of the damages by bin of torque; NaN without strength.
-    """
+    """What one flank of a gear's teeth, and the root below it, bear in one family of meshes; the worst of planets."""
 
     gear: str
     family: str
     flank: str
+    """Flank ``+`` faces the sense of +z rotation."""
     contact_holder: str
     root_holder: str
+    """Body whose teeth are worn most, where several have them: which of the planets."""
     cycles: float
+    """In the life."""
     contact_stress: float
     root_stress: float
+    """Largest of the life, K_v in them, Pa."""
     compression: float
+    """Least principal stress of the root, Pa."""
     contact_worn: float
     root_worn: float
+    """Largest stress of what wears, extremes left out, Pa."""
     contact_limit: float
     root_limit: float
+    """Stress that not even the first cycles of the S-N curve endure, Pa: a larger one makes the damage infinite; NaN
+    without strength."""
     reach: float
+    """Largest torque, K_v in it, over the largest of the pair's table."""
     contact_damage: float
     root_damage: float
+    """Miner's sums; NaN without strength."""
     contact_safety: float
     root_safety: float
+    """Factors on stress at which they are one; NaN without strength."""
     contact_static: float
     root_static: float
+    """Safety under the largest load, extremes with their partial factors among them; NaN without strength."""
     nominal_contact: float
     nominal_root: float
+    """sigma_H0 of ISO 6336-2 and sigma_F0 of ISO 6336-3 at the largest load, for comparison."""
     standard_contact_safety: float
     standard_root_safety: float
+    """S_H and S_F over the life by the nominal stresses of ISO 6336-2 and -3 with K_gamma and K_v of each load,
+    K_Hbeta of the finite elements and K_Fbeta of it, K_Halpha = K_Falpha = 1; NaN without strength."""
     outside: float
+    """Largest share of the load outside the path of contact: what tip relief would take away."""
     face_load: float
+    """Highest over mean line load along the face at the largest load."""
     contact_by_bin: Floats
     root_by_bin: Floats
+    """(bins,) parts of the damages by bin of torque; NaN without strength."""
 
 
 def check_strengths(

@@ -33,48 +33,32 @@ TOLD_SHARING = 1.0005
 
 @dataclass(frozen=True, eq=False)
 class Life(Displayed, line=" of {variant}: {flanks!n} flanks, {bearings!n} bearings"):
-    """What a gearbox bears over its life.
-
-    Attributes
-    ----------
-    variant, mesh_law, inertias, edition : str
-        What the forces are of, and the edition of the standard that gears are rated by.
-    counted : CountedLoads
-    balance : StaticBalance
-    load_sharing : mapping of mesh family to float
-        K_gamma of the static balance.
-    flanks : tuple of FlankLife
-    bearings : tuple of BearingLife
-    unrated : tuple of str
-        Why parts have no life.
-    failures : tuple of str
-        Parts whose damage is infinite, with the stress that causes it.
-    shortfalls : tuple of str
-        Parts whose safety is less than `[rating]` asks for, that live less long than `[loads]` asks for, or whose
-        stresses are not to be trusted.
-    reliefs : tuple of str
-        Pairs that carry load outside their path of contact: what relief of their tips would take away.
-    assumptions : tuple of str
-        What the figures rest on.
-    input_hash : str
-        Of gearbox file, choices, tables, files of loads and versions of methods.
-    """
+    """What a gearbox bears over its life."""
 
     variant: str
     mesh_law: str
     inertias: str
     edition: str
+    """What the forces are of, and the edition of the standard that gears are rated by."""
     counted: CountedLoads
     balance: StaticBalance
     load_sharing: Mapping[str, float]
+    """By mesh family, K_gamma of the static balance."""
     flanks: tuple[FlankLife, ...]
     bearings: tuple[BearingLife, ...]
     unrated: tuple[str, ...]
+    """Why parts have no life."""
     failures: tuple[str, ...]
+    """Parts whose damage is infinite, with the stress that causes it."""
     shortfalls: tuple[str, ...]
+    """Parts whose safety is less than `[rating]` asks for, that live less long than `[loads]` asks for, or whose
+    stresses are not to be trusted."""
     reliefs: tuple[str, ...]
+    """Pairs that carry load outside their path of contact: what relief of their tips would take away."""
     assumptions: tuple[str, ...]
+    """What the figures rest on."""
     input_hash: str
+    """Of gearbox file, choices, tables, files of loads and versions of methods."""
 
 
 def rating_of(gearbox: Gearbox) -> RatingSection:

@@ -29,18 +29,12 @@ TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Something of the balance over torques and angles, and what the loads of a hub add to it.
-
-    Attributes
-    ----------
-    values : array (t, a, ...)
-        At the torques of the balance without loads of a hub.
-    by_hub : array (t, 5, a, ...), optional
-        What a unit of each of these adds.
-    """
+    """Something of the balance over torques and angles, and what the loads of a hub add to it."""
 
     values: Floats
+    """(t, a, ...) at the torques of the balance without loads of a hub."""
     by_hub: Floats | None = None
+    """(t, 5, a, ...) what a unit of each of these adds."""
 
     def of(self, number: int) -> Response:
         """Response of one bearing alone: that number of the axis behind the angles."""
@@ -49,33 +43,24 @@ class Response:
 
 @dataclass(frozen=True, eq=False)
 class StaticBalance(Displayed, line=": {torque!n} torques, {angle!n} angles, linear: {linear}"):
-    """Forces over torques and angles.
-
-    Attributes
-    ----------
-    torque, angle : array (t,), (a,)
-        On the loaded body, N m, rising and without zero; of the carrier, rad.
-    mesh_force, misalignment : Response (t, a, meshes)
-        F_bt, N, positive on the flank that the static load presses; on tables' flank, rad.
-    bearing_load : Response (t, a, bearings, 6)
-        Force and moment of the shaft on the inner ring in the axes of what the bearing sits on, N and N m.
-    bearing_tilt : Response (t, a, bearings, 2)
-        Of the inner ring against the outer one in the same axes, rad.
-    linear : bool
-        Whether all that is proportional to the loads.
-    outside : tuple of str
-        Meshes whose load, centre distance or misalignment lies outside their table in some of these states, where
-        that goes on in a straight line.
-    """
+    """Forces over torques and angles."""
 
     torque: Floats
     angle: Floats
+    """(t,), (a,) on the loaded body, N m, rising and without zero; of the carrier, rad."""
     mesh_force: Response
     misalignment: Response
+    """(t, a, meshes) F_bt, N, positive on the flank that the static load presses; on tables' flank, rad."""
     bearing_load: Response
+    """(t, a, bearings, 6) force and moment of the shaft on the inner ring in the axes of what the bearing sits on, N
+    and N m."""
     bearing_tilt: Response
+    """(t, a, bearings, 2) of the inner ring against the outer one in the same axes, rad."""
     linear: bool
+    """Whether all that is proportional to the loads."""
     outside: tuple[str, ...] = ()
+    """Meshes whose load, centre distance or misalignment lies outside their table in some of these states, where
+    that goes on in a straight line."""
 
     def at(self, response: Response, torque: Floats, hub: Floats | None = None) -> Floats:
         """Values of a response at torques (n,) and loads of a hub (n, 5): (n, a, ...).
@@ -125,21 +110,16 @@ class StaticBalance(Displayed, line=": {torque!n} torques, {angle!n} angles, lin
 
 
 class States(NamedTuple):
-    """What is kept of states at rest (...): at one angle over torques and loads of a hub, the first of these none.
-
-    Attributes
-    ----------
-    force, misalignment : array (..., meshes)
-    load, tilt : array (..., bearings, 6), (..., bearings, 2)
-    outside : array (..., meshes)
-        1 where load, centre distance or misalignment lies outside the table.
-    """
+    """What is kept of states at rest (...): at one angle over torques and loads of a hub, the first of these none."""
 
     force: Floats
     misalignment: Floats
+    """(..., meshes)"""
     load: Floats
     tilt: Floats
+    """(..., bearings, 6), (..., bearings, 2)"""
     outside: Floats
+    """(..., meshes) 1 where load, centre distance or misalignment lies outside the table."""
 
     @classmethod
     def of(cls, assembly: Assembly, q: Floats) -> States:

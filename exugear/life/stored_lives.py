@@ -24,20 +24,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StoredLife:
-    """A file of a life.
-
-    Attributes
-    ----------
-    path : Path
-    data : xarray.Dataset or None
-        None where it does not belong to the case.
-    reason : str
-        Why it does not.
-    """
+    """A file of a life."""
 
     path: Path
     data: xr.Dataset | None
+    """None where it does not belong to the case."""
     reason: str = ""
+    """Why it does not."""
 
 
 def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], Assembly]) -> Iterator[StoredLife]:

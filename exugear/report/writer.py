@@ -64,21 +64,14 @@ class ReportError(ValueError):
 
 @dataclass(frozen=True)
 class Report:
-    """A report that was written.
-
-    Attributes
-    ----------
-    path : Path
-        The page.
-    statements : tuple of str
-        What it says in short.
-    left_out : tuple of str
-        Files that do not belong to the case, and what could not be computed, with the reason.
-    """
+    """A report that was written."""
 
     path: Path
+    """The page."""
     statements: tuple[str, ...]
+    """What it says in short."""
     left_out: tuple[str, ...]
+    """Files that do not belong to the case, and what could not be computed, with the reason."""
 
 
 def write_report(

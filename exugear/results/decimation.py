@@ -94,18 +94,14 @@ def low_pass(factor: int, half: int) -> Floats:
 
 
 class Filter(NamedTuple):
-    """A filter over rows: taps of each column on itself, and of some columns on others.
-
-    Attributes
-    ----------
-    own : (2 half + 1, columns) what each column takes of itself
-    other : (2 half + 1, columns) what each column takes of the one that stands so many columns before it
-    before : that number of columns
-    """
+    """A filter over rows: taps of each column on itself, and of some columns on others."""
 
     own: Floats
+    """(2 half + 1, columns) what each column takes of itself."""
     other: Floats
+    """(2 half + 1, columns) what each column takes of the one that stands so many columns before it."""
     before: int
+    """That number of columns."""
 
     @property
     def half(self) -> int:

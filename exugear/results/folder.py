@@ -86,18 +86,14 @@ def bodies_folder(folder: Path) -> Path:
 
 @dataclass(frozen=True)
 class Spent:
-    """What a step of the work took.
-
-    Attributes
-    ----------
-    step : what was done
-    seconds : wall time
-    memory : peak of the process's memory, bytes
-    """
+    """What a step of the work took."""
 
     step: str
+    """What was done."""
     seconds: float
+    """Wall time."""
     memory: float
+    """Peak of the process's memory, bytes."""
 
 
 def peak_memory() -> float:

@@ -34,65 +34,43 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """State from which a run goes on.
-
-    Attributes
-    ----------
-    step : int
-        Number of the step that led to it.
-    q, v : (size,) arrays
-        Coordinates and velocities.
-    past : (n, size) array
-        Accelerations at the last steps, the latest last, as far as a method of integration goes back.
-    pending : (n, columns) array
-        Samples that the filter still holds.
-    pending_first : int
-        Number of the first of them.
-    balance : (terms,) array
-        Account of energy, J, as in `exugear.dynamics.signals.BALANCE_TERMS`.
-    powers : (powers,) array
-        Powers, W, as in `exugear.dynamics.signals.POWERS`.
-    start_angle : float
-        Angle that a drive started ahead by, rad.
-    mesh_times : (times, meshes) array
-        s, as in `exugear.dynamics.signals.MESH_TIMES`.
-    judgement : array
-        Running figures of an `exugear.transient.trust.Judge`.
-    """
+    """State from which a run goes on."""
 
     step: int
+    """Number of the step that led to it."""
     q: Floats
     v: Floats
+    """(size,) coordinates and velocities."""
     past: Floats
+    """(n, size) accelerations at the last steps, the latest last, as far as a method of integration goes back."""
     pending: Floats
+    """(n, columns) samples that the filter still holds."""
     pending_first: int
+    """Number of the first of them."""
     balance: Floats
+    """(terms,) account of energy, J, as in `exugear.dynamics.signals.BALANCE_TERMS`."""
     powers: Floats
+    """(powers,) powers, W, as in `exugear.dynamics.signals.POWERS`."""
     start_angle: float
+    """Angle that a drive started ahead by, rad."""
     mesh_times: Floats
+    """(times, meshes) s, as in `exugear.dynamics.signals.MESH_TIMES`."""
     judgement: Floats
+    """Running figures of an `exugear.transient.trust.Judge`."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A stretch of a run.
-
-    Attributes
-    ----------
-    arrays : mapping of str to array
-        Variables by name, see `exugear.results.variables.VARIABLES`.
-    attributes : mapping
-        Of the run, and of the state at the end of the piece.
-    names : mapping of str to list of str
-        Of meshes and supports.
-    follows : str
-        Checksum of the piece before, empty for the first.
-    """
+    """A stretch of a run."""
 
     arrays: Mapping[str, NDArray[Any]]
+    """Variables by name, see `exugear.results.variables.VARIABLES`."""
     attributes: Mapping[str, Any]
+    """Of the run, and of the state at the end of the piece."""
     names: Mapping[str, list[str]]
+    """Of meshes and supports."""
     follows: str
+    """Checksum of the piece before, empty for the first."""
 
     def write(self, path: Path) -> str:
         """Write it whole or not at all; return its checksum."""
@@ -130,12 +108,9 @@ class RunPieces:
 
     Attributes
     ----------
-    paths : list of Path
-        Files of the pieces.
-    lengths : dict of str to int
-        Length of each dimension in `exugear.results.variables.GROWING` and of what the filter holds, so far.
-    attributes : dict
-        Of the whole run.
+    paths : files of the pieces
+    lengths : length of each dimension in `exugear.results.variables.GROWING` and of what the filter holds, so far
+    attributes : of the whole run
 
     Raises
     ------

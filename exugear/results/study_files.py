@@ -27,26 +27,17 @@ OF_LIFE = ("loads", "operation", "rating")
 
 @dataclass(frozen=True)
 class StoredStudy:
-    """A study that was put together.
-
-    Attributes
-    ----------
-    path : Path
-        Its dataset.
-    title, description : str
-    points, failed, missing : int
-    fits : bool
-        Whether the case is the one that it varied.
-    pictures : tuple of Path
-    """
+    """A study that was put together."""
 
     path: Path
+    """Its dataset."""
     title: str
     description: str
     points: int
     failed: int
     missing: int
     fits: bool
+    """Whether the case is the one that it varied."""
     pictures: tuple[Path, ...]
 
 

@@ -23,29 +23,20 @@ LEAST_MODE = 0.01
 
 @dataclass(frozen=True)
 class Contributions:
-    """What a line of the overall transmission error is made of at one speed.
-
-    Attributes
-    ----------
-    speed : float
-        Of the input, rad/s.
-    amplitude : float
-        Peak amplitude of the line at the level `linear`, m.
-    meshes : mapping of str to float
-        Share by family of meshes.
-    modes : tuple of (float, float)
-        Frequency (Hz) and share of each mode that carries a hundredth or more, the strongest first.
-    supports, bodies : mapping of str to float
-        Relative change of the amplitude per relative change of a bearing's stiffness, and of a body's inertia, the
-        mean stiffness of the meshes and the excitation staying as they are.
-    """
+    """What a line of the overall transmission error is made of at one speed."""
 
     speed: float
+    """Of the input, rad/s."""
     amplitude: float
+    """Peak amplitude of the line at the level `linear`, m."""
     meshes: Mapping[str, float]
+    """Share by family of meshes."""
     modes: tuple[tuple[float, float], ...]
+    """Frequency (Hz) and share of each mode that carries a hundredth or more, the strongest first."""
     supports: Mapping[str, float]
     bodies: Mapping[str, float]
+    """Relative change of the amplitude per relative change of a bearing's stiffness, and of a body's inertia, the
+    mean stiffness of the meshes and the excitation staying as they are."""
 
 
 def contributions(gearset: Gearset, speed: float, line: int) -> Contributions:

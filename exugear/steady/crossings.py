@@ -49,30 +49,20 @@ SAME = 0.5
 
 @dataclass(frozen=True)
 class Crossing:
-    """A line that meets a mode.
-
-    Attributes
-    ----------
-    speed : float
-        Of the input, rad/s.
-    line : int
-        Place in the line set.
-    mode : int
-        Place among the modes that were followed.
-    frequency : float
-        Of the mode there, Hz.
-    damping : float
-        Share of critical damping.
-    share : float
-        Peak over the largest of its signal, whichever signal shows it most.
-    """
+    """A line that meets a mode."""
 
     speed: float
+    """Of the input, rad/s."""
     line: int
+    """Place in the line set."""
     mode: int
+    """Place among the modes that were followed."""
     frequency: float
+    """Of the mode there, Hz."""
     damping: float
+    """Share of critical damping."""
     share: float
+    """Peak over the largest of its signal, whichever signal shows it most."""
 
 
 @dataclass(frozen=True, eq=False)

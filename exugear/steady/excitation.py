@@ -62,35 +62,24 @@ class Interface:
     """The meshes of a gearbox as they meet its mean system at one speed; m waves, r readings, f forces, n lines.
 
     Waves of non-linear bearings follow those of the meshes.
-
-    Attributes
-    ----------
-    speed : float
-        Of the overall input, rad/s.
-    frequencies : (n,) array
-        Angular frequencies of the lines, rad/s.
-    motion : (n, size, m, f) complex array
-        Motion under a unit of each force, the waves' weights in it.
-    ports : MeshPorts
-        What the meshes read and push along.
-    rows : SignalRows
-        Signals from the motion.
-    torque : float
-        Of the drive in the static state, N m.
-    torque_per_force : (m, f) array
-        Torque of the drive per steady force, N m/N.
-    bearings : BearingMean or None
-        Non-linear bearings in the mean system.
     """
 
     speed: float
+    """Of the overall input, rad/s."""
     frequencies: Floats
+    """(n,) angular frequencies of the lines, rad/s."""
     motion: Complexes
+    """(n, size, m, f) motion under a unit of each force, the waves' weights in it."""
     ports: MeshPorts
+    """What the meshes read and push along."""
     rows: SignalRows
+    """Signals from the motion."""
     torque: float
+    """Of the drive in the static state, N m."""
     torque_per_force: Floats
+    """(m, f) torque of the drive per steady force, N m/N."""
     bearings: BearingMean | None
+    """Non-linear bearings in the mean system."""
 
     @cached_property
     def deflection(self) -> Complexes:

@@ -23,27 +23,18 @@ LONGEST = 0.4
 
 @dataclass(frozen=True, eq=False)
 class SteadyBranch(Displayed):
-    """Steady states along a branch; n points.
-
-    Attributes
-    ----------
-    speed : (n,) array
-        Of the overall input, rad/s.
-    readings : (n, lines, m, r) complex array
-        What the mesh laws read.
-    growth : (n,) array
-        Fastest growth of a disturbance, 1/s, over the bases looked at one at a time.
-    folds : tuple of float
-        Speeds at which the branch turns back, rad/s.
-    ended : str
-        Why it ends before the last speed, and where; empty if it does not.
-    """
+    """Steady states along a branch; n points."""
 
     speed: Floats
+    """(n,) of the overall input, rad/s."""
     readings: Complexes
+    """(n, lines, m, r) what the mesh laws read."""
     growth: Floats
+    """(n,) fastest growth of a disturbance, 1/s, over the bases looked at one at a time."""
     folds: tuple[float, ...]
+    """Speeds at which the branch turns back, rad/s."""
     ended: str = ""
+    """Why it ends before the last speed, and where; empty if it does not."""
 
     def _line(self) -> str:
         folds = ", ".join(f"{speed:.5g}" for speed in self.folds) or "none"

@@ -43,14 +43,7 @@ SHORTEST = 1.0 / 64.0
 
 @dataclass(frozen=True, eq=False)
 class Balance:
-    """The equations of all lines at one speed; n lines, m waves, r readings, f forces.
-
-    Attributes
-    ----------
-    gearset : Gearset
-    interface : Interface
-    lattice : Lattice
-    """
+    """The equations of all lines at one speed; n lines, m waves, r readings, f forces."""
 
     gearset: Gearset
     interface: Interface
@@ -342,13 +335,7 @@ class Balance:
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """How the balance follows small changes of the readings.
-
-    Attributes
-    ----------
-    balance : Balance
-    sampled : LawSamples
-    """
+    """How the balance follows small changes of the readings."""
 
     balance: Balance
     sampled: LawSamples

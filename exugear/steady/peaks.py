@@ -36,27 +36,18 @@ BESIDE = 0.03
 
 @dataclass(frozen=True)
 class Peak:
-    """A line of a signal where it is loudest.
-
-    Attributes
-    ----------
-    line : str
-        Such as ``2 x intermediate``.
-    order : float
-        Periods per turn of the input.
-    speed : float
-        Of the input, rad/s.
-    frequency : float
-        Hz.
-    amplitude : float
-        In the signal's unit.
-    """
+    """A line of a signal where it is loudest."""
 
     line: str
+    """Such as ``2 x intermediate``."""
     order: float
+    """Periods per turn of the input."""
     speed: float
+    """Of the input, rad/s."""
     frequency: float
+    """Hz."""
     amplitude: float
+    """In the signal's unit."""
 
 
 def line_name(index: tuple[int, ...], bases: tuple[str, ...]) -> str:
@@ -115,27 +106,18 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
 
 @dataclass(frozen=True)
 class Sideband:
-    """A line beside a peak, at the speed of the peak.
-
-    Attributes
-    ----------
-    line : str
-        Its name, as of `Peak`; of a planet's sidebands the signal.
-    frequency : float
-        Hz.
-    amplitude : float
-        In the signal's unit.
-    share : float
-        Amplitude over that of the line that it stands beside: of the peak, or of the largest wave of the signal.
-    cause : str
-        What modulates the line of the peak.
-    """
+    """A line beside a peak, at the speed of the peak."""
 
     line: str
+    """Its name, as of `Peak`; of a planet's sidebands the signal."""
     frequency: float
+    """Hz."""
     amplitude: float
+    """In the signal's unit."""
     share: float
+    """Amplitude over that of the line that it stands beside: of the peak, or of the largest wave of the signal."""
     cause: str
+    """What modulates the line of the peak."""
 
 
 def _tops(values: Floats) -> Integers:
@@ -236,24 +218,16 @@ def _signed(words: str) -> str:
 
 @dataclass(frozen=True)
 class Pull:
-    """A mesh whose teeth would have to pull: they part, which a law without contact loss does not know.
-
-    Attributes
-    ----------
-    mesh : str
-        Name; of planets the family.
-    count : int
-        At how many of the speeds.
-    speed : float
-        Of the input where it pulls longest, rad/s.
-    share : float
-        Of the time there.
-    """
+    """A mesh whose teeth would have to pull: they part, which a law without contact loss does not know."""
 
     mesh: str
+    """Name; of planets the family."""
     count: int
+    """At how many of the speeds."""
     speed: float
+    """Of the input where it pulls longest, rad/s."""
     share: float
+    """Of the time there."""
 
 
 def pulls(data: xr.Dataset) -> tuple[Pull, ...]:
@@ -299,23 +273,15 @@ def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
 
 @dataclass(frozen=True)
 class BearingSwing:
-    """A linear bearing whose load swings so far about the static one that its rows are no straight line there.
-
-    Attributes
-    ----------
-    bearing : str
-    count : int
-        At how many of the speeds.
-    speed : float
-        Of the input where it swings most, rad/s.
-    share : float
-        Of the static load that the vibration takes away at most there; from 1 on the bearing comes free.
-    """
+    """A linear bearing whose load swings so far about the static one that its rows are no straight line there."""
 
     bearing: str
     count: int
+    """At how many of the speeds."""
     speed: float
+    """Of the input where it swings most, rad/s."""
     share: float
+    """Of the static load that the vibration takes away at most there; from 1 on the bearing comes free."""
 
 
 def bearing_swings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
@@ -351,26 +317,17 @@ def _swinging(data: xr.Dataset, places: list[int], static: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class ComparedPeak:
-    """A peak of a steady response beside what a run-up shows of it.
-
-    Attributes
-    ----------
-    peak : Peak
-    damping : float or None
-        Share of critical damping of the mode that is met there, where one is known.
-    run_amplitude : float
-        Largest of the run-up near that speed, in the signal's unit.
-    severity : float or None
-        Of the sweep, as `exugear.results.spectra.sweeps.sweep_severity` has it.
-    run_rank : int
-        Place among the peaks by the run-up's amplitude, 1 for the loudest.
-    """
+    """A peak of a steady response beside what a run-up shows of it."""
 
     peak: Peak
     damping: float | None
+    """Share of critical damping of the mode that is met there, where one is known."""
     run_amplitude: float
+    """Largest of the run-up near that speed, in the signal's unit."""
     severity: float | None
+    """Of the sweep, as `exugear.results.spectra.sweeps.sweep_severity` has it."""
     run_rank: int
+    """Place among the peaks by the run-up's amplitude, 1 for the loudest."""
 
 
 def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -> OrderCut:

@@ -73,29 +73,19 @@ def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int | None = None,
 
 @dataclass(frozen=True, eq=False)
 class PartingState:
-    """A steady state of a gearbox whose teeth may part.
-
-    Attributes
-    ----------
-    gearset : Gearset
-        With the lines that it took.
-    readings : (n, m, r) complex array
-        What the laws read.
-    response : Response
-    growth : float
-        Fastest growth of a disturbance, 1/s.
-    remark : str
-        What is to be said of it, empty if nothing.
-    averaged : PartingState, optional
-        The state with planets at their mean over a turn of the carrier, where this one has lines beside those of it.
-    """
+    """A steady state of a gearbox whose teeth may part."""
 
     gearset: Gearset
+    """With the lines that it took."""
     readings: Complexes
+    """(n, m, r) what the laws read."""
     response: Response
     growth: float
+    """Fastest growth of a disturbance, 1/s."""
     remark: str = ""
+    """What is to be said of it, empty if nothing."""
     averaged: PartingState | None = None
+    """The state with planets at their mean over a turn of the carrier, where this one has lines beside those of it."""
 
     def on(self, gearset: Gearset, interface: Interface | None = None) -> PartingState:
         """Return the state in the lines of another gearset, which are some of its own."""

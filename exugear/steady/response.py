@@ -36,31 +36,21 @@ class Response:
     """Steady state at one speed; n lines, m mesh waves, f forces of each.
 
     Arrays of lines hold coefficients; `exugear.steady.harmonics.lines.LineSet` says how they make a signal.
-
-    Attributes
-    ----------
-    interface : Interface
-    deflection : (n, m) complex array
-        Deflections that the laws read, m.
-    excess : (n, m, f) complex array
-        Forces beyond those of the mean system, in the law's coordinates, N and N m.
-    force : (n, m) complex array
-        Forces of the meshes on the line of action, N.
-    products : int
-        Products with the operator that the solution took.
-    apart : (m,) array
-        Share of time in which teeth are apart.
-    free : (b,) array
-        Share of time in which no rolling element of a non-linear bearing touches, by law.
     """
 
     interface: Interface
     deflection: Complexes
+    """(n, m) deflections that the laws read, m."""
     excess: Complexes
+    """(n, m, f) forces beyond those of the mean system, in the law's coordinates, N and N m."""
     force: Complexes
+    """(n, m) forces of the meshes on the line of action, N."""
     products: int
+    """Products with the operator that the solution took."""
     apart: Floats
+    """(m,) share of time in which teeth are apart."""
     free: Floats
+    """(b,) share of time in which no rolling element of a non-linear bearing touches, by law."""
 
     @cached_property
     def motion(self) -> Complexes:

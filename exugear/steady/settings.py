@@ -32,19 +32,13 @@ SLOWEST = 1e-6
 
 @dataclass(frozen=True)
 class SpeedRange:
-    """Even speeds of the overall input.
-
-    Attributes
-    ----------
-    first, last : float
-        rad/s, positive about +z.
-    count : int
-        How many, both ends included.
-    """
+    """Even speeds of the overall input."""
 
     first: float
     last: float
+    """rad/s, positive about +z."""
     count: int
+    """How many, both ends included."""
 
     def __post_init__(self) -> None:
         """Refuse what is no range."""
@@ -157,31 +151,21 @@ def check_law(name: str, level: Level) -> None:
 
 @dataclass(frozen=True)
 class SteadySettings:
-    """What is asked for.
-
-    Attributes
-    ----------
-    speeds : SpeedRange
-    level : {"linear", "parametric", "nonlinear"}
-        The static transmission error as excitation, stiffness that varies with the mesh cycle, or laws evaluated in
-        time, the position in the cycle moving with the vibration.
-    harmonics : int, optional
-        Harmonics of each mesh frequency; by default as many as the mesh stiffness asks for.
-    combinations : int
-        Largest sum of multiples of several mesh frequencies.
-    at_resonances : bool
-        Whether speeds are added where lines cross modes.
-    branches : bool
-        Whether the states are followed by arc length from the first speed to the last, through folds, with the
-        stability of each; the count of speeds and `at_resonances` then play no part.
-    """
+    """What is asked for."""
 
     speeds: SpeedRange
     level: Level = "parametric"
+    """{"linear", "parametric", "nonlinear"}: the static transmission error as excitation, stiffness that varies with
+    the mesh cycle, or laws evaluated in time, the position in the cycle moving with the vibration."""
     harmonics: int | None = None
+    """Harmonics of each mesh frequency; by default as many as the mesh stiffness asks for."""
     combinations: int = 3
+    """Largest sum of multiples of several mesh frequencies."""
     at_resonances: bool = True
+    """Whether speeds are added where lines cross modes."""
     branches: bool = False
+    """Whether the states are followed by arc length from the first speed to the last, through folds, with the
+    stability of each; the count of speeds and `at_resonances` then play no part."""
 
     def __post_init__(self) -> None:
         """Refuse what is no level, too many harmonics, and branches where there are none."""

@@ -30,22 +30,15 @@ CHECKED = 3
 
 @dataclass(frozen=True)
 class Candidate:
-    """A speed at which two modes and a harmonic of a mesh frequency may work together.
-
-    Attributes
-    ----------
-    speed : float
-        Of the input, rad/s.
-    base, harmonic : int
-        Which mesh frequency, and the multiple of it that is the sum or difference of both modes' frequencies.
-    growth : float
-        Estimate of the fastest growth there, 1/s.
-    """
+    """A speed at which two modes and a harmonic of a mesh frequency may work together."""
 
     speed: float
+    """Of the input, rad/s."""
     base: int
     harmonic: int
+    """Which mesh frequency, and the multiple of it that is the sum or difference of both modes' frequencies."""
     growth: float
+    """Estimate of the fastest growth there, 1/s."""
 
 
 def candidates(gearset: Gearset, low: float, high: float) -> tuple[Candidate, ...]:

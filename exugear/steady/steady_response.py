@@ -34,39 +34,28 @@ from fe_ste.tools.threads import one_dense_thread
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Points of a steady response as they are solved and kept.
-
-    Attributes
-    ----------
-    speed : (points,) array
-        Of the overall input, rad/s.
-    amplitude : (points, lines, signals) complex array
-        Peak amplitudes; of line 0 the mean of the vibration about the static state. Single precision, as in the file.
-    drive_torque : (points,) array
-        N m.
-    energy_error : (points,) array
-        Power that damping takes less that given by the meshes, over the larger of both.
-    products : (points,) array
-        Products with the operator of the balance.
-    apart : (points, waves) array
-        Share of time in which the teeth of each mesh wave are apart.
-    free : (points, bearings) array
-        Share of time in which no rolling element of a non-linear bearing touches, of planets the mean.
-    growth : (points,) array
-        Fastest growth of a disturbance, 1/s, along a branch and where teeth may part; NaN elsewhere.
-    remark : (points,) array of str
-        What is to be said of a point, or why there is none: its numbers are NaN then.
-    """
+    """Points of a steady response as they are solved and kept."""
 
     speed: Floats
+    """(points,) of the overall input, rad/s."""
     amplitude: SingleComplexes
+    """(points, lines, signals) peak amplitudes; of line 0 the mean of the vibration about the static state. Single
+    precision, as in the file."""
     drive_torque: Floats
+    """(points,) N m."""
     energy_error: Floats
+    """(points,) power that damping takes less that given by the meshes, over the larger of both."""
     products: Floats
+    """(points,) products with the operator of the balance."""
     apart: Floats
+    """(points, waves) share of time in which the teeth of each mesh wave are apart."""
     free: Floats
+    """(points, bearings) share of time in which no rolling element of a non-linear bearing touches, of planets the
+    mean."""
     growth: Floats
+    """(points,) fastest growth of a disturbance, 1/s, along a branch and where teeth may part; NaN elsewhere."""
     remark: Texts
+    """(points,) what is to be said of a point, or why there is none: its numbers are NaN then."""
 
     def part(self, which: slice | Booleans | Integers) -> Solved:
         """Take some of the points."""
@@ -81,72 +70,48 @@ class Solved:
 
 @dataclass(frozen=True, eq=False)
 class SteadyResponse(Displayed):
-    """Steady response over speed.
-
-    Attributes
-    ----------
-    assembly : Assembly
-        As it was solved, with equal planets.
-    settings : SteadySettings
-    input_hash : str
-        Of gearbox, choices and settings.
-    lines : LineSet
-    base_names, wave_names : tuple of str
-        Meshes of each base, and mesh waves.
-    signals : tuple of SignalName
-    bearing_names : tuple of str
-        Bearings whose law was evaluated in time; all others are linear about the static state.
-    solved : Solved
-        Points in ascending order of speed, or along a branch.
-    unsolved : tuple of (float, str)
-        Speeds at which no steady state was found, rad/s, and why.
-    crossings : tuple of Crossing
-        Where lines meet modes, the strongest first.
-    contributions : tuple of (int, Contributions)
-        Line and what makes it, at the strongest crossings.
-    folds : tuple of float
-        Speeds at which a branch turns back, rad/s.
-    branch_ended : str
-        Why a branch ends before the last speed, and where; empty if it does not.
-    growth_rate : float
-        Fastest growth of any disturbance over the speeds, 1/s: of the mean system, where two modes and a mesh frequency
-        work together, and of the points where teeth may part.
-    planet_spread : float
-        Largest change of planet bearings' stiffness that made the planets equal, over that stiffness.
-    stiffness_variation : float
-        Largest change of stiffness over the carrier's places, over the stiffness, whose mean counts.
-    harmonics : int
-        Harmonics of each mesh frequency.
-    left_out : (waves,) array
-        Share of the variation of each mesh's compliance that is above them.
-    change_with_more : float
-        Largest relative change of the ten loudest peaks by half as many harmonics again; NaN where each state has the
-        lines that it needs.
-    campbell : Campbell
-        Modes over the speeds, as far up as the lines that `crossings` looks at.
-    """
+    """Steady response over speed."""
 
     assembly: Assembly
+    """As it was solved, with equal planets."""
     settings: SteadySettings
     input_hash: str
+    """Of gearbox, choices and settings."""
     lines: LineSet
     base_names: tuple[str, ...]
     wave_names: tuple[str, ...]
+    """Meshes of each base, and mesh waves."""
     signals: tuple[SignalName, ...]
     bearing_names: tuple[str, ...]
+    """Bearings whose law was evaluated in time; all others are linear about the static state."""
     solved: Solved
+    """Points in ascending order of speed, or along a branch."""
     unsolved: tuple[tuple[float, str], ...]
+    """Speeds at which no steady state was found, rad/s, and why."""
     crossings: tuple[Crossing, ...]
+    """Where lines meet modes, the strongest first."""
     contributions: tuple[tuple[int, Contributions], ...]
+    """Line and what makes it, at the strongest crossings."""
     folds: tuple[float, ...]
+    """Speeds at which a branch turns back, rad/s."""
     branch_ended: str
+    """Why a branch ends before the last speed, and where; empty if it does not."""
     growth_rate: float
+    """Fastest growth of any disturbance over the speeds, 1/s: of the mean system, where two modes and a mesh
+    frequency work together, and of the points where teeth may part."""
     planet_spread: float
+    """Largest change of planet bearings' stiffness that made the planets equal, over that stiffness."""
     stiffness_variation: float
+    """Largest change of stiffness over the carrier's places, over the stiffness, whose mean counts."""
     harmonics: int
+    """Harmonics of each mesh frequency."""
     left_out: Floats
+    """(waves,) share of the variation of each mesh's compliance that is above them."""
     change_with_more: float
+    """Largest relative change of the ten loudest peaks by half as many harmonics again; NaN where each state has the
+    lines that it needs."""
     campbell: Campbell
+    """Modes over the speeds, as far up as the lines that `crossings` looks at."""
 
     def _line(self) -> str:
         assembly = self.assembly

@@ -35,31 +35,20 @@ SHOWN_VALUES, LONGEST_VALUE = 5, 200
 
 @dataclass(frozen=True)
 class Task:
-    """What all points of a study have in common, as it is sent to a worker.
-
-    Attributes
-    ----------
-    content : mapping
-        Of the gearbox file, with the changes that all points have.
-    source : str
-    permissions : Permissions
-    choice : Choice
-    settings : PointSettings
-    figures : mapping of name to KeptFigure
-    folder : Path
-        Of the study.
-    parameters : mapping of path to str
-        Names of the parameters that set paths of the case.
-    """
+    """What all points of a study have in common, as it is sent to a worker."""
 
     content: Mapping[str, Any]
+    """Of the gearbox file, with the changes that all points have."""
     source: str
     permissions: Permissions
     choice: Choice
     settings: PointSettings
     figures: Mapping[str, KeptFigure]
+    """By name."""
     folder: Path
+    """Of the study."""
     parameters: Mapping[str, str] = field(default_factory=dict)
+    """Mapping of path to str. Names of the parameters that set paths of the case."""
 
 
 @dataclass(frozen=True)

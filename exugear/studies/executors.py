@@ -36,17 +36,12 @@ class Submits(Protocol):
 
 @dataclass(frozen=True)
 class Pool:
-    """An executor at work.
-
-    Attributes
-    ----------
-    executor : object with the protocol of `concurrent.futures.Executor`
-    workers : int
-        Batches that it computes at once.
-    """
+    """An executor at work."""
 
     executor: Submits
+    """Object with the protocol of `concurrent.futures.Executor`."""
     workers: int
+    """Batches that it computes at once."""
 
 
 Opens = Callable[[], AbstractContextManager[Pool]]

@@ -31,30 +31,20 @@ _DIGITS = 16
 
 @dataclass(frozen=True)
 class Record:
-    """What is kept of a point.
-
-    Attributes
-    ----------
-    point : str
-        Hash of its input.
-    values : mapping
-        Figures by name: a number, or numbers by name; None for one that is none, `INFINITE` for one without end.
-    error : str
-        Why it failed; empty if it did not.
-    doubts : list of str
-        What speaks against trusting it.
-    seconds : float
-        Wall time that it took.
-    memory : float
-        Peak of the memory of its process so far, bytes.
-    """
+    """What is kept of a point."""
 
     point: str
+    """Hash of its input."""
     values: Mapping[str, Any] = field(default_factory=dict)
+    """Figures by name: a number, or numbers by name; None for one that is none, `INFINITE` for one without end."""
     error: str = ""
+    """Why it failed; empty if it did not."""
     doubts: list[str] = field(default_factory=list)
+    """What speaks against trusting it."""
     seconds: float = 0.0
+    """Wall time that it took."""
     memory: float = 0.0
+    """Peak of the memory of its process so far, bytes."""
 
     def line(self) -> str:
         """Return it as a line of a journal."""

@@ -40,15 +40,7 @@ class OptimisationError(RuntimeError):
 
 @dataclass
 class _Evaluated:
-    """Points that searches looked at.
-
-    Attributes
-    ----------
-    study : Study
-    task : Task
-    opens : Opens
-    tell : Progress, optional
-    """
+    """Points that searches looked at."""
 
     study: Study
     task: Task

@@ -30,18 +30,12 @@ Side = Literal["high", "low"]
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """A point that a search looked at.
-
-    Attributes
-    ----------
-    row : array (parameters,)
-        NaN for the case as it is.
-    draws : tuple of (str, mapping)
-        Hash and values at paths of the case of each draw of the tolerances; one without tolerances.
-    """
+    """A point that a search looked at."""
 
     row: Floats
+    """(parameters,) NaN for the case as it is."""
     draws: tuple[tuple[str, Mapping[str, Any]], ...]
+    """Hash and values at paths of the case of each draw of the tolerances; one without tolerances."""
 
     @property
     def key(self) -> str:
@@ -55,21 +49,14 @@ Figure = Callable[[Looked, str], Floats]
 
 @dataclass(frozen=True)
 class Criteria:
-    """What points of a search are judged by.
-
-    Attributes
-    ----------
-    figures : tuple of str
-        Made small.
-    limits : tuple of (str, Side, float)
-        Figure, the side that is limited, and the limit.
-    percentile : float
-        Over tolerances, of the bad side.
-    """
+    """What points of a search are judged by."""
 
     figures: tuple[str, ...]
+    """Made small."""
     limits: tuple[tuple[str, Side, float], ...]
+    """Figure, the side that is limited, and the limit."""
     percentile: float
+    """Over tolerances, of the bad side."""
 
     @classmethod
     def of(cls, study: StudyFile) -> Criteria:

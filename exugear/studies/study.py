@@ -46,24 +46,6 @@ from fe_ste.tools.versions import TABLE
 class Study(Displayed):
     """What is varied, computed and kept. Build one with `from_toml` or `from_dict`.
 
-    Attributes
-    ----------
-    file : StudyFile
-        The file as it is written.
-    source : str
-        Its path or name.
-    gearbox : Gearbox
-        The case, with the changes that all points have.
-    choice : Choice
-    settings : PointSettings
-    figures : mapping of name to KeptFigure
-    design : Design
-        All points; of a search none.
-    tolerances : Tolerances or None
-        Draws at each point of a search.
-    case_digest : str
-        Hash of the case without the changes.
-
     Examples
     --------
     >>> study = Study.from_dict(
@@ -80,14 +62,21 @@ class Study(Displayed):
     """
 
     file: StudyFile
+    """The file as it is written."""
     source: str
+    """Its path or name."""
     gearbox: Gearbox
+    """The case, with the changes that all points have."""
     choice: Choice
     settings: PointSettings
     figures: Mapping[str, KeptFigure]
+    """By name."""
     design: Design
+    """All points; of a search none."""
     case_digest: str
+    """Hash of the case without the changes."""
     tolerances: Tolerances | None = None
+    """Draws at each point of a search."""
 
     @classmethod
     def from_toml(

@@ -23,16 +23,11 @@ STUDY_FILE = "study.json"
 
 @dataclass(frozen=True)
 class Shard:
-    """A part of a study: every n-th point.
-
-    Attributes
-    ----------
-    number, of : int
-        Part `number` of `of`, counted from 1.
-    """
+    """A part of a study: every n-th point."""
 
     number: int
     of: int
+    """Part `number` of `of`, counted from 1."""
 
     def __post_init__(self) -> None:
         """Refuse a part that there is not."""
@@ -61,24 +56,16 @@ Progress = Callable[[int, int, int], None]
 
 @dataclass(frozen=True)
 class Swept:
-    """What came of a study.
-
-    Attributes
-    ----------
-    records : mapping of hash to Record
-        Of all its points that are finished.
-    computed : int
-        Points that were computed now.
-    path : Path or None
-        File of the dataset; none was written for a part whose other parts are not finished.
-    dataset : Dataset or None
-        What it holds.
-    """
+    """What came of a study."""
 
     records: Mapping[str, Record]
+    """By hash, of all its points that are finished."""
     computed: int
+    """Points that were computed now."""
     path: Path | None
+    """File of the dataset; none was written for a part whose other parts are not finished."""
     dataset: xr.Dataset | None
+    """What it holds."""
 
     @property
     def failed(self) -> list[Record]:

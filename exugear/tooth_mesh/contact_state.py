@@ -31,49 +31,20 @@ Samples = tuple[float, ...]
 
 @dataclass(frozen=True)
 class ContactCycle:
-    """What of a contact changes over the mesh cycle, at equal steps from its beginning.
-
-    Attributes
-    ----------
-    deflection : tuple of float
-        Static transmission error, m.
-    tangent_stiffness : tuple of float
-        N/m.
-    load_centre, tangent_load_centre : tuple of float
-        Of the load, and of what a little more deflection adds to it, m.
-    """
+    """What of a contact changes over the mesh cycle, at equal steps from its beginning."""
 
     deflection: Samples
+    """Tuple of float. Static transmission error, m."""
     tangent_stiffness: Samples
+    """Tuple of float. N/m."""
     load_centre: Samples
     tangent_load_centre: Samples
+    """Tuple of float. Of the load, and of what a little more deflection adds to it, m."""
 
 
 @dataclass(frozen=True)
 class ContactState:
     """Contact of a mesh at one load and misalignment, as mean over the mesh cycle.
-
-    Attributes
-    ----------
-    force : float
-        Load F0 on the transverse line of action, N, positive.
-    deflection : float
-        Static transmission error at that load and misalignment, m.
-    tangent_stiffness : float
-        Change of the load with the deflection at that misalignment, N/m.
-    misalignment : float
-        g0, rad; it opens the gap at the +z end.
-    load_centre : float
-        zc, m.
-    tangent_load_centre : float
-        Centre zt of the load that a little more deflection adds, m; also the change of the deflection with the
-        misalignment under constant load, m/rad.
-    tilt_stiffness : float
-        kg: how much the load's moment falls with the misalignment while the load stays, N m/rad.
-    centre_distance, deflection_by_distance : float
-        a0 (m), and sa: change of the deflection with the centre distance under constant load.
-    cycle : ContactCycle, optional
-        What of it changes over the mesh cycle, if that is known.
 
     Examples
     --------
@@ -83,15 +54,25 @@ class ContactState:
     """
 
     force: float
+    """Load F0 on the transverse line of action, N, positive."""
     deflection: float
+    """Static transmission error at that load and misalignment, m."""
     tangent_stiffness: float
+    """Change of the load with the deflection at that misalignment, N/m."""
     misalignment: float
+    """g0, rad; it opens the gap at the +z end."""
     load_centre: float
+    """Zc, m."""
     tangent_load_centre: float
+    """Centre zt of the load that a little more deflection adds, m; also the change of the deflection with the
+    misalignment under constant load, m/rad."""
     tilt_stiffness: float
+    """kg: how much the load's moment falls with the misalignment while the load stays, N m/rad."""
     centre_distance: float = 0.0
     deflection_by_distance: float = 0.0
+    """a0 (m), and sa: change of the deflection with the centre distance under constant load."""
     cycle: ContactCycle | None = None
+    """What of it changes over the mesh cycle, if that is known."""
 
     def seen_by(self, flank: int) -> ContactState:
         """Take the state from the axes of a table to those of a mesh with this flank, or back.

@@ -50,55 +50,49 @@ STEEPEST = 2.0
 
 @dataclass(frozen=True)
 class MeshElement:
-    """One mesh as the kernel sees it.
-
-    Attributes
-    ----------
-    mesh : Mesh
-    law : Law
-    flank : +1 or -1, the loaded flank s of gear 1
-    deflection, force : (12,) rows about the two bodies' nodes (x y z, tilts, spin of gear 1, then gear 2)
-    axis : (2, 2) axes of the two bodies relative to the frame's axis, m
-    cycles : mesh cycles per rad of gear 1 relative to the frame
-    phase : PMC at zero angles
-    stiffness, tangent : (n,) load over deflection and slope of the load over the mesh cycle, in the law's own
-        coordinate, N/m; equal where the law is a straight line
-    load : at which they are, on the transverse line of action, N
-    contact : how the teeth resist misalignment, in the axes of the mesh; None of a law in which they do not
-    damping : N s/m, in the law's own coordinate
-    damping_time : damping over stiffness, s
-    line_of_action : F_bt per scalar force of the law
-    centre, misalignment : (12,) rows of the centre distance and of the misalignment
-    errors : errors of gear 1 and gear 2 over a revolution of each from zero angle, m; empty for none
-    offset : (3,) deflection (m), change of centre distance (m) and misalignment (rad) at zero coordinates
-    table : for a law that follows a table; `stiffness` and `damping` are then what it has at the static load
-    computed_from : input of the pair's table where contact is still to be solved at the static misalignment
-    load_ways : (2, n) way of the load along the face over the mesh cycle, and of what a little more deflection adds to
-        it, each about its mean, in the axes of the mesh, m; empty where they stay or nothing is known of them
-    """
+    """One mesh as the kernel sees it."""
 
     mesh: Mesh
     law: Law
     flank: int
+    """+1 or -1, the loaded flank s of gear 1."""
     deflection: Floats
     force: Floats
+    """(12,) rows about the two bodies' nodes (x y z, tilts, spin of gear 1, then gear 2)."""
     axis: Floats
+    """(2, 2) axes of the two bodies relative to the frame's axis, m."""
     cycles: float
+    """Mesh cycles per rad of gear 1 relative to the frame."""
     phase: float
+    """PMC at zero angles."""
     stiffness: Floats
     tangent: Floats
+    """(n,) load over deflection and slope of the load over the mesh cycle, in the law's own: coordinate, N/m; equal
+    where the law is a straight line."""
     load: float
+    """At which they are, on the transverse line of action, N."""
     contact: ContactState | None
+    """How the teeth resist misalignment, in the axes of the mesh; None of a law in which they do not."""
     damping: float
+    """N s/m, in the law's own coordinate."""
     damping_time: float
+    """Damping over stiffness, s."""
     line_of_action: float
+    """F_bt per scalar force of the law."""
     centre: Floats
     misalignment: Floats
+    """(12,) rows of the centre distance and of the misalignment."""
     errors: tuple[Floats, Floats]
+    """Errors of gear 1 and gear 2 over a revolution of each from zero angle, m; empty for none."""
     offset: Floats
+    """(3,) deflection (m), change of centre distance (m) and misalignment (rad) at zero coordinates."""
     table: TableFlanks | None = None
+    """For a law that follows a table; `stiffness` and `damping` are then what it has at the static load."""
     computed_from: TableInput | None = None
+    """Input of the pair's table where contact is still to be solved at the static misalignment."""
     load_ways: Floats = field(default_factory=lambda: np.zeros((2, 0)))
+    """(2, n) way of the load along the face over the mesh cycle, and of what a little more deflection adds to: it,
+    each about its mean, in the axes of the mesh, m; empty where they stay or nothing is known of them."""
 
     def with_contact(self, contact: ContactState) -> MeshElement:
         """Return the mesh, whose teeth bear evenly so far, with a contact that was solved, in the axes of its table.

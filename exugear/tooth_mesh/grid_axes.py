@@ -31,18 +31,12 @@ ROUND_NUMBERS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 @dataclass(frozen=True)
 class GridAxes:
-    """Values along the axes of a pair's table.
-
-    Attributes
-    ----------
-    openings : tuple of float
-        Openings at the +z end over the common face width, m.
-    offsets : tuple of float
-        Centre distances less that of the pair, m.
-    """
+    """Values along the axes of a pair's table."""
 
     openings: tuple[float, ...]
+    """Openings at the +z end over the common face width, m."""
     offsets: tuple[float, ...]
+    """Centre distances less that of the pair, m."""
 
 
 def reaches(table: MeshTable, wanted: TableInput) -> bool:

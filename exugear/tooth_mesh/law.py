@@ -24,18 +24,6 @@ Angles = Literal["reference", "operating"]
 class MeshCurve:
     """Curve of load over deflection of a pair, a power of the deflection at each position in the mesh cycle.
 
-    Attributes
-    ----------
-    stiffness, tangent : (n,) arrays
-        Load over deflection, and the slope of the load, at pmc = 0, 1/n, ..., N/m.
-    force : float
-        Load on the transverse line of action at which they are, N.
-    table : TableInput, optional
-        What they were computed from: contact at other loads and misalignments can be solved then.
-    load_centre, tangent_load_centre : (n,) arrays, optional
-        Where the load bears along the face at the same positions, and what a little more deflection adds to it, m from
-        its middle, in the axes of the table. The second is the first by default.
-
     Examples
     --------
     >>> half = MeshCurve(np.array([2e9]), np.array([2.5e9]), 40e3).at(20e3)
@@ -45,10 +33,15 @@ class MeshCurve:
 
     stiffness: Floats
     tangent: Floats
+    """(n,) load over deflection, and the slope of the load, at pmc = 0, 1/n, ..., N/m."""
     force: float
+    """Load on the transverse line of action at which they are, N."""
     table: TableInput | None = None
+    """What they were computed from: contact at other loads and misalignments can be solved then."""
     load_centre: Floats | None = None
     tangent_load_centre: Floats | None = None
+    """(n,) where the load bears along the face at the same positions, and what a little more deflection adds to it,
+    m from its middle, in the axes of the table. The second is the first by default."""
 
     def at(self, force: float) -> MeshCurve:
         """Return the same curve by its stiffness at another load (N); without any, at that of the table."""
@@ -65,37 +58,29 @@ MeshData = ArrayLike | MeshCurve | SteSurface
 
 @dataclass(frozen=True)
 class TableFlanks:
-    """What the law `table` needs of a mesh beyond its rows.
-
-    Attributes
-    ----------
-    surface : SteSurface of the loaded flank
-    back, back_misalignment : (12,) rows of the other flank's deflection and misalignment
-    backlash : approach from flank to flank along the transverse line of action, m
-    back_phase : PMC of the other flank at zero angles
-    damping_time : damping over tangent stiffness, s
-    """
+    """What the law `table` needs of a mesh beyond its rows."""
 
     surface: SteSurface
+    """SteSurface of the loaded flank."""
     back: Floats
     back_misalignment: Floats
+    """(12,) rows of the other flank's deflection and misalignment."""
     backlash: float
+    """Approach from flank to flank along the transverse line of action, m."""
     back_phase: float
+    """PMC of the other flank at zero angles."""
     damping_time: float
+    """Damping over tangent stiffness, s."""
 
 
 class Law:
-    """A mesh law with a force; what it does not say otherwise is as along the line of action.
-
-    Attributes
-    ----------
-    form : number of the law's compiled form in `exugear.tooth_mesh.laws.forms`
-    tilts : whether teeth resist misalignment by the state of their contact
-        (`exugear.tooth_mesh.contact_state`); a law that does not has no moment, or one of its own
-    """
+    """A mesh law with a force; what it does not say otherwise is as along the line of action."""
 
     form: ClassVar[int]
+    """Number of the law's compiled form in `exugear.tooth_mesh.laws.forms`."""
     tilts: ClassVar[bool] = True
+    """Whether teeth resist misalignment by the state of their contact. (`exugear.tooth_mesh.contact_state`); a law
+    that does not has no moment, or one of its own."""
 
     def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | MeshCurve | SteSurface:
         """Read or compute what the law knows of a pair.

@@ -15,36 +15,24 @@ with ten by 1 %."""
 
 @dataclass(frozen=True)
 class MeshDuty(Displayed):
-    """A mesh under the static load.
-
-    Attributes
-    ----------
-    name : str
-    force : float
-        On the transverse line of action, N; positive, the flank that the static load presses pushes.
-    misalignment, opening : float
-        Of the gears, opening the gap at the +z end, rad; over the common face, m.
-    centre_distance_change : float
-        Axes further apart than nominal, m.
-    load_centre : float
-        Axial position of the resultant from the middle of the common face, m; NaN where no contact was solved.
-    face_load_factor : float
-        K_Hbeta: highest over mean line load along the face; NaN likewise.
-    pressure : float
-        Largest of the mesh cycle away from tip edges, Pa; NaN likewise.
-    remark : str
-        Why no contact was solved; empty where it was.
-    """
+    """A mesh under the static load."""
 
     name: str
     force: float
+    """On the transverse line of action, N; positive, the flank that the static load presses pushes."""
     misalignment: float
     opening: float
+    """Of the gears, opening the gap at the +z end, rad; over the common face, m."""
     centre_distance_change: float
+    """Axes further apart than nominal, m."""
     load_centre: float = math.nan
+    """Axial position of the resultant from the middle of the common face, m; NaN where no contact was solved."""
     face_load_factor: float = math.nan
+    """K_Hbeta: highest over mean line load along the face; NaN likewise."""
     pressure: float = math.nan
+    """Largest of the mesh cycle away from tip edges, Pa; NaN likewise."""
     remark: str = ""
+    """Why no contact was solved; empty where it was."""
 
     def _line(self) -> str:
         return f" of {self.name!r}: open by {1e6 * self.opening:.3g} um, K_Hbeta {self.face_load_factor:.3g}"

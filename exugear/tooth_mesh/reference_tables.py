@@ -20,21 +20,14 @@ DEFAULT_POSITIONS = 10
 
 @dataclass(frozen=True)
 class ReferenceRequest:
-    """The reference analysis of one pair.
-
-    Attributes
-    ----------
-    name : str
-        Name of the pair in the gearbox file.
-    wanted : NonlinearInput
-        All that the numbers depend on.
-    path : Path
-        The table's file.
-    """
+    """The reference analysis of one pair."""
 
     name: str
+    """Name of the pair in the gearbox file."""
     wanted: NonlinearInput
+    """All that the numbers depend on."""
     path: Path
+    """The table's file."""
 
     def compute(self, progress: Callable[[int, int, Iteration | None], None] | None = None) -> NonlinearTable:
         """Compute what the file does not hold yet, writing after each position."""

@@ -20,40 +20,27 @@ from fe_ste.transmission_error.table import TableInput
 
 @dataclass(frozen=True)
 class MeshPlace:
-    """How the gears of a mesh stand at rest, in the axes of its pair's table.
-
-    Attributes
-    ----------
-    table : TableInput
-        What the pair's table was computed from.
-    force : float
-        On the transverse line of action, N.
-    misalignment, centre_distance : float
-        rad, m.
-    group : str
-        Meshes of one group share one contact.
-    """
+    """How the gears of a mesh stand at rest, in the axes of its pair's table."""
 
     table: TableInput
+    """What the pair's table was computed from."""
     force: float
+    """On the transverse line of action, N."""
     misalignment: float
     centre_distance: float
+    """rad, m."""
     group: str
+    """Meshes of one group share one contact."""
 
 
 @dataclass(frozen=True)
 class StaticContacts:
-    """Contacts of meshes at rest.
-
-    Attributes
-    ----------
-    contacts : mapping of mesh name to MeanContact
-    unsolved : mapping of mesh name to str
-        Why there is none.
-    """
+    """Contacts of meshes at rest."""
 
     contacts: Mapping[str, MeanContact] = field(default_factory=dict)
+    """By mesh name."""
     unsolved: Mapping[str, str] = field(default_factory=dict)
+    """By mesh name, why there is none."""
 
     @property
     def states(self) -> dict[str, ContactState]:

@@ -29,27 +29,18 @@ FINITE_ELEMENTS = 500
 
 @dataclass(frozen=True)
 class TableRequest:
-    """The table of one pair: its input, its file and, where the file fits the input, its content.
-
-    Attributes
-    ----------
-    name : str
-        Name of the pair in the gearbox file.
-    wanted : fe_ste.transmission_error.table.TableInput
-        All that the numbers depend on.
-    path : Path
-        The table's file.
-    stored : MeshTable or None
-        The table in the file, if it was computed from exactly this input.
-    replaces : str
-        Why a file that is there does not serve; empty if there is none or it serves.
-    """
+    """The table of one pair: its input, its file and, where the file fits the input, its content."""
 
     name: str
+    """Name of the pair in the gearbox file."""
     wanted: TableInput
+    """All that the numbers depend on."""
     path: Path
+    """The table's file."""
     stored: MeshTable | None
+    """The table in the file, if it was computed from exactly this input."""
     replaces: str = ""
+    """Why a file that is there does not serve; empty if there is none or it serves."""
 
     @property
     def states(self) -> int:

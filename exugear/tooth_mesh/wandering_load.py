@@ -26,15 +26,6 @@ LEAST_PUSH = 1e-6
 class WanderingLoad:
     """Way of the load along the face, in its first harmonic.
 
-    Attributes
-    ----------
-    pair : str
-    amplitude : float
-        Of the load centre, m.
-    over_error : float
-        Its moment as forces at the ends of the face, over the force that the first harmonic of the transmission error
-        makes of the mean stiffness.
-
     Examples
     --------
     >>> WanderingLoad("helical", 1.8e-3, 4.3).in_words
@@ -43,7 +34,10 @@ class WanderingLoad:
 
     pair: str
     amplitude: float
+    """Of the load centre, m."""
     over_error: float
+    """Its moment as forces at the ends of the face, over the force that the first harmonic of the transmission error
+    makes of the mean stiffness."""
 
     @property
     def in_words(self) -> str:

@@ -24,8 +24,7 @@ class EnergyAccount:
 
     Attributes
     ----------
-    balance, powers : (terms,) and (powers,) arrays
-        Account and powers at the last state, J and W.
+    balance, powers : (terms,) (powers,) account and powers at the last state, J and W
 
     Examples
     --------

@@ -73,17 +73,6 @@ class ProgressMeter:
 class Run(Displayed):
     """A finished or stopped run.
 
-    Attributes
-    ----------
-    path : Path
-    complete : bool
-    end, wall : float
-        Simulated and wall time, s.
-    reasons : tuple of str
-        Why it is not to be trusted (`exugear.transient.trust`), none if it is.
-    halted : bool
-        Whether it was stopped beyond a limit, and cannot go on.
-
     Examples
     --------
     >>> Run(Path("rigid/run.nc"), complete=True, end=0.5, wall=1.25)
@@ -94,8 +83,11 @@ class Run(Displayed):
     complete: bool
     end: float
     wall: float
+    """Simulated and wall time, s."""
     reasons: tuple[str, ...] = ()
+    """Why it is not to be trusted (`exugear.transient.trust`), none if it is."""
     halted: bool = False
+    """Whether it was stopped beyond a limit, and cannot go on."""
 
     @property
     def trusted(self) -> bool:

@@ -30,37 +30,24 @@ EXPECTATIONS = ("stability_margin", "expected_error_at_band", "expected_error_of
 
 @dataclass(frozen=True, eq=False)
 class RunPlan:
-    """A run before it begins.
-
-    Attributes
-    ----------
-    assembly : Assembly
-    case : LoadCase
-    directory : Path
-        Where its results go.
-    steps : int
-        Number of steps to the end.
-    steps_per_sample : int
-        Number of steps between two stored samples.
-    band : float
-        Highest frequency whose amplitude is kept, Hz.
-    integration : Integration
-        How the compiled solver integrates; of Exudyn's own methods it tells the step.
-    solver : str
-        ``compiled`` or ``exudyn``.
-    mesh_route : str
-        How meshes act in Exudyn: ``element`` or ``loads``.
-    """
+    """A run before it begins."""
 
     assembly: Assembly
     case: LoadCase
     directory: Path
+    """Where its results go."""
     steps: int
+    """Number of steps to the end."""
     steps_per_sample: int
+    """Number of steps between two stored samples."""
     band: float
+    """Highest frequency whose amplitude is kept, Hz."""
     integration: Integration
+    """How the compiled solver integrates; of Exudyn's own methods it tells the step."""
     solver: str
+    """``compiled`` or ``exudyn``."""
     mesh_route: MeshRoute = "element"
+    """Str. How meshes act in Exudyn: ``element`` or ``loads``."""
 
     @property
     def step(self) -> float:

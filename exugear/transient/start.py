@@ -31,26 +31,17 @@ from fe_ste.tools.arrays import Floats
 
 @dataclass(frozen=True, eq=False)
 class RunStart:
-    """A run that can begin.
-
-    Attributes
-    ----------
-    loads : LoadTable
-        What acts from outside.
-    state : Checkpoint
-        State to start from.
-    pieces : RunPieces
-        What is written so far, and where the rest goes.
-    judge : Judge
-    resumed : bool
-        Whether the state is that of a run that was stopped, which is in the file already.
-    """
+    """A run that can begin."""
 
     loads: LoadTable
+    """What acts from outside."""
     state: Checkpoint
+    """State to start from."""
     pieces: RunPieces
+    """What is written so far, and where the rest goes."""
     judge: Judge
     resumed: bool
+    """Whether the state is that of a run that was stopped, which is in the file already."""
 
 
 def prepare_start(plan: RunPlan, resume: bool) -> RunStart:

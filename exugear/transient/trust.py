@@ -44,38 +44,29 @@ LEAST_ENERGY = 1e-9
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of what a run may claim.
-
-    Attributes
-    ----------
-    energy_marked, energy_stopped : float
-        Energy that the account does not explain, as part of the largest of work done, kinetic and elastic energy so
-        far. Good runs stay below 1e-5: every term is known, and only the quadrature of the powers is left. At a
-        hundredth, amplitudes are no longer known to the per cent that a level in dB is read by; a tenth from nowhere
-        means that the step does not solve the equations.
-    rim_speed_stopped : float
-        Rim of a gear, m/s: see `exugear.gearbox.load_cases.summary.BURSTING_RIM_SPEED`.
-    overspeed_stopped, swaying : float
-        Multiple of the fastest speed that the loads give the rolling train, and what a rim may have beyond it, m/s.
-        Elastic motions sway about the rolling one: 10 m/s at 1 kHz are 1.6 mm on the rim, a hundred times the
-        deflection of loaded teeth.
-    deflection_marked, deflection_stopped : float
-        Deflection of a mesh as part of the height of its teeth. Teeth of steel break at their root, at some 2 GPa,
-        when they give way by a sixtieth of their height: at three times this they are gone. At a quarter of the height
-        the gears no longer stand where the stiffness was computed, and bilateral laws know of no gap.
-    pulling_marked : float
-        Part of the run in which a mesh of a bilateral law pulls. At resonances it may do so now and then, as teeth do
-        that part. A mesh that pulls for half of the run or more is not loaded on the flank that it is the law of.
-    """
+    """Limits of what a run may claim."""
 
     energy_marked: float = 0.01
     energy_stopped: float = 0.1
+    """Energy that the account does not explain, as part of the largest of work done, kinetic and elastic energy so
+    far. Good runs stay below 1e-5: every term is known, and only the quadrature of the powers is left. At a
+    hundredth, amplitudes are no longer known to the per cent that a level in dB is read by; a tenth from nowhere
+    means that the step does not solve the equations."""
     rim_speed_stopped: float = BURSTING_RIM_SPEED
+    """Rim of a gear, m/s: see `exugear.gearbox.load_cases.summary.BURSTING_RIM_SPEED`."""
     overspeed_stopped: float = 2.0
     swaying: float = 10.0
+    """Multiple of the fastest speed that the loads give the rolling train, and what a rim may have beyond it, m/s.
+    Elastic motions sway about the rolling one: 10 m/s at 1 kHz are 1.6 mm on the rim, a hundred times the deflection
+    of loaded teeth."""
     deflection_marked: float = 0.05
     deflection_stopped: float = 0.25
+    """Deflection of a mesh as part of the height of its teeth. Teeth of steel break at their root, at some 2 GPa,
+    when they give way by a sixtieth of their height: at three times this they are gone. At a quarter of the height
+    the gears no longer stand where the stiffness was computed, and bilateral laws know of no gap."""
     pulling_marked: float = 0.5
+    """Part of the run in which a mesh of a bilateral law pulls. At resonances it may do so now and then, as teeth do
+    that part. A mesh that pulls for half of the run or more is not loaded on the flank that it is the law of."""
 
     def to_json(self) -> str:
         """Limits as text, for the file of a run."""

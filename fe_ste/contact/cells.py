@@ -23,18 +23,14 @@ _LEAST_CELL = 0.2
 
 @dataclass(frozen=True)
 class ContactSettings:
-    """Discretisation of the contact.
-
-    Parameters
-    ----------
-    slices : slices along the common face width
-    cells : cells of a slice across the window that travels with the contact line
-    window : half width of that window in Hertzian half widths at the largest mean line load
-    """
+    """Discretisation of the contact."""
 
     slices: int = 48
+    """Slices along the common face width."""
     cells: int = 9
+    """Cells of a slice across the window that travels with the contact line."""
     window: float = 1.8
+    """Half width of that window in Hertzian half widths at the largest mean line load."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot resolve a contact."""
@@ -112,32 +108,23 @@ def _lay_cells(
 
 @dataclass(frozen=True)
 class Cells(Displayed):
-    """Contact cells of one position.
-
-    Attributes
-    ----------
-    tooth, layer : ndarray (n,)
-        Tooth pair and slice.
-    roll, gear_roll : ndarray (n,)
-        Roll angles of the middle on both gears, rad.
-    half_across : ndarray (n,)
-        Half width along the profile, m.
-    gap : ndarray (n,)
-        Rigid gap of the unmodified flanks, m.
-    cut : ndarray (n,)
-        Whether a tip edge bounds the cell.
-    offset : ndarray (n,)
-        Distance of the middle from the contact line, or from the tip edge where that line is off the flanks, in cells.
-    """
+    """Contact cells of one position."""
 
     tooth: Integers
     layer: Integers
+    """(n,) tooth pair and slice."""
     roll: Floats
     gear_roll: Floats
+    """(n,) roll angles of the middle on both gears, rad."""
     half_across: Floats
+    """(n,) half width along the profile, m."""
     gap: Floats
+    """(n,) rigid gap of the unmodified flanks, m."""
     cut: Booleans
+    """(n,) whether a tip edge bounds the cell."""
     offset: Floats
+    """(n,) distance of the middle from the contact line, or from the tip edge where that line is off the flanks, in
+    cells."""
 
     def select(self, keep: Booleans) -> Cells:
         """Return the cells for which `keep` holds."""

@@ -26,18 +26,6 @@ _BORDER = 0.15
 class ContactSolution(Displayed):
     """Forces on the cells of one position.
 
-    Attributes
-    ----------
-    approach : float
-        Rotation of gear 2 as a length on the contact normal, m.
-    approach_per_load : float
-        Its derivative by the normal load, m/N.
-    force : ndarray (n,)
-        Normal force on each cell, N.
-    force_per_load : ndarray (n,)
-        Its derivative by the normal load, which is the derivative of the approach by the gap at the cell, too.
-    iterations : int
-
     Notes
     -----
     The energy force C force / 2 + gap force is least under the sum of the forces. Its least value has the derivative
@@ -45,9 +33,13 @@ class ContactSolution(Displayed):
     """
 
     approach: float
+    """Rotation of gear 2 as a length on the contact normal, m."""
     approach_per_load: float
+    """Its derivative by the normal load, m/N."""
     force: Floats
+    """(n,) normal force on each cell, N."""
     force_per_load: Floats
+    """(n,) its derivative by the normal load, which is the derivative of the approach by the gap at the cell, too."""
     iterations: int
 
     def _line(self) -> str:

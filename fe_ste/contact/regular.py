@@ -32,30 +32,21 @@ _FOUR = np.uintp(4)
 
 @dataclass(frozen=True)
 class RegularCompliance(Displayed):
-    """Regular compliance of one gear: coefficients of cubic splines over profile and face width.
-
-    Attributes
-    ----------
-    table : ndarray (blocks, f, l, l f)
-        Coefficients by profile and layer of the point that is read, and by layer and profile of the loaded one, m/N.
-    number : ndarray (t, t)
-        Block of (tooth pair read, tooth pair loaded); in a closed ring their difference decides.
-    first_tooth : int
-        Tooth pair of row and column 0 of `number`.
-    knots : ndarray
-        Knots over the arc length u = r_b roll^2 / 2, m: over it the flank's nodes are evenly spaced.
-    axial_knots : ndarray
-        Knots over the axial position, m.
-    base_radius : float
-        m.
-    """
+    """Regular compliance of one gear: coefficients of cubic splines over profile and face width."""
 
     table: Floats
+    """(blocks, f, l, l f) coefficients by profile and layer of the point that is read, and by layer and profile of
+    the loaded one, m/N."""
     number: Integers
+    """(t, t) block of (tooth pair read, tooth pair loaded); in a closed ring their difference decides."""
     first_tooth: int
+    """Tooth pair of row and column 0 of `number`."""
     knots: Floats
+    """Knots over the arc length u = r_b roll^2 / 2, m: over it the flank's nodes are evenly spaced."""
     axial_knots: Floats
+    """Knots over the axial position, m."""
     base_radius: float
+    """m."""
 
     @classmethod
     def from_flank(cls, flank: FlankCompliance, sense: int, teeth: Integers, reach: int) -> RegularCompliance:

@@ -25,34 +25,24 @@ class CondensedSector:
     Each cut face has m unknowns, the same on both sides of it, so that joining two sectors means equating the same
     numbers; the flank has n nodes. What is ``fixed`` holds with the faces held, to which is added what their
     displacements do. Pairs hold an even and an odd part, see `fe_ste.elasticity.half_sector`.
-
-    Attributes
-    ----------
-    stiffness : Chain
-        Of the plus face, N/m.
-    signs : ndarray (m,)
-        What the half turn about the middle of a face does to its unknowns.
-    load : Chain
-        Forces (m, n) on the plus face under unit nodal loads on the flank.
-    fixed : ndarray (n, n)
-        Normal displacement of the flank under unit nodal loads, m/N.
-    by_face : tuple of ndarray (n, m)
-        The same by the displacements of the plus face.
-    fixed_torque, face_torque : ndarray (n,), (m,)
-        Torque of the reaction at the held surface about the axis, per unit nodal load (m), and per displacement of the
-        plus face and the opposite one of the minus face (N).
-    weights : ndarray (n, n)
-        Nodal loads of the tent loads, see `fe_ste.elasticity.halfspace.tent_weights`.
     """
 
     stiffness: Chain
+    """Of the plus face, N/m."""
     signs: Floats
+    """(m,) what the half turn about the middle of a face does to its unknowns."""
     load: Chain
+    """Forces (m, n) on the plus face under unit nodal loads on the flank."""
     fixed: Floats
+    """(n, n) normal displacement of the flank under unit nodal loads, m/N."""
     by_face: tuple[Floats, Floats]
+    """(n, m) the same by the displacements of the plus face."""
     fixed_torque: Floats
     face_torque: Floats
+    """(n,), (m,) torque of the reaction at the held surface about the axis, per unit nodal load (m), and per
+    displacement of the plus face and the opposite one of the minus face (N)."""
     weights: Floats
+    """(n, n) nodal loads of the tent loads, see `fe_ste.elasticity.halfspace.tent_weights`."""
 
     @classmethod
     def from_mesh(cls, mesh: SectorMesh, side: int, incompatible_modes: bool) -> CondensedSector:

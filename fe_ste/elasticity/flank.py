@@ -36,32 +36,25 @@ class FlankCompliance(Displayed):
 
     Attributes
     ----------
-    gear : Gear
-    side : int
-        +1: the counter-clockwise flank of the teeth, -1: the clockwise one.
     mirror : float
         Strength of the image loads behind the free end faces taken out with the near field.
-    roll, axial : ndarray (f,), (l,)
-        Flank grid: roll angles (rad) and axial positions (m).
-    regular : dict
-        (tooth read, tooth loaded) -> ndarray (f l, f l), m/N. For the closed ring the key is (difference, 0).
-    closed : bool
-        Whether all teeth of the ring are there; else an open sector.
-    hub_torque : ndarray (f l,)
-        Torque of the reaction at the held surface about the axis per unit load on each flank node, m.
-    figures : dict
-        Unknowns, elements, least scaled Jacobian.
     """
 
     gear: Gear
     side: int
+    """+1: the counter-clockwise flank of the teeth, -1: the clockwise one."""
     images: Floats
     roll: Floats
     axial: Floats
+    """(f,), (l,) flank grid: roll angles (rad) and axial positions (m)."""
     regular: dict[tuple[int, int], Floats]
+    """(tooth read, tooth loaded) -> ndarray (f l, f l), m/N. For the closed ring the key is (difference, 0)."""
     closed: bool
+    """Whether all teeth of the ring are there; else an open sector."""
     hub_torque: Floats
+    """(f l,) torque of the reaction at the held surface about the axis per unit load on each flank node, m."""
     figures: dict[str, float | int | str]
+    """Unknowns, elements, least scaled Jacobian."""
 
     def between(self, read: int, loaded: int) -> Floats:
         """Return the compliance of tooth `read` under loads on tooth `loaded`.

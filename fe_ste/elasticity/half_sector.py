@@ -45,25 +45,19 @@ class SectorHalf:
     """Even or odd half of a sector, its inner unknowns eliminated.
 
     Loads and read-outs are the same columns.
-
-    Attributes
-    ----------
-    stiffness : ndarray (m, m)
-        Of the cut face at +pi/z, N/m; first the unknowns that a half turn about its middle keeps, see `turn_signs`.
-    face_reading : ndarray (r, m)
-        Of the columns, per displacement of the face; also the forces on the held face per load.
-    fixed_reading : ndarray (r, r)
-        Of the columns per load, the face held, m/N.
-    face_torque, fixed_torque : ndarray (m,), (r,)
-        Torque of the reaction at the held surface of this half, per displacement of the face (N) and load (m); the even
-        half takes none.
     """
 
     stiffness: Floats
+    """(m, m) of the cut face at +pi/z, N/m; first the unknowns that a half turn about its middle keeps, see
+    `turn_signs`."""
     face_reading: Floats
+    """(r, m) of the columns, per displacement of the face; also the forces on the held face per load."""
     fixed_reading: Floats
+    """(r, r) of the columns per load, the face held, m/N."""
     face_torque: Floats
     fixed_torque: Floats
+    """(m,), (r,) torque of the reaction at the held surface of this half, per displacement of the face (N) and load
+    (m); the even half takes none."""
 
 
 def sector_halves(

@@ -27,16 +27,6 @@ _FILLET_SPLIT_ANGLE = np.radians(50.0)
 class MeshSettings:
     """Numbers of elements of one tooth sector.
 
-    Parameters
-    ----------
-    layers : elements along the face width
-    flank : elements along the involute of one flank, equal in arc length
-    thickness : elements through the tooth, graded towards both flanks
-    fillet : elements along the upper part of the root fillet, which bounds the tooth core
-    root : elements along the lower fillet and half the root land
-    rim : elements from the held hub or rim to the root, graded towards the root
-    grading : ratio of the largest to the smallest element through the tooth
-
     Examples
     --------
     >>> MeshSettings().refined(2).layers
@@ -44,12 +34,19 @@ class MeshSettings:
     """
 
     layers: int = 12
+    """Elements along the face width."""
     flank: int = 20
+    """Elements along the involute of one flank, equal in arc length."""
     thickness: int = 12
+    """Elements through the tooth, graded towards both flanks."""
     fillet: int = 8
+    """Elements along the upper part of the root fillet, which bounds the tooth core."""
     root: int = 4
+    """Elements along the lower fillet and half the root land."""
     rim: int = 14
+    """Elements from the held hub or rim to the root, graded towards the root."""
     grading: float = 4.0
+    """Ratio of the largest to the smallest element through the tooth."""
 
     def __post_init__(self) -> None:
         """Refuse counts no mesh can have."""
@@ -81,31 +78,22 @@ class MeshSettings:
 
 @dataclass(frozen=True)
 class SectionMesh(Displayed, line=": {points!n} nodes, {quads!n} quadrilaterals"):
-    """Quadrilaterals of the transverse section of one tooth, centred on the +x axis.
-
-    Attributes
-    ----------
-    points : ndarray (n, 2)
-        Node coordinates, m.
-    quads : ndarray (m, 4)
-        Counter-clockwise connectivity.
-    flank_roll : ndarray (f + 1,)
-        Roll angle tan(alpha) of the flank nodes, rad, ascending.
-    between_flanks : ndarray (thickness + 1, f + 1)
-        Nodes of the tooth from the clockwise to the counter-clockwise flank, each row by ascending roll angle.
-    plus_cut, minus_cut : ndarray (c,)
-        Nodes of the cut faces at +pi/z and -pi/z, from the held surface to the root.
-    held : ndarray
-        Nodes of the held hub or rim surface.
-    """
+    """Quadrilaterals of the transverse section of one tooth, centred on the +x axis."""
 
     points: Floats
+    """(n, 2) node coordinates, m."""
     quads: Integers
+    """(m, 4) counter-clockwise connectivity."""
     flank_roll: Floats
+    """(f + 1,) roll angle tan(alpha) of the flank nodes, rad, ascending."""
     between_flanks: Integers
+    """(thickness + 1, f + 1) nodes of the tooth from the clockwise to the counter-clockwise flank, each row by
+    ascending roll angle."""
     plus_cut: Integers
     minus_cut: Integers
+    """(c,) nodes of the cut faces at +pi/z and -pi/z, from the held surface to the root."""
     held: Integers
+    """Nodes of the held hub or rim surface."""
 
     @property
     def plus_flank(self) -> Integers:
@@ -120,24 +108,16 @@ class SectionMesh(Displayed, line=": {points!n} nodes, {quads!n} quadrilaterals"
 
 @dataclass(frozen=True)
 class SectorMesh(Displayed, line=" of {gear.name!r}: {points!n} nodes, {hexahedra!n} hexahedra"):
-    """Hexahedra of one tooth sector; node ``layer * section nodes + section node``.
-
-    Attributes
-    ----------
-    gear : Gear
-    settings : MeshSettings
-    section : SectionMesh
-    axial_positions : ndarray (layers + 1,)
-        z of the node layers from the middle of the face width, m.
-    layer_points : ndarray (layers + 1, n, 2), optional
-        Nodes of the section of each layer, before it is turned, where they are not those of `section`, m.
-    """
+    """Hexahedra of one tooth sector; node ``layer * section nodes + section node``."""
 
     gear: Gear
     settings: MeshSettings
     section: SectionMesh
     axial_positions: Floats
+    """(layers + 1,) z of the node layers from the middle of the face width, m."""
     layer_points: Floats | None = None
+    """(layers + 1, n, 2) nodes of the section of each layer, before it is turned, where they are not those of
+    `section`, m."""
 
     @cached_property
     def twist_rate(self) -> float:

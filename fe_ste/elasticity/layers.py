@@ -19,24 +19,16 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class LayeredElements:
-    """Stiffness of the bricks over the quadrilaterals of a section.
-
-    Attributes
-    ----------
-    corners : ndarray (q, 8)
-        Section node of each corner of a brick.
-    above : ndarray (q, 8)
-        0 for a corner at the lower end of the layer, 1 at the upper end.
-    kinds : ndarray (layers,)
-        Height of each layer, as a place in `stiffness`.
-    stiffness : ndarray (heights, q, 8, 8, 3, 3)
-        By two corners and two directions, N/m.
-    """
+    """Stiffness of the bricks over the quadrilaterals of a section."""
 
     corners: Integers
+    """(q, 8) section node of each corner of a brick."""
     above: Integers
+    """(q, 8) 0 for a corner at the lower end of the layer, 1 at the upper end."""
     kinds: Integers
+    """(layers,) height of each layer, as a place in `stiffness`."""
     stiffness: Floats
+    """(heights, q, 8, 8, 3, 3) by two corners and two directions, N/m."""
 
     @classmethod
     def from_mesh(cls, mesh: SectorMesh, quads: Integers, share: Floats, incompatible_modes: bool) -> LayeredElements:

@@ -27,16 +27,6 @@ _LINE_MARGIN = 0.1
 class ContactMesh:
     """Numbers of elements of a sector that is refined where its flanks touch.
 
-    Parameters
-    ----------
-    layers : elements along the face width
-    contact_elements : elements across the Hertzian contact width
-    band : half width of the uniformly fine band about the contact line, in Hertzian half widths
-    growth : growth of the element size per length beyond the band
-    thickness, fillet, root, rim
-        As in `fe_ste.elasticity.hexmesh.MeshSettings`; through the tooth, elements are graded towards the loaded flank.
-    far_flank : elements along flanks that do not touch; others have no fewer
-
     Examples
     --------
     >>> ContactMesh().refined(1.5).layers
@@ -44,14 +34,21 @@ class ContactMesh:
     """
 
     layers: int = 6
+    """Elements along the face width."""
     contact_elements: float = 5.0
+    """Elements across the Hertzian contact width."""
     band: float = 1.6
+    """Half width of the uniformly fine band about the contact line, in Hertzian half widths."""
     growth: float = 0.6
+    """Growth of the element size per length beyond the band."""
     thickness: int = 9
     fillet: int = 4
     root: int = 3
     rim: int = 10
+    """As in `fe_ste.elasticity.hexmesh.MeshSettings`; through the tooth, elements are graded towards the loaded
+    flank."""
     far_flank: int = 6
+    """Elements along flanks that do not touch; others have no fewer."""
 
     def __post_init__(self) -> None:
         """Refuse what no mesh can have; the counts are checked with the mesh."""
@@ -67,29 +64,20 @@ class ContactMesh:
 
 @dataclass(frozen=True)
 class OpenSector(Displayed):
-    """Bricks of some neighbouring teeth of one gear, in its place in the pair.
-
-    Attributes
-    ----------
-    points : ndarray (n, 3)
-        m.
-    hexahedra : ndarray (m, 8)
-    held : ndarray
-        Nodes of the hub or rim surface.
-    contact_faces : ndarray (k, 2)
-        Element and number in `HEXAHEDRON_FACES` of the loaded flanks' faces.
-    tooth : ndarray (k,)
-        Tooth pair of each of these faces.
-    brick_tooth : ndarray (m,)
-        Tooth pair of the sector each hexahedron belongs to.
-    """
+    """Bricks of some neighbouring teeth of one gear, in its place in the pair."""
 
     points: Floats
+    """(n, 3) m."""
     hexahedra: Integers
+    """(m, 8)"""
     held: Integers
+    """Nodes of the hub or rim surface."""
     contact_faces: Integers
+    """(k, 2) element and number in `HEXAHEDRON_FACES` of the loaded flanks' faces."""
     tooth: Integers
+    """(k,) tooth pair of each of these faces."""
     brick_tooth: Integers
+    """(m,) tooth pair of the sector each hexahedron belongs to."""
 
     @property
     def facets(self) -> Integers:

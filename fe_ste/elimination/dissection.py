@@ -28,22 +28,15 @@ _UNEVEN = 1.0 + 2.0 * np.abs(_FRACTIONS - 0.5)
 
 @dataclass(frozen=True, eq=False)
 class Front:
-    """A step of the elimination: some blocks are eliminated, their neighbours take up what is left.
-
-    Attributes
-    ----------
-    eliminated, border : ndarray
-        Blocks, in the order of elimination; those that are kept come last.
-    children : tuple of Front
-        What comes before; none for a leaf.
-    cells : ndarray
-        Cells of a leaf.
-    """
+    """A step of the elimination: some blocks are eliminated, their neighbours take up what is left."""
 
     eliminated: Integers
     border: Integers
+    """Blocks, in the order of elimination; those that are kept come last."""
     children: tuple[Front, ...]
+    """What comes before; none for a leaf."""
     cells: Integers
+    """Cells of a leaf."""
 
 
 def dissected(middles: Floats, cells: Sequence[Integers], sizes: Integers, kept: Integers, leaf_blocks: int) -> Front:

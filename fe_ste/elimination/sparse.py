@@ -41,13 +41,11 @@ class Factorisation(ABC):
 
     Attributes
     ----------
-    name : str
-        The library at work: "pardiso" or "superlu".
-    unknowns : int
-        Number of rows of A.
+    unknowns : number of rows of A
     """
 
     name: Backend
+    """Str. The library at work: "pardiso" or "superlu"."""
 
     def __init__(self, unknowns: int) -> None:
         self.unknowns = unknowns

@@ -31,12 +31,6 @@ class ReliefShape(StrEnum):
 class Relief:
     """Tip or root relief.
 
-    Parameters
-    ----------
-    amount : material removed at the tip, or at the form circle for a root relief, m
-    start_radius : radius at which the relief begins, m
-    shape : growth from the start, in roll length; parabolic begins without a kink
-
     Raises
     ------
     GeometryError
@@ -44,8 +38,11 @@ class Relief:
     """
 
     amount: float
+    """Material removed at the tip, or at the form circle for a root relief, m."""
     start_radius: float
+    """Radius at which the relief begins, m."""
     shape: ReliefShape = ReliefShape.LINEAR
+    """Growth from the start, in roll length; parabolic begins without a kink."""
 
     def __post_init__(self) -> None:
         """Refuse amounts and shapes that make no sense."""
@@ -58,18 +55,6 @@ class Relief:
 @dataclass(frozen=True, kw_only=True)
 class FlankModification(Displayed):
     """Modification of both flanks of every tooth of a gear.
-
-    Parameters
-    ----------
-    tip_relief, root_relief : reliefs towards the tip and towards the form circle
-    profile_crowning : parabola over the roll length from form to tip circle, zero in its middle, m at either end
-    lead_crowning : parabola over the face width, zero at mid-face, m at either end
-    profile_slope : linear over the roll length; m removed at the tip, or at the form circle if negative
-    helix_slope : linear over the face width; m removed at the +z end, or at the -z end if negative
-    twist
-        Helix slope that turns over along the profile: m removed at the tip of the +z end and at the form circle of the
-        -z end, nothing at the other two corners, half at mid-flank; the other way round if negative.
-    topography : a measured or designed grid, which may also hold material that stands proud
 
     Raises
     ------
@@ -87,12 +72,20 @@ class FlankModification(Displayed):
 
     tip_relief: Relief | None = None
     root_relief: Relief | None = None
+    """Reliefs towards the tip and towards the form circle."""
     profile_crowning: float = 0.0
+    """Parabola over the roll length from form to tip circle, zero in its middle, m at either end."""
     lead_crowning: float = 0.0
+    """Parabola over the face width, zero at mid-face, m at either end."""
     profile_slope: float = 0.0
+    """Linear over the roll length; m removed at the tip, or at the form circle if negative."""
     helix_slope: float = 0.0
+    """Linear over the face width; m removed at the +z end, or at the -z end if negative."""
     twist: float = 0.0
+    """Helix slope that turns over along the profile: m removed at the tip of the +z end and at the form circle of
+    the -z end, nothing at the other two corners, half at mid-flank; the other way round if negative."""
     topography: FlankTopography | None = None
+    """A measured or designed grid, which may also hold material that stands proud."""
 
     def __post_init__(self) -> None:
         """Refuse amounts that make no sense."""

@@ -33,11 +33,6 @@ class FlankTopography(Displayed):
 
     Beyond the grid the values of its edge go on.
 
-    Parameters
-    ----------
-    radius, axial : rising, two values or more, m; axial positions from the middle of the face width
-    removed : along the flank normal, m, a row for each radius
-
     Raises
     ------
     GeometryError
@@ -53,7 +48,9 @@ class FlankTopography(Displayed):
 
     radius: tuple[float, ...]
     axial: tuple[float, ...]
+    """Rising, two values or more, m; axial positions from the middle of the face width."""
     removed: tuple[tuple[float, ...], ...]
+    """Along the flank normal, m, a row for each radius."""
 
     def __post_init__(self) -> None:
         """Refuse grids that are none."""

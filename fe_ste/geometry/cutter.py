@@ -22,21 +22,16 @@ POSITIONS = 4001
 
 @dataclass(frozen=True)
 class PinionCutter:
-    """Cutter of an internal gear, of its normal module, pressure angle and helix angle.
-
-    Parameters
-    ----------
-    teeth : number of teeth, z_0
-    tip_radius : radius of the arc that rounds its tips, transverse section, in normal modules (rho_a0*)
-    profile_shift : x_0, in normal modules; falls as it is ground again
-    tip_diameter
-        d_a0, m: the root circle of the gear follows from it. If not given, the cutter reaches the gear's root circle.
-    """
+    """Cutter of an internal gear, of its normal module, pressure angle and helix angle."""
 
     teeth: int
+    """Number of teeth, z_0."""
     tip_radius: float
+    """Radius of the arc that rounds its tips, transverse section, in normal modules (rho_a0*)."""
     profile_shift: float = 0.0
+    """x_0, in normal modules; falls as it is ground again."""
     tip_diameter: float | None = None
+    """d_a0, m: the root circle of the gear follows from it. If not given, the cutter reaches the gear's root circle."""
 
 
 def cutting_distance(gear_teeth: int, cutter_teeth: int, thickness_sum: float, angle: float, module: float) -> float:
@@ -60,24 +55,20 @@ def cutting_distance(gear_teeth: int, cutter_teeth: int, thickness_sum: float, a
 
 @dataclass(frozen=True)
 class CutterTipCut:
-    """What the rounded tip of a pinion-type cutter leaves on an internal gear, transverse section.
-
-    Parameters
-    ----------
-    base_radius, cutter_base_radius : of gear and cutter, m
-    centre_distance : at which it cuts, m
-    cutter_tip_radius, rounding : radius of the cutter's tip circle and of the arc there, m
-    cutter_base_half_angle : polar half angle of the cutter's tooth at its base circle, rad
-    half_pitch_angle : half of the angle between the gear's teeth, rad
-    """
+    """What the rounded tip of a pinion-type cutter leaves on an internal gear, transverse section."""
 
     base_radius: float
     cutter_base_radius: float
+    """Of gear and cutter, m."""
     centre_distance: float
+    """At which it cuts, m."""
     cutter_tip_radius: float
     rounding: float
+    """Radius of the cutter's tip circle and of the arc there, m."""
     cutter_base_half_angle: float
+    """Polar half angle of the cutter's tooth at its base circle, rad."""
     half_pitch_angle: float
+    """Half of the angle between the gear's teeth, rad."""
 
     @property
     def ratio(self) -> float:

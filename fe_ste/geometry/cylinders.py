@@ -9,25 +9,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Tube:
-    """Hollow cylinder or cone about the z axis.
-
-    Parameters
-    ----------
-    start, length : m
-    outer, inner : diameters at its start, m
-    density : kg/m^3
-    outer_end, inner_end : diameters at its end, m; those of its start if not given
-    aside : distance of its axis from the z axis, m; it stands for several that are spread evenly around
-    """
+    """Hollow cylinder or cone about the z axis."""
 
     start: float
     length: float
+    """In m."""
     outer: float
     inner: float
+    """Diameters at its start, m."""
     density: float
+    """kg/m^3."""
     outer_end: float | None = None
     inner_end: float | None = None
+    """Diameters at its end, m; those of its start if not given."""
     aside: float = 0.0
+    """Distance of its axis from the z axis, m; it stands for several that are spread evenly around."""
 
 
 @dataclass(frozen=True)

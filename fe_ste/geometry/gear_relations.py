@@ -39,34 +39,26 @@ def inputs_that_are_given(items: Iterable[tuple[str, Any]]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class BasicRack:
-    """Basic rack tooth profile (ISO 53), in normal modules.
-
-    Parameters
-    ----------
-    addendum : addendum of the gear tooth, h_aP*
-    dedendum : dedendum of the gear tooth, h_fP*
-    tip_radius : tip radius of the generating rack, rho_fP*: fillet radius at the root of the basic rack
-    """
+    """Basic rack tooth profile (ISO 53), in normal modules."""
 
     addendum: float = 1.0
+    """Addendum of the gear tooth, h_aP*."""
     dedendum: float = 1.25
+    """Dedendum of the gear tooth, h_fP*."""
     tip_radius: float = 0.38
+    """Tip radius of the generating rack, rho_fP*: fillet radius at the root of the basic rack."""
 
 
 @dataclass(frozen=True)
 class Material:
-    """Isotropic linear elastic material.
-
-    Parameters
-    ----------
-    youngs_modulus : Pa
-    poissons_ratio : dimensionless
-    density : kg/m^3
-    """
+    """Isotropic linear elastic material."""
 
     youngs_modulus: float = 206e9
+    """In Pa."""
     poissons_ratio: float = 0.3
+    """Dimensionless."""
     density: float = 7850.0
+    """kg/m^3."""
 
 
 @dataclass(frozen=True, kw_only=True)

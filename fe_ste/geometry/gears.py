@@ -116,8 +116,6 @@ class GearPair(UncheckedPair, Displayed):
     ----------
     name : str
         Name used in messages.
-    pinion : the smaller gear, always external
-    gear : the larger gear, external or internal
     centre_distance : float
         Operating centre distance, m, positive also for an internal pair.
     common_face_width : float, optional
@@ -148,7 +146,9 @@ class GearPair(UncheckedPair, Displayed):
     """
 
     pinion: Gear
+    """The smaller gear, always external."""
     gear: Gear
+    """The larger gear, external or internal."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot run."""

@@ -17,23 +17,17 @@ _OVERSAMPLING = 10
 
 @dataclass(frozen=True)
 class ToothProfile(Displayed):
-    """Counter-clockwise side of a tooth centred on the +x axis.
-
-    Parameters
-    ----------
-    gear : the gear it belongs to
-    tip_radius, form_radius, root_radius : radii at which flank and fillet begin and end, m
-    fillet : (n, 2)
-        Points x, y from the flank (first point, at the form radius, on the involute) to the root circle (last
-        point), evenly spaced along the curve, m. From there to the polar angle pi/z the profile is the root
-        circle.
-    """
+    """Counter-clockwise side of a tooth centred on the +x axis."""
 
     gear: Gear
+    """The gear it belongs to."""
     tip_radius: float
     form_radius: float
     root_radius: float
+    """Radii at which flank and fillet begin and end, m."""
     fillet: Floats
+    """(n, 2) points x, y from the flank (first point, at the form radius, on the involute) to the root circle (last
+    point), evenly spaced along the curve, m. From there to the polar angle pi/z the profile is the root circle."""
 
     def flank(self, radius: Floats) -> Floats:
         """Points of the involute.

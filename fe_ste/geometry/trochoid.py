@@ -17,27 +17,23 @@ SAMPLES = 2001
 
 @dataclass(frozen=True)
 class RackTipCut:
-    """What the rounded tip of a generating rack leaves on a gear, transverse section.
-
-    Parameters
-    ----------
-    reference_radius, base_radius, root_radius : m
-    half_pitch_angle : half of the angle between teeth, rad
-    base_half_angle : polar half angle of the tooth at the base circle, rad
-    pressure_angle : normal pressure angle, rad
-    helix_angle : rad
-    rounding, half_land : radius of the rack's tip and half the flat land between two such radii, normal section, m
-    """
+    """What the rounded tip of a generating rack leaves on a gear, transverse section."""
 
     reference_radius: float
     base_radius: float
     root_radius: float
+    """In m."""
     half_pitch_angle: float
+    """Half of the angle between teeth, rad."""
     base_half_angle: float
+    """Polar half angle of the tooth at the base circle, rad."""
     pressure_angle: float
+    """Normal pressure angle, rad."""
     helix_angle: float
+    """In rad."""
     rounding: float
     half_land: float
+    """Radius of the rack's tip and half the flat land between two such radii, normal section, m."""
 
     def polar(self, parameter: Floats) -> tuple[Floats, Floats]:
         """Radius and polar angle of points of the curve, the middle of the tooth at angle zero.

@@ -34,18 +34,12 @@ _PRESSURE_MAP: Final = "inferno_r"
 
 @dataclass(frozen=True)
 class HexahedraMesh(Displayed, line=": {points!n} nodes, {hexahedra!n} hexahedra"):
-    """Hexahedra of one body.
-
-    Attributes
-    ----------
-    points : (n, 3) array
-        m.
-    hexahedra : (m, 8) array of int
-        Connectivity in VTK order.
-    """
+    """Hexahedra of one body."""
 
     points: Floats
+    """(n, 3) m."""
     hexahedra: Integers
+    """(m, 8) connectivity in VTK order."""
 
     def surface(self) -> pyvista.PolyData:
         """Outer surface as quadrilaterals."""

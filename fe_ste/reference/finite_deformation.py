@@ -271,49 +271,33 @@ def _cauchy_stress(
 
 @dataclass(frozen=True)
 class BrickTangent:
-    """What one evaluation of the bricks gives.
-
-    Attributes
-    ----------
-    force : ndarray (n, 3)
-        Internal nodal forces with the modes condensed, N.
-    stiffness : ndarray (m, 24, 24)
-        Condensed tangents of the elements, N/m.
-    recovery : ndarray (m, 9, 25)
-        Step of the modes, taken negative: first column constant, others by the element's displacements.
-    """
+    """What one evaluation of the bricks gives."""
 
     force: Floats
+    """(n, 3) internal nodal forces with the modes condensed, N."""
     stiffness: Floats
+    """(m, 24, 24) condensed tangents of the elements, N/m."""
     recovery: Floats
+    """(m, 9, 25) step of the modes, taken negative: first column constant, others by the element's displacements."""
 
 
 @dataclass(frozen=True)
 class Bricks(Displayed):
-    """8-node bricks with incompatible modes, ready to be evaluated at any displacement.
-
-    Attributes
-    ----------
-    nodes : ndarray (m, 8)
-    points : ndarray (n, 3)
-        Undeformed, m.
-    gradients : ndarray (m, 88, 3)
-        Of the eight shape functions and three modes at each of the eight Gauss points, 1/m.
-    volumes : ndarray (m, 8)
-        m^3.
-    lame, shear : ndarray (m,)
-        Lame's constants, Pa.
-    finite : bool
-        Finite deformation; false gives the linear element.
-    """
+    """8-node bricks with incompatible modes, ready to be evaluated at any displacement."""
 
     nodes: Integers
+    """(m, 8)"""
     points: Floats
+    """(n, 3) undeformed, m."""
     gradients: Floats
+    """(m, 88, 3) of the eight shape functions and three modes at each of the eight Gauss points, 1/m."""
     volumes: Floats
+    """(m, 8) m^3."""
     lame: Floats
     shear: Floats
+    """(m,) lame's constants, Pa."""
     finite: bool
+    """Finite deformation; false gives the linear element."""
 
     @classmethod
     def from_mesh(

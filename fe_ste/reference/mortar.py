@@ -54,11 +54,6 @@ def summed(numbers: Integers, values: Floats, count: int) -> Floats:
 class Surface(Displayed, line=": {facets!n} facets"):
     """Quadrilaterals of a boundary.
 
-    Attributes
-    ----------
-    facets : ndarray (k, 4)
-        Nodes, counter-clockwise seen from outside.
-
     Examples
     --------
     >>> Surface(np.array([[7, 8, 3, 2]])).nodes.tolist()
@@ -66,6 +61,7 @@ class Surface(Displayed, line=": {facets!n} facets"):
     """
 
     facets: Integers
+    """(k, 4) nodes, counter-clockwise seen from outside."""
 
     @cached_property
     def nodes(self) -> Integers:
@@ -95,21 +91,14 @@ class Surface(Displayed, line=": {facets!n} facets"):
 
 @dataclass(frozen=True)
 class WeightedGap:
-    """Gap between two surfaces, weighted with the shape functions of the first one's nodes.
-
-    Attributes
-    ----------
-    gap : ndarray (s,)
-        Integral of shape function times gap by node of the first surface, m^3; negative where they overlap.
-    weight : ndarray (s,)
-        Integral of the shape function over the part that faces the other surface, m^2.
-    gradient : csr_matrix (s, 3 n)
-        Derivative of `gap` by the nodes' positions with projections and normals held, m^2.
-    """
+    """Gap between two surfaces, weighted with the shape functions of the first one's nodes."""
 
     gap: Floats
+    """(s,) integral of shape function times gap by node of the first surface, m^3; negative where they overlap."""
     weight: Floats
+    """(s,) integral of the shape function over the part that faces the other surface, m^2."""
     gradient: scipy.sparse.csr_matrix
+    """(s, 3 n) derivative of `gap` by the nodes' positions with projections and normals held, m^2."""
 
     @property
     def mean(self) -> Floats:

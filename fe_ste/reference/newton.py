@@ -41,20 +41,16 @@ class EquilibriumError(RuntimeError):
 
 @dataclass(frozen=True)
 class NewtonSettings:
-    """How equilibrium is searched.
-
-    Parameters
-    ----------
-    load_steps : equal steps in which the load is applied; a step that fails is halved
-    most_iterations : Newton iterations of a step
-    force_tolerance : largest force out of balance, as part of the largest load
-    gap_tolerance : largest mean gap or overlap left where pressure is, as part of the largest displacement
-    """
+    """How equilibrium is searched."""
 
     load_steps: int = 1
+    """Equal steps in which the load is applied; a step that fails is halved."""
     most_iterations: int = 30
+    """Newton iterations of a step."""
     force_tolerance: float = 1e-8
+    """Largest force out of balance, as part of the largest load."""
     gap_tolerance: float = 1e-8
+    """Largest mean gap or overlap left where pressure is, as part of the largest displacement."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot converge."""

@@ -32,17 +32,13 @@ _ALLOWED_OVERLAP = 2e-3
 
 @dataclass(frozen=True)
 class NonlinearSettings(Displayed):
-    """How a position is analysed.
-
-    Parameters
-    ----------
-    teeth : odd number of teeth of each open sector
-    finite_deformation : False leaves geometric non-linearity out: small strains, contact on the undeformed flanks
-    """
+    """How a position is analysed."""
 
     teeth: int = 5
+    """Odd number of teeth of each open sector."""
     mesh: ContactMesh = field(default_factory=ContactMesh)
     finite_deformation: bool = True
+    """False leaves geometric non-linearity out: small strains, contact on the undeformed flanks."""
     newton: NewtonSettings = field(default_factory=NewtonSettings)
 
     def __post_init__(self) -> None:
@@ -57,36 +53,23 @@ class NonlinearSettings(Displayed):
 
 @dataclass(frozen=True)
 class NonlinearPosition(Displayed):
-    """One position solved.
-
-    Attributes
-    ----------
-    pair : GearPair
-    torque : float
-        On gear 1, N m.
-    pmc : float
-    ste : float
-        m.
-    model : ContactModel
-        Gear 1's nodes and bricks first.
-    equilibrium : Equilibrium
-    sectors : tuple of OpenSector
-        Gear 1, gear 2.
-    load_share : dict
-        Tooth pair -> part of the normal load.
-    wall_time : float
-        s.
-    """
+    """One position solved."""
 
     pair: GearPair
     torque: float
+    """On gear 1, N m."""
     pmc: float
     ste: float
+    """m."""
     model: ContactModel
+    """Gear 1's nodes and bricks first."""
     equilibrium: Equilibrium
     sectors: tuple[OpenSector, OpenSector]
+    """Gear 1, gear 2."""
     load_share: dict[int, float]
+    """Tooth pair -> part of the normal load."""
     wall_time: float
+    """s."""
 
     @property
     def pinion_nodes(self) -> int:

@@ -35,30 +35,22 @@ class StressField(Displayed):
 
     Attributes
     ----------
-    pair : GearPair
-    torque : float
-        On gear 1, N m.
-    pmc : float
-    method : str
-        "non-linear" or "superelement".
-    sectors : tuple of OpenSector
-        Undeformed gear 1 and gear 2; the nodes below are gear 1's, then gear 2's.
-    displacement : ndarray (n, 3)
-        m.
-    von_mises : ndarray (n,)
-        Pa.
-    pressure : ndarray (n,)
-        Contact pressure at the nodes of both gears' loaded flanks, zero elsewhere, Pa.
+    method : "non-linear" or "superelement"
     """
 
     pair: GearPair
     torque: float
+    """On gear 1, N m."""
     pmc: float
     method: str
     sectors: tuple[OpenSector, OpenSector]
+    """Undeformed gear 1 and gear 2; the nodes below are gear 1's, then gear 2's."""
     displacement: Floats
+    """(n, 3) m."""
     von_mises: Floats
+    """(n,) Pa."""
     pressure: Floats
+    """(n,) contact pressure at the nodes of both gears' loaded flanks, zero elsewhere, Pa."""
 
     def nodes_of(self, number: int) -> slice:
         """Place of the nodes of gear 1 (`number` 0) or gear 2 (1) in the nodal values."""

@@ -63,11 +63,6 @@ _log = logging.getLogger(__name__)
 class NonlinearInput(Displayed, line=" of {pair.name!r}: {positions} positions, torque {torque:g} N m"):
     """All that the numbers of a table depend on.
 
-    Parameters
-    ----------
-    torque : static torque on gear 1, N m
-    positions : equally spaced positions of the mesh cycle
-
     Examples
     --------
     >>> from fe_ste.geometry.gears import Gear
@@ -79,7 +74,9 @@ class NonlinearInput(Displayed, line=" of {pair.name!r}: {positions} positions, 
 
     pair: GearPair
     torque: float
+    """Static torque on gear 1, N m."""
     positions: int = 10
+    """Equally spaced positions of the mesh cycle."""
     settings: NonlinearSettings = field(default_factory=NonlinearSettings)
 
     def __post_init__(self) -> None:
@@ -99,18 +96,13 @@ class NonlinearInput(Displayed, line=" of {pair.name!r}: {positions} positions, 
 
 @dataclass(frozen=True)
 class NonlinearTable(Displayed):
-    """Static transmission error of a pair over the mesh cycle by the reference analysis.
-
-    Attributes
-    ----------
-    dataset : xarray.Dataset
-        Over (pmc, torque): ste (m), mesh_stiffness (N/m), line_of_action_force (N), load_share by ``tooth``,
-        max_pressure, edge_pressure and max_von_mises (Pa), unknowns, iterations, wall_time (s), converged. Positions
-        that failed or were not reached are not a number. Attributes: input and hash, ``failures``, and the table of
-        all Newton iterations, ``convergence``.
-    """
+    """Static transmission error of a pair over the mesh cycle by the reference analysis."""
 
     dataset: xr.Dataset
+    """Over (pmc, torque): ste (m), mesh_stiffness (N/m), line_of_action_force (N), load_share by ``tooth``,
+    max_pressure, edge_pressure and max_von_mises (Pa), unknowns, iterations, wall_time (s), converged. Positions
+    that failed or were not reached are not a number. Attributes: input and hash, ``failures``, and the table of all
+    Newton iterations, ``convergence``."""
 
     @classmethod
     def compute(

@@ -23,24 +23,16 @@ COMPONENTS = 3
 
 @dataclass(frozen=True)
 class GaugePlaces(Displayed, line=": {edges!n} edges"):
-    """Where gauges lie.
-
-    Attributes
-    ----------
-    edges : ndarray (g, 2)
-        Section nodes of each edge.
-    side : ndarray (g,)
-        +1 on the counter-clockwise side of the tooth, -1 on the clockwise one.
-    depth : ndarray (g,)
-        Distance along the surface from the end of the flank to the middle of the edge, m.
-    radius : ndarray (g,)
-        Of the middle of the edge, m.
-    """
+    """Where gauges lie."""
 
     edges: Integers
+    """(g, 2) section nodes of each edge."""
     side: Integers
+    """(g,) +1 on the counter-clockwise side of the tooth, -1 on the clockwise one."""
     depth: Floats
+    """(g,) distance along the surface from the end of the flank to the middle of the edge, m."""
     radius: Floats
+    """(g,) of the middle of the edge, m."""
 
 
 def gauge_places(mesh: SectorMesh) -> GaugePlaces:

@@ -28,30 +28,21 @@ PITCH_ZONE = 0.05
 
 @dataclass(frozen=True)
 class MeshCycleStress(Displayed, line=": {torque!n} torques, {misalignment!n} misalignments"):
-    """Largest stresses of a pair over the mesh cycle, by torque and misalignment.
-
-    Attributes
-    ----------
-    torque, misalignment : ndarray (k,), (m,)
-        N m on gear 1, rad.
-    hertz, pitch_hertz : ndarray (k, m)
-        Largest Hertzian stress inside the path and near the pitch point, Pa.
-    outside : ndarray (k, m)
-        Largest share of the load outside the path of contact.
-    face_load : ndarray (k, m)
-        Highest over mean line load along the face.
-    root, compression : ndarray (k, m, 2)
-        Largest principal stress at the roots of gear 1 and 2, and the least one, Pa.
-    """
+    """Largest stresses of a pair over the mesh cycle, by torque and misalignment."""
 
     torque: Floats
     misalignment: Floats
+    """(k,), (m,) N m on gear 1, rad."""
     hertz: Floats
     pitch_hertz: Floats
+    """(k, m) largest Hertzian stress inside the path and near the pitch point, Pa."""
     outside: Floats
+    """(k, m) largest share of the load outside the path of contact."""
     face_load: Floats
+    """(k, m) highest over mean line load along the face."""
     root: Floats
     compression: Floats
+    """(k, m, 2) largest principal stress at the roots of gear 1 and 2, and the least one, Pa."""
 
     def at(self, values: Floats, power: float, torque: Floats, misalignment: Floats) -> Floats:
         """One of the stresses at torques (N m) and misalignments (rad), broadcast against each other.

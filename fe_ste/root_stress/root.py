@@ -26,27 +26,18 @@ REACH = 3
 
 @dataclass(frozen=True)
 class RootGauges(Displayed, line=" of {gear.name!r}: {places.edges!n} edges, {axial!n} layers"):
-    """Stress at the root of the teeth of a gear under loads on the flank of one tooth.
-
-    Attributes
-    ----------
-    gear : Gear
-    side : int
-        Loaded flank: +1 counter-clockwise, -1 clockwise.
-    places : GaugePlaces
-    roll, axial : ndarray (f,), (l,)
-        Flank grid of the loads: roll angles (rad) and axial positions (m).
-    stress : dict
-        Tooth read less tooth loaded -> ndarray (g, 3, l, f l): stress along the section, along the face and shear
-        (plane stress on the surface) per unit load into the flank at each node, Pa/N.
-    """
+    """Stress at the root of the teeth of a gear under loads on the flank of one tooth."""
 
     gear: Gear
     side: int
+    """Loaded flank: +1 counter-clockwise, -1 clockwise."""
     places: GaugePlaces
     roll: Floats
     axial: Floats
+    """(f,), (l,) flank grid of the loads: roll angles (rad) and axial positions (m)."""
     stress: dict[int, Floats]
+    """Tooth read less tooth loaded -> ndarray (g, 3, l, f l): stress along the section, along the face and shear
+    (plane stress on the surface) per unit load into the flank at each node, Pa/N."""
 
     def node_loads(self, roll: Floats, axial: Floats, force: Floats) -> Floats:
         """Share forces (N) at places of a flank among its nodes, bilinear, (f l,); places off the flank at its edge."""

@@ -27,22 +27,18 @@ _MEASURED_TO_THEORETICAL = 0.8
 
 @dataclass(frozen=True)
 class MethodBStiffness(Displayed):
-    """Stiffness of a gear pair by ISO 6336-1 method B.
-
-    Parameters
-    ----------
-    theoretical_single_stiffness : c'_th of one pair of spur teeth, N/m per m
-    single_stiffness : c': greatest stiffness of one pair of teeth, N/m per m
-    mesh_stiffness : c_gamma_alpha: mean of the mesh, N/m per m
-    face_width : common face width, m
-    outside_validity : why the value is an extrapolation; empty if it is not
-    """
+    """Stiffness of a gear pair by ISO 6336-1 method B."""
 
     theoretical_single_stiffness: float
+    """c'_th of one pair of spur teeth, N/m per m."""
     single_stiffness: float
+    """c': greatest stiffness of one pair of teeth, N/m per m."""
     mesh_stiffness: float
+    """c_gamma_alpha: mean of the mesh, N/m per m."""
     face_width: float
+    """Common face width, m."""
     outside_validity: tuple[str, ...]
+    """Why the value is an extrapolation; empty if it is not."""
 
     @property
     def mesh_stiffness_for_load_distribution(self) -> float:

@@ -23,21 +23,14 @@ _REFERENCE_LINE_LOAD = 100e3
 
 @dataclass(frozen=True)
 class FlankDeviations:
-    """Deviations of a pair that load factors count with: the larger of both gears, m.
-
-    Attributes
-    ----------
-    base_pitch : float
-        f_pb, the single pitch deviation on the base circle.
-    profile_form : float
-        f_f_alpha.
-    helix : float
-        f_ma, misalignment by manufacture of the gears.
-    """
+    """Deviations of a pair that load factors count with: the larger of both gears, m."""
 
     base_pitch: float
+    """f_pb, the single pitch deviation on the base circle."""
     profile_form: float
+    """f_f_alpha."""
     helix: float = 0.0
+    """f_ma, misalignment by manufacture of the gears."""
 
 
 def pitch_running_in(deviation: float, hardening: Hardening, limit: float, velocity: float) -> float:

@@ -20,11 +20,6 @@ class LifeCurve:
     Below the first point's cycles the factor stays as it is there. Beyond the last point the last slope goes on: no
     stress is without damage.
 
-    Attributes
-    ----------
-    cycles, factors : tuple of float
-        Rising; not rising.
-
     Examples
     --------
     >>> round(CASE_HARDENED_CONTACT.factor(1.08e9), 3)
@@ -33,6 +28,7 @@ class LifeCurve:
 
     cycles: tuple[float, ...]
     factors: tuple[float, ...]
+    """Rising; not rising."""
 
     def factor(self, cycles: float) -> float:
         """Life factor Z_NT or Y_NT at a number of cycles."""

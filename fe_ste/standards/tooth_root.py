@@ -30,27 +30,19 @@ _LARGEST_HELIX = math.radians(30.0)
 
 @dataclass(frozen=True)
 class RootStressFactors:
-    """Factors of the nominal root stress ``sigma_F0 = F_t / (b m_n) Y_F Y_S Y_beta``.
-
-    Attributes
-    ----------
-    form, stress_correction, helix : float
-        Y_F and Y_S with the load at the outer point of single contact, Y_beta.
-    rim, deep_tooth : float
-        Y_B of thin rims, Y_DT of deep teeth of high accuracy.
-    notch : float
-        q_s, the notch parameter.
-    outside_validity : tuple of str
-        Why the value is an extrapolation.
-    """
+    """Factors of the nominal root stress ``sigma_F0 = F_t / (b m_n) Y_F Y_S Y_beta``."""
 
     form: float
     stress_correction: float
     helix: float
+    """Y_F and Y_S with the load at the outer point of single contact, Y_beta."""
     rim: float
     deep_tooth: float
+    """Y_B of thin rims, Y_DT of deep teeth of high accuracy."""
     notch: float
+    """q_s, the notch parameter."""
     outside_validity: tuple[str, ...]
+    """Why the value is an extrapolation."""
 
     @property
     def product(self) -> float:

@@ -223,24 +223,16 @@ def write_dataset(path: Path, dataset: xr.Dataset) -> None:
 
 @dataclass(frozen=True)
 class Layout:
-    """What a netCDF file of one kind holds.
-
-    Attributes
-    ----------
-    kind : str
-        In words, for messages.
-    version : int
-        Version of the method whose numbers it holds, its attribute ``method_version``.
-    variables : mapping of str to tuple of str
-        Dimensions by variable; there may be more.
-    attributes : tuple of str
-        Attributes that are there; there may be more.
-    """
+    """What a netCDF file of one kind holds."""
 
     kind: str
+    """In words, for messages."""
     version: int
+    """Version of the method whose numbers it holds, its attribute ``method_version``."""
     variables: Mapping[str, tuple[str, ...]]
+    """Dimensions by variable; there may be more."""
     attributes: tuple[str, ...] = ()
+    """Attributes that are there; there may be more."""
 
     def check(self, dataset: xr.Dataset, path: Path) -> None:
         """Refuse a dataset of another kind or version.

@@ -28,37 +28,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PairCompliance(Displayed):
-    """A gear pair with the compliance of both loaded flanks: all that does not depend on position or load.
-
-    Attributes
-    ----------
-    pair : GearPair
-    flanks : tuple of FlankCompliance
-        Gear 1, gear 2.
-    contact : ContactSettings
-    axial : ndarray (slices,)
-        Middle of the contact slices, m.
-    teeth : ndarray
-        Tooth pairs that may touch.
-    reach : int
-        Largest difference of tooth pairs in contact at once.
-    regular : tuple of RegularCompliance
-        Gear 1, gear 2.
-    modifications : tuple of FlankModification
-        Gear 1, gear 2.
-    tooth_gap : ndarray, optional
-        Gap of each of `teeth` on the transverse line of action, m.
-    """
+    """A gear pair with the compliance of both loaded flanks: all that does not depend on position or load."""
 
     pair: GearPair
     flanks: tuple[FlankCompliance, FlankCompliance]
+    """Gear 1, gear 2."""
     contact: ContactSettings
     axial: Floats
+    """(slices,) middle of the contact slices, m."""
     teeth: Integers
+    """Tooth pairs that may touch."""
     reach: int
+    """Largest difference of tooth pairs in contact at once."""
     regular: tuple[RegularCompliance, RegularCompliance]
+    """Gear 1, gear 2."""
     modifications: tuple[FlankModification, FlankModification] = (FlankModification(), FlankModification())
+    """Gear 1, gear 2."""
     tooth_gap: Floats | None = None
+    """Gap of each of `teeth` on the transverse line of action, m."""
 
     @classmethod
     def from_flanks(

@@ -69,16 +69,12 @@ class Submits(Protocol):
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """File in which a grid keeps the positions that are finished.
-
-    Parameters
-    ----------
-    path : replaced as a whole at each writing, so that it can be read at any time, by xarray too
-    input_hash : hash of the grid's input; a file of another input is not taken up
-    """
+    """File in which a grid keeps the positions that are finished."""
 
     path: Path
+    """Replaced as a whole at each writing, so that it can be read at any time, by xarray too."""
     input_hash: str
+    """Hash of the grid's input; a file of another input is not taken up."""
 
     def load(self, results: StateResults) -> Booleans:
         """Fill `results` with what the file holds; return which positions are finished at which centre distance."""

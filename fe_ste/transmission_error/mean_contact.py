@@ -57,55 +57,39 @@ class MeanContact(Displayed):
     """Contact of a pair over its mesh cycle under one force, at two misalignments.
 
     Lengths and forces are along the transverse line of action. Arrays are over the misalignments.
-
-    Attributes
-    ----------
-    force : float
-        N.
-    centre_distance : float
-        m.
-    misalignment : ndarray (2,)
-        rad, rising; positive where it opens the gap at the +z end.
-    deflection : ndarray (2,)
-        Mean of the static transmission error, m.
-    stiffness : ndarray (2,)
-        Force over that, by a little more force: 1 / mean (d deflection / d force), N/m.
-    load_centre : ndarray (2,)
-        Axial position of the resultant, m from the middle of the common face; mean under the constant force.
-    tangent_load_centre : ndarray (2,)
-        That of a little more force, m: derivative of the deflection by the misalignment.
-    deflection_by_distance : float
-        Slope of the deflection by the centre distance under constant force, between both misalignments.
-    face_load_factor : ndarray (2,)
-        K_Hbeta: highest over mean line load along the face, see `fe_ste.transmission_error.face_load`.
-    max_pressure, edge_pressure : ndarray (2,)
-        Largest of the cycle, away from and at tip edges, Pa.
-    axial : ndarray (k,)
-        Middle of the contact slices, m.
-    line_load : ndarray (2, k)
-        Of all tooth pairs together, mean of the cycle, N/m.
-    cycle_deflection, cycle_stiffness, cycle_load_centre, cycle_tangent_load_centre : ndarray (2, n)
-        Static transmission error (m), force over deflection by a little more force (N/m), axial position of the
-        resultant (m) and of that of a little more force (m) at n equal steps of the mesh cycle from its beginning.
     """
 
     force: float
+    """N."""
     centre_distance: float
+    """m."""
     misalignment: Floats
+    """(2,) rad, rising; positive where it opens the gap at the +z end."""
     deflection: Floats
+    """(2,) mean of the static transmission error, m."""
     stiffness: Floats
+    """(2,) force over that, by a little more force: 1 / mean (d deflection / d force), N/m."""
     load_centre: Floats
+    """(2,) axial position of the resultant, m from the middle of the common face; mean under the constant force."""
     tangent_load_centre: Floats
+    """(2,) that of a little more force, m: derivative of the deflection by the misalignment."""
     deflection_by_distance: float
+    """Slope of the deflection by the centre distance under constant force, between both misalignments."""
     face_load_factor: Floats
+    """(2,) K_Hbeta: highest over mean line load along the face, see `fe_ste.transmission_error.face_load`."""
     max_pressure: Floats
     edge_pressure: Floats
+    """(2,) largest of the cycle, away from and at tip edges, Pa."""
     axial: Floats
+    """(k,) middle of the contact slices, m."""
     line_load: Floats
+    """(2, k) of all tooth pairs together, mean of the cycle, N/m."""
     cycle_deflection: Floats
     cycle_stiffness: Floats
     cycle_load_centre: Floats
     cycle_tangent_load_centre: Floats
+    """(2, n) static transmission error (m), force over deflection by a little more force (N/m), axial position of
+    the resultant (m) and of that of a little more force (m) at n equal steps of the mesh cycle from its beginning."""
 
     def _line(self) -> str:
         low, high = 1e6 * self.misalignment

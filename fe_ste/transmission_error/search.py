@@ -176,24 +176,16 @@ def _searched(
 
 @dataclass(frozen=True)
 class _Window:
-    """Cells laid at one position, with the gaps of several misalignments over them.
-
-    Attributes
-    ----------
-    cells : Cells
-    address : ndarray (n,)
-        Tooth pair, slice and distance from the contact line, in cells, in one number.
-    gap, near : dict
-        Misalignment's index -> gap (n,), m, and which cells are near enough to touch.
-    expected : ndarray (n,)
-        Where contact is looked for under any misalignment: around that of a state nearby.
-    """
+    """Cells laid at one position, with the gaps of several misalignments over them."""
 
     cells: Cells
     address: Integers
+    """(n,) tooth pair, slice and distance from the contact line, in cells, in one number."""
     gap: dict[int, Floats]
     near: dict[int, Booleans]
+    """Misalignment's index -> gap (n,), m, and which cells are near enough to touch."""
     expected: Booleans
+    """(n,) where contact is looked for under any misalignment: around that of a state nearby."""
 
     def groups(self, reach: int) -> list[list[int]]:
         """Misalignments whose cells are few enough tooth pairs to share a compliance matrix."""

@@ -28,28 +28,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ContactState(Displayed):
-    """Solved contact at one position.
-
-    Attributes
-    ----------
-    pmc : float
-    normal_load : float
-        Sum of the normal forces, N.
-    cells : Cells
-    solution : ContactSolution
-    pressure : ndarray (n,)
-        Pa.
-    cut_off_share : float
-        Share of the load that would be beyond the form circles, where contact is cut off: see
-        `fe_ste.contact.flank_ends`.
-    """
+    """Solved contact at one position."""
 
     pmc: float
     normal_load: float
+    """Sum of the normal forces, N."""
     cells: Cells
     solution: ContactSolution
     pressure: Floats
+    """(n,) Pa."""
     cut_off_share: float = 0.0
+    """Share of the load that would be beyond the form circles, where contact is cut off: see
+    `fe_ste.contact.flank_ends`."""
 
     def _line(self) -> str:
         cells = len(self.cells.tooth)
@@ -62,23 +52,16 @@ class SearchStart:
 
     A window that contact fills gets more cells of the same width, cells too far apart to touch are left out only if
     they are, and the complementarity problem has one solution: so a state is the same whichever were solved before.
-
-    Attributes
-    ----------
-    cells : int
-        Cells of a slice across the window.
-    depth : float
-        Reckoned approach beyond the first touch, m.
-    touching : ndarray, optional
-        Addresses, relative to the contact lines, of the cells that carried load.
-    moved : int
-        Cells by which contact may have moved since then.
     """
 
     cells: int
+    """Cells of a slice across the window."""
     depth: float
+    """Reckoned approach beyond the first touch, m."""
     touching: Integers | None = None
+    """Addresses, relative to the contact lines, of the cells that carried load."""
     moved: int = 0
+    """Cells by which contact may have moved since then."""
 
     def scaled(self, factor: float) -> SearchStart:
         """Return the start for `factor` times the load; the cells grow with the contact, so their addresses stay."""
@@ -87,20 +70,14 @@ class SearchStart:
 
 @dataclass(frozen=True)
 class StateAxes(Displayed):
-    """Axes of a grid of states.
-
-    Attributes
-    ----------
-    positions : int
-        Equally spaced positions of the mesh cycle.
-    torque, centre_distance, misalignment : ndarray
-        N m, m, rad.
-    """
+    """Axes of a grid of states."""
 
     positions: int
+    """Equally spaced positions of the mesh cycle."""
     torque: Floats
     centre_distance: Floats
     misalignment: Floats
+    """N m, m, rad."""
 
     @classmethod
     def checked(
@@ -213,34 +190,24 @@ def cut_off_variable(values: Floats) -> xr.Variable:
 
 @dataclass
 class StateResults(Displayed):
-    """Results of states over (pmc, torque, centre_distance, misalignment); those that failed are not a number.
-
-    Attributes
-    ----------
-    teeth : ndarray (t,)
-        Tooth pairs that may touch.
-    axial : ndarray (k,)
-        Middle of the contact slices, m.
-    base_radius : float
-        Of gear 1, m.
-    values : dict
-        Name of a result -> ndarray over the axes.
-    line_load : ndarray (..., t, k)
-    load_share, tangent_load_share : ndarray (..., t)
-    iterations : ndarray
-    failures : list of str
-        Why states failed.
-    """
+    """Results of states over (pmc, torque, centre_distance, misalignment); those that failed are not a number."""
 
     teeth: Integers
+    """(t,) tooth pairs that may touch."""
     axial: Floats
+    """(k,) middle of the contact slices, m."""
     base_radius: float
+    """Of gear 1, m."""
     values: dict[str, Floats]
+    """Name of a result -> ndarray over the axes."""
     line_load: Floats
+    """(..., t, k)"""
     load_share: Floats
     tangent_load_share: Floats
+    """(..., t)"""
     iterations: NDArray[np.int32]
     failures: list[str] = field(default_factory=list)
+    """Why states failed."""
 
     @classmethod
     def empty(cls, compliance: PairCompliance, shape: tuple[int, int, int, int]) -> StateResults:

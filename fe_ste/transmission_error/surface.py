@@ -128,29 +128,20 @@ def _slope_matrix(x: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class SteSurface(Displayed):
-    """Static transmission error s(pmc, centre distance, misalignment, force) of one loaded flank.
-
-    Attributes
-    ----------
-    centre_distance : (c,) array
-        Knots, m.
-    misalignment : (a,) array
-        Knots, rad.
-    root_force : (l + 1,) array
-        Knots of the root of the line-of-action force, sqrt(N), from zero.
-    coefficients : (p, c, 2 a or 1, l, 5) array
-        At each node of the other axes, on each piece of the load axis: cubic of s in t from 0 to 1 (m), and the
-        integral of s over the force from zero to the start of the piece (J). Along misalignment the same of the
-        slope follows each node, unless there is one node only.
-    guessed : (p, c, a, l) array or None
-        Nodes that are not solved, where a guess stands in; none if there are none.
-    """
+    """Static transmission error s(pmc, centre distance, misalignment, force) of one loaded flank."""
 
     centre_distance: Floats
+    """(c,) knots, m."""
     misalignment: Floats
+    """(a,) knots, rad."""
     root_force: Floats
+    """(l + 1,) knots of the root of the line-of-action force, sqrt(N), from zero."""
     coefficients: Floats
+    """(p, c, 2 a or 1, l, 5) at each node of the other axes, on each piece of the load axis: cubic of s in t from 0
+    to 1 (m), and the integral of s over the force from zero to the start of the piece (J). Along misalignment the
+    same of the slope follows each node, unless there is one node only."""
     guessed: Booleans | None = None
+    """(p, c, a, l) nodes that are not solved, where a guess stands in; none if there are none."""
 
     @classmethod
     def from_table(cls, dataset: xr.Dataset) -> SteSurface:

@@ -58,14 +58,6 @@ class TableError(FileError):
 class TableInput(Displayed):
     """All that the numbers of a table depend on.
 
-    Parameters
-    ----------
-    torque : static torques on gear 1, N m
-    positions : positions of the mesh cycle
-    centre_distance : m; empty for the pair's own
-    misalignment : rad
-    static_torque : which of several torques is that of the static state
-
     Examples
     --------
     >>> from fe_ste.geometry.gears import Gear
@@ -77,14 +69,19 @@ class TableInput(Displayed):
 
     pair: GearPair
     torque: tuple[float, ...]
+    """Static torques on gear 1, N m."""
     positions: int = 50
+    """Positions of the mesh cycle."""
     centre_distance: tuple[float, ...] = ()
+    """m; empty for the pair's own."""
     misalignment: tuple[float, ...] = (0.0,)
+    """In rad."""
     mesh: MeshSettings = field(default_factory=MeshSettings)
     contact: ContactSettings = field(default_factory=ContactSettings)
     pinion_modification: FlankModification = field(default_factory=FlankModification)
     gear_modification: FlankModification = field(default_factory=FlankModification)
     static_torque: float | None = None
+    """Which of several torques is that of the static state."""
 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
@@ -119,15 +116,10 @@ class TableInput(Displayed):
 
 @dataclass(frozen=True)
 class MeshTable(Displayed):
-    """Static transmission error of a pair over its axes.
-
-    Attributes
-    ----------
-    dataset : xarray.Dataset
-        See `fe_ste.static_transmission_error`; with the input, its hash and the solver's figures as attributes.
-    """
+    """Static transmission error of a pair over its axes."""
 
     dataset: xr.Dataset
+    """See `fe_ste.static_transmission_error`; with the input, its hash and the solver's figures as attributes."""
 
     @classmethod
     def compute(

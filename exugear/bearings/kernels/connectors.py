@@ -30,26 +30,22 @@ _SENSE = np.array([1.0, -1.0])
 
 
 class ConnectorArrays(NamedTuple):
-    """All 6x6 connectors (bearings); c connectors.
-
-    Attributes
-    ----------
-    bodies : (c, 2) first coordinate of the two bodies, -1 for ground; stiffness is in the first body's axes
-    local : (c, 2, 3) attachment in each body's axes, relative to its node, m
-    node : (c, 2, 3) node positions at zero angles, m (for ground: zero)
-    stiffness, damping : (c, 6, 6) N/m .. N m/rad, and times s
-    point_strain, point_load : (c, 6) displacement u0 (m, rad) and load F0 (N, N m) that the linear law passes
-    rolling : rolling laws, which act in parallel to the matrices
-    """
+    """All 6x6 connectors (bearings); c connectors."""
 
     bodies: Integers
+    """(c, 2) first coordinate of the two bodies, -1 for ground; stiffness is in the first body's axes."""
     local: Floats
+    """(c, 2, 3) attachment in each body's axes, relative to its node, m."""
     node: Floats
+    """(c, 2, 3) node positions at zero angles, m (for ground: zero)."""
     stiffness: Floats
     damping: Floats
+    """(c, 6, 6) N/m .. N m/rad, and times s."""
     point_strain: Floats
     point_load: Floats
+    """(c, 6) displacement u0 (m, rad) and load F0 (N, N m) that the linear law passes."""
     rolling: RollingArrays
+    """Rolling laws, which act in parallel to the matrices."""
 
     @property
     def offset(self) -> Floats:

@@ -51,33 +51,29 @@ LINE_POWER = 10.0 / 9.0
 
 
 class RollingArrays(NamedTuple):
-    """Rolling laws of c connectors; r rows.
-
-    Attributes
-    ----------
-    first : (c + 1,) first row of each connector; equal neighbours: no rolling law
-    scale : (c,) displacement of the inner ring against the outer one over the connector's strain: its sign is
-        negative where the second body carries the outer ring, its size is the share f of the deflection that
-        the bearing takes, the seat the rest. Energy is U / f, so that force and tangent are those of a potential
-    time : (c,) damping over tangent stiffness, s
-    cage_ratio, phase : (c,) cage angle (rad) = phase + ratio * (spin of second body - spin of first body)
-    layout : (r, 7) form, number of elements, first line in `circle`; of a row of rollers first entry of its table in
-        `tables`, number of strips, first entry of its gaps, half the number of slices
-    geometry : (r, 13) columns as named in this module, m, rad, N
-    circle : (e, 2) cosine and sine of the elements' angles in their cage
-    tables : flat: of each kind of roller its strips (n, 6) of tilts, patches (m, n, 16) over the root of the depth with
-        the coefficients of U / depth^2, those along the root together, gaps (h,) of the slices of half a roller
-    """
+    """Rolling laws of c connectors; r rows."""
 
     first: Integers
+    """(c + 1,) first row of each connector; equal neighbours: no rolling law."""
     scale: Floats
+    """(c,) displacement of the inner ring against the outer one over the connector's strain: its sign is: negative
+    where the second body carries the outer ring, its size is the share f of the deflection that the bearing takes,
+    the seat the rest. Energy is U / f, so that force and tangent are those of a potential."""
     time: Floats
+    """(c,) damping over tangent stiffness, s."""
     cage_ratio: Floats
     phase: Floats
+    """(c,) cage angle (rad) = phase + ratio * (spin of second body - spin of first body)."""
     layout: Integers
+    """(r, 7) form, number of elements, first line in `circle`; of a row of rollers first entry of its table in:
+    `tables`, number of strips, first entry of its gaps, half the number of slices."""
     geometry: Floats
+    """(r, 13) columns as named in this module, m, rad, N."""
     circle: Floats
+    """(e, 2) cosine and sine of the elements' angles in their cage."""
     tables: Floats
+    """Flat: of each kind of roller its strips (n, 6) of tilts, patches (m, n, 16) over the root of the depth with.
+    the coefficients of U / depth^2, those along the root together, gaps (h,) of the slices of half a roller."""
 
 
 def no_rolling(connectors: int) -> RollingArrays:

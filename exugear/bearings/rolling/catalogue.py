@@ -28,23 +28,16 @@ SPHERES = (*ALIGNING, "thrust_spherical_roller")
 
 @dataclass(frozen=True)
 class Estimate:
-    """What the file leaves open of a bearing.
-
-    Attributes
-    ----------
-    key : str
-        Name of the key in the file that would give it.
-    value, low, high : float
-        What is taken, and the range that is usual.
-    unit : str
-        Unit of the three, as the key has it; empty for numbers.
-    """
+    """What the file leaves open of a bearing."""
 
     key: str
+    """Name of the key in the file that would give it."""
     value: float
     low: float
     high: float
+    """What is taken, and the range that is usual."""
     unit: str
+    """Unit of the three, as the key has it; empty for numbers."""
 
 
 def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:

@@ -56,27 +56,18 @@ LEAST_SHOULDER = 1e-6
 
 @dataclass(frozen=True)
 class LaminaArrays:
-    """All laminae of a bearing as arrays, the input of the kernels.
-
-    Attributes
-    ----------
-    direction : (n, 6) array
-        Gradient of each lamina's approach with respect to the six displacements (1 and m).
-    gap : (n,) array
-        Approach at which the lamina begins to carry, m.
-    constant : (n,) array
-        ``c_L / laminae``, N/m^(10/9).
-    pressure : (n,) array
-        Pressure on the inner raceway over the square root of the lamina's load, Pa/N^(1/2).
-    element : (n,) array of int
-        Number of the roller that each lamina belongs to, counted through all rows of the bearing.
-    """
+    """All laminae of a bearing as arrays, the input of the kernels."""
 
     direction: Floats
+    """(n, 6) gradient of each lamina's approach with respect to the six displacements (1 and m)."""
     gap: Floats
+    """(n,) approach at which the lamina begins to carry, m."""
     constant: Floats
+    """(n,) ``c_L / laminae``, N/m^(10/9)."""
     pressure: Floats
+    """(n,) pressure on the inner raceway over the square root of the lamina's load, Pa/N^(1/2)."""
     element: Integers
+    """(n,) number of the roller that each lamina belongs to, counted through all rows of the bearing."""
 
 
 def lamina_arrays(rows: Sequence[tuple[RollerRow, int]], first_roller_angle: float = 0.0) -> LaminaArrays:
@@ -143,24 +134,16 @@ def _approaches(laminae: LaminaArrays, displacement: Floats) -> tuple[Floats, In
 
 @dataclass(frozen=True)
 class RowContacts:
-    """All contacts of a bearing, the input of the functions below.
-
-    Attributes
-    ----------
-    rows : tuple of RollingRow
-        The rows.
-    first : tuple of int
-        Number of the first element of each row, and the number of all elements at the end.
-    laminae : LaminaArrays
-        Of the rows of rollers; empty without any.
-    balls : BallArrays
-        Of the rows of balls; empty without any.
-    """
+    """All contacts of a bearing, the input of the functions below."""
 
     rows: tuple[RollingRow, ...]
+    """The rows."""
     first: tuple[int, ...]
+    """Number of the first element of each row, and the number of all elements at the end."""
     laminae: LaminaArrays | None
+    """Of the rows of rollers; empty without any."""
     balls: BallArrays | None
+    """Of the rows of balls; empty without any."""
 
 
 def row_contacts(rows: Sequence[RollingRow], first_roller_angle: float = 0.0) -> RowContacts:
@@ -273,36 +256,24 @@ def loads_of_laminae(contacts: RowContacts, displacement: Floats) -> tuple[Float
 
 @dataclass(frozen=True)
 class BearingState(Displayed):
-    """A bearing in equilibrium with a force.
-
-    Attributes
-    ----------
-    displacement : (6,) array
-        Inner ring relative to outer ring, m and rad.
-    load : (6,) array
-        Force and moment on the inner ring that hold it there, N and N m.
-    tangent : (6, 6) array
-        Derivative of the load, N/m, N, N m/rad.
-    element_load : (elements,) array
-        Load of each roller or ball, row by row, N.
-    element_pressure : (elements,) array
-        Greatest pressure of each on a raceway, Pa.
-    lamina_load : tuple of (elements, laminae) arrays
-        For each row of rollers the load of each lamina, N; None for a row of balls.
-    energy : float
-        Elastic energy, J.
-    contacts : RowContacts
-        The contacts, for further evaluation.
-    """
+    """A bearing in equilibrium with a force."""
 
     displacement: Floats
+    """(6,) inner ring relative to outer ring, m and rad."""
     load: Floats
+    """(6,) force and moment on the inner ring that hold it there, N and N m."""
     tangent: Floats
+    """(6, 6) derivative of the load, N/m, N, N m/rad."""
     element_load: Floats
+    """(elements,) load of each roller or ball, row by row, N."""
     element_pressure: Floats
+    """(elements,) greatest pressure of each on a raceway, Pa."""
     lamina_load: tuple[Floats | None, ...]
+    """(elements, laminae) for each row of rollers the load of each lamina, N; None for a row of balls."""
     energy: float
+    """Elastic energy, J."""
     contacts: RowContacts
+    """The contacts, for further evaluation."""
 
     def _line(self) -> str:
         displacement, load = (

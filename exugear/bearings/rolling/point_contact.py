@@ -58,18 +58,12 @@ def elliptic_integrals(parameter: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class EllipticContact:
-    """Hertz contact of two steel bodies whose gap grows with the square of the distance.
-
-    Attributes
-    ----------
-    curvature_sum : float
-        Sum of the four principal curvatures, hollow ones negative, 1/m.
-    ratio : float
-        Long over short half axis of the ellipse of contact.
-    """
+    """Hertz contact of two steel bodies whose gap grows with the square of the distance."""
 
     curvature_sum: float
+    """Sum of the four principal curvatures, hollow ones negative, 1/m."""
     ratio: float
+    """Long over short half axis of the ellipse of contact."""
 
     @property
     def compliance(self) -> float:
@@ -172,33 +166,22 @@ def ball_pressure(row: BallRow) -> float:
 
 @dataclass(frozen=True)
 class BallArrays:
-    """All balls of a bearing as arrays, the input of the kernels.
-
-    Attributes
-    ----------
-    start : (n, 2) array
-        From the centre of the outer groove to that of the inner groove, radially and along the axis, m.
-    gradient : (n, 2, 6) array
-        Gradient of the same with respect to the six displacements (1 and m).
-    normal : (n, 2) array
-        Direction in which the ball carries where that is fixed, else zeros.
-    free_length : (n,) array
-        Distance of the groove centres at which the ball begins to carry, m.
-    constant : (n,) array
-        N/m^(3/2).
-    pressure : (n,) array
-        Greatest pressure over the load to the power of 1/3, Pa/N^(1/3).
-    element : (n,) array of int
-        Number of each ball, counted through all rows of the bearing.
-    """
+    """All balls of a bearing as arrays, the input of the kernels."""
 
     start: Floats
+    """(n, 2) from the centre of the outer groove to that of the inner groove, radially and along the axis, m."""
     gradient: Floats
+    """(n, 2, 6) gradient of the same with respect to the six displacements (1 and m)."""
     normal: Floats
+    """(n, 2) direction in which the ball carries where that is fixed, else zeros."""
     free_length: Floats
+    """(n,) distance of the groove centres at which the ball begins to carry, m."""
     constant: Floats
+    """(n,) N/m^(3/2)."""
     pressure: Floats
+    """(n,) greatest pressure over the load to the power of 1/3, Pa/N^(1/3)."""
     element: Integers
+    """(n,) number of each ball, counted through all rows of the bearing."""
 
 
 def ball_arrays(rows: Sequence[tuple[BallRow, int]], first_roller_angle: float = 0.0) -> BallArrays:
@@ -255,21 +238,14 @@ def _row_balls(row: BallRow, first: int, first_roller_angle: float) -> BallArray
 
 @dataclass(frozen=True)
 class BallState:
-    """Balls at a displacement of the inner ring.
-
-    Attributes
-    ----------
-    approach : (n,) array
-        Not below zero, m.
-    direction : (n, 2) array
-        Unit vector of the contact force, radially and along the axis.
-    length : (n,) array
-        Distance of the groove centres where the direction turns with it, else infinite, m.
-    """
+    """Balls at a displacement of the inner ring."""
 
     approach: Floats
+    """(n,) not below zero, m."""
     direction: Floats
+    """(n, 2) unit vector of the contact force, radially and along the axis."""
     length: Floats
+    """(n,) distance of the groove centres where the direction turns with it, else infinite, m."""
 
 
 def ball_state(balls: BallArrays, displacement: Floats) -> BallState:

@@ -69,21 +69,17 @@ HERMITE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-3.0, -2.0, 3.0
 
 
 class RollerTable(NamedTuple):
-    """Condensed potential of a kind of roller, without clearance.
-
-    Attributes
-    ----------
-    strips : (n, 6) bound of first contact as a cubic over a strip of tilts (m), first tilt (rad), 1 over its width
-    patches : (m, n, 4, 4) U / depth^2 (N/m) as a bicubic over a step of tilt and one of the depth's root
-    gaps : (h,) gap of both contacts of the slices of half a roller, from its middle, m
-    most_tilt, most_depth : tilt (rad) and depth behind the bound of first contact (m) up to which the table goes
-    """
+    """Condensed potential of a kind of roller, without clearance."""
 
     strips: Floats
+    """(n, 6) bound of first contact as a cubic over a strip of tilts (m), first tilt (rad), 1 over its width."""
     patches: Floats
+    """(m, n, 4, 4) U / depth^2 (N/m) as a bicubic over a step of tilt and one of the depth's root."""
     gaps: Floats
+    """(h,) gap of both contacts of the slices of half a roller, from its middle, m."""
     most_tilt: float
     most_depth: float
+    """Tilt (rad) and depth behind the bound of first contact (m) up to which the table goes."""
 
 
 @lru_cache(maxsize=64)

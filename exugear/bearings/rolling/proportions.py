@@ -49,18 +49,12 @@ class Proportion:
 
 @dataclass(frozen=True)
 class Proportions:
-    """Proportions of one type of bearing.
-
-    Attributes
-    ----------
-    diameter : Proportion
-        Diameter of the rolling elements over outer diameter less bore.
-    spacing : Proportion
-        Circumference of the pitch circle over the sum of the elements' diameters, with a cage.
-    """
+    """Proportions of one type of bearing."""
 
     diameter: Proportion
+    """Diameter of the rolling elements over outer diameter less bore."""
     spacing: Proportion
+    """Circumference of the pitch circle over the sum of the elements' diameters, with a cage."""
 
 
 PROPORTIONS: Mapping[str, Proportions] = {

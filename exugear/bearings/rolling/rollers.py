@@ -22,12 +22,8 @@ class CylindricalRollerBearing:
 
     Parameters
     ----------
-    bore, outside_diameter, width : boundary dimensions d, D, B, m
-    full_complement : without a cage
-    element_diameter, effective_length, element_count : replace the estimates where they are known
     radial_clearance, laminae
         See `RollerRow`.
-    profile_factor : see `RollerRow`; by default the standard profile of ISO/TS 16281
 
     Examples
     --------
@@ -39,12 +35,16 @@ class CylindricalRollerBearing:
     bore: float
     outside_diameter: float
     width: float
+    """Boundary dimensions d, D, B, m."""
     full_complement: bool = False
+    """Without a cage."""
     element_diameter: float | None = None
     effective_length: float | None = None
     element_count: int | None = None
+    """Replace the estimates where they are known."""
     radial_clearance: float = 0.0
     profile_factor: float | None = None
+    """See `RollerRow`; by default the standard profile of ISO/TS 16281."""
     laminae: int = LAMINAE
 
     def __post_init__(self) -> None:
@@ -66,14 +66,6 @@ class TaperedRollerBearing:
     left out. Used alone, the bearing holds an inner ring that is pushed towards +z; turn it by a negative
     `contact_angle` or combine two in a `BearingPair`.
 
-    Parameters
-    ----------
-    bore, outside_diameter, width : boundary dimensions d, D, T, m
-    contact_angle : nominal contact angle, rad, signed as in `RollerRow`
-    full_complement, element_diameter, effective_length, element_count : as in `CylindricalRollerBearing`
-    radial_clearance, profile_factor, laminae
-        As in `CylindricalRollerBearing`.
-
     Examples
     --------
     >>> import math
@@ -87,14 +79,18 @@ class TaperedRollerBearing:
     bore: float
     outside_diameter: float
     width: float
+    """Boundary dimensions d, D, T, m."""
     contact_angle: float
+    """Nominal contact angle, rad, signed as in `RollerRow`."""
     full_complement: bool = False
     element_diameter: float | None = None
     effective_length: float | None = None
     element_count: int | None = None
+    """As in `CylindricalRollerBearing`."""
     radial_clearance: float = 0.0
     profile_factor: float | None = None
     laminae: int = LAMINAE
+    """As in `CylindricalRollerBearing`."""
 
     def __post_init__(self) -> None:
         """Check the boundary dimensions and the row that follows from them."""
@@ -113,16 +109,6 @@ class TaperedRollerBearing:
 class BearingPair:
     """Two equal bearings side by side on one shaft and in one housing, as one bearing.
 
-    Parameters
-    ----------
-    bearing : one of the two
-    arrangement
-        X (face to face): pressure lines meet the axis towards the middle of the pair. O (back to back): away
-        from it, stiff against tilting. Tandem: both rows take the same direction; also right for cylindrical
-        rollers, where the three are the same.
-    row_distance : distance of the middles of the rows, m; by default the width of one bearing (mounted face to face)
-    axial_preload : approach of the two rows along the axis against line-to-line contact, m; negative: axial clearance
-
     Examples
     --------
     >>> import math
@@ -135,9 +121,15 @@ class BearingPair:
     """
 
     bearing: CylindricalRollerBearing | TaperedRollerBearing
+    """One of the two."""
     arrangement: Literal["X", "O", "tandem"]
+    """X (face to face): pressure lines meet the axis towards the middle of the pair. O (back to back): away from it,
+    stiff against tilting. Tandem: both rows take the same direction; also right for cylindrical rollers, where the
+    three are the same."""
     row_distance: float | None = None
+    """Distance of the middles of the rows, m; by default the width of one bearing (mounted face to face)."""
     axial_preload: float = 0.0
+    """Approach of the two rows along the axis against line-to-line contact, m; negative: axial clearance."""
 
     def __post_init__(self) -> None:
         """Refuse distances and arrangements that do not exist."""

@@ -39,35 +39,25 @@ class BearingError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class RollingRow:
-    """What a row of rollers and one of balls have in common.
-
-    Attributes
-    ----------
-    element_diameter, pitch_diameter : float
-        Diameter of a ball, or mean diameter of a roller, and of the circle of their middles, m.
-    element_count : int
-        Number of rolling elements.
-    contact_angle : float
-        Angle between the contact normal and the radial plane, rad, signed: positive where the row holds an
-        inner ring that is pushed towards +z. Zero for cylindrical rollers.
-    axial_position : float
-        Middle of the elements in the frame of the bearing, m.
-    radial_clearance : float
-        Diametral clearance of the mounted row in the radial plane, m. Negative: preload.
-    aligning : bool
-        Whether the outer raceway is a sphere, in which no element tilts: tilting rings about its centre loads nothing.
-    sphere_centre : float
-        Where that centre stands on the axis, m: in the middle of radial bearings, beside thrust bearings.
-    """
+    """What a row of rollers and one of balls have in common."""
 
     element_diameter: float
     pitch_diameter: float
+    """Diameter of a ball, or mean diameter of a roller, and of the circle of their middles, m."""
     element_count: int
+    """Number of rolling elements."""
     contact_angle: float = 0.0
+    """Angle between the contact normal and the radial plane, rad, signed: positive where the row holds an inner ring
+    that is pushed towards +z. Zero for cylindrical rollers."""
     axial_position: float = 0.0
+    """Middle of the elements in the frame of the bearing, m."""
     radial_clearance: float = 0.0
+    """Diametral clearance of the mounted row in the radial plane, m. Negative: preload."""
     aligning: bool = False
+    """Whether the outer raceway is a sphere, in which no element tilts: tilting rings about its centre loads
+    nothing."""
     sphere_centre: float = 0.0
+    """Where that centre stands on the axis, m: in the middle of radial bearings, beside thrust bearings."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be built."""
@@ -94,33 +84,23 @@ class RollingRow:
 
 @dataclass(frozen=True, kw_only=True)
 class RollerRow(RollingRow):
-    """One row of rollers.
-
-    Attributes
-    ----------
-    effective_length : float
-        Effective contact length, m.
-    profile_factor : float
-        Logarithmic profile over roller diameter; 0 for a straight roller.
-    straight_share : float
-        Share of the length, about the middle, that the logarithmic profile leaves straight: long rollers.
-    profile_table : tuple of (share, drop), optional
-        Instead: the gap (m) between roller and raceway at shares, 0 to 1, of half the length, linear between.
-    crown_curvature : float
-        Curvature of the roller's outline less that of the raceway's, 1/m: spherical rollers.
-    laminae : int
-        Slices of equal length per roller; ISO/TS 16281 asks for at least 30.
-    rib : bool
-        Whether these are no raceway but the ribs that the ends of its rollers touch: see `rib_row`.
-    """
+    """One row of rollers."""
 
     effective_length: float
+    """Effective contact length, m."""
     profile_factor: float = 0.0
+    """Logarithmic profile over roller diameter; 0 for a straight roller."""
     straight_share: float = 0.0
+    """Share of the length, about the middle, that the logarithmic profile leaves straight: long rollers."""
     profile_table: tuple[tuple[float, float], ...] | None = None
+    """(share, drop) instead: the gap (m) between roller and raceway at shares, 0 to 1, of half the length, linear
+    between."""
     crown_curvature: float = 0.0
+    """Curvature of the roller's outline less that of the raceway's, 1/m: spherical rollers."""
     laminae: int = LAMINAE
+    """Slices of equal length per roller; ISO/TS 16281 asks for at least 30."""
     rib: bool = False
+    """Whether these are no raceway but the ribs that the ends of its rollers touch: see `rib_row`."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be built."""
@@ -154,16 +134,11 @@ class RollerRow(RollingRow):
 
 @dataclass(frozen=True, kw_only=True)
 class BallRow(RollingRow):
-    """One row of balls.
-
-    Attributes
-    ----------
-    inner_conformity, outer_conformity : float
-        Radius of each raceway's groove over the ball's diameter; above 0.5.
-    """
+    """One row of balls."""
 
     inner_conformity: float = 0.52
     outer_conformity: float = 0.52
+    """Radius of each raceway's groove over the ball's diameter; above 0.5."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be built."""
@@ -189,15 +164,10 @@ class RollingBearing(Protocol):
 
 @dataclass(frozen=True)
 class BearingOfRows:
-    """A bearing that is given by its rows.
-
-    Attributes
-    ----------
-    rows : tuple of RollingRow
-        In the frame of the bearing.
-    """
+    """A bearing that is given by its rows."""
 
     rows: tuple[RollingRow, ...]
+    """In the frame of the bearing."""
 
 
 Row = TypeVar("Row", bound=RollingRow)

@@ -26,10 +26,6 @@ class ShaftError(ValueError):
 class ShaftSection:
     """A piece of a shaft, a cylinder or cone: length, outer and inner diameter where it begins, m.
 
-    Parameters
-    ----------
-    outer_diameter_end, inner_diameter_end : where it ends, of a cone; those of its beginning if not given
-
     Raises
     ------
     ShaftError
@@ -41,6 +37,7 @@ class ShaftSection:
     inner_diameter: float = 0.0
     outer_diameter_end: float | None = None
     inner_diameter_end: float | None = None
+    """Where it ends, of a cone; those of its beginning if not given."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be turned."""
@@ -86,17 +83,13 @@ class ShaftSection:
 
 @dataclass(frozen=True)
 class MeshSize:
-    """Element sizes over the half-section.
-
-    Attributes
-    ----------
-    axial, radial : largest element, m
-    grading : number of lines that close in on each shoulder
-    """
+    """Element sizes over the half-section."""
 
     axial: float = 0.025
     radial: float = 0.0125
+    """Largest element, m."""
     grading: int = 3
+    """Number of lines that close in on each shoulder."""
 
 
 STANDARD_SIZE = MeshSize()
@@ -104,17 +97,13 @@ STANDARD_SIZE = MeshSize()
 
 @dataclass(frozen=True)
 class SeatBand:
-    """Where something sits on a shaft: a band of the outer surface, or a plane cross-section if it has no width.
-
-    Attributes
-    ----------
-    z : middle, m from the beginning of the first section
-    width : m; 0 for the cross-section
-    """
+    """Where something sits on a shaft: a band of the outer surface, or a plane cross-section if it has no width."""
 
     name: str
     z: float
+    """Middle, m from the beginning of the first section."""
     width: float = 0.0
+    """m; 0 for the cross-section."""
 
 
 def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[int, float, float]:

@@ -199,21 +199,17 @@ def _includes(path: Path) -> bool:
 
 @dataclass(frozen=True)
 class SolidFile:
-    """A solid in a file, meshed or read when its mesh is asked for.
-
-    Attributes
-    ----------
-    path : geometry (`GEOMETRY`) or mesh
-    unit : length of the file's unit, m
-    size, curvature : largest element (m) and elements around a circle, for a geometry
-    scripts : whether it may run if it is a script
-    """
+    """A solid in a file, meshed or read when its mesh is asked for."""
 
     path: Path
+    """Geometry (`GEOMETRY`) or mesh."""
     unit: float
+    """Length of the file's unit, m."""
     size: float = 0.0
     curvature: int = 12
+    """Largest element (m) and elements around a circle, for a geometry."""
     scripts: bool = False
+    """Whether it may run if it is a script."""
 
     @property
     def is_geometry(self) -> bool:

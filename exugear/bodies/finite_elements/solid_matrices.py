@@ -30,24 +30,20 @@ ELEMENTS_AT_A_TIME = 1000
 
 @dataclass(frozen=True)
 class Solid:
-    """Matrices of a meshed solid with n nodes; unknown 3 node + direction.
-
-    Attributes
-    ----------
-    mesh : skfem.MeshTet2 or skfem.MeshHex2
-    nodes : (n, 3) m
-    scalar_mass : (n, n) sparse, int rho N_i N_j, kg; the mass matrix holds it for each direction
-    stiffness : (3 n, 3 n) sparse, N/m
-    convection : (n, n) sparse, int rho N_i d_phi N_j with d_phi = x d_y - y d_x about the axis, kg
-    convection_square : (n, n) sparse, int rho d_phi N_i d_phi N_j, kg
-    """
+    """Matrices of a meshed solid with n nodes; unknown 3 node + direction."""
 
     mesh: Any
+    """skfem.MeshTet2 or skfem.MeshHex2."""
     nodes: Floats
+    """(n, 3) m."""
     scalar_mass: SparseMatrix
+    """(n, n) sparse, int rho N_i N_j, kg; the mass matrix holds it for each direction."""
     stiffness: SparseMatrix
+    """(3 n, 3 n) sparse, N/m."""
     convection: SparseMatrix
+    """(n, n) sparse, int rho N_i d_phi N_j with d_phi = x d_y - y d_x about the axis, kg."""
     convection_square: SparseMatrix
+    """(n, n) sparse, int rho d_phi N_i d_phi N_j, kg."""
 
     @cached_property
     def mass(self) -> SparseMatrix:

@@ -26,24 +26,19 @@ SURFACE_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class SolidSeat:
-    """Where something sits on a solid: a band of a cylinder along z, or a flat ring across z.
-
-    Attributes
-    ----------
-    name : str
-    centre : (3,) on the axis of the cylinder, in the middle of the band; m
-    radius : of the cylinder, or outer radius of the flat ring, m
-    width : of the band, m; 0 for a flat ring
-    inner_radius : of a flat ring, m
-    sector : middle and extent (rad) of the part around the axis that belongs to it; all of it by default
-    """
+    """Where something sits on a solid: a band of a cylinder along z, or a flat ring across z."""
 
     name: str
     centre: tuple[float, float, float]
+    """(3,) on the axis of the cylinder, in the middle of the band; m."""
     radius: float
+    """Of the cylinder, or outer radius of the flat ring, m."""
     width: float = 0.0
+    """Of the band, m; 0 for a flat ring."""
     inner_radius: float = 0.0
+    """Of a flat ring, m."""
     sector: tuple[float, float] | None = None
+    """Middle and extent (rad) of the part around the axis that belongs to it; all of it by default."""
 
 
 def seat_rows(solid: Solid, seats: Sequence[SolidSeat]) -> Floats:

@@ -57,23 +57,19 @@ INTEGRATION_ORDER = 5
 
 @dataclass(frozen=True)
 class Harmonic:
-    """One harmonic of a shaft as matrices over its n free unknowns.
-
-    Attributes
-    ----------
-    name : what it describes
-    mass, stiffness : (n, n) sparse, kg and N/m
-    gyroscopic : (n, n) sparse symmetric g of M q'' - 2 i Omega g q' + K q, q = q_x + i q_y; None but for bending
-    seats : (s, n) averages over the seats: per seat displacement and tilt (bending), twist, or axial displacement
-    rigid : (n, k) rigid motions: along x and tilt about the origin (bending), turn, or along z
-    """
+    """One harmonic of a shaft as matrices over its n free unknowns."""
 
     name: HarmonicName
+    """What it describes."""
     mass: SparseMatrix
     stiffness: SparseMatrix
+    """(n, n) sparse, kg and N/m."""
     gyroscopic: SparseMatrix | None
+    """(n, n) sparse symmetric g of M q'' - 2 i Omega g q' + K q, q = q_x + i q_y; None but for bending."""
     seats: Floats
+    """(s, n) averages over the seats: per seat displacement and tilt (bending), twist, or axial displacement."""
     rigid: Floats
+    """(n, k) rigid motions: along x and tilt about the origin (bending), turn, or along z."""
 
 
 @dataclass(frozen=True)

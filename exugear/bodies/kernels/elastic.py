@@ -29,36 +29,32 @@ from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, eight_at,
 
 
 class ElasticArrays(NamedTuple):
-    """Elastic bodies as b blocks with c coordinates in all.
-
-    Attributes
-    ----------
-    first : (b + 1,) first entry of each block in `coordinate`, `spin` and `momentum`
-    coordinate : (c,) position in the state
-    spin : (c,) rigid spin of the body: 1 where a coordinate turns with it
-    momentum : (c,) row s of the spin speed Omega = s . v
-    turning : (b,) block whose coordinates hold the spin of the block's body
-    partner : (b,) block whose velocities give gyroscopic forces, -1 for none
-    square : (b,) first entry of each block in the matrices below, which hold them column by column
-    stiffness, mass, inverse : blocks of K, M and the inverse of M
-    across : (b,) first entry of each block in `gyroscopic`
-    gyroscopic : blocks of G, rows of this block, columns of its partner
-    damping_time : (b,) damping over stiffness, s
-    """
+    """Elastic bodies as b blocks with c coordinates in all."""
 
     first: Integers
+    """(b + 1,) first entry of each block in `coordinate`, `spin` and `momentum`."""
     coordinate: Integers
+    """(c,) position in the state."""
     spin: Floats
+    """(c,) rigid spin of the body: 1 where a coordinate turns with it."""
     momentum: Floats
+    """(c,) row s of the spin speed Omega = s . v."""
     turning: Integers
+    """(b,) block whose coordinates hold the spin of the block's body."""
     partner: Integers
+    """(b,) block whose velocities give gyroscopic forces, -1 for none."""
     square: Integers
+    """(b,) first entry of each block in the matrices below, which hold them column by column."""
     stiffness: Floats
     mass: Floats
     inverse: Floats
+    """Blocks of K, M and the inverse of M."""
     across: Integers
+    """(b,) first entry of each block in `gyroscopic`."""
     gyroscopic: Floats
+    """Blocks of G, rows of this block, columns of its partner."""
     damping_time: Floats
+    """(b,) damping over stiffness, s."""
 
 
 def no_elastic() -> ElasticArrays:
@@ -78,34 +74,30 @@ def scratch_for(elastic: ElasticArrays | ElasticMotion) -> Floats:
 
 
 class ElasticMotion(NamedTuple):
-    """The same blocks arranged for speed, each filled up to a multiple of eight coordinates.
-
-    Attributes
-    ----------
-    first : (b + 1,) first entry of each block in `coordinate`, `spin` and `momentum`
-    sizes : (b,) coordinates of each block
-    coordinate, spin, momentum : as in `ElasticArrays`; what fills them up is a block's first coordinate and zeros
-    turning, partner, damping_time : as in `ElasticArrays`
-    square : (b,) first entry of each block in `stiffness`, `mass` and `inverse`
-    stiffness, mass, inverse : tiles of -K, M and the inverse of M, see `exugear.kernels.products`
-    across : (b,) first entry of each block in `gyroscopic`
-    gyroscopic : tiles of -G
-    """
+    """The same blocks arranged for speed, each filled up to a multiple of eight coordinates."""
 
     first: Integers
+    """(b + 1,) first entry of each block in `coordinate`, `spin` and `momentum`."""
     sizes: Integers
+    """(b,) coordinates of each block."""
     coordinate: Integers
     spin: Floats
     momentum: Floats
+    """As in `ElasticArrays`; what fills them up is a block's first coordinate and zeros."""
     turning: Integers
     partner: Integers
     damping_time: Floats
+    """As in `ElasticArrays`."""
     square: Integers
+    """(b,) first entry of each block in `stiffness`, `mass` and `inverse`."""
     stiffness: Floats
     mass: Floats
     inverse: Floats
+    """Tiles of -K, M and the inverse of M, see `exugear.kernels.products`."""
     across: Integers
+    """(b,) first entry of each block in `gyroscopic`."""
     gyroscopic: Floats
+    """Tiles of -G."""
 
 
 def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:

@@ -36,24 +36,20 @@ NUMBER_OF_SUMS = 9
 
 
 class TravellingArrays(NamedTuple):
-    """Travelling seats; t seats, s sectors at most.
-
-    Attributes
-    ----------
-    first : (t,) first of the six coordinates that follow
-    frame : (t,) coordinate of the angle that they travel with; one that stays zero if they do not
-    angle : (t,) where they are at zero angle, rad
-    number : (t,) of sectors
-    sectors : (t, s) first coordinate of each sector's seat
-    axes : (t, s, 2) cosine and sine of the middle of each sector
-    """
+    """Travelling seats; t seats, s sectors at most."""
 
     first: Integers
+    """(t,) first of the six coordinates that follow."""
     frame: Integers
+    """(t,) coordinate of the angle that they travel with; one that stays zero if they do not."""
     angle: Floats
+    """(t,) where they are at zero angle, rad."""
     number: Integers
+    """(t,) of sectors."""
     sectors: Integers
+    """(t, s) first coordinate of each sector's seat."""
     axes: Floats
+    """(t, s, 2) cosine and sine of the middle of each sector."""
 
 
 def no_travelling() -> TravellingArrays:
@@ -227,18 +223,14 @@ def place_all(x: Floats, u: Floats, seats: TravellingArrays, shares: Floats) -> 
 
 
 class TravellingTangent(NamedTuple):
-    """Derivatives of the e = size + 6 t + 1 coordinates of `follow` by the system's own.
-
-    Attributes
-    ----------
-    place : (e, size) of coordinates by coordinates, and of rates by rates
-    rate : (e, size) of rates by coordinates
-    turning : (size, size) of the forces on the sectors and the frame, by coordinates, at unchanged mesh forces
-    """
+    """Derivatives of the e = size + 6 t + 1 coordinates of `follow` by the system's own."""
 
     place: Floats
+    """(e, size) of coordinates by coordinates, and of rates by rates."""
     rate: Floats
+    """(e, size) of rates by coordinates."""
     turning: Floats
+    """(size, size) of the forces on the sectors and the frame, by coordinates, at unchanged mesh forces."""
 
 
 def travelling_tangent(q: Floats, v: Floats, force: Floats, seats: TravellingArrays) -> TravellingTangent:

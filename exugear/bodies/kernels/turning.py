@@ -37,40 +37,36 @@ from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, put, sum_
 
 
 class TurningArrays(NamedTuple):
-    """Bodies in turning frames as b bodies, arranged for speed.
-
-    Attributes
-    ----------
-    begin, size, seats : (b,) first coordinate in the state, number of coordinates and seats
-    columns : (b,) that number filled up to a multiple of eight
-    first : (b,) first entry of each body in the vectors, which are filled up likewise
-    spin, weight, pull : r, s and -C r of all bodies
-    square : (b,) first entry of each body in `stiffness`, `mass` and `inverse`
-    stiffness, mass, inverse : tiles of -K, M and its inverse, see `exugear.kernels.products`
-    across : (b,) first entry of each body in `coriolis`
-    coriolis : tiles of M S - 2 C
-    damping_time : (b,) s
-    gravity : (b, 3) m/s2
-    moving : (3, c) of all bodies M times a motion of all seats along x, y and z by one
-    """
+    """Bodies in turning frames as b bodies, arranged for speed."""
 
     begin: Integers
     size: Integers
     seats: Integers
+    """(b,) first coordinate in the state, number of coordinates and seats."""
     columns: Integers
+    """(b,) that number filled up to a multiple of eight."""
     first: Integers
+    """(b,) first entry of each body in the vectors, which are filled up likewise."""
     spin: Floats
     weight: Floats
     pull: Floats
+    """r, s and -C r of all bodies."""
     square: Integers
+    """(b,) first entry of each body in `stiffness`, `mass` and `inverse`."""
     stiffness: Floats
     mass: Floats
     inverse: Floats
+    """Tiles of -K, M and its inverse, see `exugear.kernels.products`."""
     across: Integers
+    """(b,) first entry of each body in `coriolis`."""
     coriolis: Floats
+    """Tiles of M S - 2 C."""
     damping_time: Floats
+    """(b,) s."""
     gravity: Floats
+    """(b, 3) m/s2."""
     moving: Floats
+    """(3, c) of all bodies M times a motion of all seats along x, y and z by one."""
 
 
 def turning_memory(turning: TurningArrays) -> Floats:

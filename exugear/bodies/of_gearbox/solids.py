@@ -21,18 +21,14 @@ from exugear.gearbox.sections.bodies import SolidSeatSection, SolidSection
 
 @dataclass(frozen=True)
 class SolidBody:
-    """A solid of the gearbox file.
-
-    Attributes
-    ----------
-    model : all that its reduction depends on
-    main_seat, sectors, shared_seats : as in `exugear.bodies.of_gearbox.elastic_bodies.ElasticBody`
-    """
+    """A solid of the gearbox file."""
 
     model: SolidModel
+    """All that its reduction depends on."""
     main_seat: str
     sectors: Mapping[str, tuple[str, ...]]
     shared_seats: Mapping[str, str]
+    """As in `exugear.bodies.of_gearbox.elastic_bodies.ElasticBody`."""
 
 
 def solid_body(gearbox: Gearbox, name: str) -> SolidBody:

@@ -46,33 +46,29 @@ SHOWN_MODES = 12
 
 @dataclass(frozen=True)
 class Modes(Displayed):
-    """Eigenmodes in order of frequency; n modes, in the variant `flexible` those in the band of its elastic bodies.
-
-    Attributes
-    ----------
-    assembly : what was linearised
-    frequency : (n,) undamped, Hz
-    damping_ratio : (n,) share of critical damping, from the damping matrix in the mode
-    shapes : (size, n) real, unit modal mass
-    strain : (n, elements) share of strain energy by mesh, bearing, coupling and elastic body
-    kinetic : (n, bodies, 8) share of kinetic energy by body and motion, see `BODY_MOTIONS`
-    overall : (n,) overall DTE of the mode at unit modal mass, m / sqrt(kg)
-    amplification : (n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m
-    names : what moves, in words
-    growth_rate : fastest growth of any disturbance, 1/s; above 0 only where the law `seed` makes a mode flutter
-    """
+    """Eigenmodes in order of frequency; n modes, in the variant `flexible` those in the band of its elastic bodies."""
 
     assembly: Assembly
+    """What was linearised."""
     frequency: Floats
+    """(n,) undamped, Hz."""
     damping_ratio: Floats
+    """(n,) share of critical damping, from the damping matrix in the mode."""
     shapes: Floats
+    """(size, n) real, unit modal mass."""
     element_names: tuple[str, ...]
     strain: Floats
+    """(n, elements) share of strain energy by mesh, bearing, coupling and elastic body."""
     kinetic: Floats
+    """(n, bodies, 8) share of kinetic energy by body and motion, see `BODY_MOTIONS`."""
     overall: Floats
+    """(n,) overall DTE of the mode at unit modal mass, m / sqrt(kg)."""
     amplification: Floats
+    """(n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m."""
     names: tuple[str, ...]
+    """What moves, in words."""
     growth_rate: float
+    """Fastest growth of any disturbance, 1/s; above 0 only where the law `seed` makes a mode flutter."""
 
     def _line(self) -> str:
         assembly = self.assembly

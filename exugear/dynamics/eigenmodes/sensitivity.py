@@ -30,50 +30,33 @@ HOUSING_FACTORS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 
 @dataclass(frozen=True)
 class Parameter:
-    """A model parameter to vary.
-
-    Attributes
-    ----------
-    label : str
-        With its unit.
-    values : tuple of float
-        Ascending.
-    default : float
-        Value of the case.
-    build : callable
-        The assembly at a value.
-    logarithmic : bool
-        Scale that suits it.
-    """
+    """A model parameter to vary."""
 
     label: str
+    """With its unit."""
     values: tuple[float, ...]
+    """Ascending."""
     default: float
+    """Value of the case."""
     build: Callable[[float], Assembly]
+    """The assembly at a value."""
     logarithmic: bool = True
+    """Scale that suits it."""
 
 
 @dataclass(frozen=True)
 class ParameterVariation(Displayed):
-    """Modes over a parameter; n values, m modes, each followed by its shape.
-
-    Attributes
-    ----------
-    parameter : Parameter
-    frequency : (n, m) array
-        Hz.
-    share : (n, m) array
-        Share of the overall transmission error's mobility, 0 to 1.
-    amplification : (n, m) array
-        Overall transmission error at resonance per transmission error of the mesh that excites it most, m/m.
-    damping_ratio : (n, m) array
-    """
+    """Modes over a parameter; n values, m modes, each followed by its shape."""
 
     parameter: Parameter
     frequency: Floats
+    """(n, m) Hz."""
     share: Floats
+    """(n, m) share of the overall transmission error's mobility, 0 to 1."""
     amplification: Floats
+    """(n, m) overall transmission error at resonance per transmission error of the mesh that excites it most, m/m."""
     damping_ratio: Floats
+    """(n, m)"""
 
     def _line(self) -> str:
         values, modes = self.frequency.shape
@@ -269,23 +252,15 @@ def scaled_bearings(assembly: Assembly, numbers: Sequence[int], factor: float) -
 
 @dataclass(frozen=True)
 class FrequencyMatch(Displayed, line=" {parameter.label} = {value:.3g}: {frequency:.5g} Hz"):
-    """An assumption that brings a mode to a frequency.
-
-    Attributes
-    ----------
-    parameter : Parameter
-    value : float
-        Of the parameter.
-    modes : Modes
-        Of the model with that value.
-    index : int
-        The mode among them, from 0.
-    """
+    """An assumption that brings a mode to a frequency."""
 
     parameter: Parameter
     value: float
+    """Of the parameter."""
     modes: Modes
+    """Of the model with that value."""
     index: int
+    """The mode among them, from 0."""
 
     @property
     def frequency(self) -> float:

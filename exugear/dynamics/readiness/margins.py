@@ -28,22 +28,15 @@ PROPOSED_MARGIN = 0.025
 
 @dataclass(frozen=True)
 class PairMargins:
-    """Margins of a gear pair.
-
-    Attributes
-    ----------
-    form : (float, float)
-        Of gear 1 and gear 2: roll length from the form circle to where the mate's tip touches, over the roll length of
-        the flank; NaN where the root is relieved on purpose, so that contact may end there.
-    tip_thickness : (float, float)
-        Of both tips in the normal section, in normal modules.
-    pitch_point_pressure : float
-        By Hertz under the static load, Pa; zero where the pair carries none.
-    """
+    """Margins of a gear pair."""
 
     form: tuple[float, float]
+    """Of gear 1 and gear 2: roll length from the form circle to where the mate's tip touches, over the roll length
+    of the flank; NaN where the root is relieved on purpose, so that contact may end there."""
     tip_thickness: tuple[float, float]
+    """Of both tips in the normal section, in normal modules."""
     pitch_point_pressure: float
+    """By Hertz under the static load, Pa; zero where the pair carries none."""
 
 
 def pair_margins(spec: PairSpec) -> PairMargins:
@@ -68,21 +61,14 @@ def pair_margins(spec: PairSpec) -> PairMargins:
 
 @dataclass(frozen=True)
 class ThicknessRange:
-    """What allowances of the tooth thickness make of a gear, from the thinnest to the thickest tooth.
-
-    Attributes
-    ----------
-    thickness : (float, float)
-        On the reference circle, normal section, m.
-    span_teeth : int, optional
-        Number of teeth of the base tangent; None for internal gears.
-    span : (float, float)
-        Base tangent length over them, m; zero for internal gears.
-    """
+    """What allowances of the tooth thickness make of a gear, from the thinnest to the thickest tooth."""
 
     thickness: tuple[float, float]
+    """On the reference circle, normal section, m."""
     span_teeth: int | None
+    """Number of teeth of the base tangent; None for internal gears."""
     span: tuple[float, float]
+    """Base tangent length over them, m; zero for internal gears."""
 
 
 def thickness_range(gearbox: Gearbox, name: str) -> ThicknessRange:

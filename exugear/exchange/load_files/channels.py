@@ -40,24 +40,16 @@ class LoadFileError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Channels(Displayed):
-    """Channels over time.
-
-    Attributes
-    ----------
-    path : Path
-    names, units : tuple of str
-        As the file writes them, time left out.
-    time_unit : str
-        As the file writes it; seconds where it writes none.
-    read : callable
-        Reads blocks of the file for some of its columns.
-    """
+    """Channels over time."""
 
     path: Path
     names: tuple[str, ...]
     units: tuple[str, ...]
+    """As the file writes them, time left out."""
     time_unit: str
+    """As the file writes it; seconds where it writes none."""
     read: Read
+    """Callable. Reads blocks of the file for some of its columns."""
 
     def _line(self) -> str:
         return f" of {self.path.name}: {', '.join(self.names[:SHOWN_NAMES])}"

@@ -64,30 +64,22 @@ class _Reader:
 
 @dataclass(frozen=True, eq=False)
 class _Layout:
-    """What the head of a file says of its values.
-
-    Attributes
-    ----------
-    kind, steps : int
-    first, second : float
-        Scale and offset of packed times, or first time and step.
-    scales, offsets : array (channels,)
-    names, units : tuple of str
-        Time first.
-    times, rows : int
-        Places of packed times and of the first row, bytes.
-    """
+    """What the head of a file says of its values."""
 
     kind: int
     steps: int
     first: float
     second: float
+    """Scale and offset of packed times, or first time and step."""
     scales: Floats
     offsets: Floats
+    """(channels,)"""
     names: tuple[str, ...]
     units: tuple[str, ...]
+    """Time first."""
     times: int
     rows: int
+    """Places of packed times and of the first row, bytes."""
 
     @property
     def value(self) -> np.dtype:

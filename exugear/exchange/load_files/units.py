@@ -8,18 +8,12 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit of a load file.
-
-    Attributes
-    ----------
-    quantity : str
-        What it measures: torque, force, speed, time, angle, velocity, or another.
-    factor : float
-        Its worth in SI.
-    """
+    """A unit of a load file."""
 
     quantity: str
+    """What it measures: torque, force, speed, time, angle, velocity, or another."""
     factor: float
+    """Its worth in SI."""
 
 
 _RPM = math.pi / 30.0

@@ -19,24 +19,16 @@ AdditionValue = str | float | tuple[float, ...]
 
 @dataclass(frozen=True)
 class Addition:
-    """An attribute for a component.
-
-    Attributes
-    ----------
-    component : int
-    name : str
-        In the version of the file.
-    unit : str
-    value : str, float or tuple of float
-    load_case : int, optional
-        The load case that the value belongs to; None for the component itself.
-    """
+    """An attribute for a component."""
 
     component: int
     name: str
+    """In the version of the file."""
     unit: str
     value: AdditionValue
+    """Str, float or tuple of float."""
     load_case: int | None = None
+    """The load case that the value belongs to; None for the component itself."""
 
 
 Edit = tuple[int, int, str]

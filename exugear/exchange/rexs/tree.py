@@ -28,24 +28,16 @@ class Attribute:
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """A part of the gearbox, or data on one.
-
-    Attributes
-    ----------
-    number : int
-        Its id, unique in the file.
-    type, name : str
-    attributes : mapping of str to Attribute
-        By their present names.
-    asked : set of str
-        Names that were asked for so far: what nobody asks for is left out of an import, and told.
-    """
+    """A part of the gearbox, or data on one."""
 
     number: int
+    """Its id, unique in the file."""
     type: str
     name: str = ""
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
+    """By their present names."""
     asked: set[str] = field(default_factory=set, repr=False)
+    """Names that were asked for so far: what nobody asks for is left out of an import, and told."""
 
     def __str__(self) -> str:
         """Return how messages and comments name it."""
@@ -170,23 +162,14 @@ class LoadCase:
 
 @dataclass(frozen=True)
 class Model(Displayed, line=" REXS {version}: {components!n} components, {relations!n} relations"):
-    """All of a REXS file.
-
-    Attributes
-    ----------
-    version : str
-    program : str
-        What wrote the file, with its version.
-    components : mapping of int to Component
-    relations : tuple of Relation
-        Ordered ones in their order.
-    load_cases : tuple of LoadCase
-    """
+    """All of a REXS file."""
 
     version: str
     program: str
+    """What wrote the file, with its version."""
     components: Mapping[int, Component]
     relations: tuple[Relation, ...]
+    """Ordered ones in their order."""
     load_cases: tuple[LoadCase, ...] = ()
 
     def of_type(self, *types: str) -> tuple[Component, ...]:

@@ -35,47 +35,34 @@ INSTANTS = 2001
 
 @dataclass(frozen=True)
 class LoadSummary(Displayed, line=" {name!r}: net torque {net_torque:g} N m, {start_speed:g} to {end_speed:g} rad/s"):
-    """A load case in figures, of the rolling train.
-
-    Attributes
-    ----------
-    name : str
-        Of the load case.
-    inertia : float
-        Of the whole train at the overall input, kg m2.
-    net_torque : float
-        Of all torques at the overall input, at the start and without a drive's, N m.
-    driven : bool
-        Whether a machine prescribes the speed, and holds what the torques do not.
-    start_speed, end_speed, fastest_speed : float
-        Of the overall input, rad/s; the last without sign.
-    rim_speeds : mapping of body name to float
-        Speed of the fastest gear's rim on each body with gears at `fastest_speed`, m/s.
-    mesh_frequencies : mapping of mesh name to float
-        Highest mesh frequency of each, Hz.
-    mesh_forces : mapping of mesh name to float
-        F_bt at the start, N; its sign says which flank of gear 1 carries, as in `Train.static_mesh_forces`.
-    flanks : mapping of mesh family to str
-        Loaded flanks in the course of the load case: ``+``, ``-``, ``+-`` for both, ``0`` for none.
-    reversed_flanks : tuple of str
-        Mesh families with a loaded flank that is not the one of the static load, which their tables are of.
-    least_shares : mapping of mesh family to float
-        Smallest mesh force in the course of the load case over that of the static load; negative where it reverses.
-    """
+    """A load case in figures, of the rolling train."""
 
     name: str
+    """Of the load case."""
     inertia: float
+    """Of the whole train at the overall input, kg m2."""
     net_torque: float
+    """Of all torques at the overall input, at the start and without a drive's, N m."""
     driven: bool
+    """Whether a machine prescribes the speed, and holds what the torques do not."""
     start_speed: float
     end_speed: float
     fastest_speed: float
+    """Of the overall input, rad/s; the last without sign."""
     rim_speeds: Mapping[str, float]
+    """By body name, speed of the fastest gear's rim on each body with gears at `fastest_speed`, m/s."""
     mesh_frequencies: Mapping[str, float]
+    """By mesh name, highest mesh frequency of each, Hz."""
     mesh_forces: Mapping[str, float]
+    """By mesh name, F_bt at the start, N; its sign says which flank of gear 1 carries, as in
+    `Train.static_mesh_forces`."""
     flanks: Mapping[str, str]
+    """By mesh family, loaded flanks in the course of the load case: ``+``, ``-``, ``+-`` for both, ``0`` for none."""
     reversed_flanks: tuple[str, ...]
+    """Mesh families with a loaded flank that is not the one of the static load, which their tables are of."""
     least_shares: Mapping[str, float]
+    """By mesh family, smallest mesh force in the course of the load case over that of the static load; negative
+    where it reverses."""
 
     def _table(self) -> TitledRows:
         speeds = (self.start_speed, self.end_speed, self.fastest_speed)

@@ -18,22 +18,15 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 @dataclass(frozen=True)
 class Range:
-    """Range of a kind of quantity, as metadata of an annotated type.
-
-    Attributes
-    ----------
-    least, most : float
-        What can be.
-    usual : (float, float), optional
-        What occurs; all that can be by default. Zero is usual wherever it can be: it switches something off.
-    why : str
-        What the limits come from.
-    """
+    """Range of a kind of quantity, as metadata of an annotated type."""
 
     least: float
     most: float
+    """What can be."""
     usual: tuple[float, float] | None = None
+    """What occurs; all that can be by default. Zero is usual wherever it can be: it switches something off."""
     why: str = ""
+    """What the limits come from."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Check the range after the type."""

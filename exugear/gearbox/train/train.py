@@ -30,21 +30,6 @@ class Train(
 
     It knows no gearbox: what it cannot do it tells through `fault`, which names the file.
 
-    Attributes
-    ----------
-    spins : tuple of str
-        Bodies that can turn, in the order of the spin vector.
-    meshes : tuple of MeshedBodies
-    couplings : tuple of CoupledBodies
-    input, output : str
-        Bodies at the ends of the train.
-    torques : mapping of body name to float
-        Static torques, N m.
-    locked : tuple of str
-        Bodies that hold them.
-    fault : callable
-        Makes the error to raise from what is wrong.
-
     Examples
     --------
     >>> from exugear.gearbox.gearbox import Gearbox
@@ -58,13 +43,18 @@ class Train(
     """
 
     spins: tuple[str, ...]
+    """Bodies that can turn, in the order of the spin vector."""
     meshes: tuple[MeshedBodies, ...]
     couplings: tuple[CoupledBodies, ...]
     input: str
     output: str
+    """Bodies at the ends of the train."""
     torques: Mapping[str, float]
+    """By body name, static torques, N m."""
     locked: tuple[str, ...]
+    """Bodies that hold them."""
     fault: Callable[[str], Exception]
+    """Makes the error to raise from what is wrong."""
 
     def _table(self) -> TitledRows:
         return f"train from {self.input} to {self.output}", {

@@ -16,23 +16,16 @@ from fe_ste.tools.display import Displayed
 
 @dataclass(frozen=True, eq=False)
 class DurationDistribution(Displayed):
-    """Hours and revolutions over bins of torque; empty bins are left out.
-
-    Attributes
-    ----------
-    lower, upper : array (bins,)
-        Edges, N m, by size: the upper one is farther from zero; both have the sign of the torque.
-    torque : array (bins,)
-        Mean of what lies in the bin, each instant weighted by its revolutions, N m.
-    hours, revolutions : array (bins,)
-        Of the shaft whose torque it is.
-    """
+    """Hours and revolutions over bins of torque; empty bins are left out."""
 
     lower: Floats
     upper: Floats
+    """(bins,) edges, N m, by size: the upper one is farther from zero; both have the sign of the torque."""
     torque: Floats
+    """(bins,) mean of what lies in the bin, each instant weighted by its revolutions, N m."""
     hours: Floats
     revolutions: Floats
+    """(bins,) of the shaft whose torque it is."""
 
     def _line(self) -> str:
         return f": {len(self.hours)} bins, {self.hours.sum():.6g} h"
@@ -90,24 +83,17 @@ def load_duration(
 
 @dataclass(frozen=True, eq=False)
 class LoadPoints(Displayed):
-    """Torques with what acts beside them: the bins of a distribution, split where other loads differ.
-
-    Attributes
-    ----------
-    torque : array (points,)
-        N m.
-    other : array (points, n)
-        Loads beside it, means weighted by revolutions.
-    hours, revolutions : array (points,)
-    bin : array (points,)
-        Bin of the distribution that each point lies in.
-    """
+    """Torques with what acts beside them: the bins of a distribution, split where other loads differ."""
 
     torque: Floats
+    """(points,) N m."""
     other: Floats
+    """(points, n) loads beside it, means weighted by revolutions."""
     hours: Floats
     revolutions: Floats
+    """(points,)"""
     bin: Integers
+    """(points,) bin of the distribution that each point lies in."""
 
     def _line(self) -> str:
         return f": {len(self.hours)} points, {self.hours.sum():.6g} h"

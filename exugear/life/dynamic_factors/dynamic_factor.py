@@ -31,22 +31,15 @@ WITHIN = 0.05
 
 @dataclass(frozen=True, eq=False)
 class DynamicFactor(Displayed):
-    """K_v over the speed of the loaded body.
-
-    Attributes
-    ----------
-    speed, value : array (n,)
-        rad/s without sign, rising; factors.
-    least : float
-        Factor below which none is taken.
-    source : str
-        What it is of, in words.
-    """
+    """K_v over the speed of the loaded body."""
 
     speed: Floats
     value: Floats
+    """(n,) rad/s without sign, rising; factors."""
     least: float = 1.0
+    """Factor below which none is taken."""
     source: str = ""
+    """What it is of, in words."""
 
     def _line(self) -> str:
         return f": {self.value.min():.3f} to {self.value.max():.3f} at {len(self.speed)} speeds"

@@ -37,38 +37,24 @@ EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
 
 @dataclass(frozen=True, eq=False)
 class CountedLoads(Displayed, line=" on {body!r}: {sources!n} sources, {distribution!r}"):
-    """Loads of a gearbox, counted.
-
-    Attributes
-    ----------
-    body : str
-        Body that they act on.
-    life_years : float
-    sources : tuple of LoadSource
-    distribution : DurationDistribution
-        Of all sources of fatigue.
-    points : LoadPoints
-        Its bins, split where loads of a hub differ.
-    equivalent_ranges : mapping of str to mapping of float to float
-        Damage-equivalent range of one cycle a second in the life, by component (torque, forces and moments of a hub)
-        and slope, N m or N; none without series.
-    teeth : tuple of ToothExposure
-    bearings : mapping of str to float
-        Revolutions of bearings per revolution of the body.
-    mesh_forces : mapping of str to float
-        Static force F_bt of mesh families at 1 N m on the body, N, the largest of a family.
-    bin_value : str
-    """
+    """Loads of a gearbox, counted."""
 
     body: str
+    """Body that they act on."""
     life_years: float
     sources: tuple[LoadSource, ...]
     distribution: DurationDistribution
+    """Of all sources of fatigue."""
     points: LoadPoints
+    """Its bins, split where loads of a hub differ."""
     equivalent_ranges: Mapping[str, Mapping[float, float]]
+    """Damage-equivalent range of one cycle a second in the life, by component (torque, forces and moments of a hub)
+    and slope, N m or N; none without series."""
     teeth: tuple[ToothExposure, ...]
     bearings: Mapping[str, float]
+    """Revolutions of bearings per revolution of the body."""
     mesh_forces: Mapping[str, float]
+    """Static force F_bt of mesh families at 1 N m on the body, N, the largest of a family."""
     bin_value: str
 
     @property

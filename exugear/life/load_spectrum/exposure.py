@@ -17,29 +17,20 @@ FLANKS = {1: "+", -1: "-"}
 
 @dataclass(frozen=True)
 class ToothExposure:
-    """What one tooth of a gear meets in one family of meshes.
-
-    Attributes
-    ----------
-    gear, family, holder : str
-        Gear, the family of its meshes, and the body whose teeth these are: one of equal planets.
-    member : {0, 1}
-        Whether it is gear 1 or gear 2 of the pair.
-    flank : int
-        Flank that a positive torque on the loaded body presses: +1 or -1; a negative one presses the other.
-    meshes : tuple of int
-        Numbers of the meshes that one tooth passes, one after the other.
-    cycles : float
-        Contacts of one flank per revolution of the loaded body, all these meshes together.
-    """
+    """What one tooth of a gear meets in one family of meshes."""
 
     gear: str
     family: str
     holder: str
+    """Gear, the family of its meshes, and the body whose teeth these are: one of equal planets."""
     member: int
+    """{0, 1}: whether it is gear 1 or gear 2 of the pair."""
     flank: int
+    """Flank that a positive torque on the loaded body presses: +1 or -1; a negative one presses the other."""
     meshes: tuple[int, ...]
+    """Numbers of the meshes that one tooth passes, one after the other."""
     cycles: float
+    """Contacts of one flank per revolution of the loaded body, all these meshes together."""
 
 
 def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:

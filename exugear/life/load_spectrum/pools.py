@@ -32,20 +32,14 @@ FINE, COARSE = 42, 47
 
 @dataclass(frozen=True, eq=False)
 class Samples(Displayed):
-    """Loads that last.
-
-    Attributes
-    ----------
-    torque, speed, lasting : array (samples,)
-        N m, rad/s, and how long each lasts, in a unit of the owner's.
-    hub : array (samples, 5) or (samples, 0)
-        Force along x, y, z and moment about x, y, N and N m; nothing where there are none.
-    """
+    """Loads that last."""
 
     torque: Floats
     speed: Floats
     lasting: Floats
+    """(samples,) N m, rad/s, and how long each lasts, in a unit of the owner's."""
     hub: Floats
+    """(samples, 5) (samples, 0) force along x, y, z and moment about x, y, N and N m; nothing where there are none."""
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -118,29 +112,20 @@ def _largest(samples: Samples, number: Integers) -> Samples:
 
 @dataclass(eq=False)
 class Pool:
-    """Files of one kind whose samples weigh as long as they last.
-
-    Attributes
-    ----------
-    extreme : bool
-    seconds : float
-        Of all files.
-    count, files : int
-        Samples and files.
-    least, largest : float
-        Torque, N m.
-    slowest, fastest : float
-        Speed under a torque without sign, rad/s.
-    """
+    """Files of one kind whose samples weigh as long as they last."""
 
     extreme: bool = False
     seconds: float = 0.0
+    """Of all files."""
     count: int = 0
     files: int = 0
+    """Samples and files."""
     least: float = np.inf
     largest: float = -np.inf
+    """Torque, N m."""
     slowest: float = np.inf
     fastest: float = 0.0
+    """Speed under a torque without sign, rad/s."""
     _parts: list[Samples] = field(default_factory=list)
     _powers: dict[tuple[str, float], float] = field(default_factory=dict)
 

@@ -30,38 +30,24 @@ LEAST_BEFORE_DROPOUT = 0.1
 
 @dataclass(frozen=True)
 class Taken:
-    """What was taken of a file.
-
-    Attributes
-    ----------
-    skipped, duration : float
-        s.
-    wind : float
-        Mean wind speed, m/s; NaN where none is asked for.
-    counts : mapping of component to Rainflow
-    """
+    """What was taken of a file."""
 
     skipped: float
     duration: float
+    """s."""
     wind: float
+    """Mean wind speed, m/s; NaN where none is asked for."""
     counts: Mapping[str, Rainflow]
+    """By component."""
 
 
 @dataclass(frozen=True)
 class SeriesReader:
-    """Reads the series of one source.
-
-    Attributes
-    ----------
-    gearbox : Gearbox
-    key : str
-        Key of the source, for messages.
-    source : SourceSection
-    body : str
-    """
+    """Reads the series of one source."""
 
     gearbox: Gearbox
     key: str
+    """Key of the source, for messages."""
     source: SourceSection
     body: str
 

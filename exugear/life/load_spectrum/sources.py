@@ -49,60 +49,43 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class LoadSource(Displayed):
-    """Samples of one source over the life of the gearbox.
-
-    Attributes
-    ----------
-    name, kind, case : str
-        Its key, ``fatigue`` or ``extreme``, and its label.
-    file : str
-        Name of its file, or what its files are called.
-    files, count : int
-        Number of its files, and of samples in them.
-    digest : str
-        SHA-256 of the file, or of the names and hashes of all.
-    torque, speed : array (samples,)
-        On the loaded body about +z, N m and rad/s; an extreme torque with its partial factor. Many samples are put
-        together: see `exugear.life.load_spectrum.pools`.
-    hours : array (samples,)
-        Of each sample in the whole of the life; zero for extreme sources.
-    hub : array (samples, 5) or (samples, 0)
-        Force along x, y, z and moment about x, y on the loaded body, N and N m; nothing where the source has none.
-    series : bool
-        Whether the samples follow each other in time.
-    skipped, duration : float
-        Time of each series that was left out, the longest, and that was taken, of all, s; zero for tables.
-    factors : (float, float)
-        On torque and speed.
-    least, largest : float
-        Torque, N m.
-    slowest, fastest : float
-        Speed under a torque without sign, rad/s.
-    equivalent_ranges : mapping of (component, slope) to float
-        Range of one cycle a second that does the same damage, N m or N; none of tables.
-    remarks : tuple of str
-    """
+    """Samples of one source over the life of the gearbox."""
 
     name: str
     kind: str
     case: str
+    """Its key, ``fatigue`` or ``extreme``, and its label."""
     file: str
+    """Name of its file, or what its files are called."""
     files: int
     count: int
+    """Number of its files, and of samples in them."""
     digest: str
+    """SHA-256 of the file, or of the names and hashes of all."""
     torque: Floats
     speed: Floats
+    """(samples,) on the loaded body about +z, N m and rad/s; an extreme torque with its partial factor. Many samples
+    are put together: see `exugear.life.load_spectrum.pools`."""
     hours: Floats
+    """(samples,) of each sample in the whole of the life; zero for extreme sources."""
     hub: Floats
+    """(samples, 5) (samples, 0) force along x, y, z and moment about x, y on the loaded body, N and N m; nothing
+    where the source has none."""
     series: bool
+    """Whether the samples follow each other in time."""
     skipped: float
     duration: float
+    """Time of each series that was left out, the longest, and that was taken, of all, s; zero for tables."""
     factors: tuple[float, float]
+    """On torque and speed."""
     least: float
     largest: float
+    """Torque, N m."""
     slowest: float
     fastest: float
+    """Speed under a torque without sign, rad/s."""
     equivalent_ranges: Mapping[tuple[str, float], float]
+    """(component, slope) range of one cycle a second that does the same damage, N m or N; none of tables."""
     remarks: tuple[str, ...] = ()
 
     def _line(self) -> str:

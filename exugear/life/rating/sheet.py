@@ -42,42 +42,26 @@ _KEY_UNITS = {"N/(mm um)": "N_per_mm_um", "kN m": "kN_m", "m/s": "m_per_s", "N^0
 
 @dataclass(frozen=True, eq=False)
 class FlankSheet:
-    """One flank of a gear in one family of meshes.
-
-    Attributes
-    ----------
-    gear, family, flank : str
-    member : {0, 1}
-    standard : mapping of str to float
-        By the field's symbols, SI; see `exugear.life.rating.standard.rate`.
-    finite_elements : mapping of str to float
-        `FINITE_ELEMENTS`, SI; nothing where none are known.
-    lacking : mapping of str to str
-        Why factors are not rated.
-    remarks : tuple of str
-        What lies outside the range of the standard.
-    """
+    """One flank of a gear in one family of meshes."""
 
     gear: str
     family: str
     flank: str
     member: int
+    """{0, 1}"""
     standard: Mapping[str, float]
+    """By the field's symbols, SI; see `exugear.life.rating.standard.rate`."""
     finite_elements: Mapping[str, float]
+    """`FINITE_ELEMENTS`, SI; nothing where none are known."""
     lacking: Mapping[str, str]
+    """Why factors are not rated."""
     remarks: tuple[str, ...]
+    """What lies outside the range of the standard."""
 
 
 @dataclass(frozen=True, eq=False)
 class RatingSheet(Displayed, line=" by {edition}: {flanks!n} flanks"):
-    """All flanks that are loaded, under what, and what is left out.
-
-    Attributes
-    ----------
-    edition, load : str
-    flanks : tuple of FlankSheet
-    shortfalls, assumptions, left_out : tuple of str
-    """
+    """All flanks that are loaded, under what, and what is left out."""
 
     edition: str
     load: str

@@ -50,60 +50,40 @@ FINE_CLASS = 5
 
 @dataclass(frozen=True, eq=False)
 class MeshLoads:
-    """What a family of meshes carries in each load of a spectrum.
-
-    Attributes
-    ----------
-    torque : array (n,)
-        Of the loaded body, N m: what the loads are told by.
-    force : array (n,)
-        F_t at the reference circle, mean of the meshes over the angles of the carrier, N.
-    sharing : array (n,)
-        K_gamma: the largest over that.
-    opening : array (n,)
-        Largest misalignment of the meshes as an opening over the face, m.
-    speed : array (n,)
-        Of gear 1 against the frame in which its mates stand, rad/s.
-    turns : array (n,)
-        Load cycles of the flank.
-    """
+    """What a family of meshes carries in each load of a spectrum."""
 
     torque: Floats
+    """(n,) of the loaded body, N m: what the loads are told by."""
     force: Floats
+    """(n,) F_t at the reference circle, mean of the meshes over the angles of the carrier, N."""
     sharing: Floats
+    """(n,) K_gamma: the largest over that."""
     opening: Floats
+    """(n,) largest misalignment of the meshes as an opening over the face, m."""
     speed: Floats
+    """(n,) of gear 1 against the frame in which its mates stand, rad/s."""
     turns: Floats
+    """(n,) load cycles of the flank."""
 
 
 @dataclass(frozen=True, eq=False)
 class FlankRules:
-    """What one gear of a pair is rated by.
-
-    Attributes
-    ----------
-    pair : GearPair
-    member : {0, 1}
-    strengths : tuple of StrengthSection or None
-        Of gear 1 and gear 2.
-    application_factor, stated_dynamic_factor : float
-        K_A; K_v where the standard's is not to be had.
-    viscosity : float
-        At 40 degrees Celsius, mm2/s.
-    meshes : (int, int)
-        Teeth in mesh at once around gear 1 and gear 2, for the mass that vibrates.
-    free_bore : bool
-        Whether the gear's bore is free: that of a planet.
-    """
+    """What one gear of a pair is rated by."""
 
     pair: GearPair
     member: int
+    """{0, 1}"""
     strengths: tuple[StrengthSection | None, StrengthSection | None]
+    """Of gear 1 and gear 2."""
     application_factor: float
     stated_dynamic_factor: float
+    """K_A; K_v where the standard's is not to be had."""
     viscosity: float
+    """At 40 degrees Celsius, mm2/s."""
     meshes: tuple[int, int]
+    """Teeth in mesh at once around gear 1 and gear 2, for the mass that vibrates."""
     free_bore: bool
+    """Whether the gear's bore is free: that of a planet."""
 
     @property
     def strength(self) -> StrengthSection | None:

@@ -38,52 +38,35 @@ _Signals = Mapping[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class Channel:
-    """A signal of a run-up or a steady response with its waterfall.
-
-    Attributes
-    ----------
-    name : str
-        Of the bearing, joint or mesh.
-    kind : {"support", "mesh"}
-    words : str
-        What it is.
-    copies : int
-        How many equal parts it stands for.
-    mean : float
-        Mean force over the middle third of the run, N; of bearings that go round with a carrier, of its magnitude.
-        NaN of a steady response, which has what vibrates.
-    axial : float
-        Mean axial force of a bearing there, N; NaN for a mesh and of a steady response.
-    spectra : Waterfall
-        Of a support the root of the summed squares of both transverse forces.
-    """
+    """A signal of a run-up or a steady response with its waterfall."""
 
     name: str
+    """Of the bearing, joint or mesh."""
     kind: str
+    """{"support", "mesh"}"""
     words: str
+    """What it is."""
     copies: int
+    """How many equal parts it stands for."""
     mean: float
+    """Mean force over the middle third of the run, N; of bearings that go round with a carrier, of its magnitude.
+    NaN of a steady response, which has what vibrates."""
     axial: float
+    """Mean axial force of a bearing there, N; NaN for a mesh and of a steady response."""
     spectra: Waterfall
+    """Of a support the root of the summed squares of both transverse forces."""
 
 
 @dataclass(frozen=True)
 class LoudestOrder:
-    """Where a channel is loudest along the orders.
-
-    Attributes
-    ----------
-    line : OrderLine
-    amplitude : float
-        In the unit of the channel.
-    speed, frequency : float
-        rad/s, Hz.
-    """
+    """Where a channel is loudest along the orders."""
 
     line: OrderLine
     amplitude: float
+    """In the unit of the channel."""
     speed: float
     frequency: float
+    """rad/s, Hz."""
 
 
 def channels_of(run: VariantRun, words: Words, response: xr.Dataset | None) -> Iterator[Channel]:

@@ -32,40 +32,26 @@ LEAST_SPEEDS = 3
 
 @dataclass(frozen=True)
 class Highest:
-    """Where an order is loudest at constant speed.
-
-    Attributes
-    ----------
-    level : float
-        dB re 1 µm.
-    speed : float
-        Of the input without sign, rad/s.
-    frequency : float
-        Hz.
-    """
+    """Where an order is loudest at constant speed."""
 
     level: float
+    """dB re 1 µm."""
     speed: float
+    """Of the input without sign, rad/s."""
     frequency: float
+    """Hz."""
 
 
 @dataclass(frozen=True)
 class ConstantSpeed:
-    """Overall transmission error along the orders of a steady response.
-
-    Attributes
-    ----------
-    speed : (n,) array
-        Of the input without sign, rad/s, ascending.
-    orders : (lines,) array
-        Periods per turn of the input.
-    level : (n, lines) array
-        dB re 1 µm.
-    """
+    """Overall transmission error along the orders of a steady response."""
 
     speed: Floats
+    """(n,) of the input without sign, rad/s, ascending."""
     orders: Floats
+    """(lines,) periods per turn of the input."""
     level: Floats
+    """(n, lines) dB re 1 µm."""
 
     def along(self, line: OrderLine) -> Floats | None:
         """Level at each speed, dB re 1 µm; None if the response has no such order."""

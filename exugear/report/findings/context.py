@@ -43,51 +43,33 @@ def file_part(choice: Choice) -> str:
 
 @dataclass(frozen=True)
 class Notes:
-    """What is told at the top of the page; each list in the order in which it was noted.
-
-    Attributes
-    ----------
-    statements : list of str
-        What the page says in short.
-    distrusted : list of str
-        Runs that are not to be trusted, with the reason.
-    left_out : list of str
-        Files that do not belong to the case, and what could not be computed, with the reason.
-    """
+    """What is told at the top of the page; each list in the order in which it was noted."""
 
     statements: list[str] = field(default_factory=list)
+    """What the page says in short."""
     distrusted: list[str] = field(default_factory=list)
+    """Runs that are not to be trusted, with the reason."""
     left_out: list[str] = field(default_factory=list)
+    """Files that do not belong to the case, and what could not be computed, with the reason."""
 
 
 @dataclass(frozen=True)
 class Context:
-    """What the sections of one report share.
-
-    Attributes
-    ----------
-    folder : Path
-        The results folder.
-    gearbox : Gearbox
-        The case that is kept in it.
-    target : float or None
-        Frequency (Hz) that modes are looked for at.
-    tell : callable
-        Called with what is being done.
-    notes : Notes
-    assemblies : dict of Choice to Assembly
-        Choices assembled so far.
-    stiffnesses : dict of law to mesh stiffness
-        Mesh stiffness read so far.
-    """
+    """What the sections of one report share."""
 
     folder: Path
+    """The results folder."""
     gearbox: Gearbox
+    """The case that is kept in it."""
     target: float | None
+    """Frequency (Hz) that modes are looked for at."""
     tell: Callable[[str], None]
+    """Called with what is being done."""
     notes: Notes = field(default_factory=Notes)
     assemblies: dict[Choice, Assembly] = field(default_factory=dict)
+    """Choices assembled so far."""
     stiffnesses: dict[str, dict[str, Floats | MeshCurve | SteSurface]] = field(default_factory=dict)
+    """Dict of law to mesh stiffness. Mesh stiffness read so far."""
 
     def stiffness(self, law: str) -> dict[str, Floats | MeshCurve | SteSurface]:
         """Mesh stiffness of a law from the tables of the folder, read once."""

@@ -17,35 +17,23 @@ HARMONICS = 6
 
 @dataclass(frozen=True)
 class PairExcitation:
-    """Static transmission error of a pair at its static load.
-
-    Attributes
-    ----------
-    pair : str
-    torque : float
-        On gear 1, N m.
-    position : (n,) array
-        In the mesh cycle, 0 to 1.
-    error : (n,) array
-        Transmission error, m.
-    stiffness : (n,) array
-        Mesh stiffness, N/m.
-    harmonics : (HARMONICS,) array
-        Amplitudes of the transmission error at multiples of the mesh frequency, m.
-    pressure : float
-        Highest contact pressure over the cycle, Pa; NaN if the table has none.
-    iso_stiffness : float
-        By ISO 6336-1 method B, N/m.
-    """
+    """Static transmission error of a pair at its static load."""
 
     pair: str
     torque: float
+    """On gear 1, N m."""
     position: Floats
+    """(n,) in the mesh cycle, 0 to 1."""
     error: Floats
+    """(n,) transmission error, m."""
     stiffness: Floats
+    """(n,) mesh stiffness, N/m."""
     harmonics: Floats
+    """(HARMONICS,) amplitudes of the transmission error at multiples of the mesh frequency, m."""
     pressure: float
+    """Highest contact pressure over the cycle, Pa; NaN if the table has none."""
     iso_stiffness: float
+    """By ISO 6336-1 method B, N/m."""
 
 
 def harmonics_of(error: Floats, count: int = HARMONICS) -> Floats:

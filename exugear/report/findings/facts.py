@@ -34,25 +34,17 @@ LOUDER = 1.0
 
 @dataclass(frozen=True)
 class Fact:
-    """A fact for a card of the page and a line of the command line.
-
-    Attributes
-    ----------
-    kind : str
-        What it is about.
-    figure, beside : str
-        The figure in large letters, and what stands beside it.
-    sentence : str
-        The rest.
-    link : str
-        Section of the page that has more.
-    """
+    """A fact for a card of the page and a line of the command line."""
 
     kind: str
+    """What it is about."""
     figure: str
     beside: str
+    """The figure in large letters, and what stands beside it."""
     sentence: str
+    """The rest."""
     link: str
+    """Section of the page that has more."""
 
     @property
     def line(self) -> str:

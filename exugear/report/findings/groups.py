@@ -38,26 +38,17 @@ from exugear.steady.steady_file import settings_of, steady_path
 
 @dataclass(frozen=True)
 class RankedResonance:
-    """A resonance of a run-up or a steady response, judged.
-
-    Attributes
-    ----------
-    finding : Finding
-    steady : bool
-        Whether windows of other lengths show it, too. What one window alone shows is no fact about the gearbox.
-    lacking : tuple of str
-        Variants that lack it, judged at its loudest peak and with every window.
-    elsewhere : mapping of variant to float
-        Highest level (dB) of the other variants at its loudest peak; NaN where they did not go there.
-    constant : Highest or None
-        Its loudest peak at constant speed; None where no steady response goes there.
-    """
+    """A resonance of a run-up or a steady response, judged."""
 
     finding: Finding
     steady: bool
+    """Whether windows of other lengths show it, too. What one window alone shows is no fact about the gearbox."""
     lacking: tuple[str, ...]
+    """Variants that lack it, judged at its loudest peak and with every window."""
     elsewhere: Mapping[str, float]
+    """By variant, highest level (dB) of the other variants at its loudest peak; NaN where they did not go there."""
     constant: Highest | None
+    """Its loudest peak at constant speed; None where no steady response goes there."""
 
     @property
     def peak(self) -> Pick:
@@ -95,36 +86,25 @@ class RankedResonance:
 
 @dataclass(frozen=True)
 class RunGroup:
-    """Run-ups, or steady responses, that differ in the variant alone.
-
-    Attributes
-    ----------
-    source : str
-        Where the figures are from, in words: the run-up of a load case, or constant speed at a level.
-    mesh_law, inertias : str
-    runs : mapping of variant to VariantRun
-        The stiffest first.
-    ranked : mapping of variant to tuple of RankedResonance
-        The loudest first.
-    comparisons : mapping of variant to Comparison
-        Of each other variant with the stiff reference.
-    constant : mapping of variant to ConstantSpeed
-        Levels at constant speed of run-ups that have a steady response.
-    responses : mapping of variant to Dataset
-        Steady responses that the group is made of; none where it is made of run-ups.
-    in_operation : Ranking or None
-        Resonances of the main variant's steady response at speeds of operation, by three quantities; None without one.
-    """
+    """Run-ups, or steady responses, that differ in the variant alone."""
 
     source: str
+    """Where the figures are from, in words: the run-up of a load case, or constant speed at a level."""
     mesh_law: str
     inertias: str
     runs: Mapping[str, VariantRun]
+    """By variant, the stiffest first."""
     ranked: Mapping[str, tuple[RankedResonance, ...]]
+    """By variant, the loudest first."""
     comparisons: Mapping[str, Comparison]
+    """By variant, of each other variant with the stiff reference."""
     constant: Mapping[str, ConstantSpeed]
+    """By variant, levels at constant speed of run-ups that have a steady response."""
     responses: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    """By variant, steady responses that the group is made of; none where it is made of run-ups."""
     in_operation: Ranking | None = None
+    """Resonances of the main variant's steady response at speeds of operation, by three quantities; None without
+    one."""
 
     @property
     def name(self) -> str:

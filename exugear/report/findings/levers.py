@@ -17,23 +17,16 @@ LEAST_SHIFT = 5e-4
 
 @dataclass(frozen=True)
 class Lever:
-    """Something that moves a mode.
-
-    Attributes
-    ----------
-    what : str
-        Element or body in words.
-    kind : {"stiffness", "inertia"}
-    share : float
-        Of the mode's strain or kinetic energy.
-    shift : float
-        Change of the frequency for 10 % more of it, Hz.
-    """
+    """Something that moves a mode."""
 
     what: str
+    """Element or body in words."""
     kind: str
+    """{"stiffness", "inertia"}"""
     share: float
+    """Of the mode's strain or kinetic energy."""
     shift: float
+    """Change of the frequency for 10 % more of it, Hz."""
 
 
 def shift_of(frequency: float, share: float, kind: str, step: float = STEP) -> float:

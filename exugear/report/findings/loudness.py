@@ -34,46 +34,31 @@ BOTH = "shafts and housing"
 
 @dataclass(frozen=True)
 class Loudness:
-    """How loud a resonance is in one quantity.
-
-    Attributes
-    ----------
-    amplitude : float
-        Peak amplitude of the line, in the quantity's unit; of planets the root of the mean square over them.
-    at : str
-        Bearing where it is largest, of planets their family; empty for the transmission error.
-    place : int or None
-        Among the peaks of that quantity, 1 for the loudest; None where it rises to a louder one.
-    """
+    """How loud a resonance is in one quantity."""
 
     amplitude: float
+    """Peak amplitude of the line, in the quantity's unit; of planets the root of the mean square over them."""
     at: str
+    """Bearing where it is largest, of planets their family; empty for the transmission error."""
     place: int | None
+    """Among the peaks of that quantity, 1 for the loudest; None where it rises to a louder one."""
 
 
 @dataclass(frozen=True)
 class Resonance:
-    """A line at a speed where at least one quantity has a peak.
-
-    Attributes
-    ----------
-    line : str
-        Such as ``2 x intermediate``.
-    order : float
-        Periods per turn of the input.
-    speed : float
-        Of the input, rad/s, of the peak in the quantity that places it best.
-    frequency : float
-        Hz.
-    loudness : mapping of quantity to Loudness
-        Of ``error`` (m), ``force`` (N) and ``acceleration`` (m/s2), the last two where there are bearings.
-    """
+    """A line at a speed where at least one quantity has a peak."""
 
     line: str
+    """Such as ``2 x intermediate``."""
     order: float
+    """Periods per turn of the input."""
     speed: float
+    """Of the input, rad/s, of the peak in the quantity that places it best."""
     frequency: float
+    """Hz."""
     loudness: Mapping[str, Loudness]
+    """By quantity, of ``error`` (m), ``force`` (N) and ``acceleration`` (m/s2), the last two where there are
+    bearings."""
 
     @property
     def best(self) -> int:
@@ -83,23 +68,15 @@ class Resonance:
 
 @dataclass(frozen=True)
 class Ranking:
-    """Resonances of a steady response, that with the best place in any quantity first.
-
-    Attributes
-    ----------
-    resonances : tuple of Resonance
-    speeds : (float, float)
-        Lowest and highest speed that counts, of the input without sign, rad/s.
-    whole : bool
-        Whether these are all speeds of the response: its file names none of operation, or it was not computed there.
-    accelerates : str
-        Whose acceleration it is: that of shafts where the housing is rigid.
-    """
+    """Resonances of a steady response, that with the best place in any quantity first."""
 
     resonances: tuple[Resonance, ...]
     speeds: tuple[float, float]
+    """Lowest and highest speed that counts, of the input without sign, rad/s."""
     whole: bool
+    """Whether these are all speeds of the response: its file names none of operation, or it was not computed there."""
     accelerates: str
+    """Whose acceleration it is: that of shafts where the housing is rigid."""
 
 
 def ranking_of(data: xr.Dataset) -> Ranking:

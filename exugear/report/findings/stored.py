@@ -34,22 +34,15 @@ _UNFIT = (CaseError, MeshError, VariantError, BearingError, BalanceError, KeyErr
 
 @dataclass(frozen=True)
 class StoredResults:
-    """What a report is made from.
-
-    Attributes
-    ----------
-    tables : mapping of pair name to MeshTable
-    modes : mapping of Choice to xarray.Dataset
-        As `exugear.dynamics.eigenmodes.modes.Modes.to_dataset` makes them.
-    runs : sequence of VariantRun
-    steady : sequence of xarray.Dataset
-        Steady responses as `exugear.steady.steady_file.load_response` reads them.
-    """
+    """What a report is made from."""
 
     tables: Mapping[str, MeshTable]
+    """By pair name."""
     modes: Mapping[Choice, xr.Dataset]
+    """As `exugear.dynamics.eigenmodes.modes.Modes.to_dataset` makes them."""
     runs: Sequence[VariantRun]
     steady: Sequence[xr.Dataset] = ()
+    """Steady responses as `exugear.steady.steady_file.load_response` reads them."""
 
     def __bool__(self) -> bool:
         """Tell whether there is anything to report."""

@@ -43,13 +43,7 @@ VariedModels = Mapping[Choice, Mapping[str, Figures | str]]
 
 @dataclass(frozen=True)
 class ModelVariations:
-    """Variations of one model.
-
-    Attributes
-    ----------
-    choice : Choice
-    variations : tuple of ParameterVariation
-    """
+    """Variations of one model."""
 
     choice: Choice
     variations: tuple[ParameterVariation, ...]
@@ -57,38 +51,25 @@ class ModelVariations:
 
 @dataclass(frozen=True)
 class Guarded:
-    """A mode over a parameter, beside the loudest mode near it.
-
-    Attributes
-    ----------
-    frequency, amplification : (n,) arrays
-        Of the mode that is followed by its shape, Hz and m/m.
-    loudest : (n,) array
-        Amplification of the loudest of all modes within an octave of its frequency at the default value.
-    """
+    """A mode over a parameter, beside the loudest mode near it."""
 
     frequency: Floats
     amplification: Floats
+    """(n,) of the mode that is followed by its shape, Hz and m/m."""
     loudest: Floats
+    """(n,) amplification of the loudest of all modes within an octave of its frequency at the default value."""
 
 
 @dataclass(frozen=True)
 class BestChange:
-    """The change of an assumption that makes what lies within an octave of a mode quietest.
-
-    Attributes
-    ----------
-    label : str
-        Of the parameter.
-    value, default : float
-    gain : float
-        Of the loudest mode in the octave, dB; above zero is quieter.
-    """
+    """The change of an assumption that makes what lies within an octave of a mode quietest."""
 
     label: str
+    """Of the parameter."""
     value: float
     default: float
     gain: float
+    """Of the loudest mode in the octave, dB; above zero is quieter."""
 
 
 def begin_variations(context: Context, modes: Mapping[Choice, xr.Dataset], executor: Executor) -> Future[VariedModels]:

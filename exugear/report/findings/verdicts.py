@@ -35,13 +35,7 @@ BEYOND_RATED = 1.3
 
 @dataclass(frozen=True)
 class Verdict:
-    """A check that was passed, or a thing to mind.
-
-    Attributes
-    ----------
-    passed : bool
-    words : str
-    """
+    """A check that was passed, or a thing to mind."""
 
     passed: bool
     words: str
@@ -54,21 +48,14 @@ class Verdict:
 
 @dataclass(frozen=True)
 class RunFigures:
-    """Figures that tell of one run's quality.
-
-    Attributes
-    ----------
-    residual : float
-        Share of energy that is not accounted for.
-    times : tuple of float
-        Longest pull of a mesh, longest time that teeth are apart, outside a table, beside unsolved states of it, s.
-    end : float
-        Simulated time, s.
-    """
+    """Figures that tell of one run's quality."""
 
     residual: float
+    """Share of energy that is not accounted for."""
     times: tuple[float, ...]
+    """Longest pull of a mesh, longest time that teeth are apart, outside a table, beside unsolved states of it, s."""
     end: float
+    """Simulated time, s."""
 
 
 def run_figures(run: VariantRun) -> RunFigures:

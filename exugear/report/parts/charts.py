@@ -15,36 +15,24 @@ from exugear.report.web.arrays import ArrayStore
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve of a line figure.
-
-    Attributes
-    ----------
-    label : str
-    x, y : (n,) array_like
-    style : {"line", "dashed", "thin", "points"}
-    right : bool
-        Whether the axis on the right is its.
-    """
+    """A curve of a line figure."""
 
     label: str
     x: ArrayLike
     y: ArrayLike
+    """(n,)"""
     style: str = "line"
+    """{"line", "dashed", "thin", "points"}"""
     right: bool = False
+    """Whether the axis on the right is its."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of a line figure.
-
-    Attributes
-    ----------
-    label : str
-        With its unit.
-    logarithmic : bool
-    """
+    """An axis of a line figure."""
 
     label: str
+    """With its unit."""
     logarithmic: bool = False
 
 

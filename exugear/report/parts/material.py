@@ -20,32 +20,20 @@ from exugear.results.spectra.orders import OrderLine, order_lines
 
 @dataclass(frozen=True)
 class Material:
-    """What all sections are made of.
-
-    Attributes
-    ----------
-    context : Context
-    results : StoredResults
-    words : Words
-    groups : tuple of RunGroup
-        Those of run-ups first, then those of steady responses; of each the default inertia set first.
-    variations : tuple of ModelVariations
-    lines : tuple of OrderLine
-        Orders that are drawn.
-    arrays : ArrayStore
-        Takes the arrays of the page.
-    run_data : mapping
-        Run-ups and steady responses as data of the page, as `exugear.report.parts.run_data.run_data` makes them.
-    """
+    """What all sections are made of."""
 
     context: Context
     results: StoredResults
     words: Words
     groups: Sequence[RunGroup]
+    """Those of run-ups first, then those of steady responses; of each the default inertia set first."""
     variations: Sequence[ModelVariations]
     lines: Sequence[OrderLine]
+    """Orders that are drawn."""
     arrays: ArrayStore
+    """Takes the arrays of the page."""
     run_data: Mapping[str, Any] = field(default_factory=dict)
+    """Run-ups and steady responses as data of the page, as `exugear.report.parts.run_data.run_data` makes them."""
 
     @property
     def input_words(self) -> str:
@@ -65,22 +53,15 @@ def lines_of(context: Context) -> tuple[OrderLine, ...]:
 
 @dataclass(frozen=True)
 class Part:
-    """What a section gives.
-
-    Attributes
-    ----------
-    html : str
-        Empty where it has nothing to show.
-    data : mapping
-        For the scripts, by keys of its own.
-    title, name : str
-        Its entry in the table of contents; empty for none.
-    """
+    """What a section gives."""
 
     html: str
+    """Empty where it has nothing to show."""
     data: Mapping[str, Any] = field(default_factory=dict)
+    """For the scripts, by keys of its own."""
     title: str = ""
     name: str = ""
+    """Its entry in the table of contents; empty for none."""
 
 
 def only_for(content: str, group: str, variant: str = "") -> str:

@@ -55,20 +55,12 @@ class DeformedBody:
 
 @dataclass(frozen=True)
 class ElasticScene:
-    """Elastic bodies in a mode, and their gears, which ride on their seats.
-
-    Attributes
-    ----------
-    bodies : tuple of DeformedBody
-    gears : tuple of BodyShape
-    motions : tuple of (6,) arrays
-        Motion of each gear as drawn.
-    title : str
-    """
+    """Elastic bodies in a mode, and their gears, which ride on their seats."""
 
     bodies: tuple[DeformedBody, ...]
     gears: tuple[BodyShape, ...]
     motions: tuple[Floats, ...]
+    """(6,) motion of each gear as drawn."""
     title: str
 
 

@@ -77,21 +77,13 @@ def motion_matrix(reference: ArrayLike, motion: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class ModeScene:
-    """A mode shape on the bodies of a gearbox, ready to draw.
-
-    Attributes
-    ----------
-    bodies : tuple of BodyShape
-    motions : tuple of (6,) arrays
-        Motion of each body at the drawn amplitude.
-    displacement : tuple of (n,) arrays
-        Displacement of each point over the largest of all, 0 to 1.
-    title : str
-    """
+    """A mode shape on the bodies of a gearbox, ready to draw."""
 
     bodies: tuple[BodyShape, ...]
     motions: tuple[Floats, ...]
+    """(6,) motion of each body at the drawn amplitude."""
     displacement: tuple[Floats, ...]
+    """(n,) displacement of each point over the largest of all, 0 to 1."""
     title: str
 
 

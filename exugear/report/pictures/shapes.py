@@ -19,26 +19,17 @@ from fe_ste.tools.arrays import Floats
 
 @dataclass(frozen=True)
 class BodyShape:
-    """What a body looks like.
-
-    Attributes
-    ----------
-    name : str
-    family : str
-        Name that equal bodies share, such as the planets of a set.
-    surface : Surface
-        In the frame of the gearbox, at rest.
-    reference : (3,) array
-        Point whose displacement describes the body's motion, its centre of mass, m.
-    fixed : bool
-        Drawn translucent: a ring hides its planets.
-    """
+    """What a body looks like."""
 
     name: str
     family: str
+    """Name that equal bodies share, such as the planets of a set."""
     surface: Surface
+    """In the frame of the gearbox, at rest."""
     reference: Floats
+    """(3,) point whose displacement describes the body's motion, its centre of mass, m."""
     fixed: bool = False
+    """Drawn translucent: a ring hides its planets."""
 
 
 def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:

@@ -19,17 +19,12 @@ TWIST_PER_LAYER = 0.06
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangulated surface.
-
-    Attributes
-    ----------
-    points : (n, 3) array
-        m.
-    triangles : (m, 3) array of int
-    """
+    """Triangulated surface."""
 
     points: Floats
+    """(n, 3) m."""
     triangles: Integers
+    """(m, 3)"""
 
     def moved(self, shift: ArrayLike) -> Surface:
         """Copy at another place."""

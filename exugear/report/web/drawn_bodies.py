@@ -22,23 +22,15 @@ SAME_SHAPE = 1e-6
 
 @dataclass(frozen=True)
 class DrawnBody:
-    """A body that a page draws.
-
-    Attributes
-    ----------
-    shape : BodyShape
-    colour : str
-        As ``#rrggbb``.
-    owner : str
-        Body whose seat a gear rides on; its own name otherwise.
-    field : (p, 3, n) array or None
-        Displacement of its points per coordinate of an elastic body; None for a body that moves as a whole.
-    """
+    """A body that a page draws."""
 
     shape: BodyShape
     colour: str
+    """As ``#rrggbb``."""
     owner: str
+    """Body whose seat a gear rides on; its own name otherwise."""
     field: NDArray[np.float32] | None = None
+    """(p, 3, n) displacement of its points per coordinate of an elastic body; None for a body that moves as a whole."""
 
 
 def drawn_bodies(assembly: Assembly) -> tuple[DrawnBody, ...]:
@@ -80,18 +72,12 @@ def _written(colour: tuple[float, float, float]) -> str:
 
 @dataclass(frozen=True)
 class DrawnMode:
-    """A mode as a page draws it; the largest displacement of any point is 1 m.
-
-    Attributes
-    ----------
-    motions : (bodies, 6) array
-        Motion of each body as a whole; of one with a field zero.
-    fields : mapping of place among the bodies to (p, 3) array
-        Displacement of the points of elastic bodies.
-    """
+    """A mode as a page draws it; the largest displacement of any point is 1 m."""
 
     motions: Floats
+    """(bodies, 6) motion of each body as a whole; of one with a field zero."""
     fields: dict[int, Floats]
+    """Mapping of place among the bodies to (p, 3) array. Displacement of the points of elastic bodies."""
 
 
 def drawn_mode(assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats, with_fields: bool) -> DrawnMode:

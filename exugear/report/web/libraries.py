@@ -13,22 +13,14 @@ from importlib.resources import files
 
 @dataclass(frozen=True)
 class Library:
-    """A library of others that the pages carry.
-
-    Attributes
-    ----------
-    name, version : str
-    licence : str
-        Name of its licence.
-    files : tuple of (str, str)
-        Files with the SHA-256 of each.
-    licence_file : str
-    """
+    """A library of others that the pages carry."""
 
     name: str
     version: str
     licence: str
+    """Name of its licence."""
     files: tuple[tuple[str, str], ...]
+    """Files with the SHA-256 of each."""
     licence_file: str
 
 

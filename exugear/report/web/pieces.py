@@ -55,27 +55,18 @@ def bullets(values: Iterable[str]) -> str:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a table that is more than a text.
-
-    Attributes
-    ----------
-    shown : str
-        Its text.
-    order : float or None
-        What rows are sorted by; the text otherwise.
-    choice : str
-        What clicking it chooses in the scripts of the page; empty for nothing.
-    tag : str
-        Shown as a tag instead of plain text: ``good``, ``mind`` or ``plain``.
-    bar : float or None
-        Length of a bar beside the text, 0 to 1.
-    """
+    """A cell of a table that is more than a text."""
 
     shown: str
+    """Its text."""
     order: float | None = None
+    """What rows are sorted by; the text otherwise."""
     choice: str = ""
+    """What clicking it chooses in the scripts of the page; empty for nothing."""
     tag: str = ""
+    """Shown as a tag instead of plain text: ``good``, ``mind`` or ``plain``."""
     bar: float | None = None
+    """Length of a bar beside the text, 0 to 1."""
 
     def __str__(self) -> str:
         """Text of the cell."""

@@ -18,18 +18,12 @@ from fe_ste.tools.display import Displayed, TitledRows
 
 @dataclass(frozen=True)
 class AbsenceRule:
-    """When a peak of one run counts as absent from another.
-
-    Attributes
-    ----------
-    prominence : float
-        On the same order line the other run has no peak of this prominence, dB, within the resolution, and
-    margin : float
-        its level at that place lies at least so far below, dB.
-    """
+    """When a peak of one run counts as absent from another."""
 
     prominence: float = 3.0
+    """On the same order line the other run has no peak of this prominence, dB, within the resolution, and."""
     margin: float = 6.0
+    """Its level at that place lies at least so far below, dB."""
 
     @property
     def description(self) -> str:
@@ -72,19 +66,13 @@ def _is_absent(pick: Pick, other: Waterfall, peaks: Sequence[Pick], rule: Absenc
 
 @dataclass(frozen=True)
 class Comparison(Displayed):
-    """Run-ups of two variants under the same law, inertia set and load case.
-
-    Attributes
-    ----------
-    first, second : VariantRun
-        The first is the compliant one: what it has and the second lacks is asked for.
-    rule : AbsenceRule
-        When a peak counts as absent.
-    """
+    """Run-ups of two variants under the same law, inertia set and load case."""
 
     first: VariantRun
     second: VariantRun
+    """The first is the compliant one: what it has and the second lacks is asked for."""
     rule: AbsenceRule
+    """When a peak counts as absent."""
 
     def _line(self) -> str:
         counts = f"only first {len(self.only_first)}, only second {len(self.only_second)}"

@@ -24,18 +24,12 @@ HALF_POWER = 3.0
 
 @dataclass(frozen=True)
 class LineSpectra(Waterfall):
-    """Lines at steady speeds, as a waterfall: `amplitude` is the picture, `line_level` the lines themselves.
-
-    Attributes
-    ----------
-    orders : (lines,) array
-        Periods per turn of the reference shaft.
-    line_level : (n, lines) array
-        Level at each speed, dB; NaN where no steady state is known.
-    """
+    """Lines at steady speeds, as a waterfall: `amplitude` is the picture, `line_level` the lines themselves."""
 
     orders: Floats
+    """(lines,) periods per turn of the reference shaft."""
     line_level: Floats
+    """(n, lines) level at each speed, dB; NaN where no steady state is known."""
 
     def along(self, line: OrderLine) -> Floats:
         """Level (dB) of an order at each speed, shape (n,); NaN throughout if it is none of the lines."""

@@ -30,37 +30,25 @@ def mobility_shares(modes: xr.Dataset) -> Floats:
 
 @dataclass(frozen=True)
 class ModeReport(Displayed):
-    """One eigenmode in figures.
-
-    Attributes
-    ----------
-    index : int
-        In the list of modes, from 0.
-    frequency, damping_ratio : float
-        Hz, share of critical damping.
-    name : str
-        What moves, in words.
-    share : float
-        See `mobility_shares`.
-    amplification : float
-        Overall transmission error at resonance per transmission error of the mesh that excites it most, m/m.
-    mesh : str
-        That mesh.
-    strain : mapping of str to float
-        Share of strain energy by mesh, bearing and coupling.
-    kinetic : mapping of str to float
-        Share of kinetic energy by body.
-    """
+    """One eigenmode in figures."""
 
     index: int
+    """In the list of modes, from 0."""
     frequency: float
     damping_ratio: float
+    """Hz, share of critical damping."""
     name: str
+    """What moves, in words."""
     share: float
+    """See `mobility_shares`."""
     amplification: float
+    """Overall transmission error at resonance per transmission error of the mesh that excites it most, m/m."""
     mesh: str
+    """That mesh."""
     strain: Mapping[str, float]
+    """Share of strain energy by mesh, bearing and coupling."""
     kinetic: Mapping[str, float]
+    """Share of kinetic energy by body."""
 
     def _line(self) -> str:
         share = f"share {100 * self.share:.2g} %"

@@ -17,23 +17,16 @@ from fe_ste.tools.display import Displayed, TitledRows, value_range
 
 @dataclass(frozen=True)
 class OrderCut(Displayed):
-    """Amplitude and phase along an order.
-
-    Attributes
-    ----------
-    line : OrderLine
-        The order.
-    time, speed, frequency : (n,) array
-        Middle of each window, s; speed there, rad/s; frequency of the order there, Hz.
-    amplitude : (n,) complex array
-        Peak amplitude; its phase is that relative to ``cos(order * angle)``.
-    """
+    """Amplitude and phase along an order."""
 
     line: OrderLine
+    """The order."""
     time: Floats
     speed: Floats
     frequency: Floats
+    """(n,) middle of each window, s; speed there, rad/s; frequency of the order there, Hz."""
     amplitude: Complexes
+    """(n,) peak amplitude; its phase is that relative to ``cos(order * angle)``."""
 
     def _line(self) -> str:
         return f": {shorten(', '.join(f'{name} {value}' for name, value in self._rows.items()), 180)}"

@@ -21,18 +21,12 @@ SAME_ORDER = 1e-6
 
 @dataclass(frozen=True)
 class OrderLine:
-    """A named line of constant order in a waterfall.
-
-    Attributes
-    ----------
-    name : str
-        For legends and tables, such as ``"HS mesh"``.
-    order : float
-        Periods per turn of the reference shaft.
-    """
+    """A named line of constant order in a waterfall."""
 
     name: str
+    """For legends and tables, such as ``"HS mesh"``."""
     order: float
+    """Periods per turn of the reference shaft."""
 
     def place(self, orders: Floats) -> int | None:
         """Place of the line among orders (n,); None if it is none of them."""

@@ -18,27 +18,19 @@ from fe_ste.tools.display import Displayed, TitledRows
 
 @dataclass(frozen=True)
 class Pick:
-    """A peak on an order line of a waterfall.
-
-    Attributes
-    ----------
-    line : OrderLine
-        The order that excites it.
-    time, speed, frequency : float
-        Where it peaks: s, rad/s, Hz.
-    level, prominence : float
-        Level and prominence over its surroundings on the line, dB.
-    resolution : float
-        How exactly the sweep allows the frequency to be told, Hz.
-    """
+    """A peak on an order line of a waterfall."""
 
     line: OrderLine
+    """The order that excites it."""
     time: float
     speed: float
     frequency: float
+    """Where it peaks: s, rad/s, Hz."""
     level: float
     prominence: float
+    """Level and prominence over its surroundings on the line, dB."""
     resolution: float
+    """How exactly the sweep allows the frequency to be told, Hz."""
 
 
 Peaks = Callable[[Waterfall, OrderLine, float], list[Pick]]
@@ -133,21 +125,14 @@ def _pick_at(
 
 @dataclass(frozen=True)
 class Resonance(Displayed, line=" {_frequency_text}, {_highest_text}, {picks!n} peaks"):
-    """Peaks of several order lines at one frequency.
-
-    Attributes
-    ----------
-    frequency : float
-        Mean of the peaks, weighted by their resolution, Hz.
-    resolution : float
-        Of the slowest of its lines, Hz.
-    picks : tuple of Pick
-        The highest first.
-    """
+    """Peaks of several order lines at one frequency."""
 
     frequency: float
+    """Mean of the peaks, weighted by their resolution, Hz."""
     resolution: float
+    """Of the slowest of its lines, Hz."""
     picks: tuple[Pick, ...]
+    """The highest first."""
 
     def _table(self) -> TitledRows:
         rows = {pick.line.name: f"{pick.level:.1f} dB at {pick.speed / RPM:.1f} rpm" for pick in self.picks}

@@ -40,27 +40,18 @@ _NAMES = ("time", "input_speed", "overall_dte")
 
 @dataclass(frozen=True)
 class RunSignals(Displayed, line=": {overall.size} samples at {rate:.6g} Hz"):
-    """What the waterfall of a run-up is made of.
-
-    Attributes
-    ----------
-    path : Path
-    attributes : mapping
-        What was run.
-    rate : float
-        Samples per second.
-    span : float
-        Simulated time, s.
-    speed, overall : (n,) arrays
-        Speed of the overall input, rad/s; overall transmission error, m.
-    """
+    """What the waterfall of a run-up is made of."""
 
     path: Path
     attributes: Mapping[str, Any]
+    """What was run."""
     rate: float
+    """Samples per second."""
     span: float
+    """Simulated time, s."""
     speed: Floats
     overall: Floats
+    """(n,) speed of the overall input, rad/s; overall transmission error, m."""
 
     @property
     def suitable_window(self) -> float:
@@ -118,25 +109,17 @@ def run_waterfall(path: str | Path, window_length: float | None = None) -> Water
 
 @dataclass(frozen=True)
 class Finding:
-    """A resonance of a run-up and the eigenmode it belongs to.
-
-    Attributes
-    ----------
-    resonance : Resonance
-        Peaks of one or several orders at one frequency, the highest first.
-    mode : int or None
-        Number, from 0, of the nearest eigenfrequency that the overall transmission error sees, if one lies within the
-        resolution.
-    mode_frequency : float
-        Hz; NaN without a mode.
-    mode_name : str
-        What moves, in words; empty without a mode.
-    """
+    """A resonance of a run-up and the eigenmode it belongs to."""
 
     resonance: Resonance
+    """Peaks of one or several orders at one frequency, the highest first."""
     mode: int | None
+    """Number, from 0, of the nearest eigenfrequency that the overall transmission error sees, if one lies within the
+    resolution."""
     mode_frequency: float
+    """Hz; NaN without a mode."""
     mode_name: str
+    """What moves, in words; empty without a mode."""
 
     @property
     def strongest(self) -> Pick:
@@ -151,24 +134,15 @@ class Finding:
 
 @dataclass(frozen=True)
 class VariantRun(Displayed):
-    """A run-up with its spectra, resonances and modes.
-
-    Attributes
-    ----------
-    path : Path
-    attributes : mapping
-        What was run.
-    spectra : Waterfall
-    picks : tuple of Pick
-    modes : xarray.Dataset or None
-        As `exugear.dynamics.eigenmodes.modes.Modes.to_dataset` makes it.
-    """
+    """A run-up with its spectra, resonances and modes."""
 
     path: Path
     attributes: Mapping[str, Any]
+    """What was run."""
     spectra: Waterfall
     picks: tuple[Pick, ...]
     modes: xr.Dataset | None
+    """As `exugear.dynamics.eigenmodes.modes.Modes.to_dataset` makes it."""
 
     def _line(self) -> str:
         return f" {shorten(f'{self.variant}, {self.conditions}', 150)}, {len(self.picks)} peaks"

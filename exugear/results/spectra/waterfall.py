@@ -21,37 +21,25 @@ from fe_ste.tools.display import Displayed, TitledRows, value_range
 
 @dataclass(frozen=True)
 class Waterfall(Displayed, line=": {time.size} spectra of {frequency.size} lines, {_spans}, {description}"):
-    """Spectra over the speed of the reference shaft.
-
-    Attributes
-    ----------
-    time, speed : (n,) array
-        Middle of each window, s, and the speed there, rad/s.
-    frequency : (m,) array
-        Hz.
-    amplitude : (n, m) array
-        Peak amplitudes in `unit`.
-    window : str
-        Name of the window.
-    window_length : float
-        s.
-    overlap : float
-        Share of a window that the next one repeats.
-    reference : float
-        Amplitude of 0 dB in `unit`.
-    unit : str
-        Unit of signal and reference.
-    """
+    """Spectra over the speed of the reference shaft."""
 
     time: Floats
     speed: Floats
+    """(n,) middle of each window, s, and the speed there, rad/s."""
     frequency: Floats
+    """(m,) Hz."""
     amplitude: Floats
+    """(n, m) peak amplitudes in `unit`."""
     window: str
+    """Name of the window."""
     window_length: float
+    """s."""
     overlap: float
+    """Share of a window that the next one repeats."""
     reference: float
+    """Amplitude of 0 dB in `unit`."""
     unit: str
+    """Unit of signal and reference."""
 
     def _table(self) -> TitledRows:
         rows = {

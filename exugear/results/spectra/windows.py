@@ -16,18 +16,12 @@ WINDOW_FACTORS = (0.94, 0.98, 1.02, 1.06)
 
 @dataclass(frozen=True)
 class OtherWindow:
-    """What runs to be compared show with another window.
-
-    Attributes
-    ----------
-    picks : mapping of variant to tuple of Pick
-        Peaks of each run.
-    absent : mapping of (variant, other variant) to tuple of Pick
-        Peaks of the first that the second lacks.
-    """
+    """What runs to be compared show with another window."""
 
     picks: Mapping[str, tuple[Pick, ...]]
+    """By variant, peaks of each run."""
     absent: Mapping[tuple[str, str], tuple[Pick, ...]]
+    """(variant, other variant) peaks of the first that the second lacks."""
 
 
 def other_windows(

@@ -32,25 +32,18 @@ SAME_FREQUENCY = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Campbell(Displayed, line=": {names!n} modes at {speeds!n} speeds"):
-    """Modes over speed; n speeds, m modes.
-
-    Attributes
-    ----------
-    speeds : (n,) array
-        Of the overall input, ascending, rad/s.
-    frequency, damping, whirl : (n, m) arrays
-        Hz as seen from the housing, share of critical damping, and sense of the whirl as `NamedMode` has it; NaN where
-        a mode is none.
-    kinds, names : tuple of str
-        As `NamedMode` has them, at the fastest speed.
-    """
+    """Modes over speed; n speeds, m modes."""
 
     speeds: Floats
+    """(n,) of the overall input, ascending, rad/s."""
     frequency: Floats
     damping: Floats
     whirl: Floats
+    """(n, m) Hz as seen from the housing, share of critical damping, and sense of the whirl as `NamedMode` has it;
+    NaN where a mode is none."""
     kinds: tuple[str, ...]
     names: tuple[str, ...]
+    """As `NamedMode` has them, at the fastest speed."""
 
     def mode_at(self, speed: float, frequency: float) -> int | None:
         """Find the mode that has a frequency (Hz) at a speed (rad/s), None where none is near."""

@@ -34,22 +34,15 @@ TURNING = tuple(BODY_MOTIONS.index(name) for name in ("spin", "axial", "twist", 
 
 @dataclass(frozen=True)
 class NamedMode:
-    """A mode in words.
-
-    Attributes
-    ----------
-    kind : str
-        Of `KINDS`, `MIXED`, or empty where no planet set carries the mode; with the carrier where there are several.
-    name : str
-        What moves and what is strained.
-    whirl : float
-        1 for a circle in the sense in which the body turns, -1 against it, 0 for a line and where hardly any turning
-        body moves across.
-    """
+    """A mode in words."""
 
     kind: str
+    """Of `KINDS`, `MIXED`, or empty where no planet set carries the mode; with the carrier where there are several."""
     name: str
+    """What moves and what is strained."""
     whirl: float
+    """1 for a circle in the sense in which the body turns, -1 against it, 0 for a line and where hardly any turning
+    body moves across."""
 
 
 class ModeNamer:

@@ -40,22 +40,15 @@ NARROWEST = 1.0 / 512.0
 
 @dataclass(frozen=True, eq=False)
 class ModeTracks:
-    """Modes over speed; n speeds, m modes in the order of their frequency.
-
-    Attributes
-    ----------
-    speeds : (n,) array
-        Ascending, rad/s.
-    eigenvalues : (n, m) complex array
-        1/s; NaN where a mode is none: beyond the highest frequency, or overdamped.
-    shapes, left : (n, m, size) complex arrays
-        Displacements, and the parts of left shapes that loads meet; zero where a mode is none.
-    """
+    """Modes over speed; n speeds, m modes in the order of their frequency."""
 
     speeds: Floats
+    """(n,) ascending, rad/s."""
     eigenvalues: Complexes
+    """(n, m) 1/s; NaN where a mode is none: beyond the highest frequency, or overdamped."""
     shapes: Complexes
     left: Complexes
+    """(n, m, size) displacements, and the parts of left shapes that loads meet; zero where a mode is none."""
 
     @property
     def frequency(self) -> Floats:

@@ -33,33 +33,23 @@ DIFFERENCE = 1e-5
 
 @dataclass(frozen=True)
 class Scales:
-    """What counts as one along a branch.
-
-    Attributes
-    ----------
-    lines, parameter : float
-        Size of a change of the lines, and of the parameter.
-    """
+    """What counts as one along a branch."""
 
     lines: float
     parameter: float
+    """Size of a change of the lines, and of the parameter."""
 
 
 @dataclass(frozen=True)
 class Branch:
-    """Points along a branch; n of them.
-
-    Attributes
-    ----------
-    parameter : (n,) array
-    lines : (n, ...) complex array
-    whole : bool
-        Whether it goes on to where it was to end; else it has as many points as were allowed.
-    """
+    """Points along a branch; n of them."""
 
     parameter: Floats
+    """(n,)"""
     lines: Complexes
+    """(n, ...)"""
     whole: bool = True
+    """Whether it goes on to where it was to end; else it has as many points as were allowed."""
 
     @property
     def folds(self) -> tuple[tuple[int, float], ...]:

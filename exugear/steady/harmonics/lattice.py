@@ -28,17 +28,11 @@ class LatticeError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Lattice(Displayed, line=": {samples} samples for {lines.index!n} lines"):
-    """Samples of quasi-periodic signals.
-
-    Attributes
-    ----------
-    lines : LineSet
-    generator : (bases,) array of int
-    samples : int
-    """
+    """Samples of quasi-periodic signals."""
 
     lines: LineSet
     generator: Integers
+    """(bases,)"""
     samples: int
 
     @cached_property

@@ -34,20 +34,14 @@ class LineSet(Displayed, line=": {index!n} lines of {index.shape[1]} bases"):
 
     Arrays of a signal have the coefficients c along their first axis; the first one, the mean, is real. The peak
     amplitude of a line is 2 \|c_k\|.
-
-    Attributes
-    ----------
-    index : (n, bases) array of int
-        Multiples of each base; the first line is the mean.
-    bases : (bases,) array
-        Frequency of each base over that of the reference.
-    units : (bases, independent) array of int
-        Multiples of independent frequencies that the bases are.
     """
 
     index: Integers
+    r"""(n, bases) multiples of each base; the first line is the mean."""
     bases: Floats
+    r"""(bases,) frequency of each base over that of the reference."""
     units: Integers
+    r"""(bases, independent) multiples of independent frequencies that the bases are."""
 
     @cached_property
     def orders(self) -> Floats:
@@ -131,25 +125,17 @@ class LineSet(Displayed, line=": {index!n} lines of {index.shape[1]} bases"):
 
 @dataclass(frozen=True)
 class Modulator:
-    """A slow turn of several equal things that puts lines beside those of some bases.
-
-    Attributes
-    ----------
-    order : float
-        Its frequency over that of the reference.
-    of : tuple of int
-        Bases whose lines it modulates.
-    count : int
-        How many things turn.
-    step : int or None
-        What each multiple of the bases adds to the turns of its line, to be taken within half of `count` on either
-        side; None where they follow no rule.
-    """
+    """A slow turn of several equal things that puts lines beside those of some bases."""
 
     order: float
+    """Its frequency over that of the reference."""
     of: tuple[int, ...]
+    """Bases whose lines it modulates."""
     count: int
+    """How many things turn."""
     step: int | None
+    """What each multiple of the bases adds to the turns of its line, to be taken within half of `count` on either
+    side; None where they follow no rule."""
 
     def turns(self, line: Integers) -> tuple[int, ...]:
         """Multiples of the turn beside a line (bases,): by the rule, and of a base alone all of them.

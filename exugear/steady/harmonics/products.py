@@ -34,55 +34,39 @@ def fourier_coefficients(samples: Floats, harmonics: int) -> Complexes:
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Signals that functions of the same angles couple.
-
-    Attributes
-    ----------
-    begin, size : int
-        First signal, and number of them.
-    harmonics : (q, bases) array of int
-        Multiples of the bases' angles that the functions have, of each pair k, -k both.
-    """
+    """Signals that functions of the same angles couple."""
 
     begin: int
     size: int
+    """First signal, and number of them."""
     harmonics: Integers
+    """(q, bases) multiples of the bases' angles that the functions have, of each pair k, -k both."""
 
 
 class Terms(NamedTuple):
-    """Terms of the products of g groups on n lines: which lines each line takes in.
-
-    Attributes
-    ----------
-    begin, size : (g,) first signal and number of signals of each group
-    room : (g,) number of signals filled up to whole octets, as coefficients and products stand in memory
-    first : (g, n + 1) first term of each line in the arrays that follow
-    place, mirrored : (t,) line that is taken in, and whether as its conjugate
-    block : (t,) first coefficient of the harmonic that carries it
-    """
+    """Terms of the products of g groups on n lines: which lines each line takes in."""
 
     begin: Integers
     size: Integers
+    """(g,) first signal and number of signals of each group."""
     room: Integers
+    """(g,) number of signals filled up to whole octets, as coefficients and products stand in memory."""
     first: Integers
+    """(g, n + 1) first term of each line in the arrays that follow."""
     place: Integers
     mirrored: Integers
+    """(t,) line that is taken in, and whether as its conjugate."""
     block: Integers
+    """(t,) first coefficient of the harmonic that carries it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """Products of the signals of some groups with functions of the bases' angles, as maps of lines.
-
-    Attributes
-    ----------
-    lines : LineSet
-    groups : tuple of Group
-        One after the other they have all signals.
-    """
+    """Products of the signals of some groups with functions of the bases' angles, as maps of lines."""
 
     lines: LineSet
     groups: tuple[Group, ...]
+    """One after the other they have all signals."""
 
     @cached_property
     def terms(self) -> Terms:

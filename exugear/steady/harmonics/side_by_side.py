@@ -24,30 +24,26 @@ LEFT_OVER = 1e-10
 
 
 class Elimination(NamedTuple):
-    """Order and places of an elimination of systems of one pattern with n rows and e entries, filled ones too.
-
-    Attributes
-    ----------
-    order : (n,) row that is eliminated in each step
-    row, column : (e,) place of each entry in the matrix
-    diagonal : (n,) entry on the diagonal, by step
-    first : (n + 1,) first of the later rows that each step touches, in the three arrays that follow
-    later : (r,) steps in which these rows are eliminated
-    below, right : (r,) entries in the column and in the row of the step
-    change : (n,) first of the entries in `changed` that each step changes, row by row of its later rows
-    changed : (c,) entries
-    """
+    """Order and places of an elimination of systems of one pattern with n rows and e entries, filled ones too."""
 
     order: Integers
+    """(n,) row that is eliminated in each step."""
     row: Integers
     column: Integers
+    """(e,) place of each entry in the matrix."""
     diagonal: Integers
+    """(n,) entry on the diagonal, by step."""
     first: Integers
+    """(n + 1,) first of the later rows that each step touches, in the three arrays that follow."""
     later: Integers
+    """(r,) steps in which these rows are eliminated."""
     below: Integers
     right: Integers
+    """(r,) entries in the column and in the row of the step."""
     change: Integers
+    """(n,) first of the entries in `changed` that each step changes, row by row of its later rows."""
     changed: Integers
+    """(c,) entries."""
 
 
 def elimination(pattern: Booleans) -> Elimination:

@@ -35,72 +35,46 @@ TILTS = slice(3, 5)
 
 @dataclass(frozen=True, eq=False)
 class BearingWave:
-    """One wave of the bearings of a family, or a single bearing.
-
-    Attributes
-    ----------
-    name : str
-        Bearing or family, with the wave where there are several.
-    connectors : tuple of int
-        Supports of the family, in the order of their planets.
-    law : int
-        Place of its law in `BearingWaves.laws`.
-    wave : int
-        0 mean, 1 cosine, 2 sine, and on where planets mesh out of phase.
-    weight : float
-        What a unit of its force counts in generalized forces.
-    planets : PlanetSet or None
-    """
+    """One wave of the bearings of a family, or a single bearing."""
 
     name: str
+    """Bearing or family, with the wave where there are several."""
     connectors: tuple[int, ...]
+    """Supports of the family, in the order of their planets."""
     law: int
+    """Place of its law in `BearingWaves.laws`."""
     wave: int
+    """0 mean, 1 cosine, 2 sine, and on where planets mesh out of phase."""
     weight: float
+    """What a unit of its force counts in generalized forces."""
     planets: PlanetSet | None
 
 
 class BearingMean(NamedTuple):
-    """Bearings in the mean system at one speed; b waves.
-
-    Attributes
-    ----------
-    readings, rates : (b, 5, size) arrays
-        Rows of what the laws read, by the frame's coordinates and by their rates.
-    static : (b, 5) array
-        Readings in the static state, m and rad.
-    pushes : (b, 5, size) array
-        Rows along which forces act: a unit is a generalized force of minus the row.
-    load : (b, 5) array
-        Forces in the static state, N and N m.
-    slope : (b, 5, b, 5) array
-        Derivatives of the forces by the readings there.
-    """
+    """Bearings in the mean system at one speed; b waves."""
 
     readings: Floats
     rates: Floats
+    """(b, 5, size) rows of what the laws read, by the frame's coordinates and by their rates."""
     static: Floats
+    """(b, 5) readings in the static state, m and rad."""
     pushes: Floats
+    """(b, 5, size) rows along which forces act: a unit is a generalized force of minus the row."""
     load: Floats
+    """(b, 5) forces in the static state, N and N m."""
     slope: Floats
+    """(b, 5, b, 5) derivatives of the forces by the readings there."""
 
 
 @dataclass(frozen=True, eq=False)
 class BearingWaves:
-    """All waves of the non-linear bearings of a mean system.
-
-    Attributes
-    ----------
-    system : MeanSystem
-    waves : tuple of BearingWave
-        Those of a family one after the other.
-    carriers : tuple of str
-        Carriers whose angle is a base: their planets are looked at one by one.
-    """
+    """All waves of the non-linear bearings of a mean system."""
 
     system: MeanSystem
     waves: tuple[BearingWave, ...]
+    """Those of a family one after the other."""
     carriers: tuple[str, ...]
+    """Carriers whose angle is a base: their planets are looked at one by one."""
 
     @property
     def assembly(self) -> Assembly:

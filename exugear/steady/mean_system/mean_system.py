@@ -67,41 +67,28 @@ LEAST_ENERGY = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class MeanSystem(Displayed):
-    """Mean system of an assembly over speed.
-
-    Attributes
-    ----------
-    frame : RotatingFrame
-    speeds : (3,) array
-        Speeds of the input at which it was linearised, rad/s.
-    mass : (size, size) array
-    damping, stiffness : (3, size, size) arrays
-        C and K there.
-    static : (3, size) array
-        Static coordinates u there.
-    torque : (3,) array
-        Torque of the drive that keeps the speed, N m.
-    drive : (size,) array
-        Generalized force of a unit of that torque.
-    pinned : int
-        Coordinate whose mean is zero: the spin of the overall input.
-    planet_spread : float
-        Largest change of planet bearings' stiffness that makes them equal, over that stiffness.
-    variation : float
-        Largest change of stiffness over the carrier's places, over the stiffness: its mean is taken.
-    """
+    """Mean system of an assembly over speed."""
 
     frame: RotatingFrame
     speeds: Floats
+    """(3,) speeds of the input at which it was linearised, rad/s."""
     mass: Floats
+    """(size, size)"""
     damping: Floats
     stiffness: Floats
+    """(3, size, size) C and K there."""
     static: Floats
+    """(3, size) static coordinates u there."""
     torque: Floats
+    """(3,) torque of the drive that keeps the speed, N m."""
     drive: Floats
+    """(size,) generalized force of a unit of that torque."""
     pinned: int
+    """Coordinate whose mean is zero: the spin of the overall input."""
     planet_spread: float
+    """Largest change of planet bearings' stiffness that makes them equal, over that stiffness."""
     variation: float
+    """Largest change of stiffness over the carrier's places, over the stiffness: its mean is taken."""
 
     def _line(self) -> str:
         return f": {self.size} coordinates, {self.speeds.min():.4g} to {self.speeds.max():.4g} rad/s"

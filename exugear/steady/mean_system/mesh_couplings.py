@@ -32,25 +32,17 @@ Spectra = Mapping[tuple[int, int], Complexes]
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """The waves of one family of meshes, or a single mesh.
-
-    Attributes
-    ----------
-    first, count : int
-        Its first wave, which is the mean one, and number of waves.
-    base, carrier : int
-        Place of the base that the mesh cycle follows, and of that of the carrier among the bases; -1 of none.
-    planets : PlanetSet or None
-    ahead : tuple of float
-        Cycles by which the mesh in each place is ahead; one number where all are alike.
-    """
+    """The waves of one family of meshes, or a single mesh."""
 
     first: int
     count: int
+    """Its first wave, which is the mean one, and number of waves."""
     base: int
     carrier: int
+    """Place of the base that the mesh cycle follows, and of that of the carrier among the bases; -1 of none."""
     planets: PlanetSet | None
     ahead: tuple[float, ...]
+    """Cycles by which the mesh in each place is ahead; one number where all are alike."""
 
     @property
     def waves(self) -> slice:

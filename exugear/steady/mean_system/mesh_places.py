@@ -22,24 +22,16 @@ TURNED = 5
 
 @dataclass(frozen=True, eq=False)
 class MeshPlaces:
-    """Places of all meshes; s samples (one where it stands for all), u places, m waves.
-
-    Attributes
-    ----------
-    means : tuple of int
-        Mean wave of each place.
-    there : (s, u, m) or (u, m) array
-        Values in the places from those of the waves.
-    back : (s, m, u) or (m, u) array
-        And back.
-    positions : (s, u) array
-        Position in the mesh cycle that the mean speed brings, cycles.
-    """
+    """Places of all meshes; s samples (one where it stands for all), u places, m waves."""
 
     means: tuple[int, ...]
+    """Mean wave of each place."""
     there: Floats
+    """(s, u, m) (u, m) values in the places from those of the waves."""
     back: Floats
+    """(s, m, u) (m, u) and back."""
     positions: Floats
+    """(s, u) position in the mesh cycle that the mean speed brings, cycles."""
 
 
 def mesh_places(waves: MeshWaves, speed: float, positions: Floats, angles: Floats) -> MeshPlaces:

@@ -30,31 +30,21 @@ FRONT, BACK, CENTRE, TILT, BACK_TILT = range(5)
 
 @dataclass(frozen=True, eq=False)
 class MeshPorts:
-    """Rows of all mesh waves at one speed; m waves, r readings, f forces.
-
-    Attributes
-    ----------
-    readings : (m, r, size) array
-        Rows of what the law reads; the last is the position in the mesh cycle, in cycles.
-    static : (m, r) array
-        Their values in the static state; the mean position counts from there.
-    forces : (m, f, size) array
-        Rows along which its forces push.
-    positions : (meshes,) array
-        Position in the mesh cycle at zero angle of the input, of the waves of meshes alone.
-    levers : (m, size + 1) array
-        Rows by which the deflection at mid-face is more than what a law reads of it that bears beside the middle, of
-        the waves of meshes alone; in the last column that in the static state.
-    rates : (m, r, size) array, optional
-        Rows of what the law reads by the rates of the coordinates; non-linear bearings have some.
-    """
+    """Rows of all mesh waves at one speed; m waves, r readings, f forces."""
 
     readings: Floats
+    """(m, r, size) rows of what the law reads; the last is the position in the mesh cycle, in cycles."""
     static: Floats
+    """(m, r) their values in the static state; the mean position counts from there."""
     forces: Floats
+    """(m, f, size) rows along which its forces push."""
     positions: Floats
+    """(meshes,) position in the mesh cycle at zero angle of the input, of the waves of meshes alone."""
     levers: Floats
+    """(m, size + 1) rows by which the deflection at mid-face is more than what a law reads of it that bears beside
+    the middle, of the waves of meshes alone; in the last column that in the static state."""
     rates: Floats | None = None
+    """(m, r, size) rows of what the law reads by the rates of the coordinates; non-linear bearings have some."""
 
 
 def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:

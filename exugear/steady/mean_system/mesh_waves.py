@@ -70,62 +70,41 @@ def wave_name(number: int, planets: int) -> str:
 
 @dataclass(frozen=True)
 class MeshWave:
-    """One wave of the meshes of a family, or a single mesh.
-
-    Attributes
-    ----------
-    name : str
-        Family, with the wave where there are several.
-    family : str
-    first : int
-        Mesh that stands for the family in the assembly's arrays.
-    wave : int
-        0 mean, 1 cosine, 2 sine, and on where planets mesh out of phase.
-    weight : float
-        What a unit of its force counts in generalized forces.
-    base : int
-        Base whose angle is that of the mesh cycle.
-    sense : float
-        Mesh cycles per cycle of the base when the input turns about +z: 1 or -1.
-    carrier : float
-        Turns of the waves per turn of the input.
-    ahead : tuple of float
-        Cycles by which each planet's mesh is ahead of the first's, empty where the mean over a turn stands for all.
-    """
+    """One wave of the meshes of a family, or a single mesh."""
 
     name: str
+    """Family, with the wave where there are several."""
     family: str
     first: int
+    """Mesh that stands for the family in the assembly's arrays."""
     wave: int
+    """0 mean, 1 cosine, 2 sine, and on where planets mesh out of phase."""
     weight: float
+    """What a unit of its force counts in generalized forces."""
     base: int
+    """Base whose angle is that of the mesh cycle."""
     sense: float
+    """Mesh cycles per cycle of the base when the input turns about +z: 1 or -1."""
     carrier: float
+    """Turns of the waves per turn of the input."""
     ahead: tuple[float, ...] = ()
+    """Cycles by which each planet's mesh is ahead of the first's, empty where the mean over a turn stands for all."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshWaves:
-    """All mesh waves of a mean system; m waves.
-
-    Attributes
-    ----------
-    system : MeanSystem
-    waves : tuple of MeshWave
-    base_orders : (bases,) array
-        Mesh frequencies over the frequency of the input's turns.
-    base_names : tuple of str
-        Meshes of each base.
-    passing : int
-        Multiples of the passing of planets (thrice a turn of the carrier where there are three) whose lines are looked
-        at: planets in phase are then taken one by one as they turn, as those out of phase are, and not at their mean.
-    """
+    """All mesh waves of a mean system; m waves."""
 
     system: MeanSystem
     waves: tuple[MeshWave, ...]
     base_orders: Floats
+    """(bases,) mesh frequencies over the frequency of the input's turns."""
     base_names: tuple[str, ...]
+    """Meshes of each base."""
     passing: int = 0
+    """Multiples of the passing of planets (thrice a turn of the carrier where there are three) whose lines are
+    looked at: planets in phase are then taken one by one as they turn, as those out of phase are, and not at their
+    mean."""
 
     @property
     def assembly(self) -> Assembly:

@@ -21,26 +21,17 @@ ALTERNATING = "alternating"
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """One of the quantities, and what it is made of.
-
-    Attributes
-    ----------
-    name : str
-        ``error``, ``force`` or ``acceleration``.
-    units : str
-    places : tuple of str
-        Bearings, of planets their family; of the transmission error one place without a name.
-    signals : tuple of (k,) arrays
-        Signals of each place.
-    weights : tuple of (k,) arrays
-        What they count, as factors of their amplitudes.
-    """
+    """One of the quantities, and what it is made of."""
 
     name: str
+    """``error``, ``force`` or ``acceleration``."""
     units: str
     places: tuple[str, ...]
+    """Bearings, of planets their family; of the transmission error one place without a name."""
     signals: tuple[Integers, ...]
+    """(k,) signals of each place."""
     weights: tuple[Floats, ...]
+    """(k,) what they count, as factors of their amplitudes."""
 
     def at(self, amplitude: Complexes | SingleComplexes, place: int) -> Complexes:
         """Weighted amplitudes (..., k) at a place from those of all signals (..., signals)."""

@@ -37,23 +37,15 @@ class SteadyError(ValueError):
 
 @dataclass(frozen=True)
 class PlanetSet:
-    """Equal, equally spaced planets of one carrier.
-
-    Attributes
-    ----------
-    names : tuple of str
-        In the order of their angles.
-    carrier : str
-    angles : (N,) array
-        At zero angle of the carrier, rad.
-    ratio : float
-        Angle of the carrier over that of the overall input.
-    """
+    """Equal, equally spaced planets of one carrier."""
 
     names: tuple[str, ...]
+    """In the order of their angles."""
     carrier: str
     angles: Floats
+    """(N,) at zero angle of the carrier, rad."""
     ratio: float
+    """Angle of the carrier over that of the overall input."""
 
     @property
     def waves(self) -> int:
@@ -136,13 +128,7 @@ def _check_spacing(family: str, planets: Sequence[Body]) -> None:
 
 @dataclass(frozen=True, eq=False)
 class RotatingFrame:
-    """The transformation q = q_rolling(psi) + T(psi) u of an assembly; psi is the angle of the overall input.
-
-    Attributes
-    ----------
-    assembly : Assembly
-    sets : tuple of PlanetSet
-    """
+    """The transformation q = q_rolling(psi) + T(psi) u of an assembly; psi is the angle of the overall input."""
 
     assembly: Assembly
     sets: tuple[PlanetSet, ...]

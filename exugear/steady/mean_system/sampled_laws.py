@@ -45,21 +45,14 @@ TABLE_FORCES = 5
 
 
 class LawSamples(NamedTuple):
-    """A law on s samples, with r readings and f forces.
-
-    Attributes
-    ----------
-    force : (s, f) array
-        Elastic and damped parts together, N and N m.
-    slope : (s, f, r) array
-        Derivatives by the readings.
-    damping : (s, f, r) array
-        Derivatives by their rates.
-    """
+    """A law on s samples, with r readings and f forces."""
 
     force: Floats
+    """(s, f) elastic and damped parts together, N and N m."""
     slope: Floats
+    """(s, f, r) derivatives by the readings."""
     damping: Floats
+    """(s, f, r) derivatives by their rates."""
 
 
 def widened(samples: LawSamples, forces: int, readings: int) -> LawSamples:

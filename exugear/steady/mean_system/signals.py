@@ -26,35 +26,24 @@ RATE_STEP = 1e-3
 
 @dataclass(frozen=True)
 class SignalName:
-    """A signal of the steady response.
-
-    Attributes
-    ----------
-    name : str
-        ``quantity``, or ``quantity of what, which part``.
-    quantity, units : str
-    """
+    """A signal of the steady response."""
 
     name: str
+    """``quantity``, or ``quantity of what, which part``."""
     quantity: str
     units: str
 
 
 @dataclass(frozen=True, eq=False)
 class SignalRows:
-    """Rows that give signals from the motion u at one speed of the input: (A + i w B - w^2 C) u.
-
-    Attributes
-    ----------
-    names : tuple of SignalName
-        Of these rows: overall transmission error, bearing forces, seat accelerations.
-    by_place, by_rate, by_acceleration : (signals, size) arrays
-    """
+    """Rows that give signals from the motion u at one speed of the input: (A + i w B - w^2 C) u."""
 
     names: tuple[SignalName, ...]
+    """Of these rows: overall transmission error, bearing forces, seat accelerations."""
     by_place: Floats
     by_rate: Floats
     by_acceleration: Floats
+    """(signals, size)"""
 
     def of(self, motion: Complexes, frequencies: Floats) -> Complexes:
         """Coefficients (lines, signals) of the signals of a motion (lines, size) at angular frequencies."""

@@ -37,21 +37,14 @@ REPEATING = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """What a leg of a run ended in.
-
-    Attributes
-    ----------
-    motion : (n, size) complex array
-        Lines of the motion in the rotating frame; the first row is the mean, whole.
-    outside : float
-        Share of the vibration that is not in the lines, root mean square.
-    doubled : float
-        The same when lines halfway between them are added.
-    """
+    """What a leg of a run ended in."""
 
     motion: Complexes
+    """(n, size) lines of the motion in the rotating frame; the first row is the mean, whole."""
     outside: float
+    """Share of the vibration that is not in the lines, root mean square."""
     doubled: float
+    """The same when lines halfway between them are added."""
 
     @property
     def verdict(self) -> str:

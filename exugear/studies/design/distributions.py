@@ -29,13 +29,6 @@ class Distribution(Protocol):
 class Normal:
     """Normal distribution, cut off where limits are given.
 
-    Attributes
-    ----------
-    mean, deviation : float
-        Of the distribution before it is cut off.
-    least, most : float
-        Draws lie between.
-
     Examples
     --------
     >>> Normal(0.0, 1.0).at(np.array([0.5, 0.975])).round(3).tolist()
@@ -44,8 +37,10 @@ class Normal:
 
     mean: float
     deviation: float
+    """Of the distribution before it is cut off."""
     least: float = -math.inf
     most: float = math.inf
+    """Draws lie between."""
 
     def at(self, share: Floats) -> Floats:
         """Values that a share (0 to 1) of all draws lies below."""

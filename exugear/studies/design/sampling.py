@@ -29,56 +29,37 @@ _DEVIATIONS_WITHIN = 3.0
 
 @dataclass(frozen=True)
 class Point:
-    """One variation.
-
-    Attributes
-    ----------
-    index : tuple of int
-        Its place along the dimensions of the study.
-    changes : mapping
-        Values at paths of the case.
-    """
+    """One variation."""
 
     index: tuple[int, ...]
+    """Its place along the dimensions of the study."""
     changes: Mapping[str, Any]
+    """Values at paths of the case."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A coordinate of the study's dataset.
-
-    Attributes
-    ----------
-    dimensions : tuple of str
-    values : array
-    units : str
-    path : str
-        What it sets, in words.
-    """
+    """A coordinate of the study's dataset."""
 
     dimensions: tuple[str, ...]
     values: Any
+    """Array."""
     units: str = ""
     path: str = ""
+    """What it sets, in words."""
 
 
 @dataclass(frozen=True)
 class Design:
-    """All points of a study over labelled dimensions.
-
-    Attributes
-    ----------
-    shape : mapping of dimension to size
-    axes : mapping of name to Axis
-    points : tuple of Point
-    levels : mapping of dimension to tuple
-        Values at paths of the case along each dimension; points are all their combinations.
-    """
+    """All points of a study over labelled dimensions."""
 
     shape: Mapping[str, int]
+    """Mapping of dimension to size."""
     axes: Mapping[str, Axis]
+    """By name."""
     points: tuple[Point, ...]
     levels: Mapping[str, tuple[Mapping[str, Any], ...]] = field(default_factory=dict)
+    """By dimension, values at paths of the case along each dimension; points are all their combinations."""
 
 
 @dataclass(frozen=True)

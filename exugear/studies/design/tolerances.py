@@ -16,21 +16,14 @@ from fe_ste.tools.arrays import Floats
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Draws of all tolerances together.
-
-    Attributes
-    ----------
-    axes : mapping of name to Axis
-        Coordinates over the draws.
-    draws : tuple of mapping of path to float
-        Values before they act.
-    acting : mapping of path to ParameterSection
-        What a value at a path does.
-    """
+    """Draws of all tolerances together."""
 
     axes: Mapping[str, Axis]
+    """By name, coordinates over the draws."""
     draws: tuple[Mapping[str, float], ...]
+    """Tuple of mapping of path to float. Values before they act."""
     acting: Mapping[str, ParameterSection]
+    """Mapping of path to ParameterSection. What a value at a path does."""
 
     def produced(self, gearbox: Gearbox, changes: Mapping[str, Any]) -> list[dict[str, Any]]:
         """Values at paths of the case, of each draw: a tolerance shifts or scales what a point has set.

@@ -23,24 +23,17 @@ class FigureError(ValueError):
 
 @dataclass(frozen=True)
 class Figure:
-    """What is kept of a point.
-
-    Attributes
-    ----------
-    function : callable
-        Takes `PointResults` and options by keyword; a function of a module, since workers look it up there. Each
-        option is a keyword-only parameter; its annotation names its type, its default makes it optional.
-    units : str
-    dimension : str
-        Name of the dimension of several numbers; empty for one.
-    needs : {"", "run", "steady", "life", "bearings"}
-        What it is read from, where that is more than modes, tables and the static state.
-    """
+    """What is kept of a point."""
 
     function: Callable[..., Values]
+    """Takes `PointResults` and options by keyword; a function of a module, since workers look it up there. Each
+    option is a keyword-only parameter; its annotation names its type, its default makes it optional."""
     units: str
     dimension: str = ""
+    """Name of the dimension of several numbers; empty for one."""
     needs: Needs = ""
+    """{"", "run", "steady", "life", "bearings"}: what it is read from, where that is more than modes, tables and the
+    static state."""
 
     @property
     def description(self) -> str:

@@ -36,44 +36,27 @@ class PointError(RuntimeError):
 
 @dataclass(frozen=True)
 class PointSettings:
-    """What results of points are computed with.
-
-    Attributes
-    ----------
-    steady : SteadySettings, optional
-    duration : float, optional
-        Of runs, s; that of the load case by default.
-    solver : str, optional
-        Of runs.
-    """
+    """What results of points are computed with."""
 
     steady: SteadySettings | None = None
     duration: float | None = None
+    """Of runs, s; that of the load case by default."""
     solver: Solver | None = None
+    """Str, optional. Of runs."""
 
 
 @dataclass
 class PointResults:
-    """What is computed of one variation of a gearbox.
-
-    Attributes
-    ----------
-    gearbox : Gearbox
-    choice : Choice
-    settings : PointSettings
-    shared : Shared
-    folder : Path
-        Where a run grows; removed by `clear`.
-    doubts : list of str
-        What speaks against trusting the numbers.
-    """
+    """What is computed of one variation of a gearbox."""
 
     gearbox: Gearbox
     choice: Choice
     settings: PointSettings
     shared: Shared
     folder: Path
+    """Where a run grows; removed by `clear`."""
     doubts: list[str] = field(default_factory=list)
+    """What speaks against trusting the numbers."""
 
     def table(self, pair: str) -> MeshTable:
         """Table of the transmission error of a pair.

@@ -65,13 +65,7 @@ FIGURES: dict[str, Figure] = {
 
 @dataclass(frozen=True)
 class KeptFigure:
-    """A figure with its options, as a study keeps it.
-
-    Attributes
-    ----------
-    figure : Figure
-    options : mapping
-    """
+    """A figure with its options, as a study keeps it."""
 
     figure: Figure
     options: Mapping[str, Any]

@@ -47,12 +47,7 @@ def _waiting(path: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Shared:
-    """Folder of what points share, by the hash of its input.
-
-    Attributes
-    ----------
-    folder : Path
-    """
+    """Folder of what points share, by the hash of its input."""
 
     folder: Path
 

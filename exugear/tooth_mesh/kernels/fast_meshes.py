@@ -47,76 +47,68 @@ that are not conjugate to their deflection, of bearings whose rate is not the de
 
 
 class Meshes(NamedTuple):
-    """Meshes as in `exugear.tooth_mesh.kernels.meshes.MeshArrays`; missing coordinates point to one that stays zero.
-
-    Attributes
-    ----------
-    coordinates : (m, 13)
-    slot : (m,) where the cosine and sine of the frame's angle stand among those of all angles that turn anything
-    axis : (m, 2, 2) zero for gears without translations
-    conjugate : (m,) 1 where the force row is the deflection row
-    tilting : (m,) 1 where a law along a row resists misalignment
-    tilt : (m, 7) columns as named in this module
-    way_pieces, way : of the load's ways along the face
-    spinning : (m,) 1 where the gears have their spins alone
-    ends : (m, 2) numbers of the two gears' places
-    rows : (m, 2, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose
-        row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame
-    offsets : (m, 2, 3) of each row: what cos psi, sin psi and psi itself add to its value
-    mean : (m, 2) stiffness (N/m) and damping (N s/m) at the static load, mean over the cycle
-    nominal : (m,) deflection of gears in their nominal place, m
-    table : None where no mesh follows one
-    """
+    """Meshes as in `exugear.tooth_mesh.kernels.meshes.MeshArrays`; missing coordinates point to one that stays zero."""
 
     coordinates: Integers
+    """(m, 13)"""
     slot: Integers
+    """(m,) where the cosine and sine of the frame's angle stand among those of all angles that turn anything."""
     axis: Floats
+    """(m, 2, 2) zero for gears without translations."""
     form: Integers
     deflection: Floats
     force: Floats
     conjugate: Integers
+    """(m,) 1 where the force row is the deflection row."""
     tilting: Integers
+    """(m,) 1 where a law along a row resists misalignment."""
     tilt: Floats
+    """(m, 7) columns as named in this module."""
     way_pieces: Integers
     way: Floats
+    """Of the load's ways along the face."""
     spinning: Integers
+    """(m,) 1 where the gears have their spins alone."""
     ends: Integers
+    """(m, 2) numbers of the two gears' places."""
     rows: Floats
+    """(m, 2, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose:
+    row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame."""
     offsets: Floats
+    """(m, 2, 3) of each row: what cos psi, sin psi and psi itself add to its value."""
     cycles: Floats
     phase: Floats
     pieces: Integers
     stiffness: Floats
     damping: Floats
     mean: Floats
+    """(m, 2) stiffness (N/m) and damping (N s/m) at the static load, mean over the cycle."""
     line_of_action: Floats
     error_pieces: Integers
     error: Floats
     nominal: Floats
+    """(m,) deflection of gears in their nominal place, m."""
     table: TableArrays | None
+    """None where no mesh follows one."""
 
 
 class MeshMemory(NamedTuple):
-    """Memory of the meshes' laws.
-
-    Attributes
-    ----------
-    gradient : (3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table
-    gradients : (4, 17) gradients over two padded places and the frame's angle; the last one is a sum
-    states : (m, 11) what each mesh does, columns as named in this module
-    pieces : (m, 2) load piece of each flank's table that was used last
-    law : memory of the law `table`; None where no mesh has it
-    row : (12,) row of the push between the axes and the moment of misalignment
-    damping : (5,) directions and sizes of the damping of a table
-    """
+    """Memory of the meshes' laws."""
 
     gradient: Floats
+    """(3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table."""
     gradients: Floats
+    """(4, 17) gradients over two padded places and the frame's angle; the last one is a sum."""
     states: Floats
+    """(m, 11) what each mesh does, columns as named in this module."""
     pieces: Integers
+    """(m, 2) load piece of each flank's table that was used last."""
     law: Scratch | None
+    """Memory of the law `table`; None where no mesh has it."""
     row: Floats
+    """(12,) row of the push between the axes and the moment of misalignment."""
     damping: Floats
+    """(5,) directions and sizes of the damping of a table."""
 
 
 class MeshWork(Protocol):

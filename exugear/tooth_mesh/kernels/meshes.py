@@ -57,47 +57,43 @@ WAY_COLUMNS, MOMENT_BEYOND = 8, 4
 
 
 class MeshArrays(NamedTuple):
-    """All meshes of a system as arrays; m meshes, n cubic pieces at most.
-
-    Attributes
-    ----------
-    coordinates : (m, 13) position of each local coordinate in the state, -1 where there is none
-    axis : (m, 2, 2) axis of each gear relative to the frame's axis at zero angles, m
-    form : (m,) number of the law's compiled form, which `exugear.tooth_mesh.laws.forms` chooses by
-    deflection, force : (m, 12) rows W and V, m/m and m/rad
-    cycles : (m,) mesh cycles per rad of gear 1 relative to the frame, signed by the loaded flank
-    phase : (m,) position in the mesh cycle at zero angles
-    pieces : (m,) number of equal pieces over the mesh cycle
-    stiffness : (m, n, c) coefficients of the law over each piece; of a stiffness four of a cubic, N/m
-    damping : (m,) N s/m
-    tilt : (m, 5) of a law along a row that resists misalignment: tilt stiffness kg (N m/rad) and damping (N m s/rad),
-        lever zt (m), moment F0 (zc - zt) (N m) and misalignment g0 (rad); zeros where it does not
-    way_pieces : (m,) number of equal pieces of the load's ways along the face; 0 where it stays
-    way : (m, w, 8) coefficients over each piece of the mesh cycle: of the way w of what a little more deflection adds
-        to the load, m, then of the moment F0 (c - w) that the load itself has beyond it, N m
-    line_of_action : (m,) F_bt per scalar mesh force
-    error_pieces : (m, 2) number of equal cubic pieces of each gear's error over its revolution; 0 for no error
-    error : (m, 2, e, 4) coefficients of the error over each piece, m along the transverse line of action
-    table : tables of the meshes that follow one
-    """
+    """All meshes of a system as arrays; m meshes, n cubic pieces at most."""
 
     coordinates: Integers
+    """(m, 13) position of each local coordinate in the state, -1 where there is none."""
     axis: Floats
+    """(m, 2, 2) axis of each gear relative to the frame's axis at zero angles, m."""
     form: Integers
+    """(m,) number of the law's compiled form, which `exugear.tooth_mesh.laws.forms` chooses by."""
     deflection: Floats
     force: Floats
+    """(m, 12) rows W and V, m/m and m/rad."""
     cycles: Floats
+    """(m,) mesh cycles per rad of gear 1 relative to the frame, signed by the loaded flank."""
     phase: Floats
+    """(m,) position in the mesh cycle at zero angles."""
     pieces: Integers
+    """(m,) number of equal pieces over the mesh cycle."""
     stiffness: Floats
+    """(m, n, c) coefficients of the law over each piece; of a stiffness four of a cubic, N/m."""
     damping: Floats
+    """(m,) N s/m."""
     tilt: Floats
+    """(m, 5) of a law along a row that resists misalignment: tilt stiffness kg (N m/rad) and damping (N m s/rad),
+    lever zt (m), moment F0 (zc - zt) (N m) and misalignment g0 (rad); zeros where it does not."""
     way_pieces: Integers
+    """(m,) number of equal pieces of the load's ways along the face; 0 where it stays."""
     way: Floats
+    """(m, w, 8) coefficients over each piece of the mesh cycle: of the way w of what a little more deflection adds:
+    to the load, m, then of the moment F0 (c - w) that the load itself has beyond it, N m."""
     line_of_action: Floats
+    """(m,) F_bt per scalar mesh force."""
     error_pieces: Integers
+    """(m, 2) number of equal cubic pieces of each gear's error over its revolution; 0 for no error."""
     error: Floats
+    """(m, 2, e, 4) coefficients of the error over each piece, m along the transverse line of action."""
     table: TableArrays
+    """Tables of the meshes that follow one."""
 
     def one(self, n: int) -> MeshArrays:
         """Arrays of mesh n alone."""

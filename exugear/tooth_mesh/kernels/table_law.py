@@ -59,66 +59,58 @@ DAMPING_SIZE = 5
 
 
 class TableArrays(NamedTuple):
-    """Tables of all meshes; m meshes, those of another law with zeros.
-
-    Attributes
-    ----------
-    shape : (m, 4) positions, centre distances, values and slopes along misalignment, load pieces
-    axes : (m, 2) number of knots of centre distance and misalignment
-    values : (m, n) `fe_ste.transmission_error.surface.SteSurface.coefficients`, flat, the last axis filled up to 8
-    root : (m, l + 1) knots of the root of F_bt, sqrt(N)
-    knots : (m, 2, k) knots of centre distance (m) and misalignment (rad)
-    first_node : (m, 2, k) first node that acts in each interval
-    weights : (m, 2, k, 4, 4) coefficients of the nodes' weights in each interval
-    lowest : (m,) deflection below which the flanks are apart in every position, m
-    centre, misalignment : (m, 12) rows of centre distance and misalignment, about the bodies' nodes
-    back, back_misalignment : (m, 12) rows of the other flank's deflection and misalignment
-    nominal : (m, 3) deflection (m), centre distance (m), misalignment (rad) of gears in their nominal place
-    backlash : (m,) approach from flank to flank along the transverse line of action, m
-    back_phase : (m,) position of the other flank in its mesh cycle at zero angles
-    damping_time : (m,) damping over tangent stiffness, s
-    sense : (m,) the loaded flank of gear 1, 1 or -1: the table is that of 1, or of -1 turned about the line of centres
-    has_guesses : (m,) 1 where states that were not solved have others standing in for them
-    acting_guesses : (m, k) where one of these acts (`SteSurface.acting_guesses`, flat)
-    """
+    """Tables of all meshes; m meshes, those of another law with zeros."""
 
     shape: Integers
+    """(m, 4) positions, centre distances, values and slopes along misalignment, load pieces."""
     axes: Integers
+    """(m, 2) number of knots of centre distance and misalignment."""
     values: Floats
+    """(m, n) `fe_ste.transmission_error.surface.SteSurface.coefficients`, flat, the last axis filled up to 8."""
     root: Floats
+    """(m, l + 1) knots of the root of F_bt, sqrt(N)."""
     knots: Floats
+    """(m, 2, k) knots of centre distance (m) and misalignment (rad)."""
     first_node: Integers
+    """(m, 2, k) first node that acts in each interval."""
     weights: Floats
+    """(m, 2, k, 4, 4) coefficients of the nodes' weights in each interval."""
     lowest: Floats
+    """(m,) deflection below which the flanks are apart in every position, m."""
     centre: Floats
     misalignment: Floats
+    """(m, 12) rows of centre distance and misalignment, about the bodies' nodes."""
     back: Floats
     back_misalignment: Floats
+    """(m, 12) rows of the other flank's deflection and misalignment."""
     nominal: Floats
+    """(m, 3) deflection (m), centre distance (m), misalignment (rad) of gears in their nominal place."""
     backlash: Floats
+    """(m,) approach from flank to flank along the transverse line of action, m."""
     back_phase: Floats
+    """(m,) position of the other flank in its mesh cycle at zero angles."""
     damping_time: Floats
+    """(m,) damping over tangent stiffness, s."""
     sense: Floats
+    """(m,) the loaded flank of gear 1, 1 or -1: the table is that of 1, or of -1 turned about the line of centres."""
     has_guesses: Integers
+    """(m,) 1 where states that were not solved have others standing in for them."""
     acting_guesses: Booleans
+    """(m, k) where one of these acts (`SteSurface.acting_guesses`, flat)."""
 
 
 class Scratch(NamedTuple):
-    """Memory of the law.
-
-    Attributes
-    ----------
-    basis : (3, 3, 4) weights of the nodes by axis and order of derivative
-    node : (3,) first node on each axis
-    cubic : (9, 8) the surface's derivatives in the order of `ORDERS`, over one load piece, filled up
-    law : (7,) force (N), tangent stiffness (N/m), potential (J), its derivatives by centre distance (N), by
-        misalignment (N m) and by pmc (J), `LEFT_TABLE` where an axis was left, `GUESSED` near unsolved states
-    """
+    """Memory of the law."""
 
     basis: Floats
+    """(3, 3, 4) weights of the nodes by axis and order of derivative."""
     node: Integers
+    """(3,) first node on each axis."""
     cubic: Floats
+    """(9, 8) the surface's derivatives in the order of `ORDERS`, over one load piece, filled up."""
     law: Floats
+    """(7,) force (N), tangent stiffness (N/m), potential (J), its derivatives by centre distance (N), by:
+    misalignment (N m) and by pmc (J), `LEFT_TABLE` where an axis was left, `GUESSED` near unsolved states."""
 
 
 @compiled

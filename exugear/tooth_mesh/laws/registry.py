@@ -17,28 +17,24 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LawProperties:
-    """What the program must know of a law before it computes with it.
-
-    Attributes
-    ----------
-    name : as on the command line; the law's file has the same name
-    description : one line for the command line and the page of choices
-    has_force : False where gears only roll and no mesh has a force
-    needs_tables : whether it reads tables of the static transmission error
-    needs_axes : whether these are to be tables over load, centre distance and misalignment
-    loses_contact : whether teeth part and touch on the other flank
-    signals_positions : whether a run records where the gears of each mesh stand
-    moves_load : whether the load moves along the face over the mesh cycle as the table has it
-    """
+    """What the program must know of a law before it computes with it."""
 
     name: str
+    """As on the command line; the law's file has the same name."""
     description: str
+    """One line for the command line and the page of choices."""
     has_force: bool = True
+    """False where gears only roll and no mesh has a force."""
     needs_tables: bool = True
+    """Whether it reads tables of the static transmission error."""
     needs_axes: bool = False
+    """Whether these are to be tables over load, centre distance and misalignment."""
     loses_contact: bool = False
+    """Whether teeth part and touch on the other flank."""
     signals_positions: bool = False
+    """Whether a run records where the gears of each mesh stand."""
     moves_load: bool = False
+    """Whether the load moves along the face over the mesh cycle as the table has it."""
 
 
 _TABLE_OF_LAWS = (

@@ -33,135 +33,111 @@ SUPPORT_LOAD, SUPPORT_SIZE = 12, 18
 
 
 class Bodies(NamedTuple):
-    """Bodies with six coordinates, seats of elastic bodies, the ground; then bodies with their spin alone.
-
-    Attributes
-    ----------
-    start : (b + e + 1,) first coordinate, of the rigid ones, then of seats, then one that stays zero for the ground
-    slot : (b + e + 1,) where `Work.turns` has the sine of the spin, 0 where no law needs it
-    mass, transverse, axial : (b,) kg, kg m2
-    shares : (b, 3) one over each of them: to multiply by is cheaper
-    spin, spin_inertia : (s,) coordinate and kg m2 of bodies with their spin alone
-    inverse : (s, s) inverse mass matrix of these spins where gears only roll, else (0, 0)
-    turning : (k,) coordinates whose sine is needed; the first is one that stays zero
-    """
+    """Bodies with six coordinates, seats of elastic bodies, the ground; then bodies with their spin alone."""
 
     start: Integers
+    """(b + e + 1,) first coordinate, of the rigid ones, then of seats, then one that stays zero for the ground."""
     slot: Integers
+    """(b + e + 1,) where `Work.turns` has the sine of the spin, 0 where no law needs it."""
     mass: Floats
     transverse: Floats
     axial: Floats
+    """(b,) kg, kg m2."""
     shares: Floats
+    """(b, 3) one over each of them: to multiply by is cheaper."""
     spin: Integers
     spin_inertia: Floats
+    """(s,) coordinate and kg m2 of bodies with their spin alone."""
     inverse: Floats
+    """(s, s) inverse mass matrix of these spins where gears only roll, else (0, 0)."""
     turning: Integers
+    """(k,) coordinates whose sine is needed; the first is one that stays zero."""
 
 
 class Connectors(NamedTuple):
-    """6x6 connectors, those between the same bodies one after the other.
-
-    Attributes
-    ----------
-    number : (c,) position of each connector in the assembly
-    ends : (c, 2) numbers of the two bodies in `Bodies`
-    local : (c, 2, 3) attachment in each body's axes, m
-    gap : (c, 3) second attachment against the first at zero angles, m
-    repeated : (c,) 1 where the one before has the same ends, so that angles and their rates are known
-    twisting : (c,) 1 where the angle about z acts on these ends, else 0
-    stiffness : (c, 6, 6) by column and row, N/m .. N m/rad
-    offset : (c, 6) load of the linear law without displacement, N and N m
-    time : (c,) damping over stiffness where the two are in proportion, s
-    damping : (c, 6, 6) by column and row where they are not
-    damped : (c,) 1 where they are not, else 0
-    rolling : rolling laws, in parallel to these; None where there are none
-    """
+    """6x6 connectors, those between the same bodies one after the other."""
 
     number: Integers
+    """(c,) position of each connector in the assembly."""
     ends: Integers
+    """(c, 2) numbers of the two bodies in `Bodies`."""
     local: Floats
+    """(c, 2, 3) attachment in each body's axes, m."""
     gap: Floats
+    """(c, 3) second attachment against the first at zero angles, m."""
     repeated: Integers
+    """(c,) 1 where the one before has the same ends, so that angles and their rates are known."""
     twisting: Integers
+    """(c,) 1 where the angle about z acts on these ends, else 0."""
     stiffness: Floats
+    """(c, 6, 6) by column and row, N/m .. N m/rad."""
     offset: Floats
+    """(c, 6) load of the linear law without displacement, N and N m."""
     time: Floats
+    """(c,) damping over stiffness where the two are in proportion, s."""
     damping: Floats
+    """(c, 6, 6) by column and row where they are not."""
     damped: Integers
+    """(c,) 1 where they are not, else 0."""
     rolling: RollingArrays | None
+    """Rolling laws, in parallel to these; None where there are none."""
 
 
 class Places(NamedTuple):
-    """Places of bodies and seats, numbered as in `Bodies`; then those of seats that only meshes act on.
-
-    Attributes
-    ----------
-    start : (p,) first of the six coordinates
-    spin : (s,) spins of bodies with their spin alone, whose places follow, where a mesh sees them beside other bodies
-    """
+    """Places of bodies and seats, numbered as in `Bodies`; then those of seats that only meshes act on."""
 
     start: Integers
+    """(p,) first of the six coordinates."""
     spin: Integers
+    """(s,) spins of bodies with their spin alone, whose places follow, where a mesh sees them beside other bodies."""
 
 
 class Pairs(NamedTuple):
-    """Pairs of bodies with connectors between them; p pairs, c connectors in the order of `Connectors`.
-
-    Attributes
-    ----------
-    ends : (p, 2) numbers of the two bodies in `Bodies`
-    first : (p + 1,) first connector of each pair
-    twisting : (p,) 1 where the angle about z acts, else 0
-    data : (c, 72) stiffness by column, rows padded to x y z 0 a b c 0, and padded alike the load without displacement;
-        then attachment in the first body's axes, damping over stiffness (s), attachment in the second one's axes, 1
-        where that is off its z axis, the second attachment and the second node against the first at zero angles, 1
-        where damping has a matrix of its own
-    """
+    """Pairs of bodies with connectors between them; p pairs, c connectors in the order of `Connectors`."""
 
     ends: Integers
+    """(p, 2) numbers of the two bodies in `Bodies`."""
     first: Integers
+    """(p + 1,) first connector of each pair."""
     twisting: Integers
+    """(p,) 1 where the angle about z acts, else 0."""
     data: Floats
+    """(c, 72) stiffness by column, rows padded to x y z 0 a b c 0, and padded alike the load without displacement;:
+    then attachment in the first body's axes, damping over stiffness (s), attachment in the second one's axes, 1
+    where that is off its z axis, the second attachment and the second node against the first at zero angles, 1 where
+    damping has a matrix of its own."""
 
 
 class Loads(NamedTuple):
-    """What acts from outside.
-
-    Attributes
-    ----------
-    steady : (size + 6 t,) constant generalized forces, weight included; zero on travelling seats
-    coordinate : (s,) coordinates with a torque given over time
-    first : (s + 1,) first line of each series in `time` (s) and `torque` (N m), linear between the lines
-    drive : (d,) coordinates driven behind a spring and damper
-    law : (d, 5) stiffness (N m/rad), damping (N m s/rad), and the angle that the drive follows: its value (rad),
-        speed and half the acceleration at t = 0
-    """
+    """What acts from outside."""
 
     steady: Floats
+    """(size + 6 t,) constant generalized forces, weight included; zero on travelling seats."""
     coordinate: Integers
+    """(s,) coordinates with a torque given over time."""
     first: Integers
+    """(s + 1,) first line of each series in `time` (s) and `torque` (N m), linear between the lines."""
     time: Floats
     torque: Floats
     drive: Integers
+    """(d,) coordinates driven behind a spring and damper."""
     law: Floats
+    """(d, 5) stiffness (N m/rad), damping (N m s/rad), and the angle that the drive follows: its value (rad), speed
+    and half the acceleration at t = 0."""
 
 
 class Joints(NamedTuple):
-    """Ideal joints in minimal coordinates, for their forces only.
-
-    Attributes
-    ----------
-    ends : (m, 2) joint that carries gear 1 and gear 2 of each mesh, -1 for none
-    host : (j,) joint of the body that a joint sits on, -1 for ground
-    planet : (j, 3) mass, x and y from the carrier's axis; mass 0 where nothing orbits
-    carrier, slot : (j,) coordinate of the carrier's spin, and where its sine is
-    """
+    """Ideal joints in minimal coordinates, for their forces only."""
 
     ends: Integers
+    """(m, 2) joint that carries gear 1 and gear 2 of each mesh, -1 for none."""
     host: Integers
+    """(j,) joint of the body that a joint sits on, -1 for ground."""
     planet: Floats
+    """(j, 3) mass, x and y from the carrier's axis; mass 0 where nothing orbits."""
     carrier: Integers
     slot: Integers
+    """(j,) coordinate of the carrier's spin, and where its sine is."""
 
 
 class Springs(NamedTuple):
@@ -196,46 +172,43 @@ class Work(NamedTuple):
 
     State vectors have e entries, a multiple of eight: the system's own, those of travelling seats, and six or more that
     stay zero.
-
-    Attributes
-    ----------
-    q, v : (e,) state at the present step
-    stage_q, stage_v, force, rate : (e,) stage, generalized forces and accelerations
-    turns : (k, 2) cosine and sine of `Bodies.turning`
-    frames : (b + e + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts
-    places : (p + s, 16) padded coordinates and rates of all places
-    loads : (p + s, 16) generalized forces on all places, and force and moment in global axes, padded alike
-    relative : (18,) motion of a pair's second body against the first
-    sums : (9,) force and moments on both bodies of a pair
-    supports : (c, 18) strain of each connector, its rate, force and moment on the first body, in that body's axes
-    motion : (24,) true rate of change of a connector's strain, elastic force and damping force, padded
-    rolling : (m,) see `exugear.bearings.kernels.rolling.rolling_forces`
-    mesh : memory of the meshes' laws
-    series : (s,) line of each torque series that was used last
-    shares : memory of the travelling seats, see `exugear.bodies.kernels.travelling`
-    damped : (2,) power that elastic bodies damp, and those in turning frames, at the last evaluation that asked for it
-        (W)
-    scratch, memory : memory of the elastic bodies, and of those in turning frames
     """
 
     q: Floats
     v: Floats
+    """(e,) state at the present step."""
     stage_q: Floats
     stage_v: Floats
     force: Floats
     rate: Floats
+    """(e,) stage, generalized forces and accelerations."""
     turns: Floats
+    """(k, 2) cosine and sine of `Bodies.turning`."""
     frames: Floats
+    """(b + e + 1, 16) rotation matrix, angular velocity, sine and cosine of the tilts."""
     places: Floats
+    """(p + s, 16) padded coordinates and rates of all places."""
     loads: Floats
+    """(p + s, 16) generalized forces on all places, and force and moment in global axes, padded alike."""
     relative: Floats
+    """(18,) motion of a pair's second body against the first."""
     sums: Floats
+    """(9,) force and moments on both bodies of a pair."""
     supports: Floats
+    """(c, 18) strain of each connector, its rate, force and moment on the first body, in that body's axes."""
     motion: Floats
+    """(24,) true rate of change of a connector's strain, elastic force and damping force, padded."""
     rolling: Floats
+    """(m,) see `exugear.bearings.kernels.rolling.rolling_forces`."""
     mesh: MeshMemory
+    """Memory of the meshes' laws."""
     series: Integers
+    """(s,) line of each torque series that was used last."""
     shares: Floats
+    """Memory of the travelling seats, see `exugear.bodies.kernels.travelling`."""
     damped: Floats
+    """(2,) power that elastic bodies damp, and those in turning frames, at the last evaluation that asked for it:
+    (W)."""
     scratch: Floats
     memory: Floats
+    """Memory of the elastic bodies, and of those in turning frames."""

@@ -46,19 +46,15 @@ LATEST, KNOWN = range(2)
 
 
 class Past(NamedTuple):
-    """Accelerations that a run has passed, as the compiled loop keeps them.
-
-    Attributes
-    ----------
-    accelerations : (rows, s) the latest ones, one row after the other, round and round; s is the size, filled up with
-        zeros to a multiple of eight, as the loop takes them
-    sums : (2, s) memory of a step
-    counts : (2,) row of the latest, and how many are known
-    """
+    """Accelerations that a run has passed, as the compiled loop keeps them."""
 
     accelerations: Floats
+    """(rows, s) the latest ones, one row after the other, round and round; s is the size, filled up with: zeros to a
+    multiple of eight, as the loop takes them."""
     sums: Floats
+    """(2, s) memory of a step."""
     counts: Integers
+    """(2,) row of the latest, and how many are known."""
 
     @classmethod
     def of(cls, method: Method, accelerations: Floats) -> Past:
@@ -77,17 +73,13 @@ class Past(NamedTuple):
 
 
 class Method(NamedTuple):
-    """A method of time integration, as the compiled loop reads it.
-
-    Attributes
-    ----------
-    weights : (3, k) of the last k accelerations, the latest first: sums that predict the velocity (times the step),
-        the position (times its square) and the next acceleration; k = 0 for the Runge-Kutta method
-    correction : (2,) of the difference between the acceleration and the extrapolated one, for velocity and position
-    """
+    """A method of time integration, as the compiled loop reads it."""
 
     weights: Floats
+    """(3, k) of the last k accelerations, the latest first: sums that predict the velocity (times the step), the
+    position (times its square) and the next acceleration; k = 0 for the Runge-Kutta method."""
     correction: Floats
+    """(2,) of the difference between the acceleration and the extrapolated one, for velocity and position."""
 
     @property
     def points(self) -> int:

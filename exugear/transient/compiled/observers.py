@@ -21,8 +21,7 @@ class Observer:
 
     Attributes
     ----------
-    layout : SignalLayout
-        Columns of the signals.
+    layout : columns of the signals
     """
 
     def __init__(self, assembly: Assembly, loads: LoadTable) -> None:

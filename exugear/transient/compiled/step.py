@@ -50,28 +50,19 @@ MOST_DIVISIONS = 100_000
 
 @dataclass(frozen=True, eq=False)
 class Integration(Displayed):
-    """How a run is integrated.
-
-    Attributes
-    ----------
-    method : Method
-    step : float
-        s.
-    margin : float
-        Factor by which all motions may be faster before it is not stable, in tenths, at most `MOST_MARGIN`.
-    forced_error, resonance_error : float
-        Expected errors, relative: of the amplitude of a free mass at the top of the band, and of the answer of the
-        resonance where it is largest, for excitation within the band.
-    fastest_rate : float
-        Magnitude of the fastest eigenvalue, rad/s.
-    """
+    """How a run is integrated."""
 
     method: Method
     step: float
+    """s."""
     margin: float
+    """Factor by which all motions may be faster before it is not stable, in tenths, at most `MOST_MARGIN`."""
     forced_error: float
     resonance_error: float
+    """Expected errors, relative: of the amplitude of a free mass at the top of the band, and of the answer of the
+    resonance where it is largest, for excitation within the band."""
     fastest_rate: float
+    """Magnitude of the fastest eigenvalue, rad/s."""
 
     @property
     def error(self) -> float:

@@ -36,18 +36,14 @@ from fe_ste.tools.arrays import Floats
 
 @dataclass(frozen=True)
 class SeatLaw:
-    """Forces on the seats of a body.
-
-    Attributes
-    ----------
-    force : function of time, motion and velocity (6 s,) of the seats
-        Gives forces and moments (6 s,) on them, in axes that do not turn.
-    stiffness, damping : (6 s, 6 s) about what its derivatives are, for Newton's method
-    """
+    """Forces on the seats of a body."""
 
     force: Callable[[float, Floats, Floats], Floats]
+    """Function of time, motion and velocity (6 s,) of the seats. Gives forces and moments (6 s,) on them, in axes
+    that do not turn."""
     stiffness: Floats
     damping: Floats
+    """(6 s, 6 s) about what its derivatives are, for Newton's method."""
 
 
 def linear_supports(stiffness: Floats, damping: Floats) -> SeatLaw:

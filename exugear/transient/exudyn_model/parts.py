@@ -20,27 +20,22 @@ SPIN_COORDINATE = 5
 
 @dataclass
 class Parts:
-    """Nodes and objects of an Exudyn system.
-
-    Attributes
-    ----------
-    mbs : exudyn.MainSystem
-    assembly : Assembly
-    nodes : node of each body; of an elastic one that of its main seat, and those of its seats under
-        `exugear.gearbox.parts.seat_key`
-    bodies : object of each rigid body
-    elastic_nodes : all nodes of each elastic body: those of its seats, then one for its modal coordinates
-    seat_positions : (3,) of each seat by its key, m
-    floating : bodies in floating frames, if there are any
-    """
+    """Nodes and objects of an Exudyn system."""
 
     mbs: Any
+    """exudyn.MainSystem."""
     assembly: Assembly
     nodes: dict[str, Any] = field(default_factory=dict)
+    """Node of each body; of an elastic one that of its main seat, and those of its seats under.
+    `exugear.gearbox.parts.seat_key`."""
     bodies: dict[str, Any] = field(default_factory=dict)
+    """Object of each rigid body."""
     elastic_nodes: dict[str, list[Any]] = field(default_factory=dict)
+    """All nodes of each elastic body: those of its seats, then one for its modal coordinates."""
     seat_positions: dict[str, Floats] = field(default_factory=dict)
+    """(3,) of each seat by its key, m."""
     floating: FloatingBodies | None = None
+    """Bodies in floating frames, if there are any."""
     _ground: Any = None
 
     @property

@@ -28,13 +28,6 @@ _log = logging.getLogger(__name__)
 class Store:
     """File of what was computed from one input, and is computed again where the file does not serve.
 
-    Attributes
-    ----------
-    path : Path
-        Its directory is made when something is written.
-    key : str
-        Hash of the whole input and of the version of the method. A file of another key is not read.
-
     Examples
     --------
     >>> import tempfile
@@ -49,7 +42,9 @@ class Store:
     """
 
     path: Path
+    """Its directory is made when something is written."""
     key: str
+    """Hash of the whole input and of the version of the method. A file of another key is not read."""
 
     def read(self, unpack: Callable[[Arrays], Content]) -> Content | None:
         """Read what `write` wrote.

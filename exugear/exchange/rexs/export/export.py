@@ -31,27 +31,18 @@ from fe_ste.tools.display import Displayed
 
 @dataclass(frozen=True)
 class Exported(Displayed, line=": {named} attributes of REXS, {own} of exugear"):
-    """A REXS file with results.
-
-    Attributes
-    ----------
-    content : bytes
-        The file, of the same kind, version and encoding as the one that was read.
-    own : int
-        Attributes that REXS has no name for; they begin with ``custom_exugear_``.
-    named : int
-        Attributes of REXS.
-    replaced : tuple of str
-        Results of another program that these have taken the place of.
-    left_out : tuple of str
-        Files in the results folder that do not belong to the gearbox.
-    """
+    """A REXS file with results."""
 
     content: bytes
+    """The file, of the same kind, version and encoding as the one that was read."""
     own: int
+    """Attributes that REXS has no name for; they begin with ``custom_exugear_``."""
     named: int
+    """Attributes of REXS."""
     replaced: tuple[str, ...]
+    """Results of another program that these have taken the place of."""
     left_out: tuple[str, ...]
+    """Files in the results folder that do not belong to the gearbox."""
 
 
 def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules | None = None) -> Exported:

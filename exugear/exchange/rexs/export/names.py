@@ -98,16 +98,10 @@ def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, floa
 
 @dataclass
 class Results(Displayed, line=": {additions!n} attributes"):
-    """Attributes gathered for a file.
-
-    Attributes
-    ----------
-    version : (int, int)
-        Of REXS.
-    additions : list of Addition
-    """
+    """Attributes gathered for a file."""
 
     version: Version
+    """(int, int) of REXS."""
     additions: list[Addition] = field(default_factory=list)
 
     def put(

@@ -19,25 +19,17 @@ from fe_ste.tools.display import Displayed
 
 @dataclass(frozen=True)
 class Origins(Displayed, line=" of {gears!n} gears, {pairs!n} pairs, {bearings!n} bearings"):
-    """Numbers of components by the names of parts; those of planets in the order of their angles.
-
-    Attributes
-    ----------
-    gears, pairs, bearings : mapping of str to tuple of int
-    bodies : mapping of str to tuple of tuple of int
-        Shafts and gears of each body, of planets one such tuple for each.
-    axes : mapping of int to (3, 3) array
-        Axes u, v, w of bearings and shafts as rows, in those of the gearbox file.
-    places : mapping of int to float
-        Origin of bearings, gears and shafts along z, m.
-    """
+    """Numbers of components by the names of parts; those of planets in the order of their angles."""
 
     gears: Mapping[str, tuple[int, ...]]
     pairs: Mapping[str, tuple[int, ...]]
     bearings: Mapping[str, tuple[int, ...]]
     bodies: Mapping[str, tuple[tuple[int, ...], ...]]
+    """Shafts and gears of each body, of planets one such tuple for each."""
     axes: Mapping[int, Floats]
+    """(3, 3) axes u, v, w of bearings and shafts as rows, in those of the gearbox file."""
     places: Mapping[int, float]
+    """Origin of bearings, gears and shafts along z, m."""
 
 
 def origins_of(found: Found) -> Origins:

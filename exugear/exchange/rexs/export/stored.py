@@ -37,19 +37,12 @@ _UNFIT = (CaseError, MeshError, VariantError, BearingError, BalanceError, FileEr
 
 @dataclass
 class StoredResults:
-    """What lies in a results folder.
-
-    Attributes
-    ----------
-    gearbox : Gearbox
-    folder : Path
-    left_out : list of str
-        Files that do not belong to the gearbox, with the reason.
-    """
+    """What lies in a results folder."""
 
     gearbox: Gearbox
     folder: Path
     left_out: list[str] = field(default_factory=list)
+    """Files that do not belong to the gearbox, with the reason."""
     _assemblies: dict[Choice, Assembly] = field(default_factory=dict, repr=False)
 
     def tables(self) -> dict[str, MeshTable]:

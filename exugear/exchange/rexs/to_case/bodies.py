@@ -38,35 +38,23 @@ COAXIAL = 2e-3
 
 @dataclass(frozen=True)
 class Body:
-    """Components that move as one.
-
-    Attributes
-    ----------
-    name : str
-        In the gearbox file.
-    parts : tuple of Component
-        Shafts, plates and gears.
-    axis : (float, float)
-        mm.
-    fixed : bool
-    others : tuple of tuple of Component
-        Parts of the other planets of a set, in the order of their angles.
-    angles : tuple of float
-        Angles of the planets on the carrier, deg; empty for what is no planet.
-    orbit : float
-        Their distance from the carrier's axis, mm.
-    carrier : str
-        Empty for what is no planet.
-    """
+    """Components that move as one."""
 
     name: str
+    """In the gearbox file."""
     parts: tuple[Component, ...]
+    """Shafts, plates and gears."""
     axis: tuple[float, float]
+    """mm."""
     fixed: bool = False
     others: tuple[tuple[Component, ...], ...] = ()
+    """Parts of the other planets of a set, in the order of their angles."""
     angles: tuple[float, ...] = ()
+    """Angles of the planets on the carrier, deg; empty for what is no planet."""
     orbit: float = 0.0
+    """Their distance from the carrier's axis, mm."""
     carrier: str = ""
+    """Empty for what is no planet."""
 
     def of_type(self, *types: str) -> tuple[Component, ...]:
         """Parts of some types."""

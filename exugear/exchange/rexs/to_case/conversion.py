@@ -113,16 +113,7 @@ READ_TYPES = frozenset(
 
 @dataclass(frozen=True)
 class Found(Displayed, line=" in {model!r}: {bodies!r}"):
-    """What an import found in a REXS file, with the names of the gearbox file.
-
-    Attributes
-    ----------
-    model : Model
-    places : Places
-    bodies : Bodies
-    teeth : Teeth
-    bearings : mapping of str to Block
-    """
+    """What an import found in a REXS file, with the names of the gearbox file."""
 
     model: Model
     places: Places
@@ -133,34 +124,23 @@ class Found(Displayed, line=" in {model!r}: {bodies!r}"):
 
 @dataclass(frozen=True)
 class Imported(Displayed, line=" {gearbox!r}: {changed!n} assumptions, {ignored!n} left out"):
-    """Outcome of an import.
-
-    Attributes
-    ----------
-    text : str
-        The gearbox file with its comments.
-    gearbox : Gearbox
-        What it gives.
-    changed : tuple of str
-        What was replaced or assumed and matters.
-    ignored : tuple of str
-        What was left out.
-    checked : tuple of str
-        What the file says twice, compared.
-    found : Found
-        What parts of the gearbox file stand for which components.
-    spectrum : str
-        Table of the loads over the life, which belongs beside the gearbox file under the name
-        `exugear.exchange.rexs.to_case.loads.SPECTRUM`; empty where the file tells too little.
-    """
+    """Outcome of an import."""
 
     text: str
+    """The gearbox file with its comments."""
     gearbox: Gearbox
+    """What it gives."""
     changed: tuple[str, ...]
+    """What was replaced or assumed and matters."""
     ignored: tuple[str, ...]
+    """What was left out."""
     checked: tuple[str, ...]
+    """What the file says twice, compared."""
     found: Found
+    """What parts of the gearbox file stand for which components."""
     spectrum: str
+    """Table of the loads over the life, which belongs beside the gearbox file under the name
+    `exugear.exchange.rexs.to_case.loads.SPECTRUM`; empty where the file tells too little."""
 
 
 def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules: Rules | None = None) -> Imported:

@@ -46,25 +46,16 @@ HELD_SHARE = 0.6
 
 @dataclass(frozen=True)
 class Teeth:
-    """All gears that mesh, with their names, stages and bodies; of equal planets the first.
-
-    Attributes
-    ----------
-    gears : mapping of int to Toothing
-        By the number of their component.
-    names : mapping of int to str
-    stages : mapping of str to Stage
-        By the name of their pair.
-    bodies : mapping of int to Body
-    z : mapping of int to float
-        Middle of the gear, mm.
-    """
+    """All gears that mesh, with their names, stages and bodies; of equal planets the first."""
 
     gears: Mapping[int, Toothing]
+    """By the number of their component."""
     names: Mapping[int, str]
     stages: Mapping[str, Stage]
+    """By the name of their pair."""
     bodies: Mapping[int, Body]
     z: Mapping[int, float]
+    """Middle of the gear, mm."""
 
 
 def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teeth:

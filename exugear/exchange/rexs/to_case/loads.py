@@ -43,23 +43,16 @@ LEAST_SHARE = 0.1
 
 @dataclass(frozen=True)
 class Loads:
-    """Torques (N m) and speeds (rpm) on bodies, positive about +z.
-
-    Attributes
-    ----------
-    name : str
-        Of the load case.
-    description : str
-    torques, speeds : mapping of body name to float
-    share : float, optional
-        Of the operating time, %; None where the file gives none.
-    """
+    """Torques (N m) and speeds (rpm) on bodies, positive about +z."""
 
     name: str
+    """Of the load case."""
     description: str
     torques: Mapping[str, float]
     speeds: Mapping[str, float]
+    """By body name."""
     share: float | None = None
+    """Of the operating time, %; None where the file gives none."""
 
 
 @dataclass(frozen=True)
@@ -254,18 +247,12 @@ def _rounded(torque: float) -> float:
 
 @dataclass(frozen=True)
 class LifeLoads:
-    """Loads of a life as a table, and the sections of the gearbox file on them.
-
-    Attributes
-    ----------
-    spectrum : str
-        Text of the table `SPECTRUM`, which lies beside the gearbox file; empty where the file tells too little.
-    blocks : mapping of str to Block
-        Sections by name.
-    """
+    """Loads of a life as a table, and the sections of the gearbox file on them."""
 
     spectrum: str
+    """Text of the table `SPECTRUM`, which lies beside the gearbox file; empty where the file tells too little."""
     blocks: Mapping[str, Block]
+    """Sections by name."""
 
 
 def life_blocks(

@@ -36,28 +36,19 @@ FORM_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Stage:
-    """Two gears in mesh: the pinion is the smaller, against a ring the external one.
-
-    Attributes
-    ----------
-    part : Component
-        The first of the stages that are alike, one for each planet.
-    pinion, gear : int
-        Numbers of the gears' components.
-    distance : Entry
-        Centre distance, mm; that of the positions where these do not count.
-    apart : float
-        Distance of the axes as they stand, mm.
-    common_face : Entry, optional
-        Face width that the gears share, where that is less than the narrower face, mm.
-    """
+    """Two gears in mesh: the pinion is the smaller, against a ring the external one."""
 
     part: Component
+    """The first of the stages that are alike, one for each planet."""
     pinion: int
     gear: int
+    """Numbers of the gears' components."""
     distance: Entry
+    """Centre distance, mm; that of the positions where these do not count."""
     apart: float
+    """Distance of the axes as they stand, mm."""
     common_face: Entry | None = None
+    """Face width that the gears share, where that is less than the narrower face, mm."""
 
 
 def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothing], notes: Notes) -> Entry:

@@ -17,21 +17,14 @@ COMMENT_COLUMN = 44
 
 @dataclass(frozen=True)
 class Entry:
-    """A value of the gearbox file, and where it comes from.
-
-    Attributes
-    ----------
-    value : Any
-        As TOML has it.
-    source : str
-        Component and attribute that give it; for one that is derived or assumed how.
-    kind : str
-        Empty as read, `DERIVED` or `ASSUMED`.
-    """
+    """A value of the gearbox file, and where it comes from."""
 
     value: Any
+    """As TOML has it."""
     source: str = ""
+    """Component and attribute that give it; for one that is derived or assumed how."""
     kind: str = ""
+    """Empty as read, `DERIVED` or `ASSUMED`."""
 
     @property
     def comment(self) -> str:
@@ -58,43 +51,28 @@ def assumed(value: Any, source: str) -> Entry:
 
 @dataclass(frozen=True)
 class Rules:
-    """Which of two statements counts where a file contradicts itself.
-
-    Attributes
-    ----------
-    shifts : {"file", "centre-distance"}
-        Profile shifts that do not fit to the centre distance: refused, or replaced by those that it asks for.
-    distances : {"agreeing", "positions", "file"}
-        Centre distances unlike the positions of the gears: that with which the profile shifts agree, that of the
-        positions, or that of ``center_distance``, to which axes are moved.
-    """
+    """Which of two statements counts where a file contradicts itself."""
 
     shifts: Literal["file", "centre-distance"] = "file"
+    """Profile shifts that do not fit to the centre distance: refused, or replaced by those that it asks for."""
     distances: Literal["agreeing", "positions", "file"] = "agreeing"
+    """Centre distances unlike the positions of the gears: that with which the profile shifts agree, that of the
+    positions, or that of ``center_distance``, to which axes are moved."""
 
 
 @dataclass
 class Notes:
-    """Lines gathered on the way.
-
-    Attributes
-    ----------
-    rules : Rules
-    faults : Faults
-        Why the file cannot be imported.
-    changed : list of str
-        Values of the file that were replaced, and assumptions that matter.
-    checked : list of str
-        Comparisons of what the file says twice.
-    ignored : list of str
-        What the file holds and the gearbox file does not.
-    """
+    """Lines gathered on the way."""
 
     rules: Rules = Rules()
     faults: Faults = field(default_factory=Faults)
+    """Why the file cannot be imported."""
     changed: list[str] = field(default_factory=list)
+    """Values of the file that were replaced, and assumptions that matter."""
     checked: list[str] = field(default_factory=list)
+    """Comparisons of what the file says twice."""
     ignored: list[str] = field(default_factory=list)
+    """What the file holds and the gearbox file does not."""
 
 
 def tidy(value: float) -> float:
@@ -136,22 +114,14 @@ def within(value: float, part: object, key: str, low: float, high: float) -> flo
 
 @dataclass
 class Block:
-    """Table of the gearbox file with its entries and the tables inside it.
-
-    Attributes
-    ----------
-    comment : str
-        After its head: the component that it stands for.
-    entries : dict of str to Entry
-    blocks : dict of str to Block
-    number : int
-        Of the component; 0 where nobody asks for it.
-    """
+    """Table of the gearbox file with its entries and the tables inside it."""
 
     comment: str = ""
+    """After its head: the component that it stands for."""
     entries: dict[str, Entry] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
     number: int = 0
+    """Of the component; 0 where nobody asks for it."""
 
 
 def toml_text(head: Sequence[str], top: Mapping[str, Entry], groups: Sequence[tuple[str, Mapping[str, Block]]]) -> str:

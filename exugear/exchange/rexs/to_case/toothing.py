@@ -26,28 +26,7 @@ RIGID_MODULUS = 1e6
 
 @dataclass(frozen=True)
 class Toothing:
-    """A gear in the units and signs of the gearbox file: mm, deg, the shift of a ring positive for a larger ring.
-
-    Attributes
-    ----------
-    part : Component
-    teeth : int
-    module, pressure_angle, helix_angle, face_width : Entry
-    shift : Entry, optional
-        None where the file gives none: it follows from the centre distance.
-    tip, root : Entry, optional
-        Diameters as far as they are given.
-    dedendum, tip_radius, thinning : Entry
-    allowances : Entry, optional
-        Table of the tooth thickness's allowances, where the file gives them; `thinning` is then their mean.
-    cutter : Entry, optional
-        Table of the cutter of a ring, as far as the file gives one.
-    chamfer : float
-        Radial, mm.
-    root_form : Entry, optional
-        Diameter at which the flank ends towards the root, as far as it is given.
-    internal : bool
-    """
+    """A gear in the units and signs of the gearbox file: mm, deg, the shift of a ring positive for a larger ring."""
 
     part: Component
     teeth: int
@@ -56,15 +35,21 @@ class Toothing:
     helix_angle: Entry
     face_width: Entry
     shift: Entry | None
+    """None where the file gives none: it follows from the centre distance."""
     tip: Entry | None
     root: Entry | None
+    """Diameters as far as they are given."""
     dedendum: Entry
     tip_radius: Entry
     thinning: Entry
     allowances: Entry | None
+    """Table of the tooth thickness's allowances, where the file gives them; `thinning` is then their mean."""
     cutter: Entry | None
+    """Table of the cutter of a ring, as far as the file gives one."""
     chamfer: float
+    """Radial, mm."""
     root_form: Entry | None
+    """Diameter at which the flank ends towards the root, as far as it is given."""
     internal: bool
 
 

@@ -46,34 +46,22 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Key:
-    """A key of the gearbox file.
-
-    Attributes
-    ----------
-    table : str
-        Table that it stands in, such as ``gears.NAME``; empty at the top.
-    name : str
-    unit : str
-        Empty for numbers without one and for what is no number.
-    kind : str
-        What it holds, in words.
-    range : str
-        What can be; empty for all.
-    default : str
-        What is taken without it; "needed" if nothing is.
-    meaning : str
-    example : object
-        A value that can be, as TOML has it.
-    """
+    """A key of the gearbox file."""
 
     table: str
+    """Table that it stands in, such as ``gears.NAME``; empty at the top."""
     name: str
     unit: str
+    """Empty for numbers without one and for what is no number."""
     kind: str
+    """What it holds, in words."""
     range: str
+    """What can be; empty for all."""
     default: str
+    """What is taken without it; "needed" if nothing is."""
     meaning: str
     example: object
+    """A value that can be, as TOML has it."""
 
 
 def unit_of(name: str) -> str:
