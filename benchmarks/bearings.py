@@ -13,20 +13,20 @@ import numpy as np
 from dynamics import stiffness_of
 from timing import CASE, median, say, timed
 
-from exugear.bearings.kernels.rolling import (
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.kernels.rolling import (
     RollingArrays,
     rolling_force,
     rolling_memory,
     rolling_tangent,
 )
-from exugear.bearings.rolling.potential import rolling_arrays
-from exugear.bearings.rolling.rows import BallRow, RollerRow, RollingRow
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import LoadTable
-from exugear.dynamics.statics import accelerating_start
-from exugear.gearbox.choice import Choice
-from exugear.gearbox.gearbox import Gearbox
+from exugear.system.bearings.rolling.potential import rolling_arrays
+from exugear.system.bearings.rolling.rows import BallRow, RollerRow, RollingRow
+from exugear.system.loads import LoadTable
+from exugear.system.statics import accelerating_start
 from exugear.transient.compiled.arrays import Equations, Work
 from exugear.transient.compiled.connectors import add_connectors
 from exugear.transient.compiled.methods import adams

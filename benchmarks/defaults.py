@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 
 from exugear import Choice, Gearbox, Modes, Project
-from exugear.dynamics.statics import static_state
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.templates.kinds import template
 from exugear.steady.peaks import Peak, peaks
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.system.statics import static_state
 
 CASE = Path(__file__).parent.parent / "cases" / "grc750" / "gearbox.toml"
 DEFAULT, BEST = Choice("bushing"), Choice("bushing", "table")

@@ -19,13 +19,13 @@ from typing import Any, Literal
 import numpy as np
 from timing import CASE, Cost, median, median_row, peak_memory, result, say, start, timed
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import LoadTable
-from exugear.dynamics.statics import accelerating_start
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.loads import LoadTable
+from exugear.system.statics import accelerating_start
 from exugear.transient.compiled.methods import RUNGE_KUTTA as RK4
 from exugear.transient.compiled.methods import Method, adams
 from exugear.transient.compiled.observers import Observer

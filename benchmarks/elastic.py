@@ -16,14 +16,14 @@ import numpy as np
 from dynamics import LOAD, stiffness_of
 from timing import CASE, median, say, timed
 
-from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import LoadTable
-from exugear.dynamics.signals import ENERGIES, POWERS, signal_layout
-from exugear.dynamics.statics import accelerating_start
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.system.loads import LoadTable
+from exugear.system.signals import ENERGIES, POWERS, signal_layout
+from exugear.system.statics import accelerating_start
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.compiled.step import Integration, choose_integration
 from exugear.transient.extent import SAMPLE_RATE

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from timing import Cost, timed
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import Loading
-from exugear.tooth_mesh.element import MeshElement
-from exugear.tooth_mesh.kernels.meshes import stiffness_at
+from exugear.system.assembly import Assembly
+from exugear.system.loads import Loading
+from exugear.system.tooth_mesh.element import MeshElement
+from exugear.system.tooth_mesh.kernels.meshes import stiffness_at
 from exugear.transient.exudyn_model.library import exudyn, items
 from exugear.transient.exudyn_model.system import ExudynSystem, MeshRoute
 
 
 class PythonMesh:
-    """One mesh as the textbook would write it: the law of `exugear.tooth_mesh.kernels.meshes` in plain Python."""
+    """One mesh as the textbook would write it: the law of `system.tooth_mesh.kernels.meshes` in plain Python."""
 
     def __init__(self, system: ExudynSystem, element: MeshElement) -> None:
         mesh = element.mesh

@@ -34,7 +34,7 @@ ALONE_EVERY = 251
 def measure(name: str) -> dict[str, float | int | str]:
     """Compute one pair's grid in this process and two workers, and some of its states alone."""
     from exugear.gearbox.gearbox import Gearbox
-    from exugear.tooth_mesh.tables import wanted_table
+    from exugear.system.tooth_mesh.tables import wanted_table
     from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 
     gearbox = Gearbox.from_toml(CASE)

@@ -12,14 +12,14 @@ from dynamics import stiffness_of
 from elastic import SHAFTS, with_elastic
 from timing import CASE, say, timed
 
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.settings import LEVELS, SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
 from exugear.transient.runup import simulate
 
 SPEEDS = "0:215:400"

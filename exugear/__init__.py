@@ -9,10 +9,6 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from exugear.bodies.solids import SolidModel
-    from exugear.dynamics.assemble import assemble
-    from exugear.dynamics.eigenmodes.modes import Modes, eigenmodes
-    from exugear.dynamics.statics import static_state
     from exugear.exchange.rexs.containers import read_rexs
     from exugear.exchange.rexs.to_case.conversion import to_case
     from exugear.gearbox.choice import Choice
@@ -33,7 +29,11 @@ if TYPE_CHECKING:
     from exugear.studies.dataset import load_study
     from exugear.studies.study import Study
     from exugear.studies.sweep import sweep
-    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+    from exugear.system.assemble import assemble
+    from exugear.system.bodies.solids import SolidModel
+    from exugear.system.eigenmodes.modes import Modes, eigenmodes
+    from exugear.system.statics import static_state
+    from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
     from exugear.transient.outcome import Run
     from exugear.transient.runup import simulate
 
@@ -42,27 +42,27 @@ _HOMES = {
     "CaseError": "exugear.gearbox.reading",
     "Choice": "exugear.gearbox.choice",
     "Gearbox": "exugear.gearbox.gearbox",
-    "Modes": "exugear.dynamics.eigenmodes.modes",
+    "Modes": "exugear.system.eigenmodes.modes",
     "Project": "exugear.project",
     "Run": "exugear.transient.outcome",
-    "SolidModel": "exugear.bodies.solids",
+    "SolidModel": "exugear.system.bodies.solids",
     "SpeedRange": "exugear.steady.settings",
     "SteadySettings": "exugear.steady.settings",
     "Study": "exugear.studies.study",
     "Variant": "exugear.gearbox.variant",
-    "assemble": "exugear.dynamics.assemble",
+    "assemble": "exugear.system.assemble",
     "compute_life": "exugear.life.life",
-    "eigenmodes": "exugear.dynamics.eigenmodes.modes",
+    "eigenmodes": "exugear.system.eigenmodes.modes",
     "load_run": "exugear.results.run_file",
     "load_study": "exugear.studies.dataset",
-    "mesh_stiffness": "exugear.tooth_mesh.laws.stiffness",
+    "mesh_stiffness": "exugear.system.tooth_mesh.laws.stiffness",
     "order_lines": "exugear.results.spectra.orders",
     "plot_campbell": "exugear.report.pictures.mode_diagrams",
     "plot_waterfalls": "exugear.report.pictures.run_diagrams",
     "read_rexs": "exugear.exchange.rexs.containers",
     "run_waterfall": "exugear.results.spectra.run_spectra",
     "simulate": "exugear.transient.runup",
-    "static_state": "exugear.dynamics.statics",
+    "static_state": "exugear.system.statics",
     "steady_response": "exugear.steady.steady_file",
     "sweep": "exugear.studies.sweep",
     "template": "exugear.gearbox.templates.kinds",

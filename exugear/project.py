@@ -13,32 +13,44 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.bearings.duty import BearingDuty
-from exugear.bearings.rolling.rows import BearingError
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.bearing_duties import bearing_duties, mesh_duties
-from exugear.dynamics.eigenmodes.modes import Modes, kept_modes, modes_of
-from exugear.dynamics.fingerprint import input_hash
-from exugear.dynamics.statics import BalanceError, static_state
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.variant import Variant, VariantError
 from exugear.results.bearings_file import write_duties
-from exugear.results.folder import bearings_path, bodies_folder, keep_case, kept_case, modes_path, time_noted
+from exugear.results.folder import (
+    bearings_path,
+    bodies_folder,
+    keep_case,
+    kept_case,
+    modes_path,
+    run_directory,
+    time_noted,
+)
 from exugear.results.run_file import FINAL_NAME
-from exugear.tooth_mesh.grid_axes import GridAxes, axes_reaching
-from exugear.tooth_mesh.law import MeshData
-from exugear.tooth_mesh.laws.registry import LAWS
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.tooth_mesh.mesh_duty import MeshDuty
-from exugear.tooth_mesh.placement import MeshError
-from exugear.tooth_mesh.tables import TableRequest, missing_tables, requested_tables, tables_at_work
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bearing_duties import bearing_duties, mesh_duties
+from exugear.system.bearings.duty import BearingDuty
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.eigenmodes.modes import Modes, kept_modes, modes_of
+from exugear.system.fingerprint import input_hash
+from exugear.system.statics import BalanceError, static_state
+from exugear.system.tooth_mesh.grid_axes import GridAxes, axes_reaching
+from exugear.system.tooth_mesh.law import MeshData
+from exugear.system.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.mesh_duty import MeshDuty
+from exugear.system.tooth_mesh.placement import MeshError
+from exugear.system.tooth_mesh.tables import (
+    TableRequest,
+    missing_tables,
+    requested_tables,
+    tables_at_work,
+)
 from exugear.transient.outcome import Run
-from exugear.transient.run_folder import run_directory
 from exugear.transient.runup import simulate
 from fe_ste.tools.display import Displayed
 from fe_ste.tools.stores.store import Store
@@ -148,7 +160,7 @@ class Project(Displayed):
     def requested_tables(
         self, names: Iterable[str] = (), positions: int | None = None, *, grid: bool = False
     ) -> list[TableRequest]:
-        """List tables and find those that are there: see `exugear.tooth_mesh.tables.requested_tables`."""
+        """List tables and find those that are there: see `exugear.system.tooth_mesh.tables.requested_tables`."""
         axes = self.grid_axes() if grid or self.gearbox.ste.grid else {}
         return requested_tables(self.gearbox, self.folder, names, positions, grid, axes)
 
@@ -238,7 +250,7 @@ class Project(Displayed):
         if not self.choice.variant.is_elastic:
             return {}
         inertias = self.choice.inertia_set(self.gearbox)
-        from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies  # loads finite elements
+        from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
 
         return reduced_bodies(self.gearbox, inertias, bodies_folder(self.folder), begin)
 

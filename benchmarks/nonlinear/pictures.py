@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.tooth_mesh.tables import requested_tables
+from exugear.system.tooth_mesh.tables import requested_tables
 from fe_ste.pictures.stress import draw_contact_stress
 from fe_ste.reference.position import nonlinear_position
 from fe_ste.reference.stress import StressField, stress_of_position, stress_of_state

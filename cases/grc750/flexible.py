@@ -19,8 +19,6 @@ import numpy as np
 from one_variant import grc_project, show
 
 from exugear import Choice, Modes, Project, order_lines, plot_waterfalls, run_waterfall, static_state
-from exugear.dynamics.eigenmodes.energy_shares import BODY_MOTIONS
-from exugear.dynamics.eigenmodes.modes import counterparts, modes_of
 from exugear.report.pictures.elastic_scene import (
     animate_elastic_bodies,
     draw_elastic_bodies,
@@ -32,6 +30,8 @@ from exugear.results.spectra.resonances import (
     match_eigenfrequencies,
     pick_resonances,
 )
+from exugear.system.eigenmodes.energy_shares import BODY_MOTIONS
+from exugear.system.eigenmodes.modes import counterparts, modes_of
 
 VARIANTS = ("rigid", "bushing", "flexible")
 MAIN_SHAFT_MODES = 500.0

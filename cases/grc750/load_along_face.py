@@ -16,7 +16,7 @@ from functools import lru_cache
 from one_variant import grc_project
 
 from exugear import Choice, Project, static_state
-from exugear.tooth_mesh.tables import wanted_table
+from exugear.system.tooth_mesh.tables import wanted_table
 from fe_ste import PairCompliance, static_transmission_error
 from fe_ste.transmission_error.face_load import face_load_factor
 from fe_ste.transmission_error.table import prepared_compliance

@@ -12,17 +12,17 @@ from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from exugear.cli.watched import WatchedProject
-    from exugear.dynamics.assembly import Assembly
     from exugear.gearbox.choice import Choice
     from exugear.gearbox.gearbox import Gearbox
+    from exugear.system.assembly import Assembly
 
 
 def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
     """Read a gearbox file for a verb, with what the user permits it, and try all its parts; tell what is unusual."""
-    from exugear.dynamics.readiness.readiness import check_parts, faults_of_bearings, remarks
     from exugear.gearbox.gearbox import Gearbox
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.reading import CaseError, read_toml
+    from exugear.system.readiness.readiness import check_parts, faults_of_bearings, remarks
 
     check_files_below(files_below)
     try:
@@ -71,9 +71,9 @@ def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
     FailedError
         The variant finds no balance so.
     """
-    from exugear.dynamics.assemble import assemble
     from exugear.gearbox.choice import Choice
-    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+    from exugear.system.assemble import assemble
+    from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
     law = "iso6336"
     rigid = Variant.bushing if variant.is_elastic else variant
@@ -86,19 +86,19 @@ def steady_lack(assembly: Assembly, variant: Variant) -> str:
 
     What speaks against it does not depend on finite elements.
     """
-    from exugear.bearings.supports import elastic_names
     from exugear.steady.mean_system.mean_system import unsuitable
+    from exugear.system.bearings.supports import elastic_names
 
     return unsuitable(assembly, elastic_names(assembly.gearbox) if variant.is_elastic else ())
 
 
 def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
-    from exugear.bodies.of_gearbox.solids import check_solids
-    from exugear.dynamics.readiness.readiness import lacking
     from exugear.results.folder import bodies_folder
-    from exugear.tooth_mesh.laws.registry import LAWS
-    from exugear.tooth_mesh.tables import without_table
+    from exugear.system.bodies.of_gearbox.solids import check_solids
+    from exugear.system.readiness.readiness import lacking
+    from exugear.system.tooth_mesh.laws.registry import LAWS
+    from exugear.system.tooth_mesh.tables import without_table
 
     gearbox.bodies(choice.inertias)
     if choice.load_case is not None and choice.load_case not in gearbox.load_cases:

@@ -145,13 +145,13 @@ def _told_to_the_user(error: Exception) -> Exception | None:
     if not type(error).__module__.startswith("exugear."):
         return None
     # Imported after the fact: a verb that goes well need not load them.
-    from exugear.bearings.rolling.rows import BearingError
-    from exugear.dynamics.statics import BalanceError
     from exugear.gearbox.reading import CaseError
     from exugear.gearbox.variant import VariantError
     from exugear.steady.harmonics.krylov import HarmonicBalanceError
     from exugear.steady.mean_system.rotating_frame import SteadyError
-    from exugear.tooth_mesh.placement import MeshError
+    from exugear.system.bearings.rolling.rows import BearingError
+    from exugear.system.statics import BalanceError
+    from exugear.system.tooth_mesh.placement import MeshError
 
     if isinstance(error, (CaseError, VariantError, MeshError, BearingError, SteadyError)):
         return BadInputError(error)

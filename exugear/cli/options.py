@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from exugear.gearbox.variant import OFFERED, Variant, VariantError
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.laws.registry import LAWS
 
 CaseArgument = Annotated[Path, typer.Argument(metavar="CASE.toml", help="The gearbox file.", show_default=False)]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")]
@@ -20,7 +20,7 @@ OutOption = Annotated[
 
 
 class MeshLaw(StrEnum):
-    """How teeth in mesh push each other: the laws of `exugear.tooth_mesh.laws.registry`."""
+    """How teeth in mesh push each other: the laws of `exugear.system.tooth_mesh.laws.registry`."""
 
     _ignore_ = ["members", "law"]
     members = vars()

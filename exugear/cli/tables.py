@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
     """Say what is missing or cut off in tables; return why they are not to be trusted, nothing if they are."""
-    from exugear.tooth_mesh.table_remarks import doubts_about_table, remarks_about_table
+    from exugear.system.tooth_mesh.table_remarks import doubts_about_table, remarks_about_table
 
     for name, table in tables.items():
         for remark in remarks_about_table(name, table):

@@ -27,7 +27,7 @@ class Choice:
     variant: Variant
     """How bodies are held; chosen by its name."""
     mesh_law: str
-    """How teeth in mesh push each other; `exugear.tooth_mesh.laws.registry` lists the laws."""
+    """How teeth in mesh push each other; `exugear.system.tooth_mesh.laws.registry` lists the laws."""
     inertias: str | None
     """Inertia set."""
     load_case: str | None

@@ -7,9 +7,9 @@ Tables have theirs in `fe_ste.tools.versions`.
 
 from __future__ import annotations
 
-#: Reduced elastic bodies (`exugear.bodies`). Runs and modes rest on it.
+#: Reduced elastic bodies (`exugear.system.bodies`). Runs and modes rest on it.
 REDUCTION = 1
-#: Eigenmodes (`exugear.dynamics.eigenmodes.modes`, and the laws and matrices of `exugear.dynamics.assembly`).
+#: Eigenmodes (`exugear.system.eigenmodes.modes`, and the laws and matrices of `exugear.system.assembly`).
 MODES = 4
 #: Runs in time (`exugear.transient`, both solvers, the laws, signals and filters).
 RUN = 9

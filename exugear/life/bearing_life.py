@@ -12,12 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.bearings.duty import Ratings, loads_of_rows, ratings_of
-from exugear.bearings.operating_point import cage_angles
-from exugear.bearings.rolling.catalogue import catalogue_rows
-from exugear.bearings.rolling.contact import BearingState, equilibrium
-from exugear.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
-from exugear.bearings.rolling.lubrication import (
+from exugear.gearbox.parts import Bearing
+from exugear.gearbox.sections.lubricant import LubricantSection
+from exugear.life.acting_loads import ActingLoads
+from exugear.life.static_balance import StaticBalance
+from exugear.system.bearings.duty import Ratings, loads_of_rows, ratings_of
+from exugear.system.bearings.operating_point import cage_angles
+from exugear.system.bearings.rolling.catalogue import catalogue_rows
+from exugear.system.bearings.rolling.contact import BearingState, equilibrium
+from exugear.system.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
+from exugear.system.bearings.rolling.lubrication import (
     LEAST_RATIO,
     contamination_factor,
     fatigue_limit,
@@ -25,12 +29,14 @@ from exugear.bearings.rolling.lubrication import (
     viscosity_at,
     viscosity_ratio,
 )
-from exugear.bearings.rolling.ratings import equivalent_load, equivalent_static_load
-from exugear.bearings.rolling.rows import BearingError, BearingOfRows, RollerRow, RollingRow, on_raceways
-from exugear.gearbox.parts import Bearing
-from exugear.gearbox.sections.lubricant import LubricantSection
-from exugear.life.acting_loads import ActingLoads
-from exugear.life.static_balance import StaticBalance
+from exugear.system.bearings.rolling.ratings import equivalent_load, equivalent_static_load
+from exugear.system.bearings.rolling.rows import (
+    BearingError,
+    BearingOfRows,
+    RollerRow,
+    RollingRow,
+    on_raceways,
+)
 from fe_ste.tools.arrays import Floats
 
 LAMINAE = 40

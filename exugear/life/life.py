@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.fingerprint import input_hash
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.sections.loads import RatingSection
@@ -24,6 +22,8 @@ from exugear.life.load_spectrum.counted import CountedLoads, count_loads
 from exugear.life.load_spectrum.sources import Progress
 from exugear.life.static_balance import AngleStore, StaticBalance, static_balance
 from exugear.life.verdict import LEFT_OUT, failures, needs_of_relief, reaches, shortfalls
+from exugear.system.assembly import Assembly
+from exugear.system.fingerprint import input_hash
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 from fe_ste.tools.display import Displayed
 

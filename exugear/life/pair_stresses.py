@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from exugear.gearbox.versions import LIFE
-from exugear.tooth_mesh.tables import TableRequest
+from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.geometry.gears import Gear
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress, mesh_cycle_stress
 from fe_ste.root_stress.root import RootGauges, root_gauges

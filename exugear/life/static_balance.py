@@ -15,11 +15,11 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.statics import BalanceError, locked_equilibrium, rolled_coordinates
 from exugear.gearbox.variant import VariantError
-from exugear.tooth_mesh.kernels.meshes import FORCE, OUTSIDE
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.assembly import Assembly
+from exugear.system.statics import BalanceError, locked_equilibrium, rolled_coordinates
+from exugear.system.tooth_mesh.kernels.meshes import FORCE, OUTSIDE
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -16,6 +14,8 @@ from exugear.life.dynamic_factors.response_factors import source_hash
 from exugear.life.life import checked_loads, life_hash, rating_of
 from exugear.life.life_file import read_life
 from exugear.life.stress_tables import life_requests
+from exugear.system.assembly import Assembly
+from exugear.system.statics import BalanceError
 from fe_ste.tools.files import FileError
 
 if TYPE_CHECKING:

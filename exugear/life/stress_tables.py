@@ -11,12 +11,12 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.operating_points import contact_places
-from exugear.dynamics.statics import static_state
 from exugear.life.load_spectrum.counted import CountedLoads
-from exugear.tooth_mesh.laws.registry import LAWS
-from exugear.tooth_mesh.tables import TableRequest, requested_tables
+from exugear.system.assembly import Assembly
+from exugear.system.operating_points import contact_places
+from exugear.system.statics import static_state
+from exugear.system.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.tables import TableRequest, requested_tables
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 TORQUE_SHARES = (0.35, 0.7, 1.0)

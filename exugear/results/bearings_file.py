@@ -8,9 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from exugear.bearings.duty import BearingDuty
 from exugear.gearbox.versions import MODES
-from exugear.tooth_mesh.mesh_duty import MeshDuty
+from exugear.system.bearings.duty import BearingDuty
+from exugear.system.tooth_mesh.mesh_duty import MeshDuty
 from fe_ste.tools.files import FileError, read_text, write_file
 
 

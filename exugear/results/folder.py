@@ -144,3 +144,11 @@ def _lines(path: Path) -> Iterator[Spent]:
             continue  # a line cut short by a kill says nothing
         if math.isfinite(spent.seconds):
             yield spent
+
+
+def run_directory(out: str | Path, choice: Choice) -> Path:
+    """Directory of a run: ``<variant>/<load case>-<law>-<inertias>`` in the results directory.
+
+    Nothing in the choice is left open (`Choice.of`).
+    """
+    return Path(out) / choice.variant / f"{choice.load_case}-{choice.mesh_law}-{choice.inertias}"

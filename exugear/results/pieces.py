@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, SignalLayout
 from exugear.results.variables import GROWING, VARIABLES
+from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, SignalLayout
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError
 from fe_ste.tools.sealed import open_sealed, write_arrays
@@ -48,13 +48,13 @@ class Checkpoint:
     pending_first: int
     """Number of the first of them."""
     balance: Floats
-    """(terms,) account of energy, J, as in `exugear.dynamics.signals.BALANCE_TERMS`."""
+    """(terms,) account of energy, J, as in `exugear.system.signals.BALANCE_TERMS`."""
     powers: Floats
-    """(powers,) powers, W, as in `exugear.dynamics.signals.POWERS`."""
+    """(powers,) powers, W, as in `exugear.system.signals.POWERS`."""
     start_angle: float
     """Angle that a drive started ahead by, rad."""
     mesh_times: Floats
-    """(times, meshes) s, as in `exugear.dynamics.signals.MESH_TIMES`."""
+    """(times, meshes) s, as in `exugear.system.signals.MESH_TIMES`."""
     judgement: Floats
     """Running figures of an `exugear.transient.trust.Judge`."""
 

@@ -244,3 +244,16 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
     if wanted is None:
         return data
     return data[wanted]
+
+
+def verdict_of(attributes: Mapping[str, Any]) -> str:
+    """Why the run of a file is not to be trusted, from its attributes; empty if nothing speaks against it.
+
+    Examples
+    --------
+    >>> verdict_of({"trusted": 0, "verdict": "energy: ..."}), verdict_of({"trusted": 1}), verdict_of({})
+    ('energy: ...', '', '')
+    """
+    if int(attributes.get("trusted", 1)):
+        return ""
+    return str(attributes.get("verdict", "no reason is kept"))

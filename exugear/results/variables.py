@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from exugear.dynamics.signals import SIGNALS, Variable
+from exugear.system.signals import SIGNALS, Variable
 
 STATE = (
     Variable("state_q", ("coordinate",), "m or rad"),

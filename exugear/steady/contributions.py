@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.dynamics.linearised import linearise
 from exugear.steady.excitation import Gearset
 from exugear.steady.mean_system.mean_modes import mean_modes
 from exugear.steady.response import transmission_errors
+from exugear.system.linearised import linearise
 from fe_ste.tools.arrays import Complexes, Floats
 
 LEAST_MODE = 0.01

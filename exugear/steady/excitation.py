@@ -47,8 +47,8 @@ from exugear.steady.mean_system.signals import (
     mesh_signal_names,
     signal_rows,
 )
-from exugear.tooth_mesh.kernels.meshes import SPIN_1
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.kernels.meshes import SPIN_1
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 SAMPLES_PER_HARMONIC = 16

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
 from exugear.steady.excitation import Gearset, Interface
 from exugear.steady.harmonics.krylov import HarmonicBalanceError
 from exugear.steady.harmonics.lattice import Lattice
@@ -26,7 +25,8 @@ from exugear.steady.response import Response, linear_response, parametric_respon
 from exugear.steady.settings import SteadySettings
 from exugear.steady.settling.settled import Leg, SettlingRun, cannot_settle
 from exugear.steady.stability import CHECKED, candidates, growth_at, growth_of_state, mean_growth
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.assembly import Assembly
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Complexes, Floats
 
 LEFT_OUT = 2e-4

@@ -10,15 +10,15 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.fingerprint import input_hash
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.operating_range import operating_range
 from exugear.gearbox.load_cases.summary import BURSTING_RIM_SPEED, rim_radii, summarise_loads
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.versions import STEADY
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.assembly import Assembly
+from exugear.system.fingerprint import input_hash
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
 Level = Literal["linear", "parametric", "nonlinear"]

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.dynamics.linearised import RIGID_BODY_LIMIT
 from exugear.steady.excitation import Gearset
 from exugear.steady.harmonics.floquet import exponents, kicks_needed
 from exugear.steady.mean_system.mean_modes import mean_modes
 from exugear.steady.nonlinear import Balance
+from exugear.system.linearised import RIGID_BODY_LIMIT
 from fe_ste.tools.arrays import Complexes
 
 SMOOTH_KICKS, PARTING_KICKS = 400, 1000

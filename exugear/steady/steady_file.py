@@ -10,10 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.statics import beside_unsolved_states
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.operating_range import operating_range
@@ -25,7 +21,11 @@ from exugear.steady.mean_system.signals import carried_seats
 from exugear.steady.peaks import line_name
 from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
 from exugear.steady.steady_response import Solved, SteadyResponse, response_of
-from exugear.tooth_mesh.law import MeshData
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.statics import beside_unsolved_states
+from exugear.system.tooth_mesh.law import MeshData
 from fe_ste.tools.sealed import Layout, load_dataset
 from fe_ste.tools.stores.store import Store
 

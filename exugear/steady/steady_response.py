@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.load_cases.operating_range import operating_range
 from exugear.gearbox.parts import RPM
 from exugear.steady.campbell.campbell import Campbell, campbell_of, modes_over_speed
@@ -27,6 +26,7 @@ from exugear.steady.mean_system.signals import SignalName
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, check_speeds
+from exugear.system.assembly import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
 from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.tools.threads import one_dense_thread

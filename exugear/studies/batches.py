@@ -11,7 +11,6 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits
 
-from exugear.dynamics.readiness.readiness import check_parts
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
@@ -23,6 +22,7 @@ from exugear.studies.figures.point_results import PointResults, PointSettings
 from exugear.studies.figures.registry import KeptFigure
 from exugear.studies.figures.shared import Shared
 from exugear.studies.journal import Journal, Record, told_in_json
+from exugear.system.readiness.readiness import check_parts
 from fe_ste.tools.workers import StoppedError, stop_if_asked
 
 LONG = 1.0

@@ -8,8 +8,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from exugear.bearings.supports import elastic_names, mounts_at_work
-from exugear.dynamics.signals import signals_of
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant
@@ -18,7 +16,9 @@ from exugear.studies.design.sections import StudyFile
 from exugear.studies.figures.of_life import LEAST, LIVES, SAFETIES
 from exugear.studies.figures.of_runs import OVERALL
 from exugear.studies.figures.registry import FIGURES, KeptFigure
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.bearings.supports import elastic_names, mounts_at_work
+from exugear.system.signals import signals_of
+from exugear.system.tooth_mesh.laws.registry import LAWS
 
 OF_POINTS = ("error", "doubts", "seconds", "memory")
 """What a dataset tells of each point beside its figures."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.dynamics.signals import BALANCE_TERMS, ENERGIES, POWERS
+from exugear.system.signals import BALANCE_TERMS, ENERGIES, POWERS
 from fe_ste.tools.arrays import Floats, Integers
 
 INTEGRATED = [BALANCE_TERMS.index(term) for term in POWERS]
@@ -14,7 +14,7 @@ OBSERVED = [BALANCE_TERMS.index(term) for term in ENERGIES]
 
 
 class EnergyAccount:
-    """Terms of `exugear.dynamics.signals.BALANCE_TERMS` as a run goes on.
+    """Terms of `exugear.system.signals.BALANCE_TERMS` as a run goes on.
 
     Parameters
     ----------
@@ -53,9 +53,9 @@ class EnergyAccount:
 
         Parameters
         ----------
-        powers : (n, powers) of `exugear.dynamics.signals.POWERS` at each state, W
+        powers : (n, powers) of `exugear.system.signals.POWERS` at each state, W
         written : (k,) numbers of the states whose lines are asked for, the last state's last
-        energies : (k, energies) of `exugear.dynamics.signals.ENERGIES` at these states, J
+        energies : (k, energies) of `exugear.system.signals.ENERGIES` at these states, J
 
         Returns
         -------

@@ -6,11 +6,11 @@ import math
 import shutil
 from pathlib import Path
 
-from exugear.dynamics.signals import AXES, SignalLayout, signals_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import LoadCase
 from exugear.gearbox.reading import CaseError
 from exugear.results.decimation import TAPS_PER_FACTOR
+from exugear.system.signals import AXES, SignalLayout, signals_of
 
 SAMPLE_RATE = 20e3
 """Stored rate, Hz."""

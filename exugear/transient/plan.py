@@ -8,13 +8,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.fingerprint import input_hash
-from exugear.dynamics.signals import bodies_of_forces
 from exugear.gearbox.parts import LoadCase
 from exugear.gearbox.versions import RUN
 from exugear.results.decimation import Decimator
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME
+from exugear.system.assembly import Assembly
+from exugear.system.fingerprint import input_hash
+from exugear.system.signals import bodies_of_forces
 from exugear.transient.compiled.methods import RUNGE_KUTTA
 from exugear.transient.compiled.step import Integration, unstable
 from exugear.transient.extent import too_fine

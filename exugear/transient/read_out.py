@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import AXES, SignalLayout, signal_layout
 from exugear.results.decimation import TAPS_PER_FACTOR, Filter, plain_filter
+from exugear.system.assembly import Assembly
+from exugear.system.signals import AXES, SignalLayout, signal_layout
 from exugear.transient.compiled.methods import Method, ahead_of_correction
 from exugear.transient.compiled.packing import spinning_alone
 from fe_ste.tools.arrays import Complexes, Floats, Integers
@@ -50,7 +50,7 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
 
     Examples
     --------
-    >>> from exugear.dynamics.assemble import assemble
+    >>> from exugear.system.assemble import assemble
     >>> from exugear.gearbox.choice import Choice
     >>> from exugear.gearbox.gearbox import Gearbox
     >>> from exugear.transient.compiled.methods import RUNGE_KUTTA, adams

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.dynamics.signals import ENERGIES, POWERS
 from exugear.results.pieces import Checkpoint
 from exugear.results.run_file import RunFile
+from exugear.system.signals import ENERGIES, POWERS
 from exugear.transient.account import EnergyAccount
 from exugear.transient.compiled.observers import Observer
 from exugear.transient.extent import buffer_rows

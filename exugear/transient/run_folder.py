@@ -6,20 +6,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from exugear.gearbox.choice import Choice
 from exugear.results.pieces import has_pieces
 from exugear.results.run_file import EARLIER_PARTIAL_NAME, FINAL_NAME, PARTIAL_NAME, load_run
 from fe_ste.tools.files import FileError, exclusive
 
 LOCK_NAME = "run.partial.lock"
-
-
-def run_directory(out: str | Path, choice: Choice) -> Path:
-    """Directory of a run: ``<variant>/<load case>-<law>-<inertias>`` in the results directory.
-
-    Nothing in the choice is left open (`Choice.of`).
-    """
-    return Path(out) / choice.variant / f"{choice.load_case}-{choice.mesh_law}-{choice.inertias}"
 
 
 @contextmanager

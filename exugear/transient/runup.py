@@ -12,14 +12,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import signal_layout
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.results.folder import run_directory
 from exugear.results.run_file import RunFile
-from exugear.tooth_mesh.law import Angles, MeshData
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.signals import signal_layout
+from exugear.system.tooth_mesh.law import Angles, MeshData
 from exugear.transient.compiled.solver import compile_loop_ahead, unsupported_reason
 from exugear.transient.compiled.step import INTEGRATORS, choose_integration, fastest_motion
 from exugear.transient.extent import SAMPLE_RATE, check_disk, check_duration, too_fine
@@ -28,7 +29,7 @@ from exugear.transient.interruption import interruptible
 from exugear.transient.outcome import LimitError, Progress, ProgressMeter, Run, RunError
 from exugear.transient.plan import RunPlan, plan_run
 from exugear.transient.recorder import Recorder
-from exugear.transient.run_folder import held, run_directory
+from exugear.transient.run_folder import held
 from exugear.transient.start import RunStart, prepare_start
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ def simulate(
     ----------
     choice : variant, mesh law, inertia set and load case
     stiffness : mapping of pair name to (n,) array
-        Mesh stiffness over the cycle, see `exugear.tooth_mesh.laws.stiffness.mesh_stiffness`.
+        Mesh stiffness over the cycle, see `exugear.system.tooth_mesh.laws.stiffness.mesh_stiffness`.
     out : results directory
     bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
     duration : simulated time, s; the load case's by default

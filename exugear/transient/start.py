@@ -7,10 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import DriveLaw, LoadTable
-from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayout, signal_layout
-from exugear.dynamics.statics import accelerating_start
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.summary import (
     doubt_about_bearings,
@@ -22,6 +18,10 @@ from exugear.gearbox.load_cases.torque_series import torque_series
 from exugear.gearbox.parts import LoadCase
 from exugear.results.pieces import Checkpoint, RunPieces
 from exugear.results.run_file import EARLIER_PARTIAL_NAME
+from exugear.system.assembly import Assembly
+from exugear.system.loads import DriveLaw, LoadTable
+from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayout, signal_layout
+from exugear.system.statics import accelerating_start
 from exugear.transient.outcome import RunError
 from exugear.transient.plan import EXPECTATIONS, RunPlan
 from exugear.transient.run_folder import refuse_to_resume

@@ -9,15 +9,14 @@ that end in ``stopped`` a run is stopped; beyond the others it goes on and is ma
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES
 from exugear.gearbox.load_cases.summary import BURSTING_RIM_SPEED, LoadSummary, rim_radii
+from exugear.system.assembly import Assembly
+from exugear.system.signals import BALANCE_TERMS, MESH_TIMES
 from fe_ste.tools.arrays import Floats
 
 ENERGY, RIM, SPEED, DEFLECTION, ACCOUNT = range(5)
@@ -139,7 +138,7 @@ class Judge:
         deflections : (n, meshes) m
         v : (n, size) velocities
         account_times, account : (k,) (k, terms)
-            Lines of the account of energy, J, as in `exugear.dynamics.signals.BALANCE_TERMS`.
+            Lines of the account of energy, J, as in `exugear.system.signals.BALANCE_TERMS`.
         """
         # A run that diverges passes through numbers whose sums overflow: infinite or not a number, they are too large.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -193,7 +192,7 @@ class Judge:
 
         Parameters
         ----------
-        mesh_times : (times, meshes) times of each mesh, s, as in `exugear.dynamics.signals.MESH_TIMES`
+        mesh_times : (times, meshes) times of each mesh, s, as in `exugear.system.signals.MESH_TIMES`
         simulated : time so far, s
         """
         return (
@@ -267,19 +266,6 @@ class Judge:
                 f"table: {', '.join(names)} come beside states of their tables that are not solved, where others stand "
                 f"in, for up to {times.max():.3g} s; exugear ste says which states these are and why"
             )
-
-
-def verdict_of(attributes: Mapping[str, Any]) -> str:
-    """Why the run of a file is not to be trusted, from its attributes; empty if nothing speaks against it.
-
-    Examples
-    --------
-    >>> verdict_of({"trusted": 0, "verdict": "energy: ..."}), verdict_of({"trusted": 1}), verdict_of({})
-    ('energy: ...', '', '')
-    """
-    if int(attributes.get("trusted", 1)):
-        return ""
-    return str(attributes.get("verdict", "no reason is kept"))
 
 
 def _percent(share: float) -> str:

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.eigenmodes.modes import Modes, eigenmodes
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.system.eigenmodes.modes import Modes, eigenmodes
 from exugear.transient.outcome import Run
 from exugear.transient.runup import simulate
 

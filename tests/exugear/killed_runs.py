@@ -22,11 +22,12 @@ import fe_ste.tools.files
 import fe_ste.tools.sealed
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.results.folder import run_directory
 from exugear.results.run_file import load_run
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.transient import recorder, runup
 from exugear.transient.outcome import Run
-from exugear.transient.run_folder import refuse_to_resume, run_directory
+from exugear.transient.run_folder import refuse_to_resume
 
 CALLS = ("open", "fsync", "replace", "unlink", "rmdir", "mkdir")
 DURATION = 0.024

@@ -1,6 +1,6 @@
 """Signals and energies by plain loops over the kernels: what the compiled observer is held against.
 
-`sampled` gives the columns of `exugear.dynamics.signals.SignalLayout`, `energies_of` its energies and powers but the
+`sampled` gives the columns of `exugear.system.signals.SignalLayout`, `energies_of` its energies and powers but the
 loads'. Also of variants and solvers that the compiled observer does not take.
 """
 
@@ -10,7 +10,9 @@ import math
 
 import numpy as np
 
-from exugear.bearings.kernels.rolling import (
+from exugear.gearbox.sections.entries import GROUND
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.kernels.rolling import (
     CAGE_DAMPING,
     CAGE_TORQUE,
     DAMPED_PART,
@@ -18,14 +20,16 @@ from exugear.bearings.kernels.rolling import (
     STORED,
     rolling_forces,
 )
-from exugear.bodies.kernels.elastic import elastic_energies, scratch_for
-from exugear.bodies.kernels.turning import set_turning_motion, turning_energies, turning_memory
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.eigenmodes.modes import overall_row
-from exugear.dynamics.signals import signal_layout
-from exugear.gearbox.sections.entries import GROUND
-from exugear.kernels.inertia import kinetic_energies
-from exugear.tooth_mesh.kernels.meshes import (
+from exugear.system.bodies.kernels.elastic import elastic_energies, scratch_for
+from exugear.system.bodies.kernels.turning import (
+    set_turning_motion,
+    turning_energies,
+    turning_memory,
+)
+from exugear.system.eigenmodes.modes import overall_row
+from exugear.system.kernels.inertia import kinetic_energies
+from exugear.system.signals import signal_layout
+from exugear.system.tooth_mesh.kernels.meshes import (
     DEFLECTION,
     ENERGY,
     FORCE,
@@ -33,8 +37,8 @@ from exugear.tooth_mesh.kernels.meshes import (
     ROW_SIZE,
     STATE_SIZE,
 )
-from exugear.tooth_mesh.kernels.table_law import scratch_memory
-from exugear.tooth_mesh.laws.forms import MEMORY, pass_meshes
+from exugear.system.tooth_mesh.kernels.table_law import scratch_memory
+from exugear.system.tooth_mesh.laws.forms import MEMORY, pass_meshes
 from fe_ste.tools.compilation import compiled
 
 from .plain_connectors import connector_load, connector_motion, memory_for, turn_between

@@ -12,11 +12,11 @@ from typer.testing import CliRunner
 
 from exugear import CaseError, Choice, Gearbox, Modes, Project, Run
 from exugear.cli.app import app
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.eigenmodes.modes import load_modes
 from exugear.gearbox.variant import VariantError
 from exugear.project import default_folder
 from exugear.results.run_file import load_run
+from exugear.system.assemble import assemble
+from exugear.system.eigenmodes.modes import load_modes
 
 from .spur_case import SPUR_CASE
 

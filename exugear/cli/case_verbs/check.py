@@ -16,8 +16,8 @@ from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutO
 from exugear.gearbox.variant import OFFERED, Variant
 
 if TYPE_CHECKING:
-    from exugear.dynamics.assembly import Assembly
     from exugear.gearbox.gearbox import Gearbox
+    from exugear.system.assembly import Assembly
 
 
 BEYOND = 1.05
@@ -46,7 +46,7 @@ def check(
         if rating:
             _rate(case, out, files_below, as_json)
             return
-        from exugear.dynamics.readiness.readiness import lacking, remarks
+        from exugear.system.readiness.readiness import lacking, remarks
 
         gearbox = _read(case, files_below, as_json)
         _tell_scripts(gearbox)
@@ -149,7 +149,7 @@ def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[
 
 def _tell_scripts(gearbox: Gearbox) -> None:
     """Check the solids, and say which of them only a script makes."""
-    from exugear.bodies.of_gearbox.solids import solids_of
+    from exugear.system.bodies.of_gearbox.solids import solids_of
 
     for key, model in solids_of(gearbox):
         if model.mesh.is_script:
@@ -161,7 +161,7 @@ def _tell_scripts(gearbox: Gearbox) -> None:
 
 
 def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
-    from exugear.dynamics.readiness.margins import backlash_range, pair_margins
+    from exugear.system.readiness.margins import backlash_range, pair_margins
 
     spec = gearbox.pairs[name]
     pair = spec.pair
@@ -213,7 +213,7 @@ def _play(ends: list[float]) -> str:
 
 def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up the tooth thickness of gears that have allowances of it."""
-    from exugear.dynamics.readiness.margins import thickness_range
+    from exugear.system.readiness.margins import thickness_range
 
     summaries = []
     for name, section in gearbox.case.gears.items():
@@ -247,9 +247,9 @@ def _bearing_summaries(
 
     With the mesh stiffness of ISO 6336: tables may not be there, and the static loads hardly depend on it.
     """
-    from exugear.bearings.duty import estimate_effects
-    from exugear.dynamics.bearing_duties import bearing_duties, bearing_points
     from exugear.results.bearings_file import duty_summary
+    from exugear.system.bearing_duties import bearing_duties, bearing_points
+    from exugear.system.bearings.duty import estimate_effects
 
     if assembly is None or not any(bearing.catalogue for bearing in gearbox.bearings):
         return [], []

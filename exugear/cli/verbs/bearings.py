@@ -22,8 +22,8 @@ from exugear.cli.options import (
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
-    from exugear.bearings.duty import BearingDuty
-    from exugear.tooth_mesh.mesh_duty import MeshDuty
+    from exugear.system.bearings.duty import BearingDuty
+    from exugear.system.tooth_mesh.mesh_duty import MeshDuty
 
 
 def bearings(

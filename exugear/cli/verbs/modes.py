@@ -22,7 +22,7 @@ from exugear.cli.options import (
 from exugear.cli.tables import refuse_unsolved
 
 if TYPE_CHECKING:
-    from exugear.dynamics.eigenmodes.modes import Modes
+    from exugear.system.eigenmodes.modes import Modes
 
 
 def modes(
@@ -40,8 +40,8 @@ def modes(
     Tables that are missing or do not fit the case are computed first.
     """
     with exit_codes():
-        from exugear.dynamics.statics import beside_unsolved_states
         from exugear.gearbox.choice import Choice
+        from exugear.system.statics import beside_unsolved_states
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         project.begin()

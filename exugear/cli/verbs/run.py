@@ -131,7 +131,7 @@ def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
 
 def _check_extent(project: Project, duration: float | None, folder: Path) -> None:
     """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
-    from exugear.tooth_mesh.laws.registry import LAWS
+    from exugear.system.tooth_mesh.laws.registry import LAWS
     from exugear.transient.extent import check_disk, check_duration, sample_bytes
 
     gearbox = project.gearbox
@@ -223,9 +223,9 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
     import numpy as np
 
-    from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
     from exugear.gearbox.parts import RPM
     from exugear.results.run_file import read_run
+    from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
     from exugear.transient.plan import EXPECTATIONS
 
     data, attributes = read_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from exugear.cli.watched import WatchedProject
     from exugear.gearbox.gearbox import Gearbox
-    from exugear.tooth_mesh.reference_tables import ReferenceRequest
-    from exugear.tooth_mesh.tables import TableRequest
+    from exugear.system.tooth_mesh.reference_tables import ReferenceRequest
+    from exugear.system.tooth_mesh.tables import TableRequest
     from fe_ste.reference.contact_model import Iteration
     from fe_ste.reference.table import NonlinearTable
     from fe_ste.transmission_error.table import MeshTable
@@ -80,7 +80,7 @@ def ste(
         from exugear.gearbox.variant import Variant
         from exugear.project import default_folder
         from exugear.results.folder import time_noted
-        from exugear.tooth_mesh.tables import stored_tables
+        from exugear.system.tooth_mesh.tables import stored_tables
 
         gearbox = read_gearbox(case, files_below)
         if (method or Method(gearbox.ste.method)) is Method.nonlinear:
@@ -106,11 +106,11 @@ def ste(
 
 def _tell_misalignment(project: WatchedProject) -> None:
     """Say how far the gears stand off straight, for which static tables are; nothing where bearings are unknown."""
-    from exugear.bearings.rolling.rows import BearingError
-    from exugear.bearings.supports import unsupported
-    from exugear.dynamics.statics import BalanceError, static_state
-    from exugear.tooth_mesh.placement import MeshError
-    from exugear.tooth_mesh.tables import missing_tables
+    from exugear.system.bearings.rolling.rows import BearingError
+    from exugear.system.bearings.supports import unsupported
+    from exugear.system.statics import BalanceError, static_state
+    from exugear.system.tooth_mesh.placement import MeshError
+    from exugear.system.tooth_mesh.tables import missing_tables
 
     if unsupported(project.gearbox, project.choice.variant) or missing_tables(project.gearbox, project.folder):
         return
@@ -130,7 +130,7 @@ def _tell_misalignment(project: WatchedProject) -> None:
 def _requested_tables(
     project: WatchedProject, names: list[str], positions: int | None, grid: bool
 ) -> list[TableRequest]:
-    from exugear.tooth_mesh.tables import without_table
+    from exugear.system.tooth_mesh.tables import without_table
 
     gearbox = project.gearbox
     requests = project.requested_tables(names, positions, grid=grid)
@@ -157,7 +157,7 @@ def _compute_references(
     """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
     from exugear.project import default_folder
     from exugear.results.folder import keep_case, time_noted
-    from exugear.tooth_mesh.reference_tables import requested_references, summarise_reference
+    from exugear.system.tooth_mesh.reference_tables import requested_references, summarise_reference
 
     folder = out or default_folder(case)
     requests = requested_references(gearbox, folder, names, positions)
@@ -247,7 +247,7 @@ def _tell_tables(
     pictures: list[Path],
     as_json: bool,
 ) -> None:
-    from exugear.tooth_mesh.tables import summarise
+    from exugear.system.tooth_mesh.tables import summarise
 
     summaries = [summarise(request, tables[request.name]) for request in requests]
     if as_json:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from exugear.report.findings.loudness import Ranking, Resonance
     from exugear.steady.peaks import BearingSwing, Peak, Pull
     from exugear.steady.settings import SteadySettings
-    from exugear.tooth_mesh.wandering_load import WanderingLoad
+    from exugear.system.tooth_mesh.wandering_load import WanderingLoad
 
 LEAST_AMPLITUDE = 1e-12
 """Amplitude of the overall transmission error below which a peak is round-off, m."""
@@ -252,7 +252,7 @@ def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
     """Say which meshes would have to pull, where the law does not let their teeth part."""
     from exugear.gearbox.parts import RPM
     from exugear.steady.peaks import pulls
-    from exugear.tooth_mesh.laws.registry import LAWS
+    from exugear.system.tooth_mesh.laws.registry import LAWS
 
     law = str(data.attrs["mesh_law"])
     found: tuple[Pull, ...] = () if LAWS[law].loses_contact else pulls(data)
@@ -289,8 +289,8 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
 
 def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
     """Say where the load moves along the face so far that its moment counts, if the law leaves it out."""
-    from exugear.tooth_mesh.laws.registry import LAWS
-    from exugear.tooth_mesh.wandering_load import wandering_loads
+    from exugear.system.tooth_mesh.laws.registry import LAWS
+    from exugear.system.tooth_mesh.wandering_load import wandering_loads
 
     law = LAWS[project.choice.mesh_law]
     if law.moves_load or not law.needs_tables or project.choice.variant.spins_only:

@@ -113,11 +113,11 @@ def _executor(executor: Executor, workers: int | None, scheduler: str | None) ->
 
 
 def _read(path: Path, files_below: Path | None, scripts: bool) -> Study:
-    from exugear.dynamics.readiness.readiness import check_parts
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.reading import CaseError
     from exugear.studies.design.reading import StudyError
     from exugear.studies.study import Study
+    from exugear.system.readiness.readiness import check_parts
 
     check_files_below(files_below)
     try:
@@ -132,7 +132,7 @@ def _read(path: Path, files_below: Path | None, scripts: bool) -> Study:
 
 
 def _laws() -> list[str]:
-    from exugear.tooth_mesh.laws.registry import LAWS
+    from exugear.system.tooth_mesh.laws.registry import LAWS
 
     return list(LAWS)
 

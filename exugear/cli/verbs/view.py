@@ -24,7 +24,7 @@ from exugear.cli.options import (
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
-    from exugear.dynamics.eigenmodes.modes import Modes
+    from exugear.system.eigenmodes.modes import Modes
 
 
 def view(

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.fingerprint import input_hash
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.sections.loads import RatingSection
 from exugear.results.run_file import read_run
+from exugear.system.assembly import Assembly
+from exugear.system.fingerprint import input_hash
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed
 from fe_ste.tools.files import FileError

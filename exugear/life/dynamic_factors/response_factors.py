@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.fingerprint import input_hash
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.sections.loads import RatingSection
@@ -25,12 +23,13 @@ from exugear.life.dynamic_factors.dynamic_factor import (
     merged,
     stated_factors,
 )
-from exugear.results.folder import modes_path
+from exugear.results.folder import modes_path, run_directory
 from exugear.results.run_file import FINAL_NAME
 from exugear.steady.mean_system.mesh_waves import wave_name
 from exugear.steady.mean_system.rotating_frame import PlanetSet, planet_sets
 from exugear.steady.steady_file import load_response, settings_of
-from exugear.transient.run_folder import run_directory
+from exugear.system.assembly import Assembly
+from exugear.system.fingerprint import input_hash
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.files import FileError
 

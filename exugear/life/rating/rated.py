@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant
@@ -16,6 +15,7 @@ from exugear.life.rating.beside import FlankKey
 from exugear.life.rating.nominal import nominal_loads
 from exugear.life.rating.sheet import RatingSheet, rating_sheet
 from exugear.life.static_balance import StaticBalance, static_balance
+from exugear.system.assembly import Assembly
 
 RATED_AS = Choice(Variant.bushing, "iso6336")
 """Forces and misalignment of the standard: shafts on their bearings, teeth as stiff as ISO 6336-1 has them."""

@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant
 from exugear.results.folder import bodies_folder
-from exugear.tooth_mesh.law import MeshCurve
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.surface import SteSurface
 

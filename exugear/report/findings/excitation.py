@@ -8,7 +8,7 @@ import numpy as np
 
 from exugear.report.findings.context import Context
 from exugear.report.findings.stored import StoredResults
-from exugear.tooth_mesh.laws.iso6336 import iso6336_stiffness
+from exugear.system.tooth_mesh.laws.iso6336 import iso6336_stiffness
 from fe_ste.tools.arrays import Floats
 
 HARMONICS = 6

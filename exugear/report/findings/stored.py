@@ -9,21 +9,20 @@ from typing import Any
 
 import xarray as xr
 
-from exugear.bearings.rolling.rows import BearingError
-from exugear.dynamics.eigenmodes.modes import load_modes
-from exugear.dynamics.fingerprint import input_hash
-from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.variant import VariantError
 from exugear.report.findings.context import Context, choice_of
-from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run
+from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run, verdict_of
 from exugear.results.spectra.orders import order_lines
 from exugear.results.spectra.run_spectra import RunSignals, VariantRun, analysed, run_signals
 from exugear.steady.steady_file import load_response, settings_of
-from exugear.tooth_mesh.placement import MeshError
-from exugear.tooth_mesh.tables import fitting_table
-from exugear.transient.trust import verdict_of
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.eigenmodes.modes import load_modes
+from exugear.system.fingerprint import input_hash
+from exugear.system.statics import BalanceError
+from exugear.system.tooth_mesh.placement import MeshError
+from exugear.system.tooth_mesh.tables import fitting_table
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.table import MeshTable, TableError
 
@@ -39,7 +38,7 @@ class StoredResults:
     tables: Mapping[str, MeshTable]
     """By pair name."""
     modes: Mapping[Choice, xr.Dataset]
-    """As `exugear.dynamics.eigenmodes.modes.Modes.to_dataset` makes them."""
+    """As `exugear.system.eigenmodes.modes.Modes.to_dataset` makes them."""
     runs: Sequence[VariantRun]
     steady: Sequence[xr.Dataset] = ()
     """Steady responses as `exugear.steady.steady_file.load_response` reads them."""

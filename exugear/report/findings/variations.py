@@ -15,18 +15,18 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from exugear.bearings.rolling.rows import BearingError
-from exugear.dynamics.eigenmodes.sensitivity import (
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.named_files import Permissions
+from exugear.report.findings.context import REFERENCE_VARIANT, Context
+from exugear.results.folder import kept_case
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.eigenmodes.sensitivity import (
     Parameter,
     ParameterVariation,
     assumed_parameters,
     vary_parameter,
 )
-from exugear.dynamics.statics import BalanceError
-from exugear.gearbox.choice import Choice
-from exugear.gearbox.named_files import Permissions
-from exugear.report.findings.context import REFERENCE_VARIANT, Context
-from exugear.results.folder import kept_case
+from exugear.system.statics import BalanceError
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.workers import stop_if_asked
 

@@ -9,17 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from exugear.dynamics.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import Context
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
-from exugear.results.run_file import read_run
+from exugear.results.run_file import read_run, verdict_of
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.steady.peaks import bearing_swings, pulls
-from exugear.tooth_mesh.laws.registry import LAWS
-from exugear.transient.trust import verdict_of
+from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
+from exugear.system.tooth_mesh.laws.registry import LAWS
 
 LOUDEST = 10
 """Loudest resonances that checks look at."""

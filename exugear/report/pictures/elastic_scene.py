@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.bodies.reduced_body import Surface
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.animation import gif_path, half_period_images, write_animation
 from exugear.report.pictures.motions import placed
@@ -23,6 +21,8 @@ from exugear.report.pictures.scene import (
 )
 from exugear.report.pictures.shapes import BodyShape
 from exugear.report.pictures.surfaces import gear_surface
+from exugear.system.assembly import Assembly
+from exugear.system.bodies.reduced_body import Surface
 from fe_ste.tools.arrays import Floats, Integers, Pixels
 from fe_ste.tools.drawing import finish_figure
 from fe_ste.tools.rendering import offscreen_plotter, rendered_image, without_margins

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
-from exugear.bodies.reduced_body import ReducedBody
 from exugear.report.pictures.scene import displacement_map, look, mode_figure, quad_mesh
+from exugear.system.bodies.reduced_body import ReducedBody
 from fe_ste.tools.drawing import finish_figure
 from fe_ste.tools.rendering import offscreen_plotter, rendered_image, without_margins
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from exugear.tooth_mesh.tables import TableRequest
+from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.pictures.diagrams import plot_load_share, plot_ste_curves
 from fe_ste.pictures.teeth import contact_quads, draw_tooth_contact, meshed_teeth
 from fe_ste.transmission_error.search import contact_state

@@ -9,11 +9,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from exugear.bearings.duty import BearingDuty
-from exugear.bearings.rolling.rows import BearingError
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.bearing_duties import bearing_duties, mesh_duties
-from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import choice_of, words_of
@@ -23,7 +18,12 @@ from exugear.report.parts.material import Material, Part, only_for
 from exugear.report.web import pieces
 from exugear.report.web.pieces import Cell
 from exugear.steady.peaks import line_name
-from exugear.tooth_mesh.mesh_duty import MeshDuty
+from exugear.system.assembly import Assembly
+from exugear.system.bearing_duties import bearing_duties, mesh_duties
+from exugear.system.bearings.duty import BearingDuty
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.statics import BalanceError
+from exugear.system.tooth_mesh.mesh_duty import MeshDuty
 
 LIFTS = 1.0
 """Swing over the mean force from which a linear bearing is said to have to lift off."""

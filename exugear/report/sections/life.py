@@ -11,8 +11,6 @@ from typing import Any
 
 import xarray as xr
 
-from exugear.bearings.rolling.rows import BearingError
-from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.variant import VariantError
 from exugear.life.life_diagrams import draw_life
@@ -25,7 +23,9 @@ from exugear.report.findings.words import figure_text
 from exugear.report.parts.material import Material, Part
 from exugear.report.web import pieces
 from exugear.report.web.pieces import Cell
-from exugear.tooth_mesh.placement import MeshError
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.statics import BalanceError
+from exugear.system.tooth_mesh.placement import MeshError
 
 WORDS = (
     "Loads of the gearbox file over its life, through the balance at rest of the variant and the contact of its teeth "

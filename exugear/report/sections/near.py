@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 
 import xarray as xr
 
-from exugear.dynamics.eigenmodes.modes import modes_of
-from exugear.dynamics.eigenmodes.sensitivity import (
-    FrequencyMatch,
-    assumed_parameters,
-    frequency_matches,
-)
 from exugear.gearbox.choice import Choice
 from exugear.report.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, words_of
 from exugear.report.parts.material import Material, Part
 from exugear.report.web import pieces
 from exugear.results.spectra.mode_report import NEAR, ModeReport, nearest_mode, report_mode
+from exugear.system.eigenmodes.modes import modes_of
+from exugear.system.eigenmodes.sensitivity import (
+    FrequencyMatch,
+    assumed_parameters,
+    frequency_matches,
+)
 
 
 @dataclass(frozen=True)

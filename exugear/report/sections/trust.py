@@ -18,8 +18,8 @@ from exugear.report.parts.material import Material, Part
 from exugear.report.web import pieces
 from exugear.report.web.libraries import libraries, licences
 from exugear.results.folder import times_spent
+from exugear.results.run_file import verdict_of
 from exugear.results.spectra.run_spectra import VariantRun
-from exugear.transient.trust import verdict_of
 
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
 """Packages whose versions a report names."""
@@ -29,7 +29,7 @@ MESH_TIME_LABELS = (
     "longest time outside a table",
     "longest time beside unsolved states of a table",
 )
-"""Labels of `exugear.dynamics.signals.MESH_TIMES`, in their order."""
+"""Labels of `exugear.system.signals.MESH_TIMES`, in their order."""
 GLOSSARY = {
     "overall transmission error": "Angle of the output less the ratio times the angle of the input, as a length on the "
     "base circle of the output gear.",

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.motions import displacement_of, motions_of
 from exugear.report.pictures.scene import body_colours
 from exugear.report.pictures.shapes import BodyShape, bodies_of
 from exugear.report.pictures.surfaces import Surface, gear_surface
+from exugear.system.assembly import Assembly
 from fe_ste.tools.arrays import Floats
 
 SAME_SHAPE = 1e-6

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from exugear.dynamics.assembly import Assembly
 from exugear.report.web import pieces
 from exugear.report.web.arrays import ArrayStore, rounded
 from exugear.report.web.document import whole_page
 from exugear.report.web.pieces import Cell
 from exugear.report.web.stage import stage_data
 from exugear.report.web.stage_figure import stage_figure
+from exugear.system.assembly import Assembly
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import write_file
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
 from exugear.report.pictures.scene import DISPLACEMENT_COLOURS
 from exugear.report.web.arrays import ArrayStore, rounded, rounded_list
 from exugear.report.web.drawn_bodies import DrawnBody, drawn_bodies, drawn_mode, turn_between
+from exugear.system.assembly import Assembly
 from fe_ste.tools.arrays import Floats
 
 LARGEST = 0.035

@@ -142,7 +142,7 @@ class VariantRun(Displayed):
     spectra: Waterfall
     picks: tuple[Pick, ...]
     modes: xr.Dataset | None
-    """As `exugear.dynamics.eigenmodes.modes.Modes.to_dataset` makes it."""
+    """As `exugear.system.eigenmodes.modes.Modes.to_dataset` makes it."""
 
     def _line(self) -> str:
         return f" {shorten(f'{self.variant}, {self.conditions}', 150)}, {len(self.picks)} peaks"

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.bodies.reduced_body import TILT_X, TILT_Y, UX, UY
-from exugear.dynamics.eigenmodes.energy_shares import BODY_MOTIONS, kinetic_shares, mode_name
-from exugear.dynamics.linearised import linearise
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.rotating_frame import PlanetSet
+from exugear.system.bodies.reduced_body import TILT_X, TILT_Y, UX, UY
+from exugear.system.eigenmodes.energy_shares import BODY_MOTIONS, kinetic_shares, mode_name
+from exugear.system.linearised import linearise
 from fe_ste.tools.arrays import Complexes, Floats
 
 KINDS = ("rotational", "translational", "planet")

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 
-from exugear.dynamics.linearised import RIGID_BODY_LIMIT
 from exugear.steady.mean_system.mean_system import MeanSystem
+from exugear.system.linearised import RIGID_BODY_LIMIT
 from fe_ste.tools.arrays import Complexes, Floats
 
 

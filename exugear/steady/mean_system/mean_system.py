@@ -17,10 +17,6 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from exugear.bearings.equal_planets import planet_supports, with_equal_planets
-from exugear.bearings.support_laws import load_stands_still
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.statics import BalanceError, static_state
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
 from exugear.steady.harmonics.side_by_side import Elimination, elimination, solve_side_by_side
@@ -30,6 +26,10 @@ from exugear.steady.mean_system.rotating_frame import (
     SteadyError,
     planet_sets,
 )
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.equal_planets import planet_supports, with_equal_planets
+from exugear.system.bearings.support_laws import load_stands_still
+from exugear.system.statics import BalanceError, static_state
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import Displayed
 

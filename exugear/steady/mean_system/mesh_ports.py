@@ -4,7 +4,8 @@ A law along a row reads its deflection and the position in the mesh cycle, and h
 misalignment with is in the mean system. Where its load moves along the face it reads the misalignment, too, and has a
 moment along that. The law `table` reads the
 approach of both flanks, the centre distance, the misalignment of both flanks and the position, and pushes along all
-but the last (`exugear.tooth_mesh.laws.table`). Kernels of `fe_ste.tools.compilation` read the numbers of its rows.
+but the last (`exugear.system.tooth_mesh.laws.table`). Kernels of `fe_ste.tools.compilation` read the numbers of its
+rows.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.steady.mean_system.mesh_waves import MeshWaves
-from exugear.tooth_mesh.kernels.meshes import TILT_LEVER, TILT_REST, MeshArrays
-from exugear.tooth_mesh.kernels.table_law import (
+from exugear.system.tooth_mesh.kernels.meshes import TILT_LEVER, TILT_REST, MeshArrays
+from exugear.system.tooth_mesh.kernels.table_law import (
     NOMINAL_DEFLECTION,
     NOMINAL_DISTANCE,
     NOMINAL_MISALIGNMENT,
@@ -71,7 +72,7 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
 
 
 def _row_rows(meshes: MeshArrays, wander: bool) -> tuple[list[Floats], list[Floats]]:
-    """Rows that a law along a row reads (`exugear.tooth_mesh.contact_state`), and their values at zero coordinates.
+    """Rows that a law along a row reads (`system.tooth_mesh.contact_state`), and their values at zero coordinates.
 
     They are its deflection with the mean lever of the load and, where loads wander along the face, the misalignment
     against that of the contact's state; zeros of a mesh whose load stays.

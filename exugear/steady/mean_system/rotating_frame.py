@@ -19,12 +19,12 @@ from typing import TypeAlias
 
 import numpy as np
 
-from exugear.bearings.equal_planets import FEWEST, equally_spaced, planet_families
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.parts import Body
-from exugear.kernels.coordinates import TILT
-from exugear.tooth_mesh.kernels.meshes import MeshArrays
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.equal_planets import FEWEST, equally_spaced, planet_families
+from exugear.system.kernels.coordinates import TILT
+from exugear.system.tooth_mesh.kernels.meshes import MeshArrays
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats, Integers
 
 Jet: TypeAlias = tuple[Floats, Floats, Floats]

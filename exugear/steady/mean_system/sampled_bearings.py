@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.bearings.kernels.rolling import (
+from exugear.system.bearings.kernels.rolling import (
     ELASTIC_PART,
     RollingArrays,
     rolling_memory,

@@ -1,8 +1,8 @@
 """Mesh laws on many samples at once: forces and their slopes by what the laws read, in compiled loops.
 
 A law along a row reads deflection and position, and the misalignment between them where its load moves along the face,
-with a moment along that (`exugear.tooth_mesh.contact_state`); the law `table` both flanks, the centre distance, both
-misalignments and the position (`exugear.steady.mean_system.mesh_ports`). Loops are compiled by
+with a moment along that (`exugear.system.tooth_mesh.contact_state`); the law `table` both flanks, the centre distance,
+both misalignments and the position (`exugear.steady.mean_system.mesh_ports`). Loops are compiled by
 `fe_ste.tools.compilation`.
 """
 
@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.steady.mean_system.mesh_ports import BACK, BACK_TILT, CENTRE, FRONT, POSITION, TILT
-from exugear.tooth_mesh.kernels.meshes import MeshArrays
-from exugear.tooth_mesh.kernels.table_law import (
+from exugear.system.tooth_mesh.kernels.meshes import MeshArrays
+from exugear.system.tooth_mesh.kernels.table_law import (
     BY_DISTANCE,
     BY_MISALIGNMENT,
     DAMPING_SIZE,
@@ -30,7 +30,7 @@ from exugear.tooth_mesh.kernels.table_law import (
     surface_law,
     surface_tangent,
 )
-from exugear.tooth_mesh.laws.line_of_action import STRAIGHT
+from exugear.system.tooth_mesh.laws.line_of_action import STRAIGHT
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import compiled
 
@@ -94,7 +94,7 @@ def sample_line(stiffness: Floats, readings: Floats) -> LawSamples:
 
 
 def sample_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
-    """Sample a curve of load over deflection (`exugear.tooth_mesh.laws.line_of_action`), as `sample_line`.
+    """Sample a curve of load over deflection (`exugear.system.tooth_mesh.laws.line_of_action`), as `sample_line`.
 
     Parameters
     ----------

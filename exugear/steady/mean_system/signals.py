@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.eigenmodes.modes import overall_row
-from exugear.kernels.coordinates import TILT
 from exugear.steady.mean_system.mean_system import MeanSystem, place_step
 from exugear.steady.mean_system.mesh_waves import MeshWaves, wave_name
 from exugear.steady.mean_system.rotating_frame import PlanetSet
+from exugear.system.assembly import Assembly
+from exugear.system.eigenmodes.modes import overall_row
+from exugear.system.kernels.coordinates import TILT
 from fe_ste.tools.arrays import Complexes, Floats
 
 AXES = ("x", "y", "z")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.kernels.coordinates import TILT
 from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame
+from exugear.system.kernels.coordinates import TILT
 from fe_ste.tools.arrays import Floats, Integers
 
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.dynamics.loads import DriveLaw, LoadTable
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.settling.frame_motion import frame_coordinates
+from exugear.system.loads import DriveLaw, LoadTable
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
 from fe_ste.tools.arrays import Complexes, Floats
 

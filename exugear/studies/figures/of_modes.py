@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.dynamics.eigenmodes.modes import FREE_ROTATION, Modes
 from exugear.studies.figures.point_results import PointError, PointResults
+from exugear.system.eigenmodes.modes import FREE_ROTATION, Modes
 
 
 def frequencies(results: PointResults, *, count: int = 12) -> dict[str, float]:

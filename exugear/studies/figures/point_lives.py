@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.life.dynamic_factors.response_factors import factors, source_hash
@@ -19,8 +18,9 @@ from exugear.life.verdict import UNTRUSTED_REACH, check_reach
 from exugear.steady.settings import SteadySettings, usual_speeds
 from exugear.steady.steady_file import steady_path, stored_or_computed
 from exugear.studies.figures.shared import Shared
-from exugear.tooth_mesh.laws.registry import LAWS
-from exugear.tooth_mesh.tables import TableRequest, requested_tables
+from exugear.system.assembly import Assembly
+from exugear.system.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.tables import TableRequest, requested_tables
 from fe_ste.tools.stores.store import Store
 
 if TYPE_CHECKING:

@@ -9,17 +9,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.eigenmodes.modes import Modes, modes_of
-from exugear.dynamics.statics import StaticState, static_state
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.studies.figures.shared import Shared
-from exugear.tooth_mesh.law import MeshData
-from exugear.tooth_mesh.laws.registry import LAWS, law_of
-from exugear.tooth_mesh.tables import wanted_table
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.eigenmodes.modes import Modes, modes_of
+from exugear.system.statics import StaticState, static_state
+from exugear.system.tooth_mesh.law import MeshData
+from exugear.system.tooth_mesh.laws.registry import LAWS, law_of
+from exugear.system.tooth_mesh.tables import wanted_table
 from fe_ste.tools.workers import stop_if_asked
 from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 
@@ -141,7 +141,8 @@ class PointResults:
 
     def _simulated(self, choice: Choice) -> Path:
         """File of a run; doubts about it are kept."""
-        from exugear.transient.run_folder import refuse_to_resume, run_directory
+        from exugear.results.folder import run_directory
+        from exugear.transient.run_folder import refuse_to_resume
         from exugear.transient.runup import simulate
 
         resume = not refuse_to_resume(run_directory(self.folder, choice))

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from exugear.dynamics.signals import SIGNALS
 from exugear.studies.figures import of_life, of_modes, of_runs, of_statics, of_steady, of_tables
 from exugear.studies.figures.figure import Figure, FigureError, Values
 from exugear.studies.figures.of_runs import OVERALL
 from exugear.studies.figures.point_results import PointResults
+from exugear.system.signals import SIGNALS
 
 AS_SIGNAL = "as the signal"
 """Unit of figures that an option `signal` names."""

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import filelock
 
-from exugear.bodies.elastic_body import ElasticBody
 from exugear.gearbox.gearbox import Gearbox
-from exugear.tooth_mesh.table_remarks import doubts_about_table
-from exugear.tooth_mesh.tables import TableRequest, requested_tables, wanted_table
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.tooth_mesh.table_remarks import doubts_about_table
+from exugear.system.tooth_mesh.tables import TableRequest, requested_tables, wanted_table
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
@@ -103,7 +103,7 @@ class Shared:
 
     def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:
         """Reduced elastic bodies; likewise."""
-        from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies  # loads finite elements
+        from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
 
         own = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
         key = hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from exugear.bearings.kernels.rolling import RollingArrays
-from exugear.bodies.kernels.elastic import ElasticMotion
-from exugear.bodies.kernels.travelling import TravellingArrays
-from exugear.bodies.kernels.turning import TurningArrays
-from exugear.kernels.coordinates import PADDED
-from exugear.tooth_mesh.kernels.fast_meshes import Meshes, MeshMemory
+from exugear.system.bearings.kernels.rolling import RollingArrays
+from exugear.system.bodies.kernels.elastic import ElasticMotion
+from exugear.system.bodies.kernels.travelling import TravellingArrays
+from exugear.system.bodies.kernels.turning import TurningArrays
+from exugear.system.kernels.coordinates import PADDED
+from exugear.system.tooth_mesh.kernels.fast_meshes import Meshes, MeshMemory
 from fe_ste.tools.arrays import Floats, Integers
 
 STIFFNESS, DAMPING, ANGLE, SPEED, HALF_ACCELERATION = range(5)
@@ -199,13 +199,13 @@ class Work(NamedTuple):
     motion: Floats
     """(24,) true rate of change of a connector's strain, elastic force and damping force, padded."""
     rolling: Floats
-    """(m,) see `exugear.bearings.kernels.rolling.rolling_forces`."""
+    """(m,) see `exugear.system.bearings.kernels.rolling.rolling_forces`."""
     mesh: MeshMemory
     """Memory of the meshes' laws."""
     series: Integers
     """(s,) line of each torque series that was used last."""
     shares: Floats
-    """Memory of the travelling seats, see `exugear.bodies.kernels.travelling`."""
+    """Memory of the travelling seats, see `exugear.system.bodies.kernels.travelling`."""
     damped: Floats
     """(2,) power that elastic bodies damp, and those in turning frames, at the last evaluation that asked for it:
     (W)."""

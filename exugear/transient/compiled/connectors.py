@@ -7,8 +7,13 @@ from __future__ import annotations
 
 import math
 
-from exugear.bearings.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, RollingArrays, rolling_force
-from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
+from exugear.system.bearings.kernels.rolling import (
+    CAGE_TORQUE,
+    ELASTIC_PART,
+    RollingArrays,
+    rolling_force,
+)
+from exugear.system.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
 from exugear.transient.compiled.arrays import (
     DAMPED,
     FIRST_ARM,

@@ -1,18 +1,18 @@
 """Equations of motion as one compiled piece that allocates nothing.
 
-The laws are those of `exugear.kernels`, which the tests hold them against; here they are arranged for speed: every
-sine is taken once per evaluation, constant entries that are zero are left out, bearing forces are collected per body
-before they are turned into generalized ones. Bodies without a coordinate point to one that stays zero, so that
-the loops need no exceptions.
+The laws are those of `exugear.system.kernels`, which the tests hold them against; here they are arranged for speed:
+every sine is taken once per evaluation, constant entries that are zero are left out, bearing forces are collected per
+body before they are turned into generalized ones. Bodies without a coordinate point to one that stays zero, so that the
+loops need no exceptions.
 """
 
 from __future__ import annotations
 
-from exugear.bodies.kernels.elastic import set_elastic_motion
-from exugear.bodies.kernels.travelling import place_travelling, share_travelling_forces
-from exugear.bodies.kernels.turning import set_turning_motion
-from exugear.kernels.coordinates import SPIN, TILT
-from exugear.tooth_mesh.laws.forms import add_meshes
+from exugear.system.bodies.kernels.elastic import set_elastic_motion
+from exugear.system.bodies.kernels.travelling import place_travelling, share_travelling_forces
+from exugear.system.bodies.kernels.turning import set_turning_motion
+from exugear.system.kernels.coordinates import SPIN, TILT
+from exugear.system.tooth_mesh.laws.forms import add_meshes
 from exugear.transient.compiled.arrays import (
     ANGLE,
     COS_B,
@@ -72,7 +72,7 @@ def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f:
 
 @kernel
 def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
-    """Solve the bodies' equations for `work.rate`; formula in `exugear.kernels.inertia.accelerations`."""
+    """Solve the bodies' equations for `work.rate`; formula in `exugear.system.kernels.inertia.accelerations`."""
     f = work.force
     out = work.rate
     for n in range(bodies.mass.size):

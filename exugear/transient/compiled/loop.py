@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 
-from exugear.tooth_mesh.kernels.fast_meshes import LAST_DEFLECTION, LAST_FORCE, Meshes
-from exugear.tooth_mesh.kernels.meshes import FRAME, SPIN_1, SPIN_2
+from exugear.system.tooth_mesh.kernels.fast_meshes import LAST_DEFLECTION, LAST_FORCE, Meshes
+from exugear.system.tooth_mesh.kernels.meshes import FRAME, SPIN_1, SPIN_2
 from exugear.transient.compiled.arrays import Equations, Work
 from exugear.transient.compiled.equations import evaluate
 from exugear.transient.compiled.methods import (

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.kernels.products import filled_up
+from exugear.system.kernels.products import filled_up
 from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 PREDICT_VELOCITY, PREDICT_POSITION, EXTRAPOLATE = range(3)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.eigenmodes.modes import overall_row
-from exugear.dynamics.loads import LoadTable
-from exugear.dynamics.signals import ENERGIES, SignalLayout, signal_layout
+from exugear.system.assembly import Assembly
+from exugear.system.eigenmodes.modes import overall_row
+from exugear.system.loads import LoadTable
+from exugear.system.signals import ENERGIES, SignalLayout, signal_layout
 from exugear.transient.compiled.solver import CompiledSystem
 from fe_ste.tools.arrays import Floats
 
@@ -43,8 +43,8 @@ class Observer:
         Returns
         -------
         signals : (samples, columns) see `layout`
-        energies : (samples, 2) `exugear.dynamics.signals.ENERGIES`, J
-        powers : (samples, 5) `exugear.dynamics.signals.POWERS`, W
+        energies : (samples, 2) `exugear.system.signals.ENERGIES`, J
+        powers : (samples, 5) `exugear.system.signals.POWERS`, W
         """
         signals, energies = self._system.observe(time, q, v)
         self.complete(q, v, signals)

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from exugear.bearings.kernels.rolling import rolling_memory
-from exugear.bodies.kernels.elastic import elastic_motion, scratch_for
-from exugear.bodies.kernels.travelling import travelling_memory
-from exugear.bodies.kernels.turning import turning_memory
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import LoadTable
 from exugear.gearbox.sections.entries import GROUND
-from exugear.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
-from exugear.kernels.products import filled_up
-from exugear.tooth_mesh.kernels.fast_meshes import (
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.kernels.rolling import rolling_memory
+from exugear.system.bodies.kernels.elastic import elastic_motion, scratch_for
+from exugear.system.bodies.kernels.travelling import travelling_memory
+from exugear.system.bodies.kernels.turning import turning_memory
+from exugear.system.kernels.coordinates import BODY_SIZE, PADDED, PADDED_TILT, SPIN, TILT
+from exugear.system.kernels.products import filled_up
+from exugear.system.loads import LoadTable
+from exugear.system.tooth_mesh.kernels.fast_meshes import (
     PADDED_FRAME,
     STATES_SIZE,
     Meshes,
     MeshMemory,
     padded_rows,
 )
-from exugear.tooth_mesh.kernels.meshes import (
+from exugear.system.tooth_mesh.kernels.meshes import (
     FRAME,
     ROW_SIZE,
     SPIN_1,
@@ -32,14 +32,14 @@ from exugear.tooth_mesh.kernels.meshes import (
     TILT_STIFFNESS,
     MeshArrays,
 )
-from exugear.tooth_mesh.kernels.table_law import (
+from exugear.system.tooth_mesh.kernels.table_law import (
     DAMPING_SIZE,
     NOMINAL_DEFLECTION,
     NOMINAL_MISALIGNMENT,
     scratch_memory,
 )
-from exugear.tooth_mesh.laws.registry import LAWS
-from exugear.tooth_mesh.laws.table import TABLE_FORM
+from exugear.system.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.laws.table import TABLE_FORM
 from exugear.transient.compiled.arrays import (
     COS_A,
     COS_B,

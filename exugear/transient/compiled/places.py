@@ -1,14 +1,22 @@
 """Where bodies and seats stand in the compiled solver: padded coordinates, sines, axes; and what acts on them there.
 
-Each place has eight numbers x y z 0 a b spin 0 (see `exugear.kernels.coordinates`) and their rates behind, two vectors
-of four each, as the processor takes them; forces likewise. Machine code is kept by `fe_ste.tools.compilation`.
+Each place has eight numbers x y z 0 a b spin 0 (see `exugear.system.kernels.coordinates`) and their rates behind, two
+vectors of four each, as the processor takes them; forces likewise. Machine code is kept by `fe_ste.tools.compilation`.
 """
 
 from __future__ import annotations
 
 import math
 
-from exugear.kernels.coordinates import COSINE, PADDED, PADDED_SPIN, PADDED_TILT, SINE, SPIN, TILT
+from exugear.system.kernels.coordinates import (
+    COSINE,
+    PADDED,
+    PADDED_SPIN,
+    PADDED_TILT,
+    SINE,
+    SPIN,
+    TILT,
+)
 from exugear.transient.compiled.arrays import (
     COS_A,
     COS_B,

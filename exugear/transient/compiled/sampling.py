@@ -1,6 +1,6 @@
 """Signals, energies and powers of the state that was evaluated last, compiled.
 
-What there is to observe stands in `exugear.dynamics.signals.SIGNALS`, with the kernel here that fills it. Where a
+What there is to observe stands in `exugear.system.signals.SIGNALS`, with the kernel here that fills it. Where a
 signal stands among the columns of a sample is handed over as `Columns`.
 """
 
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from exugear.bearings.kernels.rolling import (
+from exugear.system.bearings.kernels.rolling import (
     CAGE_DAMPING,
     DAMPED_PART,
     ELASTIC_PART,
@@ -16,11 +16,20 @@ from exugear.bearings.kernels.rolling import (
     RollingArrays,
     rolling_forces,
 )
-from exugear.bodies.kernels.elastic import motion_energies
-from exugear.bodies.kernels.turning import turning_energies, turning_weight_power
-from exugear.dynamics.signals import SignalLayout
-from exugear.kernels.coordinates import AXIAL, BODY_SIZE, COSINE, PADDED, PADDED_TILT, SINE, SPIN, TILT
-from exugear.tooth_mesh.kernels.fast_meshes import (
+from exugear.system.bodies.kernels.elastic import motion_energies
+from exugear.system.bodies.kernels.turning import turning_energies, turning_weight_power
+from exugear.system.kernels.coordinates import (
+    AXIAL,
+    BODY_SIZE,
+    COSINE,
+    PADDED,
+    PADDED_TILT,
+    SINE,
+    SPIN,
+    TILT,
+)
+from exugear.system.signals import SignalLayout
+from exugear.system.tooth_mesh.kernels.fast_meshes import (
     DISSIPATED,
     ELASTIC,
     KINETIC,
@@ -39,8 +48,8 @@ from exugear.tooth_mesh.kernels.fast_meshes import (
     OF_VARYING_STIFFNESS,
     Meshes,
 )
-from exugear.tooth_mesh.kernels.table_law import TableArrays
-from exugear.tooth_mesh.laws.table import TABLE_FORM
+from exugear.system.tooth_mesh.kernels.table_law import TableArrays
+from exugear.system.tooth_mesh.laws.table import TABLE_FORM
 from exugear.transient.compiled.arrays import (
     COS_B,
     DAMPED,
@@ -103,7 +112,7 @@ def observe_meshes(meshes: Meshes, work: Work, columns: Columns, sample: Floats,
 
 @kernel
 def true_rate(strain: Floats, rate: Floats, first_body: Floats, out: Floats) -> None:
-    """Fill the derivative of a connector's strain: see `exugear.bearings.kernels.connectors.connector_motion`."""
+    """Fill the derivative of a connector's strain: see `system.bearings.kernels.connectors.connector_motion`."""
     d = strain
     w = rate
     x = first_body[0] * first_body[W_X] + first_body[3] * first_body[W_Y] + first_body[6] * first_body[W_Z]

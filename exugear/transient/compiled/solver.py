@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import LoadTable
-from exugear.dynamics.signals import ENERGIES, POWERS, signal_layout
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.assembly import Assembly
+from exugear.system.loads import LoadTable
+from exugear.system.signals import ENERGIES, POWERS, signal_layout
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.transient.compiled.equations import evaluate
 from exugear.transient.compiled.loop import advance
 from exugear.transient.compiled.methods import RUNGE_KUTTA, Method, Past

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.eigenmodes.modes import coordinate_labels
-from exugear.dynamics.linearised import Linearised, linearise
+from exugear.system.assembly import Assembly
+from exugear.system.eigenmodes.modes import coordinate_labels
+from exugear.system.linearised import Linearised, linearise
 from exugear.transient.compiled.methods import (
     ORDERS,
     RUNGE_KUTTA,
@@ -112,7 +112,7 @@ def fastest_motion(assembly: Assembly) -> str:
 
     Examples
     --------
-    >>> from exugear.dynamics.assemble import assemble
+    >>> from exugear.system.assemble import assemble
     >>> from exugear.gearbox.choice import Choice
     >>> from exugear.gearbox.gearbox import Gearbox
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
@@ -234,7 +234,7 @@ def choose_integration(
 
     Examples
     --------
-    >>> from exugear.dynamics.assemble import assemble
+    >>> from exugear.system.assemble import assemble
     >>> from exugear.gearbox.choice import Choice
     >>> from exugear.gearbox.gearbox import Gearbox
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from exugear.bodies.reduced_body import ReducedBody
-from exugear.bodies.turning_frame import TurningBody
 from exugear.gearbox.parts import Body, node_position, seat_key
+from exugear.system.bodies.reduced_body import ReducedBody
+from exugear.system.bodies.turning_frame import TurningBody
 from exugear.transient.exudyn_model.floating_bodies import FloatingBodies
 from exugear.transient.exudyn_model.library import items
 from exugear.transient.exudyn_model.parts import Parts

@@ -11,15 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from exugear.bearings.kernels.connectors import ConnectorArrays
-from exugear.bearings.kernels.rolling import (
+from exugear.gearbox.parts import Joint
+from exugear.system.bearings.kernels.connectors import ConnectorArrays
+from exugear.system.bearings.kernels.rolling import (
     CAGE_TORQUE,
     ELASTIC_PART,
     rolling_force,
     rolling_memory,
 )
-from exugear.gearbox.parts import Joint
-from exugear.kernels.coordinates import BODY_SIZE, SPIN
+from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.transient.exudyn_model.library import items
 from exugear.transient.exudyn_model.parts import Parts
 from fe_ste.tools.arrays import Floats

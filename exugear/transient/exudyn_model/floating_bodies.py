@@ -10,12 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from exugear.bearings.kernels.connectors import add_connector_forces
-from exugear.bodies.floating_coordinates import FRAME_COORDINATES, MODAL, FloatingCoordinates, FloatingMotion
-from exugear.dynamics.assembly import Assembly
-from exugear.kernels.coordinates import SPIN
-from exugear.kernels.springs import SpringArrays, add_spring_forces
-from exugear.tooth_mesh.kernels.meshes import MeshArrays
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.kernels.connectors import add_connector_forces
+from exugear.system.bodies.floating_coordinates import (
+    FRAME_COORDINATES,
+    MODAL,
+    FloatingCoordinates,
+    FloatingMotion,
+)
+from exugear.system.kernels.coordinates import SPIN
+from exugear.system.kernels.springs import SpringArrays, add_spring_forces
+from exugear.system.tooth_mesh.kernels.meshes import MeshArrays
 from exugear.transient.exudyn_model.floating_object import add_floating_body
 from exugear.transient.exudyn_model.library import items
 from fe_ste.tools.arrays import Floats

@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from exugear.bodies.floating_body import FloatingBody
-from exugear.bodies.rotations import skew
+from exugear.system.bodies.floating_body import FloatingBody
+from exugear.system.bodies.rotations import skew
 from exugear.transient.exudyn_model.library import elements, exudyn, items
 
 Rotation = Literal["euler_parameters", "tait_bryan"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from exugear.dynamics.loads import Drive, Loading
+from exugear.system.loads import Drive, Loading
 from exugear.transient.exudyn_model.library import items
 from exugear.transient.exudyn_model.parts import Parts
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.tooth_mesh.kernels.meshes import ROW_SIZE, MeshArrays
-from exugear.tooth_mesh.laws.forms import add_mesh_forces
+from exugear.system.assembly import Assembly
+from exugear.system.tooth_mesh.kernels.meshes import ROW_SIZE, MeshArrays
+from exugear.system.tooth_mesh.laws.forms import add_mesh_forces
 from exugear.transient.exudyn_model.library import exudyn, items
 from exugear.transient.exudyn_model.parts import Parts
 from fe_ste.tools.arrays import Floats

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import Loading
-from exugear.kernels.springs import SpringArrays
-from exugear.tooth_mesh.kernels.meshes import MeshArrays
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.assembly import Assembly
+from exugear.system.kernels.springs import SpringArrays
+from exugear.system.loads import Loading
+from exugear.system.tooth_mesh.kernels.meshes import MeshArrays
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.transient.exudyn_model.library import items
 from exugear.transient.exudyn_model.meshes import mesh_jacobian
 from fe_ste.tools.arrays import Floats

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.parts import node_position, seat_key
+from exugear.system.assembly import Assembly
 from exugear.transient.exudyn_model.floating_bodies import FloatingBodies
 from exugear.transient.exudyn_model.library import exudyn, items
 from fe_ste.tools.arrays import Floats

@@ -19,10 +19,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import Loading
 from exugear.gearbox.variant import VariantError
-from exugear.tooth_mesh.kernels.meshes import MeshArrays
+from exugear.system.assembly import Assembly
+from exugear.system.loads import Loading
+from exugear.system.tooth_mesh.kernels.meshes import MeshArrays
 from exugear.transient.exudyn_model.bodies import add_bodies
 from exugear.transient.exudyn_model.connections import add_couplings, add_joint, add_supports
 from exugear.transient.exudyn_model.library import SolverFailure, exudyn

@@ -23,7 +23,7 @@ from exugear.cli import case_verbs, verbs
 from exugear.cli.app import OBJECTS_OF_A_START, VERBS, app, garbage_seldom_looked_for
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
 from exugear.gearbox.gearbox import Gearbox
-from exugear.tooth_mesh.tables import requested_tables
+from exugear.system.tooth_mesh.tables import requested_tables
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.elasticity.sectors import ContactMesh
@@ -78,7 +78,7 @@ def coarse_meshes():
         contact=ContactSettings(slices=8),
     )
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.tooth_mesh.tables.TableInput", coarse)
+        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", coarse)
         yield
 
 
@@ -272,7 +272,7 @@ def test_ste_with_bad_options_writes_nothing(spur_case, tmp_path, options, said)
 def test_the_nonlinear_method_writes_a_table_of_its_own_and_goes_on_from_it(spur_case, tmp_path, monkeypatch):
     mesh = ContactMesh(layers=3, contact_elements=2, growth=2.0, thickness=3, fillet=1, root=1, rim=3, far_flank=4)
     coarse = functools.partial(NonlinearInput, settings=NonlinearSettings(teeth=3, mesh=mesh))
-    monkeypatch.setattr("exugear.tooth_mesh.reference_tables.NonlinearInput", coarse)
+    monkeypatch.setattr("exugear.system.tooth_mesh.reference_tables.NonlinearInput", coarse)
     command = ("ste", spur_case, "--method", "nonlinear", "--positions", 1, "--out", tmp_path)
     outcome = exugear(*command, "--json")
     assert outcome.exit_code == 0, outcome.stderr

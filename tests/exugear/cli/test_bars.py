@@ -6,9 +6,9 @@ import pytest
 
 from exugear.cli.bars import Bars, files_read
 from exugear.cli.errors import BadInputError, FailedError, exit_codes, model_errors
-from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.reading import CaseError
-from exugear.tooth_mesh.placement import MeshError
+from exugear.system.statics import BalanceError
+from exugear.system.tooth_mesh.placement import MeshError
 
 
 def test_work_inside_of_other_work_adds_a_row_to_its_display(capsys):

@@ -11,10 +11,10 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.dynamics.eigenmodes.modes import load_modes
-from exugear.dynamics.signals import energy_residual
-from exugear.dynamics.statics import BalanceError
 from exugear.results.run_file import load_run
+from exugear.system.eigenmodes.modes import load_modes
+from exugear.system.signals import energy_residual
+from exugear.system.statics import BalanceError
 
 from ..bearing_case import BEARING_CASE, NAMES
 

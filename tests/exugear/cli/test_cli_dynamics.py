@@ -18,10 +18,10 @@ from exugear.cli.verbs.run import Solver
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant, VariantError
-from exugear.tooth_mesh.laws.registry import MESH_LAWS
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.tooth_mesh.placement import MeshError
-from exugear.tooth_mesh.tables import missing_tables, requested_tables
+from exugear.system.tooth_mesh.laws.registry import MESH_LAWS
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.placement import MeshError
+from exugear.system.tooth_mesh.tables import missing_tables, requested_tables
 from exugear.transient.outcome import RunError
 from exugear.transient.runup import SOLVERS
 from exugear.transient.runup import simulate as real_simulate
@@ -33,7 +33,7 @@ from ..spur_case import COARSE_INPUT, SPUR_CASE
 
 @pytest.fixture(autouse=True)
 def coarse_tables(monkeypatch):
-    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import OFFERED
 from exugear.project import Project
-from exugear.tooth_mesh import tables
+from exugear.system.tooth_mesh import tables
 
 from ..case_mutations import toml_text
 from ..gear_trains import KINDS

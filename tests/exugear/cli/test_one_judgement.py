@@ -12,7 +12,6 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.dynamics.readiness.readiness import check_parts, remarks
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -20,9 +19,10 @@ from exugear.project import Project
 from exugear.studies.executors import processes
 from exugear.studies.study import Study
 from exugear.studies.sweep import sweep
-from exugear.tooth_mesh import tables
-from exugear.tooth_mesh.laws.iso6336 import iso6336_stiffness
-from exugear.tooth_mesh.placement import loaded_flanks
+from exugear.system.readiness.readiness import check_parts, remarks
+from exugear.system.tooth_mesh import tables
+from exugear.system.tooth_mesh.laws.iso6336 import iso6336_stiffness
+from exugear.system.tooth_mesh.placement import loaded_flanks
 
 from ..case_mutations import toml_text
 from ..ring_case import ring_content

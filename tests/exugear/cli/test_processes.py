@@ -31,8 +31,8 @@ PROGRAM = "from exugear.cli.app import main; main()"
 COARSE_PROGRAM = f"""
 import sys
 sys.path.insert(0, {str(Path(__file__).parents[1])!r})
-import exugear.tooth_mesh.tables, spur_case
-exugear.tooth_mesh.tables.TableInput = spur_case.COARSE_INPUT
+import exugear.system.tooth_mesh.tables, spur_case
+exugear.system.tooth_mesh.tables.TableInput = spur_case.COARSE_INPUT
 {PROGRAM}
 """
 

@@ -19,7 +19,7 @@ from ..spur_case import COARSE_INPUT, SPUR_CASE
 
 @pytest.fixture(autouse=True)
 def coarse_tables(monkeypatch):
-    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
 
 
 @pytest.fixture

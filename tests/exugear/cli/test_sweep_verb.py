@@ -136,7 +136,7 @@ def test_options_that_do_not_go_together_are_refused(study, options, words):
 
 
 def test_a_report_shows_the_studies_of_its_folder(study, monkeypatch):
-    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     results = study.parent / "results"
     swept = CliRunner().invoke(
         app, ["sweep", str(study), "--workers", "1", "--out", str(results / "studies" / "seats")]

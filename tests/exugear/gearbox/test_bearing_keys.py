@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from exugear.dynamics.readiness.readiness import check_parts
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.connections import TYPES_OF_KEYS
+from exugear.system.readiness.readiness import check_parts
 
 from ..case_mutations import bases
 

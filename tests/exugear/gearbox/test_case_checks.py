@@ -12,14 +12,14 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.dynamics.eigenmodes.modes import eigenmodes
-from exugear.dynamics.readiness.readiness import check_parts, lacking, remarks
-from exugear.dynamics.statics import locked_equilibrium
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.summary import summarise_loads
 from exugear.gearbox.reading import CaseError
-from exugear.tooth_mesh.tables import wanted_table
+from exugear.system.eigenmodes.modes import eigenmodes
+from exugear.system.readiness.readiness import check_parts, lacking, remarks
+from exugear.system.statics import locked_equilibrium
+from exugear.system.tooth_mesh.tables import wanted_table
 
 from .. import gear_trains
 from ..assembled import assembled, modes_with_bodies

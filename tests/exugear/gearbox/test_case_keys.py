@@ -12,21 +12,21 @@ import pytest
 from typer.testing import CliRunner
 
 import exugear
-from exugear.bearings.rolling.catalogue import catalogue_rows
-from exugear.bearings.support_laws import catalogue_stiffness, linear_law
-from exugear.bearings.supports import elastic_names
-from exugear.bodies.of_gearbox.elastic_bodies import check_elastic_body
 from exugear.cli.app import app
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.bearing_duties import bearing_duties
-from exugear.dynamics.readiness.readiness import check_parts, lacking, remarks
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import stiffness_matrix
 from exugear.gearbox.sections import bodies, case, connections, entries, gears, loads, lubricant
 from exugear.gearbox.sections.entries import Section
 from exugear.results.folder import keep_case
-from exugear.tooth_mesh.tables import wanted_table
+from exugear.system.assemble import assemble
+from exugear.system.bearing_duties import bearing_duties
+from exugear.system.bearings.rolling.catalogue import catalogue_rows
+from exugear.system.bearings.support_laws import catalogue_stiffness, linear_law
+from exugear.system.bearings.supports import elastic_names
+from exugear.system.bodies.of_gearbox.elastic_bodies import check_elastic_body
+from exugear.system.readiness.readiness import check_parts, lacking, remarks
+from exugear.system.tooth_mesh.tables import wanted_table
 
 from .. import gear_trains
 from ..case_mutations import bases, toml_text

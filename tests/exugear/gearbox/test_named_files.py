@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from exugear.bodies.finite_elements.second_order import SolidError
-from exugear.bodies.finite_elements.solid_files import mesh_geometry, read_solid
 from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import LARGEST_TABLE, Permissions
 from exugear.gearbox.reading import CaseError
+from exugear.system.bodies.finite_elements.second_order import SolidError
+from exugear.system.bodies.finite_elements.solid_files import mesh_geometry, read_solid
 
 from ..spur_case import SPUR_CASE
 

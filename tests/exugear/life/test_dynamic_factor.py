@@ -8,8 +8,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM
@@ -21,6 +19,8 @@ from exugear.project import Project
 from exugear.steady.mean_system.rotating_frame import PlanetSet
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import stored_or_computed
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
 from exugear.transient.runup import simulate
 
 from .test_life import TABLE, content_of

@@ -17,11 +17,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from exugear.bearings.rolling.life import basic_rating_life
 from exugear.cli import app as cli
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.statics import locked_equilibrium, rolled_coordinates
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -37,7 +33,11 @@ from exugear.life.load_spectrum.counted import count_loads
 from exugear.life.pair_stresses import pair_stresses
 from exugear.life.static_balance import StaticBalance, static_balance
 from exugear.project import Project
-from exugear.tooth_mesh.kernels.meshes import FORCE
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.rolling.life import basic_rating_life
+from exugear.system.statics import locked_equilibrium, rolled_coordinates
+from exugear.system.tooth_mesh.kernels.meshes import FORCE
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import root_stress_factors

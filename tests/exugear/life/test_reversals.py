@@ -7,12 +7,12 @@ import tomllib
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.statics import accelerating_start
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.life.static_balance import static_balance
+from exugear.system.assemble import assemble
+from exugear.system.statics import accelerating_start
 
 from .. import table_case
 from ..spur_case import SPUR_CASE

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.life.kept_angles import KeptAngles
 from exugear.life.static_balance import static_balance
+from exugear.system.assemble import assemble
 from fe_ste.tools.stores.store import Store
 
 from ..table_case import surfaces

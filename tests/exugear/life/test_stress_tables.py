@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.bearing_duties import mesh_duties
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.life.stress_tables import LARGEST_STEP, stress_requests
-from exugear.tooth_mesh.tables import TableRequest
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bearing_duties import mesh_duties
+from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.transmission_error.face_load import face_load_factor
 
 from ..coarse_contact import coarse_curves, coarse_input

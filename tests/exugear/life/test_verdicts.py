@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from exugear.bearings.rolling.lubrication import fatigue_limit, life_factor, viscosity_at, viscosity_ratio
 from exugear.cli import app as cli
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
@@ -31,6 +30,12 @@ from exugear.life.static_balance import static_balance
 from exugear.life.verdict import LARGEST_REACH, check_reach, failures, shortfalls
 from exugear.project import Project
 from exugear.report.writer import write_report
+from exugear.system.bearings.rolling.lubrication import (
+    fatigue_limit,
+    life_factor,
+    viscosity_at,
+    viscosity_ratio,
+)
 from fe_ste.root_stress.mesh_cycle import MeshCycleStress
 
 from ..spur_case import COARSE_INPUT, SPUR_CASE
@@ -154,7 +159,7 @@ def test_loads_far_beyond_a_table_are_refused_before_any_work(tmp_path):
 @pytest.fixture(scope="module", autouse=True)
 def coarse_tables() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
         yield
 
 

@@ -16,8 +16,8 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.writer import write_report
 from exugear.results.folder import keep_case, modes_path
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import requested_tables
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.tables import requested_tables
 
 from ..assembled import modes_with_bodies, simulated
 from ..spur_case import COARSE_INPUT, SPUR_CASE
@@ -39,7 +39,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     gearbox = Gearbox.from_toml(case)
     keep_case(gearbox, folder)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
         for request in requested_tables(gearbox, folder):
             request.compute()
         stiffness = mesh_stiffness(gearbox, LAW, folder)

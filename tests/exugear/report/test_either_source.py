@@ -20,8 +20,8 @@ from exugear.results.spectra.orders import order_lines
 from exugear.steady.peaks import peaks
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import load_response, steady_path, stored_or_computed
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.tooth_mesh.tables import requested_tables
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.tables import requested_tables
 
 from ..assembled import assembled, simulated
 from ..spur_case import COARSE_INPUT, SPUR_CASE
@@ -35,7 +35,7 @@ VARIANTS = ("rigid", "bushing")
 @pytest.fixture(scope="module", autouse=True)
 def coarse_tables():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
         yield
 
 

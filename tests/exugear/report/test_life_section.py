@@ -25,7 +25,7 @@ STRENGTH = {
 
 @pytest.fixture
 def project(tmp_path, monkeypatch) -> Project:
-    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n100,1500,3\n200,1000,1\n")
     content = tomllib.loads(SPUR_CASE)
     rating = {"dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0, "gears": {"pinion": STRENGTH}}

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.peaks import STRAINED, bearing_swings
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
+from exugear.system.assemble import assemble
 
 from ..bearing_case import BEARING_CASE, NON_LINEAR
 

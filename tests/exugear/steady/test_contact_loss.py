@@ -10,7 +10,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady import gearbox_branches
@@ -23,6 +22,7 @@ from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.settling.settled import SettlingRun
 from exugear.steady.steady_response import response_of
+from exugear.system.assemble import assemble
 
 from .. import gear_trains, table_case
 from ..spur_case import SPUR_CASE

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from exugear import Project
-from exugear.dynamics.operating_points import contact_places
-from exugear.dynamics.statics import static_state
 from exugear.gearbox.parts import RPM
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.system.operating_points import contact_places
+from exugear.system.statics import static_state
 from fe_ste.transmission_error.compliance import pair_compliance
 from fe_ste.transmission_error.states import StateAxes
 from fe_ste.transmission_error.transmission_error import solve_positions

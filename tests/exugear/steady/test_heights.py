@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import scipy.optimize
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM
@@ -18,6 +17,7 @@ from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
+from exugear.system.assemble import assemble
 
 BUSHING = Choice("bushing")
 CYCLE = 2.0 * np.pi * np.arange(50) / 50

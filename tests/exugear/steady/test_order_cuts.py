@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.results.spectra.orders import OrderLine
 from exugear.results.spectra.sweeps import sweep_severity
@@ -16,6 +15,7 @@ from exugear.steady.peaks import compared_peaks, damping_at, peaks, steady_cut
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
+from exugear.system.assemble import assemble
 
 PLANETARY = OrderLine("planetary", 99.0)
 

@@ -8,7 +8,6 @@ import weakref
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.mean_system.mesh_places import mesh_places
@@ -18,6 +17,7 @@ from exugear.steady.nonlinear import Balance, solve_balance
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals, transmission_errors
 from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.system.assemble import assemble
 
 from .test_steady_in_time import apart, solver_of
 

@@ -7,7 +7,6 @@ import tomllib
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.gearbox_branches import follow_branch
@@ -16,6 +15,7 @@ from exugear.steady.nonlinear import Balance
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import stored_or_computed
+from exugear.system.assemble import assemble
 
 from .. import table_case
 from ..assembled import assembled

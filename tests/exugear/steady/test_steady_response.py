@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.steady.campbell.campbell import modes_over_speed
 from exugear.steady.crossings import Mode, crossings, improved, with_crossings
@@ -19,6 +18,7 @@ from exugear.steady.response import (
 )
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
+from exugear.system.assemble import assemble
 
 RANGE = np.array([1.0, 22.5])
 

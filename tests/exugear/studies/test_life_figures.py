@@ -66,7 +66,7 @@ def content(folder: Path, **changes):
 @pytest.fixture(scope="module", autouse=True)
 def coarse_tables() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
         yield
 
 

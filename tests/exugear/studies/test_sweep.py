@@ -51,8 +51,8 @@ def journal_lines(folder):
 
 
 def test_points_are_those_of_gearboxes_varied_one_by_one(here, home):
-    from exugear.dynamics.eigenmodes.modes import eigenmodes
-    from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+    from exugear.system.eigenmodes.modes import eigenmodes
+    from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
     study = small_study(home)
     data = load_study(here.path)
@@ -220,7 +220,7 @@ def test_a_line_that_was_cut_short_is_no_point(tmp_path):
 
 @pytest.mark.validation
 def test_points_with_one_table_compute_it_once(tmp_path, monkeypatch):
-    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     computed = []
     compute = MeshTable.compute
     monkeypatch.setattr(MeshTable, "compute", lambda *args, **options: computed.append(1) or compute(*args, **options))
@@ -232,7 +232,7 @@ def test_points_with_one_table_compute_it_once(tmp_path, monkeypatch):
 
 
 def test_two_that_want_the_same_table_wait_for_one(tmp_path, monkeypatch):
-    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     computed, begun = [], threading.Barrier(2)
     compute = MeshTable.compute
     monkeypatch.setattr(MeshTable, "compute", lambda *args, **options: computed.append(1) or compute(*args, **options))

@@ -17,7 +17,7 @@ from exugear.cli import app as cli
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.run_file import load_run
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.transient import recorder, runup
 from exugear.transient.outcome import Progress
 from fe_ste.tools.files import FileError
@@ -83,7 +83,7 @@ from pathlib import Path
 from exugear.transient import recorder, runup
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
 case, out, solver, room = sys.argv[1:]
 gearbox = Gearbox.from_toml(case)
@@ -177,7 +177,7 @@ from pathlib import Path
 from exugear.transient import recorder, runup
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
 case, out, go = map(Path, sys.argv[1:])
 recorder.FLUSH_INTERVAL = 0.0025
@@ -277,12 +277,12 @@ def test_pieces_of_two_runs_never_mix(case: Path, tmp_path: Path) -> None:
 FILLING = """
 import sys
 from pathlib import Path
-import exugear.tooth_mesh.tables
+import exugear.system.tooth_mesh.tables
 from exugear.gearbox.gearbox import Gearbox
 from tests.exugear.spur_case import COARSE_INPUT
 
-exugear.tooth_mesh.tables.TableInput = COARSE_INPUT
-(request,) = exugear.tooth_mesh.tables.requested_tables(Gearbox.from_toml(sys.argv[1]), Path(sys.argv[2]))
+exugear.system.tooth_mesh.tables.TableInput = COARSE_INPUT
+(request,) = exugear.system.tooth_mesh.tables.requested_tables(Gearbox.from_toml(sys.argv[1]), Path(sys.argv[2]))
 request.compute()
 """
 

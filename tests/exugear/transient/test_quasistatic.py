@@ -10,12 +10,12 @@ import pytest
 import xarray as xr
 from scipy.interpolate import CubicSpline
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.statics import locked_equilibrium
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.tooth_mesh.laws.packing import pack
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.statics import locked_equilibrium
+from exugear.system.tooth_mesh.laws.packing import pack
 from fe_ste.transmission_error.surface import SteSurface
 from fe_ste.transmission_error.table import MeshTable, TableInput
 

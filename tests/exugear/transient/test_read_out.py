@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import LoadTable
-from exugear.dynamics.signals import signal_layout
-from exugear.dynamics.statics import accelerating_start
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.decimation import Decimator, plain_filter
+from exugear.system.assembly import Assembly
+from exugear.system.loads import LoadTable
+from exugear.system.signals import signal_layout
+from exugear.system.statics import accelerating_start
 from exugear.transient.compiled.methods import RUNGE_KUTTA, Method, adams, stabilised
 from exugear.transient.compiled.observers import Observer
 from exugear.transient.compiled.solver import CompiledSystem

@@ -14,12 +14,12 @@ import pytest
 import scipy.signal
 import xarray as xr
 
-from exugear.dynamics.signals import BALANCE_TERMS
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import CaseError
 from exugear.results.run_file import load_run
+from exugear.system.signals import BALANCE_TERMS
 from exugear.transient.exudyn_model.system import ExudynSystem
 from exugear.transient.outcome import Progress, RunError
 from exugear.transient.runup import simulate

@@ -19,19 +19,19 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from exugear.cli import app as cli
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.signals import MESH_TIMES
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.summary import summarise_loads
 from exugear.report.writer import write_report
-from exugear.results.run_file import load_run
-from exugear.tooth_mesh.kernels.table_law import piece_at
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.results.run_file import load_run, verdict_of
+from exugear.system.assemble import assemble
+from exugear.system.signals import MESH_TIMES
+from exugear.system.tooth_mesh.kernels.table_law import piece_at
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.transient.compiled.step import highest_rate
 from exugear.transient.outcome import LimitError, Progress, RunError
 from exugear.transient.runup import simulate
-from exugear.transient.trust import LIMITS, Judge, verdict_of
+from exugear.transient.trust import LIMITS, Judge
 
 from ..assembled import simulated
 from ..spur_case import SPUR_CASE
@@ -247,14 +247,14 @@ DIVERGED = """
 import sys
 import tomllib
 import numpy as np
-from exugear.dynamics.assemble import assemble
+from exugear.system.assemble import assemble
 from exugear.transient.compiled.observers import Observer
 from exugear.transient.compiled.solver import CompiledSystem
-from exugear.dynamics.loads import LoadTable
+from exugear.system.loads import LoadTable
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.tooth_mesh.laws.forms import add_mesh_forces
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.laws.forms import add_mesh_forces
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
 sys.path.insert(0, sys.argv[1])
 from spur_case import SPUR_CASE

@@ -12,7 +12,7 @@ import pytest
 import xarray as xr
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.tooth_mesh.grid_axes import axes_reaching
+from exugear.system.tooth_mesh.grid_axes import axes_reaching
 from fe_ste.contact.cells import ContactSettings
 from fe_ste.elasticity.flank import flank_compliance
 from fe_ste.flanks.modifications import FlankModification, Relief, radius_at_roll_length_from_tip

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.statics import static_state
 from exugear.exchange.rexs.export.names import Results
 from exugear.exchange.rexs.export.teeth import Target, instance_of
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM, Body, seat_key
+from exugear.system.assembly import Assembly
+from exugear.system.statics import static_state
 from fe_ste.tools.arrays import Floats
 
 SPEED = "rotational_speed"

@@ -9,14 +9,6 @@ from typing import Any, TypeVar
 
 import xarray as xr
 
-from exugear.bearings.rolling.rows import BearingError
-from exugear.bodies.elastic_body import ElasticBody
-from exugear.bodies.of_gearbox.elastic_bodies import reduced_bodies
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.eigenmodes.modes import load_modes
-from exugear.dynamics.fingerprint import input_hash
-from exugear.dynamics.statics import BalanceError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -24,9 +16,17 @@ from exugear.gearbox.variant import VariantError
 from exugear.results.bearings_file import read_duties
 from exugear.results.folder import bodies_folder
 from exugear.results.run_file import FINAL_NAME, load_run
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.tooth_mesh.placement import MeshError
-from exugear.tooth_mesh.tables import fitting_table, table_path
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.system.eigenmodes.modes import load_modes
+from exugear.system.fingerprint import input_hash
+from exugear.system.statics import BalanceError
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.placement import MeshError
+from exugear.system.tooth_mesh.tables import fitting_table, table_path
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.table import MeshTable, TableError
 

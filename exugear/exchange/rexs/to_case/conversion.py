@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from exugear.dynamics.readiness.readiness import check_parts
 from exugear.exchange.rexs.additions import OWN
 from exugear.exchange.rexs.faults import RexsError, plain
 from exugear.exchange.rexs.to_case.bodies import GEARS, JOINING, Bodies, find_bodies
@@ -63,6 +62,7 @@ from exugear.exchange.rexs.to_case.supports import (
 from exugear.exchange.rexs.tree import Component, Model
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
+from exugear.system.readiness.readiness import check_parts
 from fe_ste.tools.display import Displayed
 
 OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}

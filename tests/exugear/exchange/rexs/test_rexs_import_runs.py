@@ -14,7 +14,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
 from exugear.results.run_file import load_run
-from exugear.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
 DATA = Path(__file__).parent / "data"
 LAW = "iso6336"

@@ -103,7 +103,7 @@ def test_the_verbs_import_and_count_the_loads_and_never_write_over_a_table(tmp_p
 @pytest.mark.validation
 def test_life_runs_on_what_was_imported(tmp_path, monkeypatch):
     """200 N m on 20 teeth of 3 mm and a face of 20 mm is too much for flanks: it ends with code 1 and says so."""
-    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     path = tmp_path / "own.rexs"
     path.write_text(file_with_spectrum().text())
     assert exugear("import", path, "--out", tmp_path / "case").exit_code == 0

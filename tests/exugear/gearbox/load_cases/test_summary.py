@@ -12,8 +12,6 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from exugear.cli import app as cli
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.statics import accelerating_start
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.summary import (
@@ -25,6 +23,8 @@ from exugear.gearbox.load_cases.summary import (
 )
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import CaseError
+from exugear.system.assemble import assemble
+from exugear.system.statics import accelerating_start
 from exugear.transient.runup import simulate
 
 from ...spur_case import SPUR_CASE

@@ -88,7 +88,7 @@ def test_a_new_file_goes_through_all_verbs_with_tables_of_its_teeth(
 ) -> None:
     """The pair with few elements a tooth: what the README shows, in a test of its own, has the default mesh."""
     if case.parent.name == "pair":
-        monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     out = case.parent / "out"
     assert exugear("ste", case, "--positions", 8, "--out", out).exit_code == 0
     for variant in ("rigid", "bushing"):

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from exugear.bearings.supports import unsupported
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.eigenmodes.modes import modes_of
-from exugear.dynamics.statics import accelerating_start, static_state
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases.summary import doubts_about, summarise_loads
 from exugear.gearbox.variant import VariantError
+from exugear.system.assemble import assemble
+from exugear.system.bearings.supports import unsupported
+from exugear.system.eigenmodes.modes import modes_of
+from exugear.system.statics import accelerating_start, static_state
 from exugear.transient.runup import simulate
 
 RING_CASE = """

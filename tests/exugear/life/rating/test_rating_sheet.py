@@ -242,7 +242,7 @@ def test_finite_elements_stand_beside_the_nominal_load_where_a_table_is_there(tm
 @pytest.mark.validation
 def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_life(tmp_path, monkeypatch):
     """As the life has them; a life of other loads is told as such, and the page's data has the same sheet."""
-    monkeypatch.setattr("exugear.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n100,1500,500\n60,1500,500\n")
     content = spur(tmp_path)
     content["loads"] = {"body": "shaft_1", "life_years": 1.0, "sources": {"one": {"file": "loads.csv"}}}

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.dynamics.eigenmodes.modes import modes_of
-from exugear.dynamics.eigenmodes.sensitivity import Parameter, ParameterVariation
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings.levers import levers_of
 from exugear.report.findings.variations import best_change, guarded
 from exugear.report.findings.words import Words
 from exugear.results.spectra.windows import is_among, other_windows, survives
+from exugear.system.eigenmodes.modes import modes_of
+from exugear.system.eigenmodes.sensitivity import Parameter, ParameterVariation
 
 from ...assembled import assembled
 from ...results.spectra.run_ups import STORED_LINE

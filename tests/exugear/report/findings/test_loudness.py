@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases.operating_range import operating_range
 from exugear.gearbox.parts import RPM
@@ -18,6 +17,7 @@ from exugear.steady.mean_system.quantities import quantities_of
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
+from exugear.system.assemble import assemble
 
 SPEED = np.linspace(1.0, 5.0, 401)
 SIGNALS = ("overall_dte", *(f"{kind} brg {axis}" for kind in ("support_force", "seat_acceleration") for axis in "xyz"))

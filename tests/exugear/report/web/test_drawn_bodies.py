@@ -10,7 +10,6 @@ import zlib
 import numpy as np
 import pytest
 
-from exugear.dynamics.eigenmodes.modes import modes_of
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.pictures.motions import displacement_of
@@ -19,6 +18,7 @@ from exugear.report.web.arrays import ArrayStore
 from exugear.report.web.drawn_bodies import drawn_bodies, drawn_mode, turn_between
 from exugear.report.web.mode_page import write_mode_page
 from exugear.report.web.stage import stage_data
+from exugear.system.eigenmodes.modes import modes_of
 
 from ... import gear_trains
 from ...assembled import assembled

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.bearings.equal_planets import planet_supports, with_equal_planets
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.eigenmodes.modes import eigenmodes
-from exugear.dynamics.linearised import linearise
 from exugear.gearbox.choice import Choice
 from exugear.steady.mean_system.mean_system import PLACES, mean_system, tangents
 from exugear.steady.mean_system.mesh_waves import mesh_waves
 from exugear.steady.mean_system.rotating_frame import RotatingFrame, SteadyError, planet_sets
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
+from exugear.system.assemble import assemble
+from exugear.system.bearings.equal_planets import planet_supports, with_equal_planets
+from exugear.system.eigenmodes.modes import eigenmodes
+from exugear.system.linearised import linearise
 
 BUSHING = Choice("bushing")
 

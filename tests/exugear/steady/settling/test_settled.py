@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
 from exugear.steady.mean_system.rotating_frame import RotatingFrame, planet_sets
 from exugear.steady.settling.frame_motion import frame_coordinates
+from exugear.system.assemble import assemble
 
 FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
 

@@ -11,17 +11,17 @@ import pytest
 import scipy.signal
 import xarray as xr
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import DriveLaw, Loading, LoadTable
-from exugear.dynamics.signals import signal_layout
-from exugear.dynamics.statics import accelerating_start
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.results.spectra.order_cut import order_cut
 from exugear.results.spectra.orders import harmonics
-from exugear.tooth_mesh.laws.registry import LAWS
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.loads import DriveLaw, Loading, LoadTable
+from exugear.system.signals import signal_layout
+from exugear.system.statics import accelerating_start
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.transient.compiled.methods import RUNGE_KUTTA, Method
 from exugear.transient.compiled.observers import Observer
 from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason

@@ -10,15 +10,20 @@ import pytest
 import scipy.linalg
 import skfem
 
-from exugear.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
-from exugear.bodies.finite_elements.solid_seats import SolidSeat
-from exugear.bodies.finite_elements.turned_hexahedra import turned_hexahedra
-from exugear.bodies.finite_elements.turned_section import Shaft
-from exugear.bodies.floating import floating_body
-from exugear.bodies.floating_body import FloatingBody
-from exugear.bodies.reduced_body import Blank
-from exugear.bodies.reduction import selective_mass_scaling
-from exugear.bodies.solids import ReducedSolid, SolidModel, gyroscopic_matrix, reduce_matrices
+from exugear.system.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.system.bodies.finite_elements.solid_seats import SolidSeat
+from exugear.system.bodies.finite_elements.turned_hexahedra import turned_hexahedra
+from exugear.system.bodies.finite_elements.turned_section import Shaft
+from exugear.system.bodies.floating import floating_body
+from exugear.system.bodies.floating_body import FloatingBody
+from exugear.system.bodies.reduced_body import Blank
+from exugear.system.bodies.reduction import selective_mass_scaling
+from exugear.system.bodies.solids import (
+    ReducedSolid,
+    SolidModel,
+    gyroscopic_matrix,
+    reduce_matrices,
+)
 from exugear.transient.exudyn_model.floating import FloatingSystem, SeatLaw, linear_supports
 from fe_ste.geometry.gears import Material
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.bearings.kernels.connectors import add_connector_forces
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.eigenmodes.modes import modes_of
-from exugear.dynamics.linearised import linearise
-from exugear.dynamics.loads import Loading
-from exugear.dynamics.statics import StartState, accelerating_start
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import VariantError
-from exugear.kernels.springs import add_spring_forces
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.kernels.connectors import add_connector_forces
+from exugear.system.eigenmodes.modes import modes_of
+from exugear.system.kernels.springs import add_spring_forces
+from exugear.system.linearised import linearise
+from exugear.system.loads import Loading
+from exugear.system.statics import StartState, accelerating_start
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...assembled import assembled

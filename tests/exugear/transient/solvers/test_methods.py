@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.linearised import linearise
-from exugear.dynamics.loads import LoadTable
-from exugear.dynamics.statics import accelerating_start
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.linearised import linearise
+from exugear.system.loads import LoadTable
+from exugear.system.statics import accelerating_start
 from exugear.transient.compiled.methods import (
     CORRECT_POSITION,
     CORRECT_VELOCITY,

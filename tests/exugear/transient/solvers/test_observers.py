@@ -5,11 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.signals import BALANCE_TERMS, ENERGIES, MESH_TIMES, POWERS, SIGNALS, signal_layout, signals_of
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.tooth_mesh.kernels.table_law import GUESSED, LEFT_TABLE
+from exugear.system.assemble import assemble
+from exugear.system.signals import (
+    BALANCE_TERMS,
+    ENERGIES,
+    MESH_TIMES,
+    POWERS,
+    SIGNALS,
+    signal_layout,
+    signals_of,
+)
+from exugear.system.tooth_mesh.kernels.table_law import GUESSED, LEFT_TABLE
 from exugear.transient.compiled import observers, sampling
 
 from ...table_case import surfaces

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.dynamics.assemble import assemble
 from exugear.gearbox.choice import Choice
+from exugear.system.assemble import assemble
 from exugear.transient.compiled.methods import RUNGE_KUTTA, adams, growth, stabilised
 from exugear.transient.compiled.step import MARGIN, SLOWEST, choose_integration
 

@@ -10,9 +10,9 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from exugear.dynamics.signals import BALANCE_TERMS
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.system.signals import BALANCE_TERMS
 from exugear.transient.runup import simulate
 
 from ...assembled import bodies_of

@@ -20,11 +20,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from exugear.dynamics.assemble import assemble
-from exugear.dynamics.assembly import Assembly
-from exugear.dynamics.loads import LoadTable
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.loads import LoadTable
 from exugear.transient.compiled.solver import CompiledSystem
 from fe_ste.transmission_error.surface import SteSurface
 

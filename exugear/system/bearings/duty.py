@@ -1,0 +1,246 @@
+"""What bearings bear: load, stiffness, misalignment, contact pressure and life of each at its operating point."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.gearbox.sections.connections import CatalogueSection
+from exugear.system.bearings.operating_point import OperatingPoint, cage_angles
+from exugear.system.bearings.rolling.catalogue import catalogue_rows, estimates, with_estimate
+from exugear.system.bearings.rolling.contact import (
+    BearingState,
+    bearing_state,
+    equilibrium,
+    is_preloaded,
+    row_contacts,
+    tangent_stiffness,
+)
+from exugear.system.bearings.rolling.known_ratings import known_rating, margins
+from exugear.system.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
+from exugear.system.bearings.rolling.ratings import (
+    basic_dynamic_rating,
+    basic_static_rating,
+    equivalent_load,
+    equivalent_static_load,
+)
+from exugear.system.bearings.rolling.rows import BearingError, BearingOfRows, is_rib
+from exugear.system.bearings.support_laws import (
+    LEAST_LOAD,
+    holding_force,
+    holds_one_way,
+    law_in_words,
+)
+from fe_ste.tools.arrays import Floats
+
+INSIDE = ("element_diameter_mm", "element_count", "element_length_mm")
+"""Estimates that ratings rest on."""
+STATED_FACTOR = 3.0
+"""Factor between a stated radial load and the reaction beyond which a remark says so: stiffness goes with the tenth to
+the third power of the load."""
+
+
+@dataclass(frozen=True)
+class Ratings:
+    """Load ratings of a bearing, N."""
+
+    dynamic: float
+    static: float
+    estimated: bool
+    """Whether they follow from the inside of the bearing, by ISO 281 and ISO 76."""
+    makers: tuple[str, ...] = ()
+    """Whose catalogues they are the least of; empty if they are not."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Radial stiffness (N/m) at both ends of what an estimated dimension may be, under the same load."""
+
+    key: str
+    """Key of the file that would replace the estimate."""
+    value: float
+    low: float
+    high: float
+    """Estimate and its range, in the unit of the key."""
+    at_low: float
+    at_high: float
+    """Radial stiffness there, N/m; NaN where such a bearing cannot be built."""
+
+
+@dataclass(frozen=True)
+class BearingDuty:
+    """What a catalogue bearing bears."""
+
+    name: str
+    family: str
+    kind: str
+    law: str
+    """Its name, that of its section, the type of bearing, and what its force follows."""
+    radial_load: float
+    axial_load: float
+    """Of the shaft on the inner ring, what its rows carry, N."""
+    reaction: float | None
+    """Radial load that the statics find, N, where the loads before are those that the file states."""
+    stiffness: Floats
+    """(6, 6) of the rows, mean over positions of the cage, N/m .. N m/rad."""
+    radial_stiffness: float
+    """Along the load, N/m."""
+    misalignment: float
+    """Tilt of the inner ring against the outer one, rad."""
+    element_load: float
+    pressure: float
+    """Load (N) and contact pressure at the inner ring (Pa) of the most loaded rolling element."""
+    ratings: Ratings
+    basic_life: float
+    reference_life: float
+    """L10 by ISO 281 and L10r by ISO/TS 16281 (basic: lubricant and cleanliness left out), million revolutions;
+    infinite without load."""
+    remarks: tuple[str, ...]
+    """What a reader should know before trusting the row."""
+
+
+def ratings_of(section: CatalogueSection) -> Ratings:
+    """Load ratings of catalogue bearings: of the file, or the least that makers print for the designation, or by ISO.
+
+    Those of ISO 281 and ISO 76 rest on the inside of the bearing. Where that is estimated, they are divided by how far
+    estimates may lie above catalogues: a bearing is never rated better than it may be.
+    """
+    rows = catalogue_rows(section)
+    given = (section.dynamic_rating_kN, section.static_rating_kN)
+    computed = basic_dynamic_rating(rows, section.type), basic_static_rating(rows, section.type)
+    known = known_rating(section)
+    if known is not None:
+        both = 1.0 if section.arrangement == "single" else 2.0
+        computed = known.dynamic * both ** (7.0 / 9.0 if section.type.endswith("_roller") else 0.7), known.static * both
+    elif any(estimate.key in INSIDE for estimate in estimates(section)):
+        dynamic_margin, static_margin = margins(section)
+        computed = computed[0] / dynamic_margin, computed[1] / static_margin
+    dynamic, static = (own if stated is None else 1e3 * stated for own, stated in zip(computed, given, strict=True))
+    if None not in given:
+        return Ratings(dynamic, static, estimated=False)
+    return Ratings(dynamic, static, estimated=known is None, makers=known.makers if known else ())
+
+
+def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDuty:
+    """Find what a bearing bears at its operating point.
+
+    Parameters
+    ----------
+    reaction : (6,) for a bearing whose load the file states: what the statics find, N and N m
+    """
+    bearing = point.bearing
+    rows = point.rows
+    section = point.bearing.catalogue
+    assert section is not None
+    ratings = ratings_of(section)
+    states = [
+        bearing_state(row_contacts(rows, angle), point.displacement)
+        for angle in cage_angles(rows, point.first_roller_angle)
+    ]
+    radial = point.radial_load
+    axial = float(point.load[2])
+    equivalent = equivalent_load(rows, section.type, radial, abs(axial), ratings.static)
+    return BearingDuty(
+        name=bearing.name,
+        family=bearing.family,
+        kind=section.type,
+        law=law_in_words(bearing, point.load_stands_still),
+        radial_load=radial,
+        axial_load=axial,
+        stiffness=point.stiffness,
+        radial_stiffness=point.radial_stiffness,
+        misalignment=point.misalignment,
+        element_load=max(_largest_load(state) for state in states),
+        pressure=max(float(state.element_pressure.max()) for state in states),
+        ratings=ratings,
+        basic_life=basic_rating_life(ratings.dynamic, equivalent, section.type),
+        reference_life=reference_life(
+            rows,
+            [np.concatenate(loads) for loads in zip(*map(loads_of_rows, states), strict=True)],
+            section.type,
+            dynamic_rating=ratings.dynamic,
+            inner_ring_turns_against_load=not bearing.carries_outer_ring,
+        ),
+        reaction=None if reaction is None else math.hypot(reaction[0], reaction[1]),
+        remarks=tuple(_remarks(point, ratings, reaction)),
+    )
+
+
+def loads_of_rows(state: BearingState) -> list[Floats]:
+    """Give the loads of each row as its life needs them, N: (elements, laminae) of rollers, (elements,) of balls."""
+    first = state.contacts.first
+    return [
+        state.element_load[begin:end] if laminae is None else laminae
+        for laminae, begin, end in zip(state.lamina_load, first[:-1], first[1:], strict=True)
+    ]
+
+
+def _largest_load(state: BearingState) -> float:
+    """Load of the most loaded element on its raceways, N."""
+    first = state.contacts.first
+    of_rows = zip(state.contacts.rows, first[:-1], first[1:], strict=True)
+    return max(float(state.element_load[begin:end].max()) for row, begin, end in of_rows if not is_rib(row))
+
+
+def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -> list[str]:
+    section = point.bearing.catalogue
+    rows = point.rows
+    assert section is not None
+    remarks = []
+    if point.is_unloaded:
+        remarks.append("carries hardly anything: stiffness at a hundredth of its dynamic rating")
+    elif not is_preloaded(rows) and math.hypot(point.radial_load, float(point.load[2])) < minimum_load(
+        ratings.dynamic, section.type
+    ):
+        remarks.append("carries less than what rolling elements need to roll, by the usual rule: they may slide")
+    if reaction is not None:
+        found = math.hypot(reaction[0], reaction[1])
+        if max(found, point.radial_load) > STATED_FACTOR * min(found, point.radial_load):
+            remarks.append(
+                f"radial_load_kN = {1e-3 * point.radial_load:.4g} is stated, the static load gives {1e-3 * found:.4g}"
+            )
+    if holds_one_way(rows):
+        sense = "+z" if rows[0].contact_angle > 0.0 else "-z"
+        remarks.append(f"holds its inner ring along the axis in one direction only, against a push towards {sense}")
+    static = equivalent_static_load(rows, section.type, point.radial_load, abs(float(point.load[2])))
+    if static > ratings.static:
+        estimated = " estimated" if ratings.estimated else ""
+        remarks.append(
+            f"equivalent static load {1e-3 * static:.4g} kN is beyond its{estimated} static rating "
+            f"{1e-3 * ratings.static:.4g} kN"
+        )
+    return remarks
+
+
+def estimate_effects(point: OperatingPoint) -> tuple[Sensitivity, ...]:
+    """Radial stiffness at both ends of each dimension that the file leaves open, under the load of an operating point.
+
+    What changes is taken in one position of the cage.
+    """
+    section = point.bearing.catalogue
+    assert section is not None
+    share = point.radial_stiffness / _radial_stiffness(section, point)
+    effects = []
+    for estimate in estimates(section):
+        limits = (estimate.low, estimate.high)
+        ends = [share * _radial_stiffness(with_estimate(section, estimate, limit), point) for limit in limits]
+        effects.append(Sensitivity(estimate.key, estimate.value, *limits, *ends))
+    return tuple(effects)
+
+
+def _radial_stiffness(section: CatalogueSection, point: OperatingPoint) -> float:
+    force = point.load[:3]
+    tilt = point.displacement[3:5]
+    if point.is_unloaded:
+        least = LEAST_LOAD * basic_dynamic_rating(point.rows, section.type)
+        force = np.array(holding_force(point.rows, least, point.direction))
+        tilt = np.zeros(2)
+    try:
+        rows = catalogue_rows(section)
+        displacement = equilibrium(BearingOfRows(rows), force, tilt=tilt).displacement
+    except BearingError:
+        return float("nan")
+    along = np.array([np.cos(point.direction), np.sin(point.direction)])
+    return float(along @ tangent_stiffness(row_contacts(rows), displacement)[:2, :2] @ along)

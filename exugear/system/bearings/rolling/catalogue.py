@@ -1,0 +1,363 @@
+"""Rows of rolling elements from a catalogue section, and estimates of what it leaves open.
+
+A catalogue prints the boundary dimensions. What the file leaves open of the inside follows from the usual
+proportions of the type (`exugear.system.bearings.rolling.proportions`), and is told as an estimate with its range.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from exugear.gearbox.sections.connections import (
+    CONTACT_ANGLES_DEG,
+    ROUNDING_MM,
+    TYPES_OF_KEYS,
+    CatalogueSection,
+)
+from exugear.system.bearings.rolling import proportions
+from exugear.system.bearings.rolling.rows import (
+    BallRow,
+    BearingError,
+    RollerRow,
+    RollingRow,
+    moved,
+    pair_rows,
+    rib_row,
+)
+
+ALIGNING = ("spherical_roller", "self_aligning_ball")
+"""Types whose outer raceway is a sphere about the middle of the bearing."""
+SPHERES = (*ALIGNING, "thrust_spherical_roller")
+"""Types whose outer raceway is a sphere about a point of the axis."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What the file leaves open of a bearing."""
+
+    key: str
+    """Name of the key in the file that would give it."""
+    value: float
+    low: float
+    high: float
+    """What is taken, and the range that is usual."""
+    unit: str
+    """Unit of the three, as the key has it; empty for numbers."""
+
+
+def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:
+    """Rows of the bearing, or of the pair, that a section describes.
+
+    Parameters
+    ----------
+    section : what the file says of the bearing
+
+    Returns
+    -------
+    in the frame of the bearing, with z along the global one; from -z to +z
+
+    Raises
+    ------
+    exugear.system.bearings.rolling.rows.BearingError
+        The elements do not fit into the bearing.
+
+    Notes
+    -----
+    A four-point ball bearing is two rows of the same balls about one centre, with contact angles of both signs: each
+    diagonal of a ball is a line of contact by itself. That leaves out that the diagonals share the ball's
+    equilibrium when their angles differ under load, and the gap between the halves of the groove under radial load.
+
+    Examples
+    --------
+    >>> section = CatalogueSection(type="spherical_roller", bore_mm=85.0, outer_diameter_mm=180.0, width_mm=60.0)
+    >>> [(row.element_count, round(math.degrees(row.contact_angle))) for row in catalogue_rows(section)]
+    [(14, -13), (14, 13)]
+    """
+    full = _completed(section)
+    row = _ball_row(full) if full.type.endswith("ball") else _roller_row(full)
+    return *_placed(full, row), *_ribs(full, row)
+
+
+def estimates(section: CatalogueSection) -> tuple[Estimate, ...]:
+    """Tell what `catalogue_rows` takes for the keys that a section leaves open.
+
+    An estimate rests on what the section gives and on the estimates before it: the number of rollers, say, on
+    their diameter.
+
+    Examples
+    --------
+    >>> section = CatalogueSection(type="cylindrical_roller", bore_mm=160.0, outer_diameter_mm=290.0, width_mm=80.0)
+    >>> [(estimate.key, round(estimate.value, 2)) for estimate in estimates(section)][1:4]
+    [('element_diameter_mm', 35.1), ('element_count', 17.0), ('element_length_mm', 51.2)]
+    """
+    found = []
+    for estimated in _ESTIMATED.values():
+        estimate = estimated(section)
+        if estimate is not None and _is_open(section, estimate.key):
+            found.append(estimate)
+            section = with_estimate(section, estimate, estimate.value)
+    return tuple(found)
+
+
+def with_estimate(section: CatalogueSection, estimate: Estimate, value: float) -> CatalogueSection:
+    """Give the section as if the file stated a value for what it leaves open.
+
+    Parameters
+    ----------
+    estimate : one of the section's
+    value : in the unit of the estimate; counts are rounded
+
+    Examples
+    --------
+    >>> section = CatalogueSection(type="cylindrical_roller", bore_mm=160.0, outer_diameter_mm=290.0, width_mm=80.0)
+    >>> diameter = next(each for each in estimates(section) if each.key == "element_diameter_mm")
+    >>> ends = [with_estimate(section, diameter, end) for end in (diameter.low, diameter.high)]
+    >>> [catalogue_rows(end)[0].element_count for end in ends]
+    [19, 16]
+    """
+    given: float | int = round(value) if estimate.key == "element_count" else value
+    return section.model_copy(update={estimate.key: given})
+
+
+def _completed(section: CatalogueSection) -> CatalogueSection:
+    for estimate in estimates(section):
+        section = with_estimate(section, estimate, estimate.value)
+    return section
+
+
+def _is_open(section: CatalogueSection, key: str) -> bool:
+    if key in TYPES_OF_KEYS and section.type not in TYPES_OF_KEYS[key][0]:
+        return False
+    return getattr(section, key) is None or key not in section.model_fields_set
+
+
+# -- estimates, in the order in which they rest on each other -----------------------------------------------------
+
+
+def row_count(section: CatalogueSection) -> int:
+    """Rows in one bearing."""
+    return section.row_count or (2 if section.type in ALIGNING else 1)
+
+
+def _scaled(key: str, proportion: proportions.Proportion, scale: float, unit: str) -> Estimate:
+    return Estimate(key, proportion.value * scale, proportion.low * scale, proportion.high * scale, unit)
+
+
+def _pitch_diameter(section: CatalogueSection) -> Estimate:
+    mean = 0.5 * (section.bore_mm + section.outer_diameter_mm)
+    height = section.outer_diameter_mm - section.bore_mm
+    beyond = proportions.PITCH_BEYOND_MEAN
+    value, low, high = (mean + share * height for share in (beyond.value, beyond.low, beyond.high))
+    return Estimate("pitch_diameter_mm", value, low, high, "mm")
+
+
+def _contact_angle(section: CatalogueSection) -> Estimate | None:
+    if section.type not in CONTACT_ANGLES_DEG or (section.type in ALIGNING and row_count(section) == 1):
+        return None
+    if section.type in proportions.CONTACT_ANGLE_DEG:
+        return _scaled("contact_angle_deg", proportions.CONTACT_ANGLE_DEG[section.type], 1.0, "deg")
+    distance = proportions.ALIGNING_ROW_DISTANCE[section.type]
+    pitch = _given(section, "pitch_diameter_mm")
+    value, low, high = (
+        math.degrees(math.atan(share * section.width_mm / pitch))
+        for share in (distance.value, distance.low, distance.high)
+    )
+    return Estimate("contact_angle_deg", value, low, high, "deg")
+
+
+def _element_diameter(section: CatalogueSection) -> Estimate:
+    height = section.outer_diameter_mm - section.bore_mm
+    estimate = _scaled("element_diameter_mm", proportions.PROPORTIONS[section.type].diameter, height, "mm")
+    if section.element_count is None:
+        return estimate
+    # As many as the file says have to fit.
+    most = _given(section, "pitch_diameter_mm") * math.sin(math.pi / section.element_count) / 1.005
+    value, low, high = (min(length, most) for length in (estimate.value, estimate.low, estimate.high))
+    return Estimate(estimate.key, value, low, high, estimate.unit)
+
+
+def _element_count(section: CatalogueSection) -> Estimate:
+    ratio = _given(section, "element_diameter_mm") / _given(section, "pitch_diameter_mm")
+    most = int(math.pi / math.asin(min(ratio, 1.0)))
+    spacing = proportions.PROPORTIONS[section.type].spacing
+    value, low, high = (
+        float(min(most, proportions.element_count(section.type, ratio, each, section.full_complement)))
+        for each in (spacing.value, spacing.high, spacing.low)
+    )
+    if section.full_complement:
+        low = value - 1.0
+        high = float(most)
+    return Estimate("element_count", value, low, high, "")
+
+
+def _element_length(section: CatalogueSection) -> Estimate | None:
+    if section.type not in proportions.ROLLER_LENGTH:
+        return None
+    return _scaled(
+        "element_length_mm", proportions.ROLLER_LENGTH[section.type], section.width_mm / row_count(section), "mm"
+    )
+
+
+def _groove(key: str) -> Callable[[CatalogueSection], Estimate]:
+    return lambda section: _scaled(key, proportions.GROOVE_RATIO, 1.0, "")
+
+
+def _rib_contact(section: CatalogueSection) -> Estimate | None:
+    if section.ribs == "none":
+        return None
+    return _scaled("rib_contact_mm", proportions.RIB_CONTACT, _given(section, "element_diameter_mm"), "mm")
+
+
+def _osculation(section: CatalogueSection) -> Estimate:
+    return _scaled("osculation", proportions.OSCULATION, 1.0, "")
+
+
+def _row_distance(section: CatalogueSection) -> Estimate | None:
+    if section.arrangement != "single":
+        distance = proportions.PAIR_DISTANCE
+        if section.type == "tapered_roller":
+            distance = proportions.TAPERED_PAIR_DISTANCE.get(section.arrangement, distance)
+        return _scaled("row_distance_mm", distance, section.width_mm, "mm")
+    rows = row_count(section)
+    if rows == 1 or section.type in ALIGNING:
+        return None
+    return Estimate(
+        "row_distance_mm", section.width_mm / rows, 0.75 * section.width_mm / rows, section.width_mm / rows, "mm"
+    )
+
+
+def _radial_clearance(section: CatalogueSection) -> Estimate | None:
+    if section.type not in proportions.CLEARANCE_UM:
+        return None
+    fixed, per_bore = proportions.CLEARANCE_UM[section.type]
+    return Estimate("radial_clearance_mm", 0.0, 0.0, 1e-3 * (fixed + per_bore * section.bore_mm), "mm")
+
+
+def _axial_preload(section: CatalogueSection) -> Estimate | None:
+    if section.arrangement not in ("X", "O") or "radial_clearance_mm" in section.model_fields_set:
+        return None
+    setting = proportions.AXIAL_SETTING_UM_PER_MM * section.bore_mm
+    return Estimate("axial_preload_um", 0.0, -setting, setting, "um")
+
+
+_ESTIMATED: Mapping[str, Callable[[CatalogueSection], Estimate | None]] = {
+    "pitch_diameter_mm": _pitch_diameter,
+    "element_diameter_mm": _element_diameter,
+    "element_count": _element_count,
+    "element_length_mm": _element_length,
+    "rib_contact_mm": _rib_contact,
+    "contact_angle_deg": _contact_angle,
+    "inner_groove_ratio": _groove("inner_groove_ratio"),
+    "outer_groove_ratio": _groove("outer_groove_ratio"),
+    "osculation": _osculation,
+    "row_distance_mm": _row_distance,
+    "radial_clearance_mm": _radial_clearance,
+    "axial_preload_um": _axial_preload,
+}
+
+
+# -- rows ---------------------------------------------------------------------------------------------------------
+
+
+def _given(section: CatalogueSection, key: str) -> float:
+    """Value of a key that is given or was estimated before."""
+    return float(getattr(section, key))
+
+
+def _common(section: CatalogueSection) -> dict[str, Any]:
+    """Give what rows of rollers and of balls share, SI, after a check that the elements fit."""
+    diameter = _given(section, "element_diameter_mm")
+    pitch = _given(section, "pitch_diameter_mm")
+    count = round(_given(section, "element_count"))
+    # Across the contact the elements reach from groove to groove; rings need some wall.
+    height = diameter * math.cos(math.radians(section.contact_angle_deg or 0.0))
+    # Needles without rings run on shaft and bore themselves.
+    wall = -ROUNDING_MM if section.type == "needle_roller" else 0.0
+    inside = pitch - height - section.bore_mm
+    outside = section.outer_diameter_mm - pitch - height
+    if min(inside, outside) < wall or (wall == 0.0 and min(inside, outside) == 0.0):
+        raise BearingError(
+            f"element_diameter_mm = {diameter:g} on pitch_diameter_mm = {pitch:g} reaches beyond the rings; between "
+            f"bore_mm = {section.bore_mm:g} and outer_diameter_mm = {section.outer_diameter_mm:g} it must be smaller"
+        )
+    most = int(math.pi / math.asin(min(1.0, diameter / pitch)))
+    if count > most:
+        raise BearingError(
+            f"element_count = {count} rolling elements of element_diameter_mm = {diameter:g} do not fit on "
+            f"pitch_diameter_mm = {pitch:g}; {most} do"
+        )
+    return {
+        "element_diameter": 1e-3 * diameter,
+        "pitch_diameter": 1e-3 * pitch,
+        "element_count": count,
+        "radial_clearance": 1e-3 * section.radial_clearance_mm,
+        "aligning": section.type in SPHERES,
+    }
+
+
+def _roller_row(section: CatalogueSection) -> RollerRow:
+    """One row in the middle of the bearing, without its contact angle."""
+    common = _common(section)
+    length = 1e-3 * _given(section, "element_length_mm")
+    profile: dict[str, Any] = {}
+    if section.type in SPHERES:
+        raceway = _outer_raceway_radius(section)
+        profile["crown_curvature"] = (1.0 / _given(section, "osculation") - 1.0) / raceway
+    elif section.profile == "standard":
+        factor, straight = proportions.standard_profile(section.type, common["element_diameter"], length)
+        profile.update(profile_factor=factor, straight_share=straight)
+    elif section.profile == "none":
+        profile["profile_factor"] = 0.0
+    else:
+        profile["profile_table"] = tuple((share, 1e-6 * drop) for share, drop in section.profile)
+    return RollerRow(**common, effective_length=length, **profile)
+
+
+def _outer_raceway_radius(section: CatalogueSection) -> float:
+    """Radius (m) of the sphere that the rows of an aligning bearing run in."""
+    angle = math.radians(section.contact_angle_deg or 0.0)
+    return 0.5e-3 * (_given(section, "pitch_diameter_mm") / math.cos(angle) + _given(section, "element_diameter_mm"))
+
+
+def _ball_row(section: CatalogueSection) -> BallRow:
+    """One row in the middle of the bearing, without its contact angle."""
+    if section.type == "self_aligning_ball":
+        outer = _outer_raceway_radius(section) / (1e-3 * _given(section, "element_diameter_mm"))
+    else:
+        outer = _given(section, "outer_groove_ratio")
+    return BallRow(**_common(section), inner_conformity=_given(section, "inner_groove_ratio"), outer_conformity=outer)
+
+
+def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollingRow, ...]:
+    """Put the rows of a bearing or a pair side by side, with their contact angles."""
+    angle = math.radians(section.contact_angle_deg or 0.0)
+    signed = angle if section.holds_towards == "+z" else -angle
+    if section.type == "four_point_ball":
+        return tuple(moved(row, each, 0.0) for each in (-angle, angle))
+    if section.arrangement != "single":
+        distance = 1e-3 * _given(section, "row_distance_mm")
+        preload = 1e-6 * section.axial_preload_um
+        return pair_rows(moved(row, signed, 0.0), section.arrangement, distance, preload)
+    if section.type == "thrust_spherical_roller":
+        # All rollers press on one point of the axis, beside the bearing.
+        centre = -0.5 * row.pitch_diameter * math.tan(signed)
+        return (replace(moved(row, signed, 0.0), sphere_centre=centre),)
+    rows = row_count(section)
+    if section.type in ALIGNING and rows == 2:
+        # Both rows point to the middle of the bearing.
+        place = 0.5 * row.pitch_diameter * math.tan(angle)
+        return moved(row, -angle, -place), moved(row, angle, place)
+    distance = 1e-3 * _given(section, "row_distance_mm") if rows > 1 else 0.0
+    return tuple(moved(row, signed, (number - 0.5 * (rows - 1)) * distance) for number in range(rows))
+
+
+def _ribs(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollerRow, ...]:
+    """Ribs of cylindrical rollers as rows of their own, first those that hold the inner ring against +z."""
+    if section.ribs == "none" or not isinstance(row, RollerRow):
+        return ()
+    length = 1e-3 * _given(section, "rib_contact_mm")
+    senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[section.ribs]
+    return tuple(rib_row(row, sense, length) for sense in senses)

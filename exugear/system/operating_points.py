@@ -1,0 +1,299 @@
+"""Catalogue bearings at the loads that they really carry: the static state with the full law of their rows.
+
+A bearing's stiffness depends on its load, and the load on the stiffness of all bearings. The static state is solved
+with the non-linear law of every row, so that both belong to each other to round-off. The problem is convex, and starts
+from the bearings' stiffness at a nominal load. A linear bearing then passes the point that its rows are in, and has
+their tangent there: its own static state is that of the rows.
+
+What lasts in motion is the mean over the turn of each carrier, which equal planets tell at one of its angles: bearings
+of planets get the mean of their set. Unequal ones, by their pins or their spacing, are looked at over the whole turn.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from exugear.gearbox.parts import Bearing, Body
+from exugear.system.assembly import Assembly
+from exugear.system.bearings.equal_planets import (
+    PlanetSupports,
+    equally_spaced,
+    planet_families,
+    planet_supports,
+    with_equal_planets,
+)
+from exugear.system.bearings.kernels.connectors import ConnectorArrays
+from exugear.system.bearings.operating_point import OperatingPoint, operating_point
+from exugear.system.bearings.rolling.contact import bearing_load, equilibrium, row_contacts
+from exugear.system.bearings.rolling.rows import BearingOfRows
+from exugear.system.bearings.support_laws import (
+    SupportLaw,
+    bearing_rows,
+    catalogue_stiffness,
+    holds_one_way,
+    is_catalogued,
+    linear_law,
+    load_stands_still,
+    rolling_law,
+    through_point,
+    with_laws,
+)
+from exugear.system.kernels.coordinates import BODY_SIZE, TILT
+from exugear.system.statics import BalanceError, locked_equilibrium, rolled_coordinates
+from exugear.system.tooth_mesh.kernels.meshes import FORCE
+from exugear.system.tooth_mesh.static_contact import MeshPlace, static_contacts
+from fe_ste.tools.arrays import Floats
+
+_log = logging.getLogger(__name__)
+CARRIER_ANGLES = 8
+"""Angles of a carrier over its turn, over which bearings are averaged where its planets are not equal."""
+CONTACT_STEPS = 2
+"""Steps between shafts and contact: a third one changes misalignments by less than a hundredth of an urad."""
+
+
+class _State(NamedTuple):
+    """All supports in one static state; points only of those from a catalogue."""
+
+    strain: Floats
+    load: Floats
+    """(supports, 6) displacement (m, rad) and load (N, N m), in the axes of what each sits on."""
+    points: tuple[OperatingPoint | None, ...]
+    """Operating points, None for supports that are not from a catalogue."""
+
+
+def at_static_load(assembly: Assembly) -> Assembly:
+    """Give catalogue bearings of an assembly the laws that they have under the static load of the gearbox file.
+
+    Parameters
+    ----------
+    assembly : one whose catalogue bearings have their nominal stiffness
+
+    Returns
+    -------
+    Assembly
+        With the operating points of its catalogue bearings. Those without `radial_load_kN` in the file follow their
+        rows at rest; in motion linear ones have the stiffness there and pass that point, non-linear ones keep their
+        rows.
+
+    Raises
+    ------
+    BalanceError
+        The static load cannot be held.
+    """
+    assembly, near = _with_contacts(assembly)
+    if not any(is_catalogued(support) for support in assembly.supports):
+        return assembly
+    q, searched = _loaded_state(assembly, near)
+    nominal = _points(assembly, searched, assembly.support_strains(q))
+    resting, laws = _resting(assembly, nominal)
+    here, over_turns = _states(resting, laws, q)
+    moving, spread = _in_motion(resting, laws, here, over_turns)
+    return replace(
+        resting,
+        connectors=moving,
+        connectors_at_rest=resting.connectors,
+        operating_points=here.points,
+        planet_spread=spread,
+    )
+
+
+def _with_contacts(assembly: Assembly) -> tuple[Assembly, Floats | None]:
+    """Let teeth bear as finite elements have it where gears stand at rest; with the last state of the search."""
+    near = None
+    even = assembly
+    for _ in range(CONTACT_STEPS if contact_places(assembly, np.zeros(assembly.size)) else 0):
+        near, _laws = _loaded_state(assembly, near)
+        assembly = even.with_contacts(static_contacts(contact_places(assembly, near)))
+    for remark in assembly.contacts.remarks:
+        _tell(remark)
+    return assembly, near
+
+
+@cache
+def _tell(remark: str) -> None:
+    """Say it once in a process, whoever asks for the assembly: most doors to it have no other way to."""
+    _log.warning(remark)
+
+
+def contact_places(assembly: Assembly, q: Floats) -> dict[str, MeshPlace]:
+    """Places of the meshes whose contact can be solved, at a state at rest, in the axes of their tables."""
+    positions = assembly.gear_positions(q)
+    force = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, FORCE]
+    equal = {planet.name for planets in _equal(assembly) for planet in planets}
+    places = {}
+    for number, element in enumerate(assembly.elements):
+        mesh = element.mesh
+        tilts = assembly.meshes.coordinates[number, [TILT, BODY_SIZE + TILT]]
+        if element.computed_from is None or (tilts < 0).all():
+            continue
+        distance, misalignment = positions[number]
+        together = mesh.pinion in equal or mesh.gear in equal
+        places[mesh.name] = MeshPlace(
+            table=element.computed_from,
+            force=float(force[number]),
+            misalignment=element.flank * float(misalignment),
+            centre_distance=float(distance),
+            group=mesh.family if together else mesh.name,
+        )
+    return places
+
+
+def _loaded_state(assembly: Assembly, near: Floats | None = None) -> tuple[Floats, tuple[SupportLaw, ...]]:
+    """Coordinates under the static load with the rows of all bearings whose load is looked for, and the laws there."""
+    laws = tuple(
+        _law_at_rest(support, catalogue_stiffness(support.catalogue), 0.0, 0.0)
+        if support.catalogue is not None and is_catalogued(support)
+        else linear_law(support, 0.0)
+        for support in assembly.supports
+    )
+    nominal = [
+        support.factor * catalogue_stiffness(support.catalogue) if is_catalogued(support) else np.zeros((6, 6))
+        for support in assembly.supports
+    ]
+    searched = replace(
+        assembly, connectors=with_laws(assembly.connectors, laws), rows_stiffness=np.array(nominal).reshape(-1, 6, 6)
+    )
+    return _balance(searched, laws, near=near), laws
+
+
+def _balance(
+    assembly: Assembly, laws: Sequence[SupportLaw], about: Floats | None = None, near: Floats | None = None
+) -> Floats:
+    """Coordinates under the static load, of the train rolled to `about`, from a state that is near it."""
+    load = assembly.gearbox.case.static_load
+    meshes = assembly.mean_meshes
+    try:
+        return locked_equilibrium(assembly, load.torques_N_m, assembly.gearbox.locked, meshes, about, near=near)
+    except BalanceError as error:
+        raise BalanceError(f"{error}; {_what_holds_one_way(laws, assembly.connector_names)}") from None
+
+
+def _law_at_rest(support: Bearing, of_rows: Floats, direction: float, damping_time: float) -> SupportLaw:
+    """Law of a bearing's rows in static states, placed by the direction of its load.
+
+    The seat of a bearing with clearance yields under load only: the share of a deflection that the bearing takes counts
+    beyond the clearance.
+    """
+    law = rolling_law(support, damping_time, of_rows, direction)
+    share = abs(law.scale)
+    rows = tuple(
+        replace(row, radial_clearance=share * row.radial_clearance) if row.radial_clearance > 0.0 else row
+        for row in law.rows
+    )
+    return replace(law, rows=rows)
+
+
+def _points(assembly: Assembly, laws: Sequence[SupportLaw], strains: Floats) -> tuple[OperatingPoint | None, ...]:
+    """Operating points of catalogue bearings at the strains (supports, 6) of all supports."""
+    bodies = _bodies(assembly)
+    return tuple(
+        _point(support, bodies, law, strain) if is_catalogued(support) else None
+        for support, law, strain in zip(assembly.supports, laws, strains, strict=True)
+    )
+
+
+def _bodies(assembly: Assembly) -> dict[str, Body]:
+    return {body.name: body for body in assembly.gearbox.bodies()}
+
+
+def _point(support: Bearing, bodies: dict[str, Body], law: SupportLaw, strain: Floats) -> OperatingPoint:
+    """Operating point of a bearing at the displacement of its body against what it sits on."""
+    displacement = law.scale * strain
+    rows = bearing_rows(support)
+    if rows != law.rows:  # its seat yields, and it has clearance
+        force = bearing_load(row_contacts(law.rows, law.phase), displacement)[:3]
+        if force.any():
+            tilt = displacement[3:5]
+            angle = law.phase
+            displacement = equilibrium(BearingOfRows(rows), force, tilt=tilt, first_roller_angle=angle).displacement
+    return operating_point(support, displacement, load_stands_still(support, bodies), law.phase)
+
+
+def _resting(assembly: Assembly, points: Sequence[OperatingPoint | None]) -> tuple[Assembly, tuple[SupportLaw, ...]]:
+    """Assembly with the rows of all catalogue bearings, placed by their loads, and their laws."""
+    time = assembly.gearbox.case.damping.bearing_time_s
+    laws = tuple(
+        linear_law(support, time) if point is None else _law_at_rest(support, point.stiffness, point.direction, time)
+        for support, point in zip(assembly.supports, points, strict=True)
+    )
+    of_rows = [np.zeros((6, 6)) if point is None else point.bearing.factor * point.stiffness for point in points]
+    connectors = with_laws(assembly.connectors, laws)
+    connectors, _ = with_equal_planets(connectors, _equal_supports(assembly))
+    placed = tuple(replace(law, phase=float(phase)) for law, phase in zip(laws, connectors.rolling.phase, strict=True))
+    return replace(assembly, connectors=connectors, rows_stiffness=np.array(of_rows)), placed
+
+
+def _state(assembly: Assembly, laws: Sequence[SupportLaw], q: Floats) -> _State:
+    strain = assembly.support_strains(q)
+    return _State(strain, assembly.support_loads_at_rest(q), _points(assembly, laws, strain))
+
+
+def _states(assembly: Assembly, laws: Sequence[SupportLaw], near: Floats) -> tuple[_State, dict[str, list[_State]]]:
+    """State at the angles zero, from a state that is near it; those over the turn of carriers with unequal planets."""
+    here = _state(assembly, laws, _balance(assembly, laws, near=near))
+    over_turns: dict[str, list[_State]] = {}
+    for carrier in sorted({planets[0].carrier or "" for planets in _unequal(assembly)}):
+        over_turns[carrier] = [here]
+        for turn in 2.0 * math.pi / CARRIER_ANGLES * np.arange(1, CARRIER_ANGLES):
+            about = rolled_coordinates(assembly, carrier, float(turn))
+            over_turns[carrier].append(_state(assembly, laws, _balance(assembly, laws, about)))
+    return here, over_turns
+
+
+def _in_motion(
+    assembly: Assembly, laws: Sequence[SupportLaw], here: _State, over_turns: dict[str, list[_State]]
+) -> tuple[ConnectorArrays, float]:
+    """Connectors with the laws that last in motion, and how far bearings of equal planets were apart in stiffness."""
+    bodies = _bodies(assembly)
+    time = assembly.gearbox.case.damping.bearing_time_s
+    all_around = [state for states in over_turns.values() for state in states] or [here]
+    equal = {planet.name for planets in _equal(assembly) for planet in planets}
+    found = []
+    for n, (support, law) in enumerate(zip(assembly.supports, laws, strict=True)):
+        if not is_catalogued(support) or support.law == "iso16281":
+            found.append(law)
+            continue
+        states = [here] if support.body in equal else over_turns.get(bodies[support.body].carrier or "", all_around)
+        points = [state.points[n] for state in states]
+        of_rows = np.mean([point.stiffness for point in points if point is not None], axis=0)
+        strain, load = np.mean([(state.strain[n], state.load[n]) for state in states], axis=0)
+        linear = linear_law(support, time, of_rows)
+        found.append(through_point(linear, strain, load, load_stands_still(support, bodies)))
+    return with_equal_planets(with_laws(assembly.connectors, found), _equal_supports(assembly))
+
+
+def _equal(assembly: Assembly) -> list[list[Body]]:
+    """Planet sets whose planets pass the same loads, one after the other."""
+    if assembly.gearbox.pin_offsets:
+        return []
+    return [planets for planets in planet_families(assembly.bodies) if equally_spaced(planets)]
+
+
+def _unequal(assembly: Assembly) -> list[list[Body]]:
+    equal = _equal(assembly)
+    return [planets for planets in planet_families(assembly.bodies) if planets not in equal]
+
+
+def _equal_supports(assembly: Assembly) -> list[PlanetSupports]:
+    """Catalogue bearings of equal planets."""
+    found = []
+    for planets in _equal(assembly):
+        names = [planet.name for planet in planets]
+        angles = np.array([planet.orbit_angle for planet in planets])
+        found += planet_supports(assembly.supports, names, angles)
+    return [own for own in found if all(is_catalogued(assembly.supports[n]) for n in own.numbers)]
+
+
+def _what_holds_one_way(laws: Sequence[SupportLaw], names: Sequence[str]) -> str:
+    """Say which bearings hold their ring in one direction along the axis only."""
+    one_way = [name for name, law in zip(names, laws, strict=True) if law.rows and holds_one_way(law.rows)]
+    if not one_way:
+        return "look for a body that only clearances hold"
+    return f"{', '.join(one_way)}: held along the axis in one direction only; look at arrangements and `holds_towards`"

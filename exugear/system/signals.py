@@ -1,0 +1,447 @@
+"""What a run records: one table of signals, and where each stands among the columns of a sample.
+
+`SIGNALS` has a row for each signal, under the name that it has in the file of a run. Whoever fills, judges, writes or
+reads signals goes by these names: `SignalLayout` says which columns of a sample belong to one.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from exugear.system.assembly import Assembly
+from exugear.system.tooth_mesh.kernels.table_law import GUESSED, LEFT_TABLE
+from exugear.system.tooth_mesh.laws.registry import LAWS
+from fe_ste.tools.arrays import Booleans, Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+AXES = ("x", "y", "z")
+"""Entries along the dimension `axis`: the global axes."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable in the file of a run."""
+
+    name: str
+    dimensions: tuple[str, ...]
+    units: str
+    long_name: str = ""
+    """What it is, where the name does not say it."""
+    sign_convention: str = ""
+    """What a positive value means, where it can have either sign."""
+    kind: str = "f8"
+    """Type in the file, as NumPy writes it."""
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Attributes of the variable in the file."""
+        words = {"units": self.units, "long_name": self.long_name, "sign_convention": self.sign_convention}
+        return {key: value for key, value in words.items() if value}
+
+
+@dataclass(frozen=True)
+class Signal(Variable):
+    """A row of `SIGNALS`.
+
+    The first dimension says what kind of signal it is: ``time``, a value of each stored sample; ``mesh``, a time that
+    is added up for each mesh; ``balance_time``, a term of the account of energy.
+    """
+
+    filled_by: tuple[str, ...] = ()
+    """Functions of `exugear.transient.compiled.sampling` that fill its columns, or its part of the account; or
+    methods of `exugear.transient.compiled.observers`. Empty where `formula` gives it, or where it is a time itself."""
+    formula: Callable[[SignalLayout, Floats], Floats | Booleans] | None = None
+    """Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
+    that is added up: in which samples it passes."""
+    laws: Literal["all", "table", "bilateral"] = "all"
+    """Mesh laws that have it: all, the law `table`, or all others. A time that a law has not got is zero."""
+    on_bearings: bool = False
+    """Whether only variants on bearings have it; of ideal joints `exugear.system.support_loads` derives it."""
+    stored: bool = True
+    """Whether it stands in the file; other signals are for the formulas alone."""
+    is_power: bool = False
+    """Of the account of energy: whether the observer gives its power (W), which the run integrates."""
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether it has a value in each sample."""
+        return self.dimensions[0] == "time"
+
+    @property
+    def is_mesh_time(self) -> bool:
+        """Whether it is a time that is added up for each mesh."""
+        return self.dimensions == ("mesh",)
+
+    @property
+    def is_balance_term(self) -> bool:
+        """Whether it is a term of the account of energy."""
+        return self.dimensions == ("balance_time",) and bool(self.filled_by)
+
+
+SIGNALS = (
+    Signal("time", ("time",), "s", "time from the start of the run"),
+    Signal(
+        "input_speed",
+        ("time",),
+        "rad/s",
+        "speed of the overall input",
+        sign_convention="rotation about +z",
+        filled_by=("Observer.complete",),
+    ),
+    Signal(
+        "overall_dte_angle",
+        ("time",),
+        "rad",
+        "overall transmission error as an angle of the output",
+        sign_convention="output ahead, about +z, of where the ratio puts it",
+        filled_by=("Observer.complete",),
+    ),
+    Signal(
+        "overall_dte",
+        ("time",),
+        "m",
+        "overall transmission error as a length",
+        sign_convention="as overall_dte_angle, at the base radius of the output gear",
+        formula=lambda layout, rows: layout.values("overall_dte_angle", rows) * layout.radius,
+    ),
+    Signal(
+        "mesh_dte",
+        ("time", "mesh"),
+        "m",
+        "deflection of the mesh along the transverse line of action",
+        sign_convention="the loaded flanks approach",
+        kind="f4",
+        filled_by=("observe_meshes",),
+    ),
+    Signal(
+        "mesh_force",
+        ("time", "mesh"),
+        "N",
+        "force in the transverse plane of gear 2 on gear 1, whose bodies `mesh_bodies` names in this order",
+        sign_convention="the loaded flank pushes",
+        kind="f4",
+        filled_by=("observe_meshes",),
+    ),
+    Signal(
+        "support_force",
+        ("time", "support", "axis"),
+        "N",
+        "force of the support on its body, the first that `support_bodies` names, from the second",
+        sign_convention="on the body, along the global axis",
+        kind="f4",
+        filled_by=("observe_supports", "observe_joints"),
+    ),
+    Signal(
+        "support_moment",
+        ("time", "support", "axis"),
+        "N m",
+        "moment of the support on the same body, about its seat there",
+        sign_convention="on the body, about the global axis",
+        kind="f4",
+        filled_by=("observe_supports",),
+        on_bearings=True,
+    ),
+    Signal(
+        "pulling_time",
+        ("mesh",),
+        "s",
+        "time in which the deflection had the sign that teeth cannot carry (where the law is bilateral)",
+        formula=lambda layout, rows: layout.values("mesh_dte", rows) < 0.0,
+        laws="bilateral",
+    ),
+    Signal(
+        "apart_time",
+        ("mesh",),
+        "s",
+        "time in which the teeth were apart (law table)",
+        formula=lambda layout, rows: layout.values("mesh_force", rows) == 0.0,
+        laws="table",
+    ),
+    Signal(
+        "outside_time",
+        ("mesh",),
+        "s",
+        "time in which load, centre distance or misalignment lay outside the table, which then goes on in a straight "
+        "line",
+        formula=lambda layout, rows: layout.values("outside_table", rows) == LEFT_TABLE,
+        laws="table",
+    ),
+    Signal(
+        "unsolved_time",
+        ("mesh",),
+        "s",
+        "time in which the table was read beside states that are not solved, where others stand in for them",
+        formula=lambda layout, rows: layout.values("outside_table", rows) == GUESSED,
+        laws="table",
+    ),
+    Signal(
+        "centre_distance_change",
+        ("time", "mesh"),
+        "m",
+        "change of the distance between both gears' axes",
+        sign_convention="axes further apart than nominal",
+        kind="f4",
+        filled_by=("observe_meshes",),
+        laws="table",
+    ),
+    Signal(
+        "misalignment",
+        ("time", "mesh"),
+        "rad",
+        "misalignment of the flanks in the plane of action",
+        sign_convention="the gap opens at the +z end",
+        kind="f4",
+        filled_by=("observe_meshes",),
+        laws="table",
+    ),
+    Signal(
+        "outside_table",
+        ("time", "mesh"),
+        "1",
+        "1 where load, centre distance or misalignment lies outside the table, 2 beside states of it that are not "
+        "solved, else 0",
+        filled_by=("observe_meshes",),
+        laws="table",
+        stored=False,
+    ),
+    Signal("balance_time", ("balance_time",), "s", "times of the account of energy"),
+    Signal(
+        "work_of_loads",
+        ("balance_time",),
+        "J",
+        "work of torques, drive and weight since the start",
+        sign_convention="put into the motion",
+        filled_by=("observe_loads", "observe_elastic_bodies"),
+        is_power=True,
+    ),
+    Signal(
+        "kinetic_energy",
+        ("balance_time",),
+        "J",
+        "kinetic energy of all bodies",
+        filled_by=("observe_bodies", "observe_elastic_bodies"),
+    ),
+    Signal(
+        "elastic_energy",
+        ("balance_time",),
+        "J",
+        "elastic energy of meshes, supports, couplings and bodies",
+        filled_by=(
+            "observe_meshes",
+            "observe_connectors",
+            "observe_springs",
+            "observe_elastic_bodies",
+        ),
+    ),
+    Signal(
+        "dissipated_energy",
+        ("balance_time",),
+        "J",
+        "work of all dampers since the start",
+        sign_convention="taken from the motion",
+        filled_by=(
+            "observe_meshes",
+            "observe_connectors",
+            "observe_springs",
+            "observe_elastic_bodies",
+        ),
+        is_power=True,
+    ),
+    Signal(
+        "work_of_varying_stiffness",
+        ("balance_time",),
+        "J",
+        "work of stiffness that changes over the mesh cycle, since the start",
+        sign_convention="taken from the motion",
+        filled_by=("observe_meshes",),
+        is_power=True,
+    ),
+    Signal(
+        "non_conservative_work",
+        ("balance_time",),
+        "J",
+        "work of the law seed beyond its deflection, since the start",
+        sign_convention="taken from the motion",
+        filled_by=("observe_meshes",),
+        is_power=True,
+    ),
+    Signal(
+        "bearing_rate_work",
+        ("balance_time",),
+        "J",
+        "work of bearings whose rate is not that of their displacement, since the start",
+        sign_convention="taken from the motion",
+        filled_by=("observe_connectors",),
+        is_power=True,
+    ),
+)
+"""All signals, in the order of the file.
+
+The account of energy: the loads' work = change of kinetic and elastic energy + the other four. The last two of these
+are what the law `seed` does because its force has parts that its deflection does not see, and what the bearings do
+because their rate is not the derivative of their displacement (see
+`exugear.system.bearings.kernels.connectors.connector_motion`).
+"""
+MESH_TIMES = tuple(signal.name for signal in SIGNALS if signal.is_mesh_time)
+"""Times (s) that a run adds up for each mesh."""
+BALANCE_TERMS = tuple(signal.name for signal in SIGNALS if signal.is_balance_term)
+"""Terms of the account of energy."""
+POWERS = tuple(signal.name for signal in SIGNALS if signal.is_power)
+"""Terms of the account whose power is observed."""
+ENERGIES = tuple(name for name in BALANCE_TERMS if name not in POWERS)
+"""Terms of the account that are observed as they are."""
+
+
+def signals_of(tabled: bool, jointed: bool = False) -> tuple[Signal, ...]:
+    """Rows of `SIGNALS` that a run with the law `table`, or with another, has on bearings, or on ideal joints.
+
+    Examples
+    --------
+    >>> {signal.name for signal in signals_of(True)} - {signal.name for signal in signals_of(False)} >= {"misalignment"}
+    True
+    """
+    laws = ("all", "table" if tabled else "bilateral")
+    return tuple(signal for signal in SIGNALS if signal.laws in laws and not (jointed and signal.on_bearings))
+
+
+@dataclass(frozen=True, eq=False)
+class SignalLayout:
+    """Which columns of a sample belong to which signal; ``layout[name]`` is their slice.
+
+    Examples
+    --------
+    >>> names = {"mesh": ("first", "second"), "support": ("pin",), "axis": AXES}
+    >>> layout = SignalLayout(SIGNALS, names, radius=0.1)
+    >>> layout["mesh_force"], layout["support_force"]
+    (slice(4, 6, None), slice(6, 9, None))
+    >>> samples = np.arange(2.0 * layout.count).reshape(2, layout.count)
+    >>> layout.values("support_force", samples)
+    array([[[ 6.,  7.,  8.]],
+    <BLANKLINE>
+           [[24., 25., 26.]]])
+    """
+
+    signals: tuple[Signal, ...]
+    """What a run holds of `SIGNALS`."""
+    names: Mapping[str, tuple[str, ...]]
+    """Names along the dimensions ``mesh`` and ``support``."""
+    radius: float
+    """Base radius of the overall output gear, m."""
+
+    @cached_property
+    def _slices(self) -> dict[str, slice]:
+        slices = {}
+        end = 0
+        for signal in self.signals:
+            if signal.is_sampled and signal.filled_by:
+                start = end
+                end = end + math.prod(self.shape(signal))
+                slices[signal.name] = slice(start, end)
+        return slices
+
+    @cached_property
+    def count(self) -> int:
+        """Columns of a sample."""
+        return int(max(columns.stop for columns in self._slices.values()))
+
+    def __contains__(self, name: str) -> bool:
+        """Tell whether a signal has columns."""
+        return name in self._slices
+
+    def __getitem__(self, name: str) -> slice:
+        """Columns of a signal."""
+        return self._slices[name]
+
+    def shape(self, signal: Variable) -> tuple[int, ...]:
+        """Sizes of a signal's dimensions after the first."""
+        return tuple(len(self.names[dimension]) for dimension in signal.dimensions[1:])
+
+    @property
+    def sample_bytes(self) -> int:
+        """Size of a stored sample in the file.
+
+        Examples
+        --------
+        >>> names = {"mesh": tuple("abcdefgh"), "support": tuple("abcdefghijkl"), "axis": AXES}
+        >>> SignalLayout(signals_of(False), names, radius=0.1).sample_bytes
+        384
+        """
+        stored = (signal for signal in self.signals if signal.is_sampled and signal.stored)
+        return sum(np.dtype(signal.kind).itemsize * math.prod(self.shape(signal)) for signal in stored)
+
+    def values(self, name: str, rows: Floats) -> Floats:
+        """Values (samples, ...) of a signal in samples (samples, columns), with its dimensions after time."""
+        signal = next(signal for signal in self.signals if signal.name == name)
+        return rows[:, self[name]].reshape(len(rows), *self.shape(signal))
+
+    def stored_values(self, times: Floats, rows: Floats) -> dict[str, Floats]:
+        """Variables of the file by name, of samples (samples, columns) at times (s)."""
+        values: dict[str, Floats] = {"time": times}
+        for signal in self.signals:
+            if signal.is_sampled and signal.stored and signal.name not in values:
+                made = self.values(signal.name, rows) if signal.formula is None else signal.formula(self, rows)
+                values[signal.name] = np.asarray(made, dtype=np.float64)
+        return values
+
+    def mesh_times(self, rows: Floats) -> Floats:
+        """Count the samples (samples, columns) in which each of `MESH_TIMES` passes, (times, meshes)."""
+        counts = np.zeros((len(MESH_TIMES), len(self.names["mesh"])))
+        for signal in self.signals:
+            if signal.is_mesh_time and signal.formula is not None:
+                # Along columns as they lie counting takes four times as long.
+                passing = np.ascontiguousarray(signal.formula(self, rows).T)
+                counts[MESH_TIMES.index(signal.name)] = [np.count_nonzero(mesh) for mesh in passing]
+        return counts
+
+
+def signal_layout(assembly: Assembly) -> SignalLayout:
+    """Lay out the signals of an assembly.
+
+    Supports are bearings, or the ideal joints of the variant `rigid`.
+    """
+    gearbox = assembly.gearbox
+    joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant.spins_only else ()
+    return SignalLayout(
+        signals_of(LAWS[assembly.mesh_law].signals_positions, assembly.variant.spins_only),
+        {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints, "axis": AXES},
+        gearbox.output_radius,
+    )
+
+
+def bodies_of_forces(assembly: Assembly) -> dict[str, str]:
+    """Bodies between which meshes and supports act, in words, as attributes of a file.
+
+    Of a mesh those of gear 1 and gear 2; of a support its body and what this sits on.
+    """
+    meshes = [f"{element.mesh.name}: {element.mesh.pinion}, {element.mesh.gear}" for element in assembly.elements]
+    joints = assembly.gearbox.joints if assembly.variant.spins_only else ()
+    supports = [f"{support.name}: {support.body}, {support.on}" for support in assembly.supports or joints]
+    return {"mesh_bodies": "; ".join(meshes), "support_bodies": "; ".join(supports)}
+
+
+STEADY_CHANGE = 1e-3
+"""Change of kinetic energy, over the kinetic energy, below which a run counts as one at constant speed."""
+
+
+def energy_residual(data: xr.Dataset | Mapping[str, Floats]) -> float:
+    """Energy that the account of a run does not explain, over the change of kinetic energy; NaN if nothing moves.
+
+    At constant speed the change says nothing: below `STEADY_CHANGE` of the kinetic energy, that itself is the measure.
+    """
+    change = {term: float(data[term][-1] - data[term][0]) for term in BALANCE_TERMS}
+    explained = sum(value for term, value in change.items() if term != "work_of_loads")
+    kinetic = change["kinetic_energy"]
+    last = float(data["kinetic_energy"][-1])
+    scale = kinetic if abs(kinetic) > STEADY_CHANGE * last else last
+    if scale:
+        return (change["work_of_loads"] - explained) / scale
+    return math.nan

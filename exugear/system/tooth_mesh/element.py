@@ -1,0 +1,303 @@
+"""The mesh force element: frames, signs and phases of every mesh, and its parameters for the kernel.
+
+Frames and signs, in this one place
+-----------------------------------
+- All axes along +z, rotations positive about +z, helix angle positive for a right-hand gear.
+- u is the unit vector from gear 1's axis to the pitch point: towards gear 2's axis for an external pair,
+  away from it for an internal one. t = z x u is where gear 1's pitch point moves when gear 1 turns
+  positively.
+- s = +1 when the loaded flank of gear 1 faces +t (gear 1, driving, turns positively), else -1. It follows
+  from the sign of the transmitted torque, not of the speed.
+- The flank of gear 1 pushes gear 2 with F_bt (s t cos a + u sin a - s z tan b), a the working transverse
+  pressure angle, b the base helix angle of gear 1. Gear 1 feels the opposite: the radial part -u sin a
+  separates the gears, for external and internal pairs alike, and a right-hand gear driving in +z is pushed
+  towards +z.
+- Deflection is positive when the flanks approach. It is conjugate to F_bt, so that its spin part is
+  s (r_b1 theta_1 + r_b2 theta_2) for an external pair and s (r_b1 theta_1 - r_b2 theta_2) for an internal
+  one.
+- PMC grows with s theta_1, seen from the frame of the line of centres; PMC = 0 when the loaded flanks touch
+  in the pitch point at the middle of the common face.
+
+Where the gears stand: the centre distance is along the line of centres at mid-face; misalignment is the turning of
+gear 1's axis against gear 2's in the loaded flank's plane of action, positive where it opens the gap at the +z end.
+What deflection and force are to a law, and what else it knows of the teeth, stands in its file
+(`exugear.system.tooth_mesh.laws`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Body, Mesh, node_position, seat_key
+from exugear.gearbox.sections.entries import GROUND
+from exugear.system.kernels.coordinates import BODY_SIZE
+from exugear.system.tooth_mesh.contact_state import ContactState, changed_over_cycle, even_contact
+from exugear.system.tooth_mesh.law import Angles, Law, MeshCurve, MeshData, TableFlanks
+from exugear.system.tooth_mesh.placement import (
+    MeshError,
+    loaded_flanks,
+    position_rows,
+    tooth_places,
+)
+from exugear.system.tooth_mesh.wheel_errors import wheel_errors
+from fe_ste.geometry.gears import Gear
+from fe_ste.tools.arrays import Floats
+from fe_ste.transmission_error.table import TableInput
+
+STEEPEST = 2.0
+"""Largest exponent of a curve of load over deflection: flanks that touch on one end first, the contact growing."""
+
+
+@dataclass(frozen=True)
+class MeshElement:
+    """One mesh as the kernel sees it."""
+
+    mesh: Mesh
+    law: Law
+    flank: int
+    """+1 or -1, the loaded flank s of gear 1."""
+    deflection: Floats
+    force: Floats
+    """(12,) rows about the two bodies' nodes (x y z, tilts, spin of gear 1, then gear 2)."""
+    axis: Floats
+    """(2, 2) axes of the two bodies relative to the frame's axis, m."""
+    cycles: float
+    """Mesh cycles per rad of gear 1 relative to the frame."""
+    phase: float
+    """PMC at zero angles."""
+    stiffness: Floats
+    tangent: Floats
+    """(n,) load over deflection and slope of the load over the mesh cycle, in the law's own: coordinate, N/m; equal
+    where the law is a straight line."""
+    load: float
+    """At which they are, on the transverse line of action, N."""
+    contact: ContactState | None
+    """How the teeth resist misalignment, in the axes of the mesh; None of a law in which they do not."""
+    damping: float
+    """N s/m, in the law's own coordinate."""
+    damping_time: float
+    """Damping over stiffness, s."""
+    line_of_action: float
+    """F_bt per scalar force of the law."""
+    centre: Floats
+    misalignment: Floats
+    """(12,) rows of the centre distance and of the misalignment."""
+    errors: tuple[Floats, Floats]
+    """Errors of gear 1 and gear 2 over a revolution of each from zero angle, m; empty for none."""
+    offset: Floats
+    """(3,) deflection (m), change of centre distance (m) and misalignment (rad) at zero coordinates."""
+    table: TableFlanks | None = None
+    """For a law that follows a table; `stiffness` and `damping` are then what it has at the static load."""
+    computed_from: TableInput | None = None
+    """Input of the pair's table where contact is still to be solved at the static misalignment."""
+    load_ways: Floats = field(default_factory=lambda: np.zeros((2, 0)))
+    """(2, n) way of the load along the face over the mesh cycle, and of what a little more deflection adds to: it,
+    each about its mean, in the axes of the mesh, m; empty where they stay or nothing is known of them."""
+
+    def with_contact(self, contact: ContactState) -> MeshElement:
+        """Return the mesh, whose teeth bear evenly so far, with a contact that was solved, in the axes of its table.
+
+        The mean of a curved law's stiffness is then that of the contact. So are its changes over the mesh cycle and the
+        load's ways along the face, as far as the positions of the contact tell; finer ones stay the table's. Where
+        gears stand so askew that flanks touch long before or after their middles would, the deflection at mid-face is
+        mostly that gap, and no measure of how teeth yield: the curve then begins at the gap.
+        """
+        secant = self.stiffness
+        tangent = self.tangent
+        ways = self.load_ways
+        load = self.load
+        gap = 0.0
+        if self.is_curved:
+            straight = contact.force / contact.tangent_stiffness
+            yielding = float(np.clip(contact.deflection, straight, STEEPEST * straight))
+            gap = contact.deflection - yielding
+            secant, tangent, ways = self._over_cycle(contact, yielding)
+            secant = secant * (contact.force / yielding / np.mean(secant))
+            tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
+            load = contact.force
+        slope = contact.deflection_by_distance
+        shift = slope * (self.mesh.centre_distance + float(self.offset[1]) - contact.centre_distance)
+        return replace(
+            self,
+            stiffness=secant,
+            tangent=tangent,
+            load=load,
+            load_ways=ways,
+            contact=contact.seen_by(self.flank),
+            damping=self.damping_time * float(np.mean(tangent)),
+            deflection=self.deflection - slope * self.centre,
+            force=self.force - slope * self.centre,
+            offset=self.offset - np.array([shift + gap, 0.0, 0.0]),
+        )
+
+    def _over_cycle(self, contact: ContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
+        """Secant and tangent stiffness (n,), N/m, and ways of the load (2, n), m, where the gears stand."""
+        cycle = contact.cycle
+        if cycle is None:
+            return self.stiffness, self.tangent, self.load_ways
+        deflection = changed_over_cycle(contact.force / self.stiffness, cycle.deflection)
+        deflection += yielding - np.mean(deflection)
+        softness = changed_over_cycle(1.0 / self.tangent, tuple(1.0 / np.array(cycle.tangent_stiffness)))
+        softness += 1.0 / contact.tangent_stiffness - np.mean(softness)
+        # A curve needs teeth that yield wherever they are.
+        deflection = np.maximum(deflection, yielding / STEEPEST)
+        softness = np.maximum(softness, 1.0 / (STEEPEST * contact.tangent_stiffness))
+        ways = self.load_ways
+        if ways.size:
+            centres = cycle.load_centre, cycle.tangent_load_centre
+            pairs = zip(self.flank * ways, centres, strict=True)
+            ways = self.flank * np.array([changed_over_cycle(known, found) for known, found in pairs])
+        return contact.force / deflection, 1.0 / softness, ways
+
+    @property
+    def is_curved(self) -> bool:
+        """Whether load over deflection is another line than a straight one."""
+        return self.table is None and not np.array_equal(self.stiffness, self.tangent)
+
+    @property
+    def bears_beside(self) -> bool:
+        """Whether the load bears beside the middle of the face where the gears stand straight."""
+        contact = self.contact
+        return contact is not None and any((contact.misalignment, contact.load_centre, contact.tangent_load_centre))
+
+    @property
+    def rest(self) -> float:
+        """Deflection at which the mean tangent at the static load has no force, m; zero of a straight law."""
+        return self.load / float(np.mean(self.stiffness)) - self.load / float(np.mean(self.tangent))
+
+
+def mesh_elements(
+    gearbox: Gearbox,
+    stiffness: Mapping[str, MeshData],
+    law: Law,
+    inertias: str | None = None,
+    flanks: Mapping[str, int] | None = None,
+    angles: Angles = "reference",
+    displaced: Mapping[str, tuple[float, float]] | None = None,
+    nodes: Mapping[str, Floats] | None = None,
+    contact: Mapping[str, ContactState] | None = None,
+) -> tuple[MeshElement, ...]:
+    """Elements of all meshes.
+
+    Parameters
+    ----------
+    stiffness : mapping of pair name to (n,) array, to a curve, or to the table's surface
+        F_bt / STE at pmc = 0, 1/n, ..., N/m; a single value for a constant. The law `table` needs surfaces.
+    law : `exugear.system.tooth_mesh.laws.registry.law_of` knows it by its name
+    inertias : inertia set: it decides where the bodies' nodes (centres of mass) are
+    flanks : loaded flank of each mesh; from the static load by default
+    angles : {"reference", "operating"}
+        Angles of the law `seed`.
+    displaced : place of bodies at zero coordinates against their nominal one, x and y seen from the mesh's frame, m
+    nodes : position (3,) of the node that carries a gear, by `seat_key` of body and gear; the body's own otherwise
+    contact : by mesh name
+        Contact at the static misalignment, in the axes of the pair's table (of the flank +1). A law that is curved has
+        its stiffness from there, and how that and the place of the load change over the mesh cycle
+        (`MeshElement.with_contact`). Meshes without one, or loaded on the other flank, bear evenly along the common
+        face (`even_contact`).
+
+    Raises
+    ------
+    MeshError
+        No stiffness for a pair at work, or none that the law can do with.
+    """
+    usual = loaded_flanks(gearbox)
+    flanks = usual if flanks is None else flanks
+    phases, orientation = tooth_places(gearbox, flanks)
+    bodies = {body.name: body for body in gearbox.bodies(inertias)}
+    time = gearbox.case.damping.mesh_time_s
+    static = gearbox.train.static_mesh_forces()
+    elements = []
+    for mesh in gearbox.meshes:
+        if mesh.pair.name not in stiffness:
+            raise MeshError(f"mesh {mesh.name}: no stiffness for pair {mesh.pair.name!r}; compute its table")
+        data = stiffness[mesh.pair.name]
+        flank = flanks[mesh.name]
+        phase = phases[mesh.name]
+        ends = (_node(mesh.pinion, mesh.pair.pinion, bodies, nodes), _node(mesh.gear, mesh.pair.gear, bodies, nodes))
+        known = contact.get(mesh.name) if contact and flank == usual[mesh.name] else None
+        secant, tangent, load = _at_load(law, data, mesh, static[mesh.name])
+        deflection, force = law.rows(mesh, flank, ends, angles)
+        centre, misalignment = position_rows(mesh, flank, ends)
+        mesh_stiffness, factor = law.stiffness(mesh, secant, angles)
+        mesh_tangent, _ = law.stiffness(mesh, tangent, angles)
+        even = even_contact(mesh.pair, load, float(np.mean(secant)), float(np.mean(tangent)))
+        element = MeshElement(
+            mesh=mesh,
+            law=law,
+            flank=flank,
+            deflection=deflection,
+            force=force,
+            axis=_gear_axes(mesh, bodies),
+            cycles=flank * mesh.pair.pinion.teeth / (2.0 * math.pi),
+            phase=phase,
+            stiffness=mesh_stiffness,
+            tangent=mesh_tangent,
+            load=load,
+            contact=even if law.tilts else None,
+            damping=time * float(np.mean(mesh_tangent)),
+            damping_time=time,
+            line_of_action=factor,
+            centre=centre,
+            misalignment=misalignment,
+            errors=wheel_errors(gearbox, mesh, flank, phase, orientation),
+            offset=_offset(mesh, displaced or {}, deflection, centre),
+            table=law.table_flanks(mesh, flank, ends, phase, data, time),
+            computed_from=data.table if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
+            load_ways=_load_ways(law, data, flank, usual[mesh.name]),
+        )
+        if known is not None and law.tilts:
+            element = replace(element.with_contact(known), computed_from=None)
+        elements.append(element)
+    return tuple(elements)
+
+
+def _at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats, float]:
+    """Secant and tangent stiffness (n,) over the mesh cycle along the line of action, N/m, and their load, N."""
+    secant, tangent = law.samples(data, mesh, static_force)
+    load = abs(static_force) or (data.force if isinstance(data, MeshCurve) else 0.0)
+    for values in (secant, tangent):
+        if not (np.all(np.isfinite(values)) and np.all(values > 0.0)):
+            raise MeshError(f"pair {mesh.pair.name}: mesh stiffness must be positive and finite")
+    return secant, tangent, load
+
+
+def _load_ways(law: Law, data: MeshData, flank: int, usual: int) -> Floats:
+    """Ways of the load as `MeshElement.load_ways`; of the flank that a table is of, not of that behind."""
+    # A flank -1 is that of the table turned about: the ends of the face change places.
+    if flank == usual:
+        return flank * law.load_ways(data)
+    return np.zeros((2, 0))
+
+
+def _offset(mesh: Mesh, displaced: Mapping[str, tuple[float, float]], deflection: Floats, centre: Floats) -> Floats:
+    """Deflection, change of centre distance and misalignment at zero coordinates, (3,)."""
+    offset = np.zeros(3)
+    for start, body in ((0, mesh.pinion), (BODY_SIZE, mesh.gear)):
+        way = np.array(displaced.get(body, (0.0, 0.0)))
+        offset[:2] += deflection[start : start + 2] @ way, centre[start : start + 2] @ way
+    return offset
+
+
+def _node(body: str, gear: Gear, bodies: Mapping[str, Body], nodes: Mapping[str, Floats] | None) -> Floats:
+    """Position of the node that carries a gear of a body, m."""
+    seat = None if nodes is None else nodes.get(seat_key(body, gear.name))
+    if seat is None:
+        return node_position(bodies[body])
+    return seat
+
+
+def _gear_axes(mesh: Mesh, bodies: Mapping[str, Body]) -> Floats:
+    """Axes of the two gears relative to the frame's axis (2, 2); irrelevant but finite for ground."""
+    origin: Floats = np.array(bodies[mesh.frame].axis if mesh.frame != GROUND else (0.0, 0.0))
+    axes: Floats = np.array([bodies[mesh.pinion].axis, bodies[mesh.gear].axis]) - origin
+    if mesh.frame != GROUND:
+        for name, axis in zip((mesh.pinion, mesh.gear), axes, strict=True):
+            if bodies[name].carrier is None and math.hypot(*axis) > 1e-6:
+                raise MeshError(f"mesh {mesh.name}: body {name} is not on the axis of its frame {mesh.frame}")
+    return axes

@@ -1,0 +1,87 @@
+"""All mesh laws in one table: their names, what they are in a line, and what the rest of the program must know.
+
+To add a law: a file of its name in this folder, with a `LAW`, and a row here. Only a law whose force is no stiffness
+over the mesh cycle times the deflection needs more, a branch in `exugear.system.tooth_mesh.laws.along_row`. Nothing
+heavy is imported here, because the command line reads its choices from this table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, cast
+
+if TYPE_CHECKING:
+    from exugear.system.tooth_mesh.law import Law
+
+
+@dataclass(frozen=True)
+class LawProperties:
+    """What the program must know of a law before it computes with it."""
+
+    name: str
+    """As on the command line; the law's file has the same name."""
+    description: str
+    """One line for the command line and the page of choices."""
+    has_force: bool = True
+    """False where gears only roll and no mesh has a force."""
+    needs_tables: bool = True
+    """Whether it reads tables of the static transmission error."""
+    needs_axes: bool = False
+    """Whether these are to be tables over load, centre distance and misalignment."""
+    loses_contact: bool = False
+    """Whether teeth part and touch on the other flank."""
+    signals_positions: bool = False
+    """Whether a run records where the gears of each mesh stand."""
+    moves_load: bool = False
+    """Whether the load moves along the face over the mesh cycle as the table has it."""
+
+
+_TABLE_OF_LAWS = (
+    LawProperties("rigid", "gears only roll; variant `rigid` alone", has_force=False, needs_tables=False),
+    LawProperties("constant", "as `line_of_action` with the mean of load over deflection, a straight line"),
+    LawProperties("iso6336", "as `constant`, stiffness by ISO 6336-1 method B", needs_tables=False),
+    LawProperties(
+        "seed",
+        "the published tangential law: deflection along the pitch circle, force with radial and axial parts; "
+        "not conservative",
+    ),
+    LawProperties(
+        "line_of_action",
+        "load over deflection over the mesh cycle by secant and tangent of the table, stiffness against misalignment; "
+        "all motions along the line of action",
+        moves_load=True,
+    ),
+    LawProperties(
+        "table",
+        "the whole table: force by load, position, centre distance and misalignment; "
+        "teeth part and touch on the other flank",
+        needs_axes=True,
+        loses_contact=True,
+        signals_positions=True,
+        moves_load=True,
+    ),
+)
+LAWS = {law.name: law for law in _TABLE_OF_LAWS}
+MESH_LAWS = tuple(LAWS)
+
+
+def law_of(name: str) -> Law:
+    """Load what a law with a force computes with.
+
+    Raises
+    ------
+    MeshError
+        No such law, or one without a force.
+
+    Examples
+    --------
+    >>> law_of("constant").coefficients([3.0])
+    array([[3., 0., 0., 0.]])
+    """
+    if name not in LAWS or not LAWS[name].has_force:
+        from exugear.system.tooth_mesh.placement import MeshError
+
+        known = ", ".join(law.name for law in LAWS.values() if law.has_force)
+        raise MeshError(f"mesh law {name!r} has no force element; laws are {known}")
+    return cast("Law", import_module(f"{__package__}.{name}").LAW)

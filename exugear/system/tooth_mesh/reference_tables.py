@@ -1,0 +1,102 @@
+"""Tables of a gearbox's pairs by the reference analysis, beside those that its dynamics use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.system.tooth_mesh.tables import TABLE_FOLDER, requested_tables
+from fe_ste.reference.contact_model import Iteration
+from fe_ste.reference.table import NonlinearInput, NonlinearTable
+
+#: Positions of the mesh cycle unless asked for otherwise: one takes a minute or two.
+DEFAULT_POSITIONS = 10
+
+
+@dataclass(frozen=True)
+class ReferenceRequest:
+    """The reference analysis of one pair."""
+
+    name: str
+    """Name of the pair in the gearbox file."""
+    wanted: NonlinearInput
+    """All that the numbers depend on."""
+    path: Path
+    """The table's file."""
+
+    def compute(self, progress: Callable[[int, int, Iteration | None], None] | None = None) -> NonlinearTable:
+        """Compute what the file does not hold yet, writing after each position."""
+        return NonlinearTable.compute(self.wanted, self.path, progress)
+
+
+def requested_references(
+    gearbox: Gearbox, out: Path, names: Iterable[str] = (), positions: int | None = None
+) -> list[ReferenceRequest]:
+    """List the reference analyses of a gearbox under its static load; computes and writes nothing.
+
+    Parameters
+    ----------
+    out : results folder; a table lies in ``tables/<pair>-nonlinear.nc``
+    names : pairs; without any, those that the file wants a table of
+    positions : positions of the mesh cycle
+
+    Raises
+    ------
+    CaseError
+        A pair that is not in the file, or that carries no load in its static state.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [str(request.path) for request in requested_references(gearbox, Path("nowhere"), ["high_speed"])]
+    ['nowhere/tables/high_speed-nonlinear.nc']
+    """
+    requests = requested_tables(gearbox, out, names)
+    return [
+        ReferenceRequest(
+            request.name,
+            NonlinearInput(
+                pair=request.wanted.pair,
+                torque=request.wanted.static_torque or request.wanted.torque[0],
+                positions=positions or DEFAULT_POSITIONS,
+            ),
+            out / TABLE_FOLDER / f"{request.name}-nonlinear.nc",
+        )
+        for request in requests
+    ]
+
+
+def summarise_reference(request: ReferenceRequest, table: NonlinearTable) -> dict[str, Any]:
+    """Return the figures of a table that a person asks for first; the unit is part of the key.
+
+    What no converged position gives is None.
+    """
+    data = table.dataset
+
+    def figure(values: xr.DataArray) -> float | None:
+        value = float(values)
+        if value == value:
+            return value
+        return None
+
+    return {
+        "pair": request.name,
+        "table": str(request.path),
+        "method": "nonlinear",
+        "torque_gear_1_N_m": request.wanted.torque,
+        "positions": request.wanted.positions,
+        "states": request.wanted.positions,
+        "not_converged": int((~data["converged"]).sum()),
+        "ste_mean_um": figure(1e6 * data["ste"].mean()),
+        "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),
+        "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),
+        "max_pressure_MPa": figure(1e-6 * data["max_pressure"].max()),
+        "max_von_mises_MPa": figure(1e-6 * data["max_von_mises"].max()),
+        "wall_time_per_position_s": figure(data["wall_time"].mean()),
+        "input_hash": table.input_hash,
+    }

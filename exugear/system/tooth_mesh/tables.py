@@ -1,0 +1,342 @@
+"""The transmission error tables of a gearbox: which are wanted, which are there, and what they say in figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
+from exugear.system.tooth_mesh.grid_axes import GridAxes, axes_reaching, reaches
+from fe_ste.transmission_error.hertz import pitch_point_pressure
+from fe_ste.transmission_error.states import CUT_OFF
+from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+TABLE_FOLDER = "tables"
+
+
+FINITE_ELEMENTS = 500
+"""States whose solution takes as long as the finite elements of two gears."""
+
+
+@dataclass(frozen=True)
+class TableRequest:
+    """The table of one pair: its input, its file and, where the file fits the input, its content."""
+
+    name: str
+    """Name of the pair in the gearbox file."""
+    wanted: TableInput
+    """All that the numbers depend on."""
+    path: Path
+    """The table's file."""
+    stored: MeshTable | None
+    """The table in the file, if it was computed from exactly this input."""
+    replaces: str = ""
+    """Why a file that is there does not serve; empty if there is none or it serves."""
+
+    @property
+    def states(self) -> int:
+        """Number of states of the table."""
+        wanted = self.wanted
+        return wanted.positions * len(wanted.torque) * max(len(wanted.centre_distance), 1) * len(wanted.misalignment)
+
+    @property
+    def work(self) -> int:
+        """Work of the table, in states: the finite elements of both gears count as `FINITE_ELEMENTS`."""
+        return FINITE_ELEMENTS + self.states
+
+    def compute(self, progress: Callable[[int, int], None] | None = None) -> MeshTable:
+        """Compute the table and write its file; what a stopped computation had finished is taken up.
+
+        Parameters
+        ----------
+        progress : called with the number of finished positions and of all positions
+        """
+        partial = self.path.with_suffix(".partial.nc")
+        table = MeshTable.compute(self.wanted, progress, partial=partial)
+        table.save(self.path)
+        partial.unlink(missing_ok=True)
+        return table
+
+
+def requested_tables(
+    gearbox: Gearbox,
+    out: Path,
+    names: Iterable[str] = (),
+    positions: int | None = None,
+    grid: bool = False,
+    axes: Mapping[str, GridAxes] | None = None,
+) -> list[TableRequest]:
+    """List the tables of a gearbox and find those that are there; computes and writes nothing.
+
+    Parameters
+    ----------
+    gearbox : the case
+    out : results folder; the tables lie in its folder ``tables``
+    names : pairs to list; without any, those that the file wants a table of
+    positions : positions of the mesh cycle; without it what the file says
+    grid : ask for the axes of the file even if its section ``ste`` does not
+    axes : by pair name, axes where the file names none; usual ones by default
+
+    Raises
+    ------
+    CaseError
+        A pair that is not in the file, or that carries no load in its static state.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [request.name for request in requested_tables(gearbox, Path("nowhere"))]
+    ['sun_planet', 'ring_planet', 'intermediate', 'high_speed']
+    """
+    chosen = list(names) or [name for name, spec in gearbox.pairs.items() if spec.table]
+    for name in chosen:
+        if name not in gearbox.pairs:
+            known = ", ".join(gearbox.pairs)
+            raise CaseError(f"{gearbox.source}: no gear pair {name!r}; the pairs are {known}")
+        if not gearbox.pairs[name].static_torque > 0.0 or name in gearbox.stated_stiffness:
+            raise gearbox.fault(without_table(gearbox, [name]))
+    grid = grid or gearbox.ste.grid
+    own = axes or {}
+    count = positions or gearbox.ste.positions
+    wanted = {name: wanted_table(gearbox, name, count, grid, own.get(name)) for name in chosen}
+    return [_request(gearbox, name, out, table, grid, own.get(name)) for name, table in wanted.items()]
+
+
+def without_table(gearbox: Gearbox, names: Iterable[str]) -> str:
+    """Say why the first of these pairs without a table has none, and what would be right; empty if all have one."""
+    law = "take a mesh law that needs a stiffness alone (line_of_action, constant, seed, iso6336)"
+    for name in names:
+        if gearbox.case.pairs[name].stiffness is not None:
+            return (
+                f"pairs.{name}.stiffness: is stated, so the pair has no table; leave it out to have one computed, "
+                f"or {law}"
+            )
+        if not gearbox.pairs[name].static_torque > 0.0:
+            return (
+                f"pairs.{name}: carries no torque in [static_load]; a table needs one, for it belongs to one loaded "
+                f"flank; put a torque on what it drives, or {law}"
+            )
+    return ""
+
+
+def table_path(out: Path, name: str) -> Path:
+    """Place of a pair's table: ``tables/<pair>.nc`` in the results folder."""
+    return out / TABLE_FOLDER / f"{name}.nc"
+
+
+def wanted_table(
+    gearbox: Gearbox, name: str, positions: int, grid: bool = False, axes: GridAxes | None = None
+) -> TableInput:
+    """All that the numbers of a pair's table depend on.
+
+    Parameters
+    ----------
+    name : pair
+    grid : over the axes of the file's section ``ste``, else the static state alone
+    axes : axes where the file names none; usual ones by default
+
+    Raises
+    ------
+    CaseError
+        If the gears cannot run at a centre distance of the axes.
+    """
+    spec = gearbox.pairs[name]
+    # Statics leave rounding in the torque; another machine's must not make another hash of it.
+    torque = _rounded(spec.static_torque)
+    pinion, gear = (given if spec.flank > 0 else given.mirrored() for given in spec.modifications)
+    static = TableInput(
+        pair=spec.pair,
+        torque=(torque,),
+        positions=positions,
+        pinion_modification=pinion,
+        gear_modification=gear,
+        static_torque=torque,
+    )
+    if not grid:
+        return static
+    ste = gearbox.ste
+    pair = spec.pair
+    usual = axes or axes_reaching(pair)
+    openings = usual.openings if ste.misalignment_um is None else tuple(1e-6 * um for um in ste.misalignment_um)
+    return replace(
+        static,
+        torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in ste.torque_factors),
+        centre_distance=gearbox.table_distances(name)
+        or tuple(pair.centre_distance + offset for offset in usual.offsets),
+        misalignment=tuple(opening / pair.face_width for opening in openings),
+    )
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.12g}")
+
+
+def fitting_table(
+    gearbox: Gearbox, name: str, out: Path, grid: bool = False, axes: GridAxes | None = None
+) -> MeshTable:
+    """Read the table of a pair, however many positions it has, if all else is the case's.
+
+    Parameters
+    ----------
+    name : pair
+    out : results folder
+    grid
+        Whether it must have exactly the axes that the file's section ``ste`` names, and the others at all; else any
+        axes with the static state serve.
+    axes : what axes must reach that the file does not name
+
+    Raises
+    ------
+    fe_ste.transmission_error.table.TableError
+        The file is missing, unreadable, or was computed from another input.
+    """
+    path = table_path(out, name)
+    table = _opened(path)
+    wanted = wanted_table(gearbox, name, table.dataset.sizes["pmc"], grid)
+    fits = _with_named_axes(gearbox, table, wanted) if grid else _holds(table, wanted)
+    if not (table.input_hash == wanted.hash or fits):
+        raise TableError(f"{path}: was computed from another input; compute it again")
+    if grid and axes is not None and not reaches(table, wanted_table(gearbox, name, wanted.positions, grid, axes)):
+        raise TableError(f"{path}: its axes end too near to the static state; compute it again")
+    return table
+
+
+def _opened(path: Path) -> MeshTable:
+    """Read a table, or give the one that was read of the same file before: a verb looks at each several times."""
+    try:
+        status = path.stat()
+    except OSError:
+        return MeshTable.open(path)  # says what is wrong
+    return _read(path, (status.st_ino, status.st_size, status.st_mtime_ns))
+
+
+@lru_cache(maxsize=16)
+def _read(path: Path, version: tuple[int, ...]) -> MeshTable:
+    return MeshTable.open(path)
+
+
+def _holds(table: MeshTable, static: TableInput) -> bool:
+    """Whether a table over more states was computed from the input `static`, axes aside, and holds its state."""
+    try:
+        torque = float(table.static_state["torque"])
+    except TableError:
+        return False
+    torques, distances, misalignments = (_values(table, name) for name in ("torque", "centre_distance", "misalignment"))
+    wider = replace(static, torque=torques, centre_distance=distances, misalignment=misalignments)
+    return torque == static.torque[0] and table.input_hash == wider.hash
+
+
+def _with_named_axes(gearbox: Gearbox, table: MeshTable, wanted: TableInput) -> bool:
+    """Whether a table has the axes that the file names, and any values along those that it does not."""
+    ste = gearbox.ste
+    named = wanted
+    follow = []
+    if ste.centre_distance_offsets_um is None:
+        follow.append(_values(table, "centre_distance"))
+        named = replace(named, centre_distance=follow[-1])
+    if ste.misalignment_um is None:
+        follow.append(_values(table, "misalignment"))
+        named = replace(named, misalignment=follow[-1])
+    return table.input_hash == named.hash and all(len(values) > 1 for values in follow)
+
+
+def _values(table: MeshTable, axis: str) -> tuple[float, ...]:
+    return tuple(table.dataset[axis].to_numpy().tolist())
+
+
+def missing_tables(
+    gearbox: Gearbox, out: Path, grid: bool = False, axes: Mapping[str, GridAxes] | None = None
+) -> list[TableRequest]:
+    """List the tables that dynamics need and that are not there, or belong to another input.
+
+    Parameters
+    ----------
+    out : results folder
+    grid : whether the mesh law interpolates over load, centre distance and misalignment
+    axes : by pair name, what axes must reach that the file does not name
+    """
+    work = tables_at_work(gearbox, out, grid, axes)
+    requests = []
+    for name in _with_tables(gearbox, grid):
+        if name not in work:
+            requests += requested_tables(gearbox, out, [name], grid=grid, axes=axes)
+    return requests
+
+
+def tables_at_work(
+    gearbox: Gearbox, out: Path, grid: bool = False, axes: Mapping[str, GridAxes] | None = None
+) -> dict[str, MeshTable]:
+    """Tables of the pairs at work that are there and fit; parameters as of `missing_tables`."""
+    found = {}
+    for name in _with_tables(gearbox, grid):
+        with suppress(TableError):
+            found[name] = fitting_table(gearbox, name, out, grid, (axes or {}).get(name))
+    return found
+
+
+def _with_tables(gearbox: Gearbox, grid: bool) -> list[str]:
+    """Pairs at work whose tables dynamics read; of those with a stated stiffness only a law with axes does."""
+    names = dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes)
+    return [name for name in names if grid or name not in gearbox.stated_stiffness]
+
+
+def _request(
+    gearbox: Gearbox, name: str, out: Path, wanted: TableInput, grid: bool, axes: GridAxes | None
+) -> TableRequest:
+    path = table_path(out, name)
+    if not path.exists():
+        return TableRequest(name, wanted, path, None)
+    try:
+        stored = fitting_table(gearbox, name, out, grid, axes)
+    except TableError as error:
+        return TableRequest(name, wanted, path, None, str(error))
+    if stored.dataset.sizes["pmc"] != wanted.positions:
+        return TableRequest(name, wanted, path, None, f"{path}: was computed from another input, with other positions")
+    return TableRequest(name, wanted, path, stored)
+
+
+def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
+    """Return the figures of a table that a person asks for first; the unit is part of the key.
+
+    Of the static state, but for the numbers of states. What no converged position gives is None.
+    """
+    data = table.static_state
+
+    def figure(values: xr.DataArray) -> float | None:
+        value = float(values)
+        if value == value:
+            return value
+        return None
+
+    return {
+        "pair": request.name,
+        "table": str(request.path),
+        "torque_gear_1_N_m": float(data["torque"]),
+        "positions": request.wanted.positions,
+        "states": table.dataset["ste"].size,
+        "not_converged": int((~table.dataset["converged"]).sum()),
+        "cut_off": int((table.dataset[CUT_OFF] > 0.0).sum()),
+        "largest_share_cut_off": figure(table.dataset[CUT_OFF].max()),
+        "static_share_cut_off": figure(data[CUT_OFF].max()),
+        "ste_mean_um": figure(1e6 * data["ste"].mean()),
+        "ste_peak_to_peak_um": figure(1e6 * (data["ste"].max() - data["ste"].min())),
+        "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),
+        "max_pressure_MPa": figure(1e-6 * data["max_pressure"].max()),
+        "pitch_point_pressure_MPa": 1e-6 * pitch_point_pressure(request.wanted.pair, float(data["torque"])),
+        "input_hash": table.input_hash,
+    }
+
+
+def stored_tables(gearbox: Gearbox, out: Path, positions: int | None = None) -> dict[str, MeshTable]:
+    """Return the tables of a results folder that fit the gearbox, by the name of the pair."""
+    requests = requested_tables(gearbox, out, positions=positions)
+    return {request.name: request.stored for request in requests if request.stored}

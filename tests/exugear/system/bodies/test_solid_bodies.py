@@ -1,0 +1,368 @@
+"""Solids in the gearbox file and in the variant `flexible`: an elastic housing on its mounts."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.sparse
+import xarray as xr
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import VariantError
+from exugear.report.pictures.elastic_scene import elastic_scene
+from exugear.system.assemble import assemble
+from exugear.system.assembly import Assembly
+from exugear.system.bodies.finite_elements.solid_matrices import assemble as assemble_solid
+from exugear.system.bodies.finite_elements.solid_seats import seat_rows
+from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.system.bodies.of_gearbox.solids import solid_body
+from exugear.system.eigenmodes.energy_shares import BODY_MOTIONS
+from exugear.system.eigenmodes.modes import counterparts, eigenmodes, modes_of
+from exugear.system.fingerprint import input_hash
+from exugear.system.linearised import linearise
+from exugear.system.loads import Loading, LoadTable
+from exugear.system.signals import energy_residual
+from exugear.system.statics import accelerating_start, locked_equilibrium
+from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.exudyn_model.system import ExudynSystem
+from fe_ste.elimination.sparse import factorise
+
+from ...assembled import assembled, bodies_of, modes_with_bodies, simulated
+from ...box_case import box_content
+from ...limit_case import unchecked
+from ...plain_signals import sampled
+
+STIFFNESS = {"spur": 2e8 * (1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(16) / 16))}
+LOAD = {"shaft_1": 100.0, "shaft_2": 140.0}
+STEP = 5e-6
+
+
+def works(library: str) -> bool:
+    """Tell whether an optional library and what it needs of the system is there."""
+    try:
+        importlib.import_module(library)
+    except (ImportError, OSError):
+        return False
+    return True
+
+
+pytestmark = pytest.mark.skipif(not works("meshio"), reason="meshio (extra mesh) is missing")
+needs_gmsh = pytest.mark.skipif(not works("gmsh"), reason="gmsh (extra mesh) or its system libraries are missing")
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory: pytest.TempPathFactory) -> Gearbox:
+    folder = tmp_path_factory.mktemp("box")
+    return Gearbox.from_dict(box_content(folder), str(folder / "case.toml"))
+
+
+@pytest.fixture(scope="module")
+def housed(box: Gearbox) -> Assembly:
+    return assembled(box, Choice("flexible"), STIFFNESS)
+
+
+def moving(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
+    """Preloaded state at 5 rad/s, all coordinates and rates moved at random."""
+    start = accelerating_start(assembly, LOAD, 5.0)
+    random = np.random.default_rng(7)
+    return start.q + 1e-6 * random.normal(size=assembly.size), start.v + 1e-2 * random.normal(size=assembly.size)
+
+
+def test_seats_of_the_housing_give_way_as_those_of_the_whole_model(box: Gearbox, housed: Assembly) -> None:
+    # Second way: every unknown of the finite elements, the foot as a spring on its seat, loads on both bearing seats.
+    model = solid_body(box, "box").model
+    solid = assemble_solid(model.elements, model.material)
+    rows = seat_rows(solid, model.seats)
+    spring = np.zeros((18, 18))
+    arm = np.eye(6)
+    arm[0, 4], arm[1, 3] = -0.028, 0.028  # the support is 28 mm below the seat
+    spring[12:, 12:] = arm.T @ np.diag([5e7, 5e7, 5e7, 1e5, 1e5, 1e5]) @ arm
+    held = solid.stiffness + scipy.sparse.csr_array(rows.T) @ scipy.sparse.csr_array(spring @ rows)
+    with factorise(scipy.sparse.csr_array(held)) as factors:
+        whole = rows @ factors.solve(np.ascontiguousarray(rows[:12].T))
+    linear = linearise(housed, np.zeros(housed.size))
+    place = housed.elastic_slices["box"]
+    reduced = (linear.stiffness["box_body"] + linear.stiffness["foot"])[place, place]
+    found = np.linalg.inv(reduced)[:18, :12]
+    scale = np.sqrt(np.outer(whole.diagonal().repeat(1)[:12], whole.diagonal()[:12]))
+    # The connector's tangent is a difference quotient; static deflections are exact by construction.
+    assert np.abs((found[:12] - whole[:12]) / scale).max() < 1e-6
+    rigid = np.linalg.inv(arm.T @ np.diag([5e7, 5e7, 5e7, 1e5, 1e5, 1e5]) @ arm)
+    assert whole[2, 2] > 1.5 * rigid[2, 2]  # the plate itself gives way, too
+
+
+def test_a_stiffer_housing_tends_to_one_that_is_the_ground(box: Gearbox) -> None:
+    # On the ground its bearings have no factor: the seats that it stood for are rigid.
+    rigid = eigenmodes(box.varied({"housing.factor": 1.0}), Choice("bushing"), STIFFNESS)
+    gaps = []
+    for factor in (1e3, 1e4):
+        mounts = {
+            f"mounts.foot.stiffness.{key}": 50.0 * factor * value
+            for key, value in box.content["mounts"]["foot"]["stiffness"].items()
+        }
+        stiff = unchecked(
+            box.varied({"elasticity.band_Hz": 5e4, "elasticity.limit_Hz": 1e6}),
+            {
+                **mounts,
+                "bodies.box.solid.material.youngs_modulus_GPa": 206.0 * factor,
+                "elasticity.limit_Hz": 1e8,
+            },
+        )
+        found = modes_with_bodies(stiff, Choice("flexible"), STIFFNESS)
+        place, share = counterparts(rigid, found)
+        assert share[1:].min() > 0.8  # modes a few Hz apart mix
+        gaps.append(np.abs(found.frequency[place][1:] / rigid.frequency[1:] - 1.0).max())
+    assert gaps[1] < 0.002
+    assert gaps[1] == pytest.approx(gaps[0] / 10, rel=0.05)  # compliance in series: first order
+
+
+def test_the_housing_factor_is_for_housings_that_are_the_ground(box: Gearbox, housed: Assembly) -> None:
+    ground = assemble(box, Choice("bushing"), STIFFNESS)
+    assert ground.connector_names == ("bearing_1", "bearing_2")
+    assert housed.connector_names == ("bearing_1", "bearing_2", "foot")
+    assert np.allclose(ground.connectors.stiffness, 0.5 * housed.connectors.stiffness[:2])
+    assert not ground.elastic_bodies
+    assert (ground.housing_factor, housed.housing_factor) == (0.5, 1.0)
+    assert (ground.connectors.bodies[:, 0] == -1).all()
+
+
+def test_a_housing_neither_turns_nor_has_gyroscopic_forces(housed: Assembly) -> None:
+    assert set(housed.spin) == {"shaft_1", "shaft_2"}
+    body = housed.elastic_bodies["box"].reduced
+    assert body.frame == "ground"
+    assert not body.spin.any()
+    assert not body.gyroscopic.any()
+    speeds = {"shaft_1": 30.0, "shaft_2": -20.0}
+    assert not housed.rolling_velocity(np.zeros(housed.size), speeds)[housed.elastic_slices["box"]].any()
+    with pytest.raises(VariantError, match="no turning body 'box' to load"):
+        housed.torque_vector({"box": 1.0})
+
+
+def test_weight_and_mass_of_a_housing_are_those_of_its_solid(box: Gearbox) -> None:
+    heavy = assembled(box.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), Choice("flexible"), STIFFNESS)
+    mass = 7850.0 * 0.125 * 0.05 * 0.012
+    body, place = heavy.elastic_bodies["box"], heavy.elastic_slices["box"]
+    assert body.shape_inertia.mass == pytest.approx(mass, rel=1e-9)
+    assert body.shape_inertia.centre == pytest.approx((0.0375, 0.0, -0.006), abs=1e-9)
+    down = body.reduced.rigid_motions((0.0, 0.0, 0.0))[:, 1]
+    assert down @ heavy.weight[place] == pytest.approx(-9.81 * mass, rel=1e-9)
+    q = locked_equilibrium(heavy, {}, ["shaft_2"], heavy.mean_meshes)
+    loads = heavy.bearing_loads(q, np.zeros(heavy.size))
+    # The foot carries the plate and both shafts (1 and 2 kg).
+    assert abs(loads[heavy.connector_names.index("foot"), 1]) == pytest.approx(9.81 * (mass + 3.0), rel=1e-6)
+
+
+def test_modes_tell_of_the_housing(housed: Assembly) -> None:
+    modes = modes_of(housed)
+    assert np.allclose(modes.kinetic.sum(axis=(1, 2)), 1.0)
+    assert modes.kinetic.min() >= 0.0
+    assert any("strained: box itself" in name for name in modes.names)
+    assert any("strained: foot" in name for name in modes.names)
+    assert any(name.startswith("box radial") for name in modes.names)
+    names = [body.name for body in housed.bodies]
+    shares = modes.kinetic[:, names.index("box")].max(axis=0)
+    assert shares[BODY_MOTIONS.index("deformation")] > 0.05
+    assert shares[[BODY_MOTIONS.index(motion) for motion in ("bending", "twist", "stretch")]].max() == 0.0
+    scene = elastic_scene(housed, modes.shapes[:, 3])
+    assert len(scene.bodies) == 1
+    assert not scene.gears
+
+
+def test_matrices_of_exudyn_are_those_of_the_assembly(housed: Assembly) -> None:
+    rest = np.zeros(housed.size)
+    found = ExudynSystem(housed, rest, rest, Loading(), with_meshes=False).linearised()
+    linear = linearise(housed, rest)
+    others = [name for name in linear.stiffness if name not in housed.mesh_names]
+    stiff, damping = (sum(elements[name] for name in others) for elements in (linear.stiffness, linear.damping))
+    for one, two in zip(found, (linear.mass, stiff, damping), strict=True):
+        assert np.abs(one - two).max() < 1e-9 * np.abs(two).max()  # the assembly's bearings are difference quotients
+
+
+def test_the_compiled_solver_follows_exudyn_and_the_plain_kernels(housed: Assembly) -> None:
+    q, v = moving(housed)
+    system = CompiledSystem(housed, q, v, LoadTable(LOAD), STEP)
+    plain = housed.accelerations(q, v, housed.torque_vector(LOAD))
+    assert np.abs(system.accelerations() - plain).max() < 1e-9 * np.abs(plain).max()
+    steps = 400
+    states = np.empty((2, steps + 1, housed.size))
+    states[:, 0] = q, v
+    assert system.advance(0, states[0, 1:], states[1, 1:]) == steps
+    rows: list[np.ndarray] = []
+
+    def keep(t: float, q: np.ndarray, v: np.ndarray) -> bool:
+        rows.append(np.array([q, v]))
+        return True
+
+    ExudynSystem(housed, q, v, Loading(LOAD)).run(0.0, steps, STEP, keep)
+    found, expected = sampled(housed, *states), sampled(housed, *np.swapaxes(np.array(rows), 0, 1))
+    swing = np.mean((expected - expected.mean(axis=0)) ** 2, axis=0)
+    assert np.sqrt(np.mean((found - expected) ** 2, axis=0) / swing).max() < 1e-5
+
+
+def test_work_of_the_loads_is_accounted_for(box: Gearbox, tmp_path: Path) -> None:
+    run = simulated(box, Choice("flexible", load_case="run_up"), STIFFNESS, tmp_path, duration=0.05)
+    data = xr.load_dataset(run.path, engine="h5netcdf")
+    # Everything is accounted for, so only the quadrature of the powers is left.
+    assert abs(energy_residual(data)) < 1e-6
+    assert list(data.support.values) == ["bearing_1", "bearing_2", "foot"]
+
+
+def test_the_reduction_of_a_solid_is_stored_under_its_body(box: Gearbox, tmp_path: Path) -> None:
+    bodies_of(box, Choice("flexible"), tmp_path)
+    assert [file.name.split("-")[0] for file in tmp_path.iterdir()] == ["box"]
+
+
+PLATE = """
+SetFactory("OpenCASCADE");
+plate = newv; Box(plate) = {-40, -40, -20, 160, 80, 20};
+bores() = {};
+For n In {0:1}
+  bore = newv; Cylinder(bore) = {n * 75, 0, -21, 0, 0, 22, 15}; bores() += {bore};
+EndFor
+BooleanDifference{ Volume{plate}; Delete; }{ Volume{bores()}; Delete; }
+"""
+
+
+@pytest.mark.validation
+@needs_gmsh
+def test_a_script_step_and_its_mesh_are_the_same_body(tmp_path: Path) -> None:
+    # STEP is the same geometry, whose edges gmsh may take up in another order; the mesh is the script's own.
+    box = Gearbox.from_dict(box_content(tmp_path), str(tmp_path / "case.toml"), Permissions(scripts=True))
+    gmsh: Any = importlib.import_module("gmsh")
+    (tmp_path / "plate.geo").write_text(PLATE, encoding="utf-8")
+    gmsh.initialize(["test", "-nopopup"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(tmp_path / "plate.geo"))
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(tmp_path / "plate.step"))
+        gmsh.write(str(tmp_path / "plate.brep"))
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 20.0)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 8)
+        gmsh.model.mesh.setSize(gmsh.model.getEntities(0), 20.0)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.model.mesh.optimize("HighOrder")
+        gmsh.option.setNumber("Mesh.SaveAll", 1)
+        gmsh.write(str(tmp_path / "plate.msh"))
+    finally:
+        gmsh.finalize()
+    bore = {"diameter_mm": 30.0, "width_mm": 20.0}
+    bodies = {}
+    for file in ("plate.geo", "plate.step", "plate.brep", "plate.msh"):
+        solid = {"file": file, "element_size_mm": 20.0, "elements_around": 8, "seats": {}}
+        for name, x in (("bearing_1", 0.0), ("bearing_2", 75.0), ("foot", 75.0)):
+            solid["seats"][name] = {**bore, "position_mm": [x, 0.0, -10.0]}
+        solid["seats"]["foot"] = {"same_as": "bearing_2"}
+        bodies[file] = reduced_bodies(box.varied({"bodies.box.solid": solid}), "disc")["box"]
+    script = bodies.pop("plate.geo")
+    volume = 0.16 * 0.08 * 0.02 - 2 * np.pi * 0.015**2 * 0.02
+    # Circles are eight parabolas: their area is 8e-4 off, and is a ninth of the plate's.
+    assert script.shape_inertia.mass == pytest.approx(7850.0 * volume, rel=1.5e-4)
+    assert script.shared_seats == {"foot": "bearing_2"}
+    for file, body in bodies.items():
+        tolerance = 1e-9 if file == "plate.msh" else 0.01
+        assert body.shape_inertia.mass == pytest.approx(script.shape_inertia.mass, rel=1e-5)
+        assert body.reduced.stiffness[:12, :12].diagonal() == pytest.approx(
+            script.reduced.stiffness[:12, :12].diagonal(), rel=tolerance
+        )
+
+
+def test_a_gear_in_sectors_has_a_seat_for_each(box: Gearbox) -> None:
+    solid = dict(box.content["bodies"]["box"]["solid"])
+    wheel = {"sectors": 3, "diameter_mm": 40.0, "width_mm": 8.0}
+    with_wheel = solid | {"seats": solid["seats"] | {"wheel": wheel}}
+    case = box.varied({"bodies.box.wheels_z_mm": {"wheel": -6.0}, "bodies.box.solid": with_wheel})
+    found = solid_body(case, "box")
+    assert found.sectors == {"wheel": ("wheel_1", "wheel_2", "wheel_3")}
+    assert [seat.name for seat in found.model.seats][:3] == list(found.sectors["wheel"])
+    assert [seat.sector for seat in found.model.seats[:3]] == [(n * 2 * np.pi / 3, 2 * np.pi / 3) for n in range(3)]
+    with pytest.raises(CaseError, match=r"seats\.foot\.sectors = 3: only the seat of a gear has sectors"):
+        foot = solid["seats"]["foot"] | {"sectors": 3}
+        solid_body(box.varied({"bodies.box.solid": solid | {"seats": solid["seats"] | {"foot": foot}}}), "box")
+    with pytest.raises(CaseError, match="sectors must be odd"):
+        box.varied({"bodies.box.solid.seats.wheel": {"sectors": 4}})
+
+
+@needs_gmsh
+@pytest.mark.long
+def test_the_grc_stands_on_its_mounts_with_elastic_housing(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
+    # Second way: equilibrium of the whole gearbox. What goes in and does not come out is held by the trunnions' couple.
+    assembly = assembled(grc, Choice("flexible"), stiffness, folder=tmp_path / "bodies")
+    load = grc.case.static_load
+    q = locked_equilibrium(assembly, load.torques_N_m, load.locked, assembly.mean_meshes)
+    loads = assembly.bearing_loads(q, np.zeros(assembly.size))
+    left, right, shaft = (
+        loads[assembly.connector_names.index(n)] for n in ("arm_left", "arm_right", "main_shaft_support")
+    )
+    held = abs(0.9 * (right[1] - left[1]))
+    # Mounts tilt with the housing (5 mrad), and couples of second order go with that.
+    assert held == pytest.approx(240e3 * (1.0 - 1.0 / grc.train.ratio), rel=1e-4)
+    assert np.abs((left + right + shaft)[:3]).max() < 1e-4 * np.abs(left[1])
+    # The published finite-element analysis of the real rear housing has tilts of 0.12 to 0.54 mrad at 401 kN m.
+    housing, place = assembly.elastic_bodies["housing"].reduced, assembly.elastic_slices["housing"]
+    tilts = [
+        np.hypot(*q[place][housing.first_coordinate(name) + 3 : housing.first_coordinate(name) + 5])
+        for name in ("lss_bc", "ims_bc", "hss_bc")
+    ]
+    assert 1e-4 < max(tilts) < 1e-3
+    run = simulated(grc, Choice("flexible", load_case="generating"), stiffness, tmp_path, duration=0.02)
+    assert abs(energy_residual(xr.load_dataset(run.path, engine="h5netcdf"))) < 1e-6
+
+
+def test_results_know_the_file_of_a_solid(box: Gearbox, housed: Assembly, tmp_path: Path) -> None:
+    before = input_hash(housed)
+    content = box_content(tmp_path)
+    same = Gearbox.from_dict(content, str(tmp_path / "case.toml"))
+    assert input_hash(assembled(same, Choice("flexible"), STIFFNESS)) == before
+    text = (tmp_path / "plate.vtu").read_bytes()
+    (tmp_path / "plate.vtu").write_bytes(text + b"\n")
+    assert input_hash(assembled(same, Choice("flexible"), STIFFNESS)) != before
+
+
+def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatch: Any) -> None:
+    box = Gearbox.from_dict(box_content(tmp_path), str(tmp_path / "case.toml"))
+    for name in ("plate.step", "plate.xdmf"):
+        (tmp_path / name).write_text("no STEP", encoding="utf-8")
+
+    def refused(changes: dict[str, Any], match: str) -> None:
+        with pytest.raises((CaseError, VariantError), match=match):
+            assembled(box.varied(changes), Choice("flexible"), STIFFNESS)
+
+    solid, seats = "bodies.box.solid", box.content["bodies"]["box"]["solid"]["seats"]
+    refused({f"{solid}.file": "none.vtu"}, r"bodies\.box\.solid\.file = 'none\.vtu': no such file")
+    refused({f"{solid}.file": "plate.xdmf"}, r"solid\.file = 'plate\.xdmf': no format .* must end in \.geo, \.step, ")
+    refused({f"{solid}.file": "plate.step"}, r"bodies\.box\.solid\.element_size_mm: this key is missing")
+    needs = r"seats\.bearing_1: bearing 'bearing_1' needs its seat; give diameter_mm and width_mm"
+    refused({f"{solid}.seats": {}}, needs)
+    refused({f"{solid}.seats": seats | {"lid": {"diameter_mm": 5.0}}}, r"seats\.lid: .* give width_mm and position_mm")
+    moved = seats["bearing_1"] | {"position_mm": [0.0, 0.0, 3.0]}
+    refused({f"{solid}.seats.bearing_1": moved}, r"bodies\.box\.solid: seat bearing_1: no face of the mesh lies on it")
+    refused({f"{solid}.seats.foot": {"same_as": "feet"}}, r"foot\.same_as = 'feet': no such seat; seats are bearing_1")
+    refused({f"{solid}.seats.foot": {"same_as": "bearing_1", "width_mm": 3.0}}, "same_as stands alone")
+    blank = {"mass_kg": 1.0, "axial_kg_m2": 1.0, "transverse_kg_m2": 1.0}
+    refused({f"{solid}.blanks": {"lid": blank}}, r"blanks\.lid: no such seat; seats are bearing_1, bearing_2, foot")
+    refused({f"{solid}.torque_seat": "lid"}, r"torque_seat = 'lid': no such seat")
+    refused({f"{solid}.band_Hz": 2e4}, r"band_Hz = 20000: it must be below elasticity\.limit_Hz")
+    refused({"mounts": {}}, "body box is elastic, but nothing holds it")
+    refused({"mounts.foot.body": "shaft_9"}, r"mounts\.foot: no body 'shaft_9'")
+    refused({"mounts.bearing_1": box.content["mounts"]["foot"]}, "bearings. has this name, too")
+    refused({"bodies.box.flexibility": "nonrotating"}, "a fixed body takes 'elastic'")
+    refused({"bodies.box.flexibility": "none"}, "no body is elastic")
+    shape = {"start_z_mm": 0.0, "sections": [{"length_mm": 10.0, "outer_diameter_mm": 10.0}]}
+    refused({"bodies.box.shape": shape}, "give a shape or a solid, not both")
+    if works("gmsh"):
+        refused({f"{solid}.file": "plate.step", f"{solid}.element_size_mm": 20.0}, r"plate\.step: gmsh cannot")
+
+    def missing(name: str) -> Any:
+        raise ModuleNotFoundError(name)
+
+    monkeypatch.setattr("exugear.system.bodies.finite_elements.solid_files.importlib.import_module", missing)
+    refused({f"{solid}.length_unit_mm": 1.001}, r"meshio is not installed: pip install 'exugear\[mesh\]'")

@@ -1,0 +1,74 @@
+"""Margins told before long work: they foresee which contact comes to form circles, and proposals that mend them."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.system.readiness.margins import PROPOSED_MARGIN, doubts_about_pairs, pair_margins
+from exugear.system.readiness.readiness import remarks
+from fe_ste.contact.flank_ends import reaches_form_circle
+from fe_ste.transmission_error.hertz import pitch_point_pressure
+from fe_ste.transmission_error.search import contact_state
+from fe_ste.transmission_error.table import MeshTable, prepared_compliance
+
+from ...gear_trains import pair
+from ...spur_case import COARSE_INPUT
+
+
+def spur(shift: float = 0.0, **large: Any) -> Gearbox:
+    """A spur pair whose profile shifts cancel out, with a table."""
+    content = pair(helix_deg=0.0)
+    content["gears"]["small"]["profile_shift"], content["gears"]["large"]["profile_shift"] = shift, -shift
+    content["gears"]["large"] |= large
+    del content["pairs"]["helical"]["stiffness"]
+    return Gearbox.from_dict(content)
+
+
+def table_of(gearbox: Gearbox, torque: float = 100.0) -> MeshTable:
+    spec = gearbox.pairs["helical"]
+    return MeshTable.compute(COARSE_INPUT(pair=spec.pair, torque=(torque,), positions=24, static_torque=torque))
+
+
+def at_form_circle(gearbox: Gearbox, torque: float = 100.0) -> int:
+    """Positions of 24 at which contact comes to a form circle."""
+    spec = gearbox.pairs["helical"]
+    wanted = COARSE_INPUT(pair=spec.pair, torque=(torque,), positions=24, static_torque=torque)
+    compliance = prepared_compliance(wanted)
+    states = [contact_state(compliance, torque, p / 24) for p in range(24)]
+    return sum(reaches_form_circle(compliance.flanks, state.cells, state.solution.force) for state in states)
+
+
+@pytest.mark.validation
+def test_a_small_margin_foretells_contact_at_the_form_circle_and_the_proposal_mends_it() -> None:
+    gearbox = spur(0.9)
+    assert pair_margins(gearbox.pairs["helical"]).form[0] < 0.01
+    (doubt,) = (line for line in remarks(gearbox) if "form circle" in line)
+    assert doubt.startswith("gears.large.tip_diameter_mm = ")
+    assert at_form_circle(gearbox) > 0
+    assert not table_of(gearbox).failures
+    proposed = re.search(r"; (\d+\.\d+) leaves 2\.5 %", doubt)
+    assert proposed is not None
+    mended = spur(0.9, tip_diameter_mm=float(proposed[1]))
+    assert pair_margins(mended.pairs["helical"]).form[0] == pytest.approx(PROPOSED_MARGIN, abs=1e-4)
+    assert not list(doubts_about_pairs(mended))
+    assert at_form_circle(mended) == 0
+
+
+def test_a_thin_tip_is_a_warning_and_a_pointed_one_a_fault() -> None:
+    thin = spur(1.2)
+    assert pair_margins(thin.pairs["helical"]).tip_thickness[0] == pytest.approx(0.120, abs=1e-3)
+    assert any("0.120 normal modules thick; 0.2 is the usual least" in line for line in remarks(thin))
+    with pytest.raises(ValueError, match="at least 0.1 is needed"):
+        spur(1.25)
+
+
+def test_the_greatest_pressure_of_a_spur_table_is_about_that_of_hertz_at_the_pitch_point() -> None:
+    """Where one tooth pair carries all, near the pitch point; cells average it, and curvature varies: 5 %."""
+    gearbox = spur()
+    table = table_of(gearbox, 300.0)
+    expected = pitch_point_pressure(gearbox.pairs["helical"].pair, 300.0)
+    assert float(table.dataset["max_pressure"].max()) == pytest.approx(expected, rel=0.05)

@@ -1,0 +1,174 @@
+"""Mistakes that a file may well hold are told from the gears' own dimensions; good files raise no alarm."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from exugear.exchange.rexs.containers import read_rexs
+from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.rexs.to_case.conversion import to_case
+from exugear.gearbox.gearbox import Gearbox
+from exugear.system.readiness.plausibility import doubts_about_parts, usual_backlash
+from exugear.system.readiness.readiness import check_parts, remarks
+
+from ...gear_trains import KINDS
+
+ROOT = Path(__file__).parents[4]
+REXS = ROOT / "tests" / "exugear" / "exchange" / "rexs" / "data"
+
+
+def template(name: str) -> dict[str, Any]:
+    return tomllib.loads((files("exugear.gearbox.templates") / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def in_grams(content: dict[str, Any]) -> None:
+    content["bodies"]["input"]["inertia"]["discs"]["mass_kg"] = 2650.0
+
+
+def in_tonnes(content: dict[str, Any]) -> None:
+    content["bodies"]["input"]["inertia"]["discs"]["mass_kg"] = 2.65e-3
+
+
+def in_square_millimetres(content: dict[str, Any]) -> None:
+    content["bodies"]["output"]["inertia"]["discs"] |= {"axial_kg_m2": 33100.0, "transverse_kg_m2": 27800.0}
+
+
+def without_a_bearing(content: dict[str, Any]) -> None:
+    del content["bearings"]["output_right"]
+
+
+def further_apart(content: dict[str, Any]) -> None:
+    content["pairs"]["helical"]["centre_distance_mm"] = 129.0
+    content["bodies"]["output"]["axis_position_mm"] = [129.0, 0.0]
+
+
+def shifted_the_other_way(content: dict[str, Any]) -> None:
+    content["gears"]["pinion"]["profile_shift"] = -0.3
+
+
+def half_beside(content: dict[str, Any]) -> None:
+    content["bodies"]["output"]["wheels_z_mm"]["wheel"] = 21.0
+
+
+def half_a_bearing_bore(content: dict[str, Any]) -> None:
+    content["bearings"]["output_left"]["catalogue"]["bore_mm"] = 25.0
+
+
+def half_a_bore_without_designation(content: dict[str, Any]) -> None:
+    content["bearings"]["input_left"]["catalogue"] |= {"bore_mm": 17.5, "designation": ""}
+
+
+def a_bore_in_metres(content: dict[str, Any]) -> None:
+    content["gears"]["planet"]["held_diameter_mm"] = 0.062
+
+
+def half_a_wheels_bore(content: dict[str, Any]) -> None:
+    content["gears"]["wheel"]["held_diameter_mm"] = 45.0
+
+
+def half_a_pinions_bore(content: dict[str, Any]) -> None:
+    content["gears"]["pinion_1"]["held_diameter_mm"] = 18.0
+
+
+def half_a_planets_bore(content: dict[str, Any]) -> None:
+    content["gears"]["planet"]["held_diameter_mm"] = 31.0
+
+
+def a_rim_of_metres(content: dict[str, Any]) -> None:
+    content["gears"]["ring"]["held_diameter_mm"] = 29972.0
+
+
+MISTAKES: dict[str, tuple[str, Callable[[dict[str, Any]], None], str]] = {
+    "mass in g": ("pair", in_grams, "bodies.input.inertia.discs.mass_kg = 2650: a steel cylinder"),
+    "mass in t": ("pair", in_tonnes, "bodies.input.inertia.discs.mass_kg = 0.00265: a steel cylinder"),
+    "inertia in kg mm2": (
+        "pair",
+        in_square_millimetres,
+        "bodies.output.inertia.discs.axial_kg_m2 = 33100: with 10.5 kg a radius of gyration of 5.61e+04 mm",
+    ),
+    "one bearing": ("pair", without_a_bearing, "bearings.output_left: is the only bearing of output"),
+    "centre distance": ("pair", further_apart, "pairs.helical.centre_distance_mm = 129: leaves 926 um of backlash"),
+    "profile shift": ("pair", shifted_the_other_way, "profile_shift of both gears (-0.3 and -0.0558) with its sign"),
+    "faces": ("pair", half_beside, "bodies.output.wheels_z_mm.wheel = 21: helical has 20 mm of its face in mesh"),
+    "bore of a bearing": (
+        "pair",
+        half_a_bearing_bore,
+        "bearings.output_left.catalogue.bore_mm = 25: with outer_diameter_mm = 90 is not the '6210'",
+    ),
+    "bore without designation": (
+        "pair",
+        half_a_bore_without_designation,
+        "bearings.input_left.catalogue.bore_mm = 17.5: no usual bearing of 72 mm outer diameter",
+    ),
+    "bore in m": ("planetary", a_bore_in_metres, "gears.planet.held_diameter_mm = 0.062: hardly a bore"),
+    "bore of a wheel": (
+        "pair",
+        half_a_wheels_bore,
+        "gears.wheel.held_diameter_mm = 45: the bearings on both sides of it have bores of 50 and 50 mm",
+    ),
+    "bore of a pinion": (
+        "parallel",
+        half_a_pinions_bore,
+        "gears.pinion_1.held_diameter_mm = 18: the bearings on both sides of it have bores of 30 and 30 mm",
+    ),
+    "bore of a planet": ("planetary", half_a_planets_bore, "its face runs 20 mm into bearings.planet_left at"),
+    "rim": ("wind", a_rim_of_metres, "gears.ring.held_diameter_mm = 29972: a rim 1.445e+04 mm thick"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_told_with_key_value_and_what_it_is_compared_with(mistake: str) -> None:
+    name, change, words = MISTAKES[mistake]
+    content = template(name)
+    change(content)
+    gearbox = Gearbox.from_dict(content)
+    check_parts(gearbox)  # possible, all of them
+    assert sum(words in line for line in remarks(gearbox)) == 1, remarks(gearbox)
+
+
+@pytest.mark.parametrize("name", ["pair", "parallel", "planetary", "wind"])
+def test_templates_raise_no_alarm(name: str) -> None:
+    assert remarks(Gearbox.from_dict(template(name))) == ()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_trains_of_every_kind_raise_no_alarm(kind: str) -> None:
+    assert list(doubts_about_parts(Gearbox.from_dict(KINDS[kind]()))) == []
+
+
+def test_the_reference_gearbox_raises_no_alarm(grc: Gearbox) -> None:
+    assert list(doubts_about_parts(grc)) == []
+
+
+@pytest.mark.parametrize("path", sorted(REXS.glob("*.rexs*")), ids=lambda path: path.name)
+def test_imports_raise_no_alarm(path: Path) -> None:
+    try:
+        gearbox = to_case(read_rexs(path), path.name).gearbox
+    except RexsError:
+        pytest.skip("refused in words, which the tests of imports hold")
+    assert list(doubts_about_parts(gearbox)) == []
+
+
+def test_backlash_of_the_recommendation_is_that_of_its_formula() -> None:
+    """ISO/TR 10064-2: 2/3 (0.06 + 0.0005 a + 0.03 m_n), in mm."""
+    pair = Gearbox.from_dict(template("pair")).gear_pairs["helical"]
+    assert usual_backlash(pair) == pytest.approx(2e-3 / 3.0 * (0.06 + 0.0005 * 128.0 + 0.03 * 3.0))
+
+
+def test_a_wheel_narrower_than_the_shaft_that_is_drawn_under_it_is_told():
+    """All wheels of the GRC with halved bores; its pinions are one piece with their shafts, at any held diameter."""
+    for name, words in (("hs_gear", "shape is 160 mm thick there"), ("im_gear", "shape is 280 mm thick there")):
+        content = tomllib.loads((ROOT / "cases/grc750/gearbox.toml").read_text("utf-8"))
+        content["gears"][name]["held_diameter_mm"] *= 0.5
+        found = [*doubts_about_parts(Gearbox.from_dict(content, str(ROOT / "cases/grc750/gearbox.toml")))]
+        assert any(name in line and words in line for line in found), found
+    for name in ("im_pinion", "hs_pinion"):
+        content = tomllib.loads((ROOT / "cases/grc750/gearbox.toml").read_text("utf-8"))
+        content["gears"][name]["held_diameter_mm"] *= 0.5
+        assert not [*doubts_about_parts(Gearbox.from_dict(content, str(ROOT / "cases/grc750/gearbox.toml")))]

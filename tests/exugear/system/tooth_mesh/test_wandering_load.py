@@ -1,0 +1,77 @@
+"""How far the load moves along the face in a mesh cycle, and whether `steady` says where its moment is left out."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from exugear.cli.app import app
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import template
+from exugear.system.tooth_mesh.tables import fitting_table, requested_tables
+from exugear.system.tooth_mesh.wandering_load import wandering_loads
+
+from ...spur_case import COARSE_INPUT, SPUR_CASE
+
+
+@pytest.fixture(autouse=True)
+def coarse_tables(monkeypatch):
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
+
+
+def with_tables(content, folder):
+    gearbox = Gearbox.from_dict(content)
+    for request in requested_tables(gearbox, folder, positions=12):
+        request.compute().save(request.path)
+    return gearbox
+
+
+@pytest.mark.validation
+def test_the_load_of_spur_teeth_stays_in_the_middle(tmp_path):
+    (own,) = wandering_loads(with_tables(tomllib.loads(SPUR_CASE), tmp_path), tmp_path)
+    assert own.amplitude < 1e-6
+    assert own.over_error < 0.01
+
+
+@pytest.mark.validation
+def test_the_load_of_helical_teeth_moves_along_them_as_their_contact_has_it(tmp_path):
+    """Moment over push by the line loads of the contact itself, summed along the face."""
+    gearbox = with_tables(tomllib.loads(template("pair")), tmp_path)
+    (own,) = wandering_loads(gearbox, tmp_path)
+    point = fitting_table(gearbox, "helical", tmp_path).static_state
+    line_load = point["line_load"].sum("tooth").to_numpy()
+    across = point["axial_position"].to_numpy()
+    centre = (line_load * (across - across.mean())).sum(axis=1) / line_load.sum(axis=1)
+    turning = np.exp(-2j * np.pi * np.arange(len(centre)) / len(centre))
+    assert own.amplitude == pytest.approx(2.0 * abs(np.mean(centre * turning)), rel=0.1)
+    assert own.over_error > 1.0
+
+
+@pytest.mark.validation
+def test_steady_says_that_the_moment_is_left_out_and_how_much_that_is(tmp_path):
+    case = tmp_path / "pair.toml"
+    case.write_text(template("pair"), encoding="utf-8")
+    usual = ["steady", str(case), "--out", str(tmp_path / "out"), "--variant", "bushing", "--speeds", "500:1500:4"]
+    asked = [*usual, "--mesh-law", "seed"]
+    told = CliRunner().invoke(app, asked)
+    assert told.exit_code == 0, told.stderr
+    words = " ".join(told.stderr.split())
+    assert "helical: the load moves by +-" in words
+    assert "is left out by the law seed: peaks of modes in which gears tilt may be many times higher" in words
+    summary = json.loads(CliRunner().invoke(app, [*asked, "--json"]).stdout)
+    (own,) = summary["left_out_moments"]
+    assert own["pair"] == "helical"
+    assert own["over_transmission_error"] > 1.0
+    # The usual law has it.
+    assert "is left out" not in " ".join(CliRunner().invoke(app, usual).stderr.split())
+
+
+def test_steady_says_nothing_where_the_load_stays(tmp_path):
+    case = tmp_path / "spur.toml"
+    case.write_text(SPUR_CASE, encoding="utf-8")
+    asked = ["steady", str(case), "--out", str(tmp_path / "out"), "--variant", "bushing", "--speeds", "500:1500:4"]
+    assert "the load moves" not in " ".join(CliRunner().invoke(app, asked).stderr.split())
