@@ -15,23 +15,21 @@ from timing import CASE, median, say, timed
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.kernels.rolling import (
+from exugear.system.bearings.rolling.point_contact import rolling_arrays
+from exugear.system.bearings.rolling.rows import BallRow, RollerRow, RollingRow
+from exugear.system.build import assemble
+from exugear.system.kernels.rolling import (
     RollingArrays,
     rolling_force,
     rolling_memory,
     rolling_tangent,
 )
-from exugear.system.bearings.rolling.potential import rolling_arrays
-from exugear.system.bearings.rolling.rows import BallRow, RollerRow, RollingRow
 from exugear.system.loads import LoadTable
 from exugear.system.statics import accelerating_start
-from exugear.transient.compiled.arrays import Equations, Work
-from exugear.transient.compiled.connectors import add_connectors
-from exugear.transient.compiled.methods import adams
-from exugear.transient.compiled.packing import equations_of, work_for
-from exugear.transient.compiled.places import gather_places, place_bodies
+from exugear.system.system import Assembly
+from exugear.transient.compiled.equations import add_connectors, gather_places, place_bodies
+from exugear.transient.compiled.integrator import adams
+from exugear.transient.compiled.packing import Equations, Work, equations_of, work_for
 from exugear.transient.compiled.solver import CompiledSystem
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel

@@ -22,16 +22,14 @@ from timing import CASE, Cost, median, median_row, peak_memory, result, say, sta
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.statics import accelerating_start
-from exugear.transient.compiled.methods import RUNGE_KUTTA as RK4
-from exugear.transient.compiled.methods import Method, adams
-from exugear.transient.compiled.observers import Observer
-from exugear.transient.compiled.solver import CompiledSystem
-from exugear.transient.compiled.step import choose_integration, methods_of
-from exugear.transient.extent import SAMPLE_RATE
+from exugear.system.system import Assembly
+from exugear.transient.compiled.integrator import RUNGE_KUTTA as RK4
+from exugear.transient.compiled.integrator import Method, adams, choose_integration, methods_of
+from exugear.transient.compiled.solver import CompiledSystem, Observer
+from exugear.transient.plan import SAMPLE_RATE
 from exugear.transient.runup import BAND, simulate
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}

@@ -18,15 +18,15 @@ from timing import CASE, median, say, timed
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.system.bodies.of_gearbox import reduced_bodies
+from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.signals import ENERGIES, POWERS, signal_layout
 from exugear.system.statics import accelerating_start
+from exugear.system.system import Assembly
+from exugear.transient.compiled.integrator import Integration, choose_integration
 from exugear.transient.compiled.solver import CompiledSystem
-from exugear.transient.compiled.step import Integration, choose_integration
-from exugear.transient.extent import SAMPLE_RATE
+from exugear.transient.plan import SAMPLE_RATE
 from exugear.transient.runup import BAND
 
 SHAFTS = ("lss", "ims", "hss")

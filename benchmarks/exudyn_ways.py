@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from timing import Cost, timed
 
-from exugear.system.assembly import Assembly
+from exugear.system.kernels.meshes import stiffness_at
 from exugear.system.loads import Loading
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshElement
-from exugear.system.tooth_mesh.kernels.meshes import stiffness_at
 from exugear.transient.exudyn_model.library import exudyn, items
 from exugear.transient.exudyn_model.system import ExudynSystem, MeshRoute
 

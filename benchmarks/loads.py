@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from timing import CASE, ROOT, median, say, timed
 
-from exugear.exchange.load_files.reading import read_channels
+from exugear.exchange.series_files import read_channels
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.life.dynamic_factors.dynamic_factor import stated_factors
+from exugear.life.dynamic_factors import stated_factors
+from exugear.life.gear_life import pair_stresses
 from exugear.life.life import checked_loads, compute_life, rating_of
-from exugear.life.pair_stresses import pair_stresses
 from exugear.project import Project
 
 POSITIONS = 10

@@ -16,10 +16,10 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.settings import LEVELS, SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
 from exugear.system.bodies.elastic_body import ElasticBody
-from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
+from exugear.system.bodies.of_gearbox import reduced_bodies
+from exugear.system.build import assemble
+from exugear.system.system import Assembly
 from exugear.transient.runup import simulate
 
 SPEEDS = "0:215:400"

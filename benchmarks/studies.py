@@ -16,10 +16,9 @@ from typing import Any
 from timing import CASE, ROOT, say
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.studies.design.paths import changed
 from exugear.studies.executors import Kept, Opens, processes
-from exugear.studies.figures.point_results import PointResults
-from exugear.studies.figures.shared import Shared
+from exugear.studies.point_results import PointResults, Shared
+from exugear.studies.sampling import changed
 from exugear.studies.study import Study
 from exugear.studies.sweep import sweep, task_of
 
@@ -112,7 +111,7 @@ def _in_processes(workers: int) -> Opens:
     from contextlib import contextmanager
 
     from exugear.studies.executors import Pool
-    from fe_ste.tools.workers import Workers
+    from fe_ste.tools.threads import Workers
 
     @contextmanager
     def opened() -> Any:

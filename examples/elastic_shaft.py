@@ -16,7 +16,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from exugear import Choice, Gearbox, Project, static_state, template
-from exugear.system.eigenmodes.modes import counterparts
+from exugear.system.modes import counterparts
 
 rigid_shafts = Gearbox.from_dict(tomllib.loads(template("parallel")))
 shape = {

@@ -16,7 +16,7 @@ from pathlib import Path
 import gmsh
 
 from exugear import Choice, Gearbox, Project, template
-from exugear.report.pictures.solid_scene import draw_free_vibration
+from exugear.report.pictures.scene import draw_free_vibration
 
 folder = Path("results/housing")
 folder.mkdir(parents=True, exist_ok=True)

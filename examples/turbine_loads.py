@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from exugear import Choice, Gearbox, Project, compute_life
-from exugear.life.dynamic_factors.dynamic_factor import stated_factors
+from exugear.life.dynamic_factors import stated_factors
 from exugear.life.life import checked_loads
 
 gearbox = Gearbox.from_toml("../cases/grc750/gearbox.toml")

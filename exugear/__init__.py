@@ -18,20 +18,19 @@ if TYPE_CHECKING:
     from exugear.gearbox.variant import Variant
     from exugear.life.life import compute_life
     from exugear.project import Project
-    from exugear.report.pictures.mode_diagrams import plot_campbell
-    from exugear.report.pictures.run_diagrams import plot_waterfalls
+    from exugear.report.pictures.diagrams import plot_campbell, plot_waterfalls
     from exugear.report.writer import write_report
     from exugear.results.run_file import load_run
-    from exugear.results.spectra.orders import order_lines
     from exugear.results.spectra.run_spectra import run_waterfall
+    from exugear.results.spectra.waterfall import order_lines
     from exugear.steady.settings import SpeedRange, SteadySettings
     from exugear.steady.steady_file import steady_response
     from exugear.studies.dataset import load_study
     from exugear.studies.study import Study
     from exugear.studies.sweep import sweep
-    from exugear.system.assemble import assemble
     from exugear.system.bodies.solids import SolidModel
-    from exugear.system.eigenmodes.modes import Modes, eigenmodes
+    from exugear.system.build import assemble
+    from exugear.system.modes import Modes, eigenmodes
     from exugear.system.statics import static_state
     from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
     from exugear.transient.outcome import Run
@@ -42,7 +41,7 @@ _HOMES = {
     "CaseError": "exugear.gearbox.reading",
     "Choice": "exugear.gearbox.choice",
     "Gearbox": "exugear.gearbox.gearbox",
-    "Modes": "exugear.system.eigenmodes.modes",
+    "Modes": "exugear.system.modes",
     "Project": "exugear.project",
     "Run": "exugear.transient.outcome",
     "SolidModel": "exugear.system.bodies.solids",
@@ -50,15 +49,15 @@ _HOMES = {
     "SteadySettings": "exugear.steady.settings",
     "Study": "exugear.studies.study",
     "Variant": "exugear.gearbox.variant",
-    "assemble": "exugear.system.assemble",
+    "assemble": "exugear.system.build",
     "compute_life": "exugear.life.life",
-    "eigenmodes": "exugear.system.eigenmodes.modes",
+    "eigenmodes": "exugear.system.modes",
     "load_run": "exugear.results.run_file",
     "load_study": "exugear.studies.dataset",
     "mesh_stiffness": "exugear.system.tooth_mesh.laws.stiffness",
-    "order_lines": "exugear.results.spectra.orders",
-    "plot_campbell": "exugear.report.pictures.mode_diagrams",
-    "plot_waterfalls": "exugear.report.pictures.run_diagrams",
+    "order_lines": "exugear.results.spectra.waterfall",
+    "plot_campbell": "exugear.report.pictures.diagrams",
+    "plot_waterfalls": "exugear.report.pictures.diagrams",
     "read_rexs": "exugear.exchange.rexs.containers",
     "run_waterfall": "exugear.results.spectra.run_spectra",
     "simulate": "exugear.transient.runup",

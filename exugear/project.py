@@ -18,7 +18,6 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.variant import Variant, VariantError
-from exugear.results.bearings_file import write_duties
 from exugear.results.folder import (
     bearings_path,
     bodies_folder,
@@ -27,25 +26,26 @@ from exugear.results.folder import (
     modes_path,
     run_directory,
     time_noted,
+    write_duties,
 )
 from exugear.results.run_file import FINAL_NAME
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bearing_duties import bearing_duties, mesh_duties
 from exugear.system.bearings.duty import BearingDuty
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bodies.elastic_body import ElasticBody
-from exugear.system.eigenmodes.modes import Modes, kept_modes, modes_of
-from exugear.system.fingerprint import input_hash
+from exugear.system.build import assemble
+from exugear.system.modes import Modes, kept_modes, modes_of
+from exugear.system.operating_points import bearing_duties, mesh_duties
 from exugear.system.statics import BalanceError, static_state
-from exugear.system.tooth_mesh.grid_axes import GridAxes, axes_reaching
-from exugear.system.tooth_mesh.law import MeshData
+from exugear.system.system import Assembly, input_hash
+from exugear.system.tooth_mesh.contact_state import MeshDuty
+from exugear.system.tooth_mesh.element import MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.system.tooth_mesh.mesh_duty import MeshDuty
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import (
+    GridAxes,
     TableRequest,
+    axes_reaching,
     missing_tables,
     requested_tables,
     tables_at_work,
@@ -53,7 +53,7 @@ from exugear.system.tooth_mesh.tables import (
 from exugear.transient.outcome import Run
 from exugear.transient.runup import simulate
 from fe_ste.tools.display import Displayed
-from fe_ste.tools.stores.store import Store
+from fe_ste.tools.stores import Store
 from fe_ste.transmission_error.table import MeshTable
 
 if TYPE_CHECKING:
@@ -250,7 +250,7 @@ class Project(Displayed):
         if not self.choice.variant.is_elastic:
             return {}
         inertias = self.choice.inertia_set(self.gearbox)
-        from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
+        from exugear.system.bodies.of_gearbox import reduced_bodies
 
         return reduced_bodies(self.gearbox, inertias, bodies_folder(self.folder), begin)
 
@@ -322,7 +322,7 @@ class Project(Displayed):
 
         Without axes of the file they go over load and misalignment around where the gears stand.
         """
-        from exugear.life.stress_tables import life_requests
+        from exugear.life.static_balance import life_requests
 
         return life_requests(self.assembly(), counted, self.folder)
 
@@ -338,8 +338,7 @@ class Project(Displayed):
         CaseError
             Loads that cannot be used, or that go far beyond the tables; strengths that do not fit the gears.
         """
-        from exugear.life.life import checked_loads
-        from exugear.life.verdict import check_reach
+        from exugear.life.life import check_reach, checked_loads
 
         counted = checked_loads(self.gearbox, progress)
         check_reach(
@@ -364,11 +363,11 @@ class Project(Displayed):
         progress : called with the number of static states that are solved, and of all
         counted : what `checked_loads` gave; read anew without it
         """
-        from exugear.life.dynamic_factors.response_factors import factors, source_hash
-        from exugear.life.kept_angles import KeptAngles
+        from exugear.life.dynamic_factors import factors, source_hash
+        from exugear.life.gear_life import pair_stresses
         from exugear.life.life import compute_life, life_hash, rating_of  # root stress, which a run needs not
         from exugear.life.life_file import stored_life, write_life
-        from exugear.life.pair_stresses import pair_stresses
+        from exugear.life.static_balance import KeptAngles
 
         counted = counted or self.checked_loads()
         if any(request.stored is None for request in self.life_tables()):
@@ -413,7 +412,7 @@ class Project(Displayed):
         CaseError
             No section `[rating]`, loads that cannot be used, or strengths that do not fit the gears.
         """
-        from exugear.life.rating.rated import RATED_AS, balanced, rated, rated_loads
+        from exugear.life.rating.sheet import RATED_AS, balanced, rated, rated_loads
 
         counted = rated_loads(self.gearbox)
         at_rest = self.chosen(variant=RATED_AS.variant, mesh_law=RATED_AS.mesh_law)
@@ -426,7 +425,7 @@ class Project(Displayed):
 
     def _rated_by_life(self, counted: CountedLoads) -> tuple[Figures, tuple[str, ...]]:
         """Figures of the life in the folder; none, and why, where there is none that fits."""
-        from exugear.life.rating.beside import of_life
+        from exugear.life.rating.sheet import of_life
 
         missing = "no finite elements beside it: `exugear life` computes them"
         if not self.life_path.is_file() or any(request.stored is None for request in self.life_tables()):
@@ -443,10 +442,9 @@ class Project(Displayed):
         self, balance: StaticBalance, begin: Callable[[str], None] | None
     ) -> tuple[Figures, tuple[str, ...]]:
         """Figures of the nominal load from tables that are there."""
+        from exugear.life.gear_life import pair_stresses
         from exugear.life.life import rating_of
-        from exugear.life.pair_stresses import pair_stresses
-        from exugear.life.rating.beside import of_nominal_load, remarks_on
-        from exugear.life.rating.nominal import nominal_loads
+        from exugear.life.rating.sheet import nominal_loads, of_nominal_load, remarks_on
 
         rating = rating_of(self.gearbox)
         stresses = pair_stresses(self.requested_tables(), self.folder, begin, keep=False)
@@ -458,7 +456,7 @@ class Project(Displayed):
 
     def stored_life(self, counted: CountedLoads) -> xr.Dataset | None:
         """Life in the folder that was computed from exactly this input; None without one."""
-        from exugear.life.dynamic_factors.response_factors import source_hash
+        from exugear.life.dynamic_factors import source_hash
         from exugear.life.life import life_hash, rating_of
         from exugear.life.life_file import stored_life
 

@@ -17,12 +17,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fe_ste.contact.cells import ContactSettings
-    from fe_ste.contact.kinematics import ContactError
-    from fe_ste.elasticity.hexmesh import MeshSettings
-    from fe_ste.elasticity.sectors import ContactMesh
-    from fe_ste.flanks.modifications import FlankModification, Relief, ReliefShape
-    from fe_ste.flanks.topography import FlankTopography
+    from fe_ste.contact.kinematics import ContactError, ContactSettings
+    from fe_ste.elasticity.hexmesh import ContactMesh, MeshSettings
+    from fe_ste.flanks import FlankModification, FlankTopography, Relief, ReliefShape
     from fe_ste.geometry.checks import GeometryError
     from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
     from fe_ste.geometry.profile import ToothProfile, tooth_profile
@@ -68,10 +65,10 @@ _HOMES = {
     "BasicRack": "fe_ste.geometry.gears",
     "Checkpoint": "fe_ste.transmission_error.grid",
     "ContactError": "fe_ste.contact.kinematics",
-    "ContactMesh": "fe_ste.elasticity.sectors",
-    "ContactSettings": "fe_ste.contact.cells",
-    "FlankModification": "fe_ste.flanks.modifications",
-    "FlankTopography": "fe_ste.flanks.topography",
+    "ContactMesh": "fe_ste.elasticity.hexmesh",
+    "ContactSettings": "fe_ste.contact.kinematics",
+    "FlankModification": "fe_ste.flanks",
+    "FlankTopography": "fe_ste.flanks",
     "Gear": "fe_ste.geometry.gears",
     "GearPair": "fe_ste.geometry.gears",
     "GeometryError": "fe_ste.geometry.checks",
@@ -81,8 +78,8 @@ _HOMES = {
     "MeshTable": "fe_ste.transmission_error.table",
     "NonlinearSettings": "fe_ste.reference.position",
     "PairCompliance": "fe_ste.transmission_error.compliance",
-    "Relief": "fe_ste.flanks.modifications",
-    "ReliefShape": "fe_ste.flanks.modifications",
+    "Relief": "fe_ste.flanks",
+    "ReliefShape": "fe_ste.flanks",
     "SteSurface": "fe_ste.transmission_error.surface",
     "TableError": "fe_ste.transmission_error.table",
     "TableInput": "fe_ste.transmission_error.table",

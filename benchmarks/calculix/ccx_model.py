@@ -1,6 +1,6 @@
 """CalculiX model of a gear pair: open sectors of the meshes of `fe_ste`, contact, and the turning of gear 2.
 
-The pose is that of `fe_ste.elasticity.sectors`, whose numbers of a brick's faces are those of CalculiX. Gear 1's hub
+The pose is that of `fe_ste.elasticity.hexmesh`, whose numbers of a brick's faces are those of CalculiX. Gear 1's hub
 is held; gear 2's hub is a rigid body that turns about its axis under the torque.
 Units in the input file: mm, N, MPa.
 """
@@ -16,7 +16,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from fe_ste.elasticity.sectors import OpenSector
+from fe_ste.elasticity.hexmesh import OpenSector
 from fe_ste.geometry.gears import GearPair
 
 _M_TO_MM = 1e3

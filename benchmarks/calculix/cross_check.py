@@ -20,9 +20,8 @@ from typing import Any
 
 from ccx_model import CalculixSettings, run_calculix, write_input
 
-from fe_ste.contact.cells import ContactSettings
-from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.elasticity.sectors import placed_sectors
+from fe_ste.contact.kinematics import ContactSettings
+from fe_ste.elasticity.hexmesh import MeshSettings, placed_sectors
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.reference.newton import solve_contact
 from fe_ste.reference.position import gear_model

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.tables import requested_tables
-from fe_ste.pictures.stress import draw_contact_stress
-from fe_ste.reference.position import nonlinear_position
-from fe_ste.reference.stress import StressField, stress_of_position, stress_of_state
+from fe_ste.pictures.teeth import draw_contact_stress
+from fe_ste.reference.position import StressField, nonlinear_position, stress_of_position, stress_of_state
 from fe_ste.transmission_error.search import contact_state
 from fe_ste.transmission_error.table import prepared_compliance
 

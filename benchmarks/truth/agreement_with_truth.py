@@ -15,7 +15,7 @@ import numpy as np
 from superelement import cell_deflection
 
 from cases import PAIRS, TEETH, LoadCase
-from fe_ste.contact.cells import Cells
+from fe_ste.contact.kinematics import Cells
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fe_ste.contact.cells import Cells
+from fe_ste.contact.kinematics import Cells
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.tools.arrays import Floats, Integers

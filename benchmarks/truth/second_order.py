@@ -12,7 +12,7 @@ import skfem
 from cases import TEETH, LoadCase
 from fe_ste.elasticity.bricks import gradient_products, skfem_mesh
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, refined_sector_mesh
-from fe_ste.elimination.sparse import factorise
+from fe_ste.elimination import factorise
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 
@@ -158,7 +158,7 @@ def sector(load: LoadCase, number: int, fineness: Fineness) -> Sector:
 
 def _line(load: LoadCase, number: int, tooth: int, z: Floats) -> Floats:
     """Roll angle of the rigid contact line of a tooth pair on gear 0 or 1."""
-    from fe_ste.elasticity.sectors import contact_line_rolls
+    from fe_ste.elasticity.hexmesh import contact_line_rolls
 
     return contact_line_rolls(load.pair, tooth, load.pmc, z)[number]
 

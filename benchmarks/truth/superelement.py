@@ -8,9 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from cases import LoadCase
-from fe_ste.contact.compliance import compliance_matrix
+from fe_ste.contact.compliance import RegularCompliance, compliance_matrix
 from fe_ste.contact.kinematics import FlankPair
-from fe_ste.contact.regular import RegularCompliance
 from fe_ste.elasticity.flank import FlankCompliance
 from fe_ste.elasticity.halfspace import rectangle_integral
 from fe_ste.geometry.gears import Material

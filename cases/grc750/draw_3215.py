@@ -20,9 +20,8 @@ from one_variant import grc_project
 
 from exugear import Choice, Gearbox, Project, SpeedRange, SteadySettings, eigenmodes, steady_response
 from exugear.gearbox.parts import RPM
-from exugear.report.pictures.motions import mode_scene, motions_of
 from exugear.report.pictures.scene import draw_mode
-from exugear.report.pictures.shapes import bodies_of
+from exugear.report.pictures.shapes import bodies_of, mode_scene, motions_of
 from fe_ste.tools.drawing import WARNING_COLOUR, drawing_style, finish_figure, new_figure
 
 NAMES = {"planet_bearings": "Planet bearings", "all_bearings": "All bearings"}

@@ -19,7 +19,7 @@ import numpy as np
 from one_variant import grc_project, show
 
 from exugear import Choice, Modes, Project, order_lines, plot_waterfalls, run_waterfall, static_state
-from exugear.report.pictures.elastic_scene import (
+from exugear.report.pictures.scene import (
     animate_elastic_bodies,
     draw_elastic_bodies,
     elastic_scene,
@@ -30,8 +30,7 @@ from exugear.results.spectra.resonances import (
     match_eigenfrequencies,
     pick_resonances,
 )
-from exugear.system.eigenmodes.energy_shares import BODY_MOTIONS
-from exugear.system.eigenmodes.modes import counterparts, modes_of
+from exugear.system.modes import BODY_MOTIONS, counterparts, modes_of
 
 VARIANTS = ("rigid", "bushing", "flexible")
 MAIN_SHAFT_MODES = 500.0

@@ -36,9 +36,9 @@ from exugear.steady.excitation import Gearset
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import transmission_errors
-from exugear.system.fingerprint import input_hash
+from exugear.system.system import input_hash
 from exugear.system.tooth_mesh.contact_state import ContactState
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.tooth_mesh.element import MeshCurve
 
 TARGET_HZ, NEAR, AROUND = 3215.0, 0.02, 0.10
 FASTEST = 215.0 * np.pi / 30.0

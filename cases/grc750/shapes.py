@@ -14,9 +14,9 @@ import sys
 from pathlib import Path
 
 from exugear import Gearbox, SolidModel
-from exugear.report.pictures.solid_scene import draw_free_vibration
-from exugear.system.bodies.of_gearbox.solids import solid_body
-from exugear.system.bodies.reduced_body import ReducedBody
+from exugear.report.pictures.scene import draw_free_vibration
+from exugear.system.bodies.of_gearbox import solid_body
+from exugear.system.bodies.reduction import ReducedBody
 from exugear.system.bodies.solids import load_or_reduce_solid
 
 RIM = {

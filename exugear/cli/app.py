@@ -15,8 +15,7 @@ from typing import Annotated
 import typer
 
 from exugear.cli.console import say, say_what_is_logged
-from exugear.cli.libraries import leave_out_dask
-from exugear.cli.streams import standard_streams
+from exugear.cli.process import leave_out_dask, standard_streams
 
 VERBS = (
     "case_verbs.new",

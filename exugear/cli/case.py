@@ -1,20 +1,24 @@
-"""What verbs ask of a gearbox file before they work."""
+"""What verbs share: arguments and options, and what they ask of a gearbox file before they work."""
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from exugear.cli.console import counted, note
-from exugear.cli.errors import BadInputError, model_errors
-from exugear.cli.folders import check_results_folder
-from exugear.gearbox.variant import Variant
+import typer
+
+from exugear.cli.console import BadInputError, check_results_folder, counted, model_errors, note
+from exugear.gearbox.variant import OFFERED, Variant, VariantError
+from exugear.system.tooth_mesh.laws.registry import LAWS
 
 if TYPE_CHECKING:
     from exugear.cli.watched import WatchedProject
     from exugear.gearbox.choice import Choice
     from exugear.gearbox.gearbox import Gearbox
-    from exugear.system.assembly import Assembly
+    from exugear.system.system import Assembly
+
+# What verbs ask of a gearbox file before they work
 
 
 def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
@@ -22,7 +26,7 @@ def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = Fa
     from exugear.gearbox.gearbox import Gearbox
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.reading import CaseError, read_toml
-    from exugear.system.readiness.readiness import check_parts, faults_of_bearings, remarks
+    from exugear.system.readiness import check_parts, faults_of_bearings, remarks
 
     check_files_below(files_below)
     try:
@@ -72,7 +76,7 @@ def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
         The variant finds no balance so.
     """
     from exugear.gearbox.choice import Choice
-    from exugear.system.assemble import assemble
+    from exugear.system.build import assemble
     from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
     law = "iso6336"
@@ -87,7 +91,7 @@ def steady_lack(assembly: Assembly, variant: Variant) -> str:
     What speaks against it does not depend on finite elements.
     """
     from exugear.steady.mean_system.mean_system import unsuitable
-    from exugear.system.bearings.supports import elastic_names
+    from exugear.system.bearings.stiffness import elastic_names
 
     return unsuitable(assembly, elastic_names(assembly.gearbox) if variant.is_elastic else ())
 
@@ -95,8 +99,8 @@ def steady_lack(assembly: Assembly, variant: Variant) -> str:
 def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
     from exugear.results.folder import bodies_folder
-    from exugear.system.bodies.of_gearbox.solids import check_solids
-    from exugear.system.readiness.readiness import lacking
+    from exugear.system.bodies.of_gearbox import check_solids
+    from exugear.system.readiness import lacking
     from exugear.system.tooth_mesh.laws.registry import LAWS
     from exugear.system.tooth_mesh.tables import without_table
 
@@ -117,3 +121,95 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
         raise BadInputError(
             f"--mesh-law {choice.mesh_law}: its gears only roll, which needs the variant rigid, not {choice.variant}"
         )
+
+
+# Arguments and options that several verbs share
+
+CaseArgument = Annotated[Path, typer.Argument(metavar="CASE.toml", help="The gearbox file.", show_default=False)]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")]
+OutOption = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Results folder. (default: results/FOLDER-OF-THE-CASE)"),
+]
+
+
+class MeshLaw(StrEnum):
+    """How teeth in mesh push each other: the laws of `exugear.system.tooth_mesh.laws.registry`."""
+
+    _ignore_ = ["members", "law"]
+    members = vars()
+    for law in LAWS:
+        members[law] = law
+
+
+class ShiftRule(StrEnum):
+    """Profile shifts of an industry file that contradict the centre distance: refused, or replaced."""
+
+    file = "file"
+    centre_distance = "centre-distance"
+
+
+class DistanceRule(StrEnum):
+    """Centre distances of an industry file unlike the positions of its gears: which of them counts."""
+
+    agreeing = "agreeing"
+    positions = "positions"
+    file = "file"
+
+
+ShiftsOption = Annotated[
+    ShiftRule,
+    typer.Option(
+        "--shifts",
+        help="Profile shifts that the centre distance contradicts: those of the file, which refuses them, or "
+        "those that the centre distance asks for.",
+    ),
+]
+DistancesOption = Annotated[
+    DistanceRule,
+    typer.Option(
+        "--distances",
+        help="Centre distances unlike the positions of the gears: those that agree with the profile shifts, those of "
+        "the positions, or those that the file states.",
+    ),
+]
+
+USUAL_LAW = MeshLaw("line_of_action")
+
+
+def _variant(name: str) -> Variant:
+    try:
+        return Variant.offered(name)
+    except VariantError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+VariantOption = Annotated[
+    Variant,
+    typer.Option("--variant", parser=_variant, metavar=f"<{'|'.join(OFFERED)}>", help="How the shafts are held."),
+]
+_LAWS_TOLD = "How teeth in mesh push each other. " + "; ".join(
+    f"{law.name}: {law.description.replace('; ', ', ')}" for law in LAWS.values()
+)
+LawOption = Annotated[MeshLaw, typer.Option("--mesh-law", help=_LAWS_TOLD)]
+FilesBelowOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--files-below",
+        metavar="DIR",
+        envvar="EXUGEAR_FILES_BELOW",
+        help="A further folder that files may lie in which the gearbox file names. (default: its own alone)",
+        show_default=False,
+    ),
+]
+ScriptsOption = Annotated[
+    bool,
+    typer.Option(
+        "--allow-scripts",
+        envvar="EXUGEAR_ALLOW_SCRIPTS",
+        help="Let gmsh scripts run that the gearbox file names; they can do all that you can.",
+    ),
+]
+InertiasOption = Annotated[
+    str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. (default: as the file says)")
+]

@@ -7,23 +7,28 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.bars import Bars, Row, files_read
-from exugear.cli.console import note
-from exugear.cli.errors import BadInputError, FailedError
-from exugear.cli.folders import make_results_folder
-from exugear.cli.tables import tell_of_tables
+from exugear.cli.console import (
+    BadInputError,
+    Bars,
+    FailedError,
+    Row,
+    files_read,
+    make_results_folder,
+    note,
+    tell_of_tables,
+)
 from exugear.gearbox.reading import CaseError
 from exugear.project import Project
 from exugear.results.folder import time_noted
-from exugear.system.assembly import Assembly
 from exugear.system.bearings.duty import BearingDuty
-from exugear.system.bearings.supports import elastic_names
+from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.elastic_body import ElasticBody
-from exugear.system.eigenmodes.modes import Modes
-from exugear.system.tooth_mesh.mesh_duty import MeshDuty
+from exugear.system.modes import Modes
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.contact_state import MeshDuty
 from exugear.system.tooth_mesh.tables import TableRequest
 from exugear.transient.outcome import Progress, Run
-from fe_ste.elimination.sparse import FactorisationError
+from fe_ste.elimination import FactorisationError
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.transmission_error.grid import GridError
 from fe_ste.transmission_error.table import MeshTable

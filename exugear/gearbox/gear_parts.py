@@ -12,8 +12,8 @@ from typing import Any, Literal
 import numpy as np
 
 from exugear.gearbox.named_files import LARGEST_TABLE
-from exugear.gearbox.origin import Origin, part_of_each, parts_of_each
 from exugear.gearbox.parts import Body, Mesh, PairSpec, WheelDeviation
+from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.connections import MeshSection
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import (
@@ -23,26 +23,26 @@ from exugear.gearbox.sections.gears import (
     ModificationSection,
     PairSection,
 )
-from fe_ste.flanks.modifications import (
+from fe_ste.flanks import (
     FlankModification,
+    FlankTopography,
     Relief,
     ReliefShape,
     radius_at_roll_length_from_root,
     radius_at_roll_length_from_tip,
 )
-from fe_ste.flanks.topography import FlankTopography
-from fe_ste.geometry.cutter import PinionCutter
-from fe_ste.geometry.fitting import (
+from fe_ste.geometry.gear_relations import UncheckedGear
+from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
+from fe_ste.geometry.involute import PinionCutter
+from fe_ste.geometry.pair_relations import (
     LEAST_ROOT_MARGIN,
     ROOT_MARGIN,
+    UncheckedPair,
     clear_tip_diameter,
     fitted_tip_diameter,
     root_margin,
     shift_beside,
 )
-from fe_ste.geometry.gear_relations import UncheckedGear
-from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
-from fe_ste.geometry.pair_relations import UncheckedPair
 from fe_ste.tools.arrays import Floats
 
 DEEPEST_REMOVAL = 0.5

@@ -13,9 +13,9 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
-from exugear.gearbox import body_parts, checks, gear_parts, support_parts
+from exugear.gearbox import body_parts, checks, gear_parts
+from exugear.gearbox import body_parts as support_parts
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
-from exugear.gearbox.origin import Origin
 from exugear.gearbox.parts import (
     Bearing,
     Body,
@@ -27,12 +27,11 @@ from exugear.gearbox.parts import (
     WheelDeviation,
     stiffness_matrix,
 )
-from exugear.gearbox.reading import CaseError, parse_case, read_toml, readable, shortened
+from exugear.gearbox.reading import CaseError, Origin, parse_case, read_toml, readable, shortened
 from exugear.gearbox.sections.case import CaseFile, SteSection, labels_in_use
-from exugear.gearbox.sections.quantities import unusual_values
-from exugear.gearbox.train.kinematics import Tie
-from exugear.gearbox.train.train import Train
-from fe_ste.flanks.modifications import FlankModification
+from exugear.gearbox.sections.entries import unusual_values
+from exugear.gearbox.train import Tie, Train
+from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards import iso6336
 from fe_ste.tools.display import Displayed, TitledRows

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from exugear.gearbox.sections.connections import CatalogueSection, StiffnessSection
-from fe_ste.flanks.modifications import FlankModification
+from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed, TitledRows, value_range

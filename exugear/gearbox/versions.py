@@ -9,7 +9,7 @@ from __future__ import annotations
 
 #: Reduced elastic bodies (`exugear.system.bodies`). Runs and modes rest on it.
 REDUCTION = 1
-#: Eigenmodes (`exugear.system.eigenmodes.modes`, and the laws and matrices of `exugear.system.assembly`).
+#: Eigenmodes (`exugear.system.modes`, and the laws and matrices of `exugear.system.system`).
 MODES = 4
 #: Runs in time (`exugear.transient`, both solvers, the laws, signals and filters).
 RUN = 9

@@ -13,19 +13,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from exugear.gearbox.parts import Bearing
-from exugear.gearbox.sections.lubricant import LubricantSection
-from exugear.life.acting_loads import ActingLoads
-from exugear.life.static_balance import StaticBalance
-from exugear.system.bearings.duty import Ratings, loads_of_rows, ratings_of
-from exugear.system.bearings.operating_point import cage_angles
+from exugear.gearbox.sections.loads import LubricantSection
+from exugear.life.static_balance import ActingLoads, StaticBalance
+from exugear.system.bearings.duty import Ratings, cage_angles, loads_of_rows, ratings_of
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import BearingState, equilibrium
-from exugear.system.bearings.rolling.life import basic_rating_life, minimum_load, reference_life
-from exugear.system.bearings.rolling.lubrication import (
+from exugear.system.bearings.rolling.life import (
     LEAST_RATIO,
+    basic_rating_life,
     contamination_factor,
     fatigue_limit,
     life_factor,
+    minimum_load,
+    reference_life,
     viscosity_at,
     viscosity_ratio,
 )

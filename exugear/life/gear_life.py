@@ -7,42 +7,52 @@ that of line loads inside the path of contact, root stress that of gauges on the
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.loads import RatingSection, StrengthSection
-from exugear.life.acting_loads import ActingLoads
-from exugear.life.dynamic_factors.dynamic_factor import DynamicFactor
-from exugear.life.load_spectrum.exposure import FLANKS, ToothExposure
-from exugear.life.static_balance import StaticBalance
-from fe_ste.geometry.gears import GearPair
-from fe_ste.root_stress.mesh_cycle import MeshCycleStress
-from fe_ste.standards.load_factors import Hardening
+from exugear.gearbox.versions import LIFE
+from exugear.life.dynamic_factors import DynamicFactor
+from exugear.life.load_spectrum.counted import FLANKS, ToothExposure
+from exugear.life.static_balance import ActingLoads, StaticBalance
+from exugear.system.tooth_mesh.tables import TableRequest
+from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.root_stress import MeshCycleStress, RootGauges, mesh_cycle_stress, root_gauges
+from fe_ste.standards.iso6336 import Hardening
 from fe_ste.standards.pitting import (
-    lubricant_factor,
-    nominal_contact_stress,
-    reduced_radius,
-    roughness_factor,
-    tangential_force,
-    velocity_factor,
-)
-from fe_ste.standards.root_strength import notch_factor, size_factor, surface_factor
-from fe_ste.standards.service_life import (
     CASE_HARDENED_BENDING,
     CASE_HARDENED_CONTACT,
     THROUGH_HARDENED_BENDING,
     THROUGH_HARDENED_CONTACT,
     LifeCurve,
     damages,
+    lubricant_factor,
+    nominal_contact_stress,
+    reduced_radius,
+    roughness_factor,
     safety_factor,
+    tangential_force,
+    velocity_factor,
 )
-from fe_ste.standards.tooth_root import root_face_load_factor, root_stress_factors
+from fe_ste.standards.tooth_root import (
+    notch_factor,
+    root_face_load_factor,
+    root_stress_factors,
+    size_factor,
+    surface_factor,
+)
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.stores import Layout, Store
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 RZ_OF_RA = 6.0
 """Rz over Ra (ISO 6336-2)."""
@@ -373,3 +383,77 @@ def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:
         for curve in (strength.contact_curve, strength.bending_curve)
     )
     return contact, bending
+
+
+# Stresses of gear pairs from their tables, computed once and kept beside these
+
+_FIELDS = {
+    "hertz": (("torque", "misalignment"), "Pa", "largest Hertzian stress inside the path of contact"),
+    "pitch_hertz": (("torque", "misalignment"), "Pa", "largest Hertzian stress near the pitch point"),
+    "outside": (("torque", "misalignment"), "1", "largest share of the load outside the path of contact"),
+    "face_load": (("torque", "misalignment"), "1", "highest over mean line load along the face"),
+    "root": (("torque", "misalignment", "gear"), "Pa", "largest principal stress at the roots of gear 1 and 2"),
+    "compression": (("torque", "misalignment", "gear"), "Pa", "least principal stress there"),
+}
+_LAYOUT = Layout(
+    "pair stress",
+    LIFE,
+    {name: dims for name, (dims, _, _) in _FIELDS.items()} | {"torque": ("torque",), "misalignment": ("misalignment",)},
+    ("pair", "input_hash"),
+)
+
+
+def pair_stresses(
+    requests: Iterable[TableRequest],
+    folder: Path,
+    begin: Callable[[str], None] | None = None,
+    keep: bool = True,
+) -> dict[str, MeshCycleStress]:
+    """Stresses of all pairs whose tables are there; those that are missing, or belong to another table, are computed.
+
+    Parameters
+    ----------
+    folder : where they are kept: ``stress/<pair>.nc``
+    begin : called with the name of each pair before it is computed
+    keep : whether what is computed is written
+    """
+    known: dict[tuple[Gear, int], RootGauges] = {}
+
+    def gauges(gear: Gear, side: int) -> RootGauges:
+        if (gear, side) not in known:
+            known[gear, side] = root_gauges(gear, side)
+        return known[gear, side]
+
+    stresses = {}
+    for request in requests:
+        if request.stored is None:
+            continue
+        pair = request.wanted.pair
+        digest = hashlib.sha256(f"{LIFE} {request.stored.input_hash}".encode()).hexdigest()
+        store = Store(folder / "stress" / f"{request.name}.nc", digest)
+        dataset = store.read_dataset(_LAYOUT)
+        if dataset is not None:
+            kept = MeshCycleStress(**{name: dataset[name].to_numpy() for name in ("torque", "misalignment", *_FIELDS)})
+        else:
+            if begin is not None:
+                begin(request.name)
+            both = gauges(pair.pinion, 1), gauges(pair.gear, -1 if pair.gear.internal else 1)
+            kept = mesh_cycle_stress(pair, request.stored.dataset, both)
+            if keep:
+                store.write_dataset(_to_dataset(kept, request.name))
+        stresses[request.name] = kept
+    return stresses
+
+
+def _to_dataset(stress: MeshCycleStress, pair: str) -> xr.Dataset:
+    import xarray as xr
+
+    variables = {
+        name: (dims, np.asarray(getattr(stress, name)), {"units": units, "long_name": words})
+        for name, (dims, units, words) in _FIELDS.items()
+    }
+    coordinates = {
+        "torque": (("torque",), stress.torque, {"units": "N m"}),
+        "misalignment": (("misalignment",), stress.misalignment, {"units": "rad"}),
+    }
+    return xr.Dataset(variables, coordinates, {"pair": pair, "method_version": LIFE})

@@ -3,25 +3,35 @@
 For fatigue the balance at rest is enough: what a turbine's torque swings with lies far below the first mode of a
 gearbox. Linear laws are solved once an angle and scaled; others on some torques, and forces over torque are linear
 between these.
+
+A table of one load knows gears that stand straight. Where contact is solved at the static misalignment, stresses come
+from tables of their own: over the loads of the life, and over misalignments from straight to beyond the static ones.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from exugear.gearbox.variant import VariantError
-from exugear.system.assembly import Assembly
-from exugear.system.statics import BalanceError, locked_equilibrium, rolled_coordinates
-from exugear.system.tooth_mesh.kernels.meshes import FORCE, OUTSIDE
+from exugear.life.load_spectrum.counted import CountedLoads
+from exugear.life.load_spectrum.counting import LoadPoints
+from exugear.system.kernels.meshes import FORCE, OUTSIDE
+from exugear.system.operating_points import contact_places
+from exugear.system.statics import BalanceError, locked_equilibrium, rolled_coordinates, static_state
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
+from exugear.system.tooth_mesh.tables import TableRequest, requested_tables
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed
+from fe_ste.tools.stores import Arrays, Store
+from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Torques over the largest at which laws that are not linear are solved."""
@@ -322,3 +332,210 @@ def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
         back = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         turned[number] = np.sign(scales[number]) * np.concatenate([back @ loads[number, :3], back @ loads[number, 3:]])
     return turned, scales[:, None] * strains[:, 3:5]
+
+
+# Solved angles of a static balance, kept until the life is there: what was stopped goes on with the same bits
+
+
+class KeptAngles(Displayed):
+    """Solved angles in one file, written anew with each.
+
+    Parameters
+    ----------
+    store : of all that the life rests on
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> KeptAngles(Store(Path("nowhere/life.partial.npz"), key="this input"))
+    <KeptAngles: 0 in nowhere/life.partial.npz>
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self._angles = store.read(_unpacked) or {}
+
+    def _line(self) -> str:
+        return f": {len(self._angles)} in {self._store.path.as_posix()}"
+
+    def stored(self, number: int) -> States | None:
+        """States of an angle by its number, None where they are not there."""
+        return self._angles.get(number)
+
+    def store(self, number: int, states: States) -> None:
+        """Keep the states of an angle."""
+        self._angles[number] = states
+        self._store.write(
+            {f"{name}_{angle}": array for angle, kept in self._angles.items() for name, array in kept._asdict().items()}
+        )
+
+
+def _unpacked(arrays: Arrays) -> dict[int, States]:
+    numbers = [int(name.removeprefix("force_")) for name in arrays if name.startswith("force_")]
+    return {number: States(*(arrays[f"{name}_{number}"] for name in States._fields)) for number in numbers}
+
+
+# What acts on a gearbox, as its parts are rated under it: points of its distribution, and the worst of all
+
+
+@dataclass(frozen=True, eq=False)
+class ActingLoads:
+    """Loads over a life."""
+
+    points: LoadPoints
+    """What wears, with the loads of a hub beside the torque."""
+    worst_torque: Floats
+    worst_hub: Floats
+    """(w,), (w, 5) what counts for static safety: the ends of the distribution, and extreme sources with their
+    partial factors; N m, N and N m."""
+    bins: int
+    """Bins of the distribution that the points belong to."""
+    slowest: float
+    fastest: float
+    """Least and largest speed of the body under a torque, rad/s without sign, extreme sources among them."""
+
+    @property
+    def torques(self) -> Floats:
+        """All torques, N m."""
+        return np.concatenate([self.points.torque, self.worst_torque])
+
+    @property
+    def hub_sizes(self) -> Floats:
+        """Largest of each load of a hub without sign, (5,)."""
+        return np.asarray(np.abs(np.concatenate([self.points.other, self.worst_hub])).max(axis=0))
+
+    def worst(self, sense: int) -> tuple[Floats, Floats]:
+        """Torques of one sign, points among them, and the loads of a hub beside them."""
+        torque = self.torques
+        hub = np.concatenate([self.points.other, self.worst_hub])
+        own = torque * sense > 0.0
+        return torque[own], hub[own]
+
+    def by_bin(self, values: Floats) -> Floats:
+        """Sum values of points (points,) into the bins of the distribution, (bins,)."""
+        return np.asarray(np.bincount(self.points.bin, values, self.bins), dtype=np.float64)
+
+
+def acting_loads(counted: CountedLoads) -> ActingLoads:
+    """Gather what acts of counted loads."""
+    distribution = counted.distribution
+    extremes = [source for source in counted.sources if source.kind == "extreme"]
+    ends = np.array([distribution.upper.max(), distribution.upper.min()])
+    return ActingLoads(
+        points=counted.points,
+        worst_torque=np.concatenate([ends, *(extreme.torque for extreme in extremes)]),
+        worst_hub=np.concatenate(
+            [np.zeros((2, counted.points.other.shape[1])), *(extreme.hub_loads for extreme in extremes)]
+        ),
+        bins=len(distribution.hours),
+        slowest=min(source.slowest for source in counted.sources),
+        fastest=max(source.fastest for source in counted.sources),
+    )
+
+
+# Tables that stresses of a life are taken from: around the places where gears stand, where no grid of the file says
+
+TABLE_TORQUE_SHARES = (0.35, 0.7, 1.0)
+"""Torques over the static one; a larger one follows from the loads."""
+REACH_STEP = 0.25
+"""Step to which the largest of them is rounded up, so that loads that change a little leave tables as they are."""
+ROOM = 1.25
+"""How far misalignments reach beyond the static one at the largest torque: planets share loads unequally."""
+LARGEST_STEP, ROUNDING = 15e-6, 2.5e-6
+"""Largest step of misalignment as an opening over the face, and what its ends are rounded to, m."""
+STRAIGHT = 1e-6
+"""Opening over the face up to which gears stand straight, m."""
+
+
+def life_requests(assembly: Assembly, counted: CountedLoads, folder: Path) -> list[TableRequest]:
+    """Tables that stresses of a life come from, and those of them that are in a results folder.
+
+    Of a law that reads grids these are its grids; else see `stress_requests`.
+    """
+    grid = LAWS[assembly.mesh_law].needs_axes
+    requests = requested_tables(assembly.gearbox, folder, grid=grid)
+    if grid:
+        return requests
+    return stress_requests(assembly, requests, counted, folder)
+
+
+def stress_requests(
+    assembly: Assembly, requests: Iterable[TableRequest], counted: CountedLoads, folder: Path
+) -> list[TableRequest]:
+    """Tables of a life: those that are wanted, or wider ones where gears stand off straight and contact can be solved.
+
+    Parameters
+    ----------
+    requests : of the pairs; those with axes of the file stay as they are
+    folder : results folder: wider tables are kept in ``stress/<pair>.states.nc``
+
+    Raises
+    ------
+    BalanceError
+        The static load cannot be held.
+    """
+    tilts = _misalignments(assembly)
+    reaches = _reaches(assembly, counted)
+    found = []
+    for request in requests:
+        wanted = request.wanted
+        width = wanted.pair.face_width
+        far = max(map(abs, tilts.get(request.name, (0.0,)))) * width
+        if len(wanted.misalignment) > 1 or far < STRAIGHT:
+            found.append(request)
+            continue
+        found.append(_wider(request, tilts[request.name], reaches.get(request.name, 1.0), folder))
+    return found
+
+
+def _misalignments(assembly: Assembly) -> dict[str, list[float]]:
+    """Find the static misalignments of the meshes of each pair in the axes of its table, rad."""
+    tilts: dict[str, list[float]] = {}
+    if assembly.contacts.contacts:
+        state = static_state(assembly)
+        for contact_place in contact_places(state.assembly, state.q).values():
+            tilts.setdefault(contact_place.table.pair.name, []).append(contact_place.misalignment)
+    return tilts
+
+
+def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, float]:
+    """Largest torque of the loads over the static one by pair, at least 1."""
+    largest = max(float(abs(source.torque).max()) for source in counted.sources)
+    found: dict[str, float] = {}
+    for mesh in assembly.gearbox.meshes:
+        static = assembly.gearbox.pairs[mesh.pair.name].static_torque
+        if static > 0.0:
+            torque = largest * counted.mesh_forces[mesh.family] * mesh.pair.pinion.base_radius
+            found[mesh.pair.name] = max(1.0, torque / static, found.get(mesh.pair.name, 1.0))
+    return found
+
+
+def _wider(request: TableRequest, tilts: Iterable[float], reach: float, folder: Path) -> TableRequest:
+    """Ask for a pair's table over load and misalignment, and find it where it is kept."""
+    static = request.wanted
+    width = request.wanted.pair.face_width
+    highest = math.ceil(reach / REACH_STEP - 1e-6) * REACH_STEP
+    shares = TABLE_TORQUE_SHARES if highest <= 1.0 else (*TABLE_TORQUE_SHARES, highest)
+    openings = [ROOM * highest * tilt * width for tilt in tilts]
+    low = math.floor(min(0.0, *openings) / ROUNDING) * ROUNDING
+    high = math.ceil(max(0.0, *openings) / ROUNDING) * ROUNDING
+    steps = max(1, math.ceil((high - low) / LARGEST_STEP - 1e-6))
+    nodes = [low + (high - low) * step / steps for step in range(steps + 1)]
+    wanted = replace(
+        static,
+        torque=tuple(_rounded(static.torque[0] * share) for share in shares),
+        misalignment=tuple(_rounded(node / width) for node in nodes),
+    )
+    path = folder / "stress" / f"{request.name}.states.nc"
+    return TableRequest(request.name, wanted, path, _stored(path, wanted))
+
+
+def _stored(path: Path, wanted: TableInput) -> MeshTable | None:
+    try:
+        return MeshTable.open(path, wanted)
+    except TableError:
+        return None
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.12g}")

@@ -5,37 +5,93 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from exugear.gearbox.named_files import Permissions
-from exugear.report.findings.context import Context
+from exugear.report.bearings_section import bearings_section
+from exugear.report.findings.context import Context, bytes_of_runs, stored_models, with_responses
 from exugear.report.findings.groups import groups_of
-from exugear.report.findings.stored import bytes_of_runs, stored_models, with_responses
-from exugear.report.findings.variations import begin_variations, model_variations
+from exugear.report.findings.verdicts import begin_variations, model_variations
 from exugear.report.findings.words import Words
-from exugear.report.parts.material import Material, Part, lines_of
-from exugear.report.parts.run_data import run_data
-from exugear.report.sections.bearings import bearings_section
-from exugear.report.sections.change import change_section
-from exugear.report.sections.gears import gears_section
-from exugear.report.sections.life import life_section
-from exugear.report.sections.modes import modes_section
-from exugear.report.sections.near import near_section
-from exugear.report.sections.ranking import ranking_section
-from exugear.report.sections.rings import rings_section
-from exugear.report.sections.short import short_section
-from exugear.report.sections.steady import steady_section
-from exugear.report.sections.studies import studies_section
-from exugear.report.sections.trust import trust_section
-from exugear.report.shell import page_body
-from exugear.report.web.arrays import ArrayStore
-from exugear.report.web.document import whole_page
+from exugear.report.gears_section import gears_section
+from exugear.report.life_section import life_section, studies_section
+from exugear.report.material import Material, Part, lines_of
+from exugear.report.modes_section import change_section, modes_section, near_section
+from exugear.report.run_data import run_data
+from exugear.report.steady_section import steady_section
+from exugear.report.summary_section import ranking_section, rings_section, short_section
+from exugear.report.trust_section import trust_section
+from exugear.report.web import html
+from exugear.report.web.document import ArrayStore, whole_page
 from exugear.results.folder import REPORT_FILE, kept_case
 from fe_ste.tools.files import write_file
+
+# What stands around the sections of the report: head, table of contents, controls of the whole page, foot
+
+
+def page_body(material: Material, parts: Sequence[Part]) -> str:
+    """Put the sections together: warnings first, then what was found, then what is left out."""
+    notes = material.context.notes
+    warning = "Runs that are not to be trusted; what follows shows them all the same"
+    head = html.element(
+        "header",
+        _brand(material) + _tools() + _contents(parts),
+        class_="top",
+    )
+    above = html.alert(warning, notes.distrusted) if notes.distrusted else ""
+    left_out = html.section("Left out", html.bullets(notes.left_out), name="left-out") if notes.left_out else ""
+    main = html.element("main", above + _sets(material) + "".join(part.html for part in parts) + left_out, id="content")
+    told = f"Made by exugear from {material.file_words}. This page asks nothing of any network."
+    foot = html.element("footer", html.paragraph(told))
+    skip = html.element("a", "Skip to the content", class_="skip", href="#content")
+    live = html.element("p", "", id="said", class_="toast", role="status", aria_live="polite")
+    tip = html.element("p", "", id="tip", class_="tip", hidden=True)
+    return skip + head + main + foot + live + tip
+
+
+def _brand(material: Material) -> str:
+    gearbox = material.context.gearbox
+    shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
+    line = f"Where it rings, how loud, and why. Ratio {gearbox.train.ratio:.6f}"
+    steady = ", ".join(dict.fromkeys(str(data.attrs["variant"]) for data in material.results.steady))
+    line += f"; run-ups {shown}" if shown else ""
+    line += f"; constant speeds {steady}." if steady else "."
+    return html.element("div", f"<h1>{html.text(gearbox.name)}</h1>{html.paragraph(line)}", class_="brand")
+
+
+def _tools() -> str:
+    def button(name: str, shown: str, label: str) -> str:
+        return html.element("button", shown, type="button", id=name, aria_label=label)
+
+    buttons = [
+        button("share", "Copy view", "Copy a link to exactly this view"),
+        button("save-data", "Data (JSON)", "Save the data of this page as JSON"),
+        button("print", "Print", "Print this page"),
+        button("theme", "◐", "Dark or light colours"),
+    ]
+    return html.element("div", "".join(buttons), class_="page-tools scripts-only")
+
+
+def _contents(parts: Sequence[Part]) -> str:
+    links = "".join(
+        html.element("a", html.text(part.title), href=f"#{part.name}") for part in parts if part.title and part.html
+    )
+    return html.element("nav", links, aria_label="Sections")
+
+
+def _sets(material: Material) -> str:
+    """Choice of the group of results, where there are several: which source the figures are read from."""
+    if len(material.groups) < 2:
+        return ""
+    choices = html.element("div", "", class_="choices", id="group", role="group", aria_label="Results shown")
+    return html.element("div", f"Figures of: {choices}", class_="controls scripts-only")
+
+
+# The report of a results folder: one web page that needs nothing else
 
 SECTIONS: Final[tuple[Callable[[Material], Part], ...]] = (
     short_section,
@@ -91,7 +147,7 @@ def write_report(
     files_below
         A further folder that files may lie in which the gearbox file names. Scripts among them never run: what they
         would make must be kept in the folder.
-    executor : works beside this process where that saves time, such as `fe_ste.tools.workers.Workers`
+    executor : works beside this process where that saves time, such as `fe_ste.tools.threads.Workers`
 
     Raises
     ------

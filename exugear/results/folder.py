@@ -1,4 +1,4 @@
-"""The results folder: the case it belongs to, whether a file fits that case, and where the time went."""
+"""The results folder: its case, whether a file fits it, its studies, what its bearings and meshes bear."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import logging
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,7 +18,13 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.reading import CaseError, parsed
+from exugear.gearbox.versions import MODES, STUDY
+from exugear.system.bearings.duty import BearingDuty
+from exugear.system.tooth_mesh.contact_state import MeshDuty
 from fe_ste.tools.files import FileError, append_line, read_text, write_file
+from fe_ste.tools.stores import Layout, open_dataset
+
+# The results folder: the case it belongs to, whether a file fits that case, and where the time went
 
 CASE_FILE = "case.json"
 TIMES_FILE = "times.jsonl"
@@ -152,3 +158,155 @@ def run_directory(out: str | Path, choice: Choice) -> Path:
     Nothing in the choice is left open (`Choice.of`).
     """
     return Path(out) / choice.variant / f"{choice.load_case}-{choice.mesh_law}-{choice.inertias}"
+
+
+# Studies in a results folder: their datasets and pictures, as a report finds them
+
+STUDIES, DATASET, PICTURES = "studies", "study.nc", "pictures"
+"""Folder of all studies in a results folder; file of one, and folder of its pictures."""
+STUDY_LAYOUT = Layout(
+    "study", STUDY, {}, ("title", "study", "case", "case_digest", "input_hash", "points", "failed", "missing")
+)
+WORDS = ("labels", "report")
+"""Tables of a gearbox file that no figure of a study reads."""
+OF_LIFE = ("loads", "operation", "rating")
+"""Tables that figures of lives read, and no other."""
+
+
+@dataclass(frozen=True)
+class StoredStudy:
+    """A study that was put together."""
+
+    path: Path
+    """Its dataset."""
+    title: str
+    description: str
+    points: int
+    failed: int
+    missing: int
+    fits: bool
+    """Whether the case is the one that it varied."""
+    pictures: tuple[Path, ...]
+
+
+def read_content(gearbox: Gearbox, of_life: bool) -> dict[str, Any]:
+    """Tables of a gearbox file that figures of a study read, those of lives among them or not."""
+    unread = WORDS if of_life else (*WORDS, *OF_LIFE)
+    return {key: value for key, value in gearbox.content.items() if key not in unread}
+
+
+def case_digest(gearbox: Gearbox, of_life: bool = False) -> str:
+    """Hash of all that the figures of a study depend on in a case."""
+    content = read_content(gearbox, of_life)
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
+    """Find the studies in a results folder; what is no study of this version is left out.
+
+    Parameters
+    ----------
+    folder : results folder
+    gearbox : its case
+    """
+    for path in sorted((folder / STUDIES).glob(f"*/{DATASET}")):
+        try:
+            with open_dataset(path, STUDY_LAYOUT) as data:
+                attributes = dict(data.attrs)
+        except FileError:
+            continue
+        yield StoredStudy(
+            path=path,
+            title=str(attributes["title"]),
+            description=str(attributes.get("description", "")),
+            points=int(attributes["points"]),
+            failed=int(attributes["failed"]),
+            missing=int(attributes["missing"]),
+            fits=attributes["case_digest"] in (case_digest(gearbox), case_digest(gearbox, of_life=True)),
+            pictures=tuple(sorted((path.parent / PICTURES).glob("*.png"))),
+        )
+
+
+# The file of what bearings and meshes bear: JSON, units in the keys, hash of its input, version of its method
+
+
+def duty_summary(duty: BearingDuty) -> dict[str, Any]:
+    """Figures of a bearing by key, in the units that catalogues use; lives without end are None."""
+    return {
+        "bearing": duty.name,
+        "type": duty.kind,
+        "law": duty.law,
+        "radial_load_kN": 1e-3 * duty.radial_load,
+        "axial_load_kN": 1e-3 * duty.axial_load,
+        "reaction_kN": None if duty.reaction is None else 1e-3 * duty.reaction,
+        "radial_stiffness_N_per_m": duty.radial_stiffness,
+        "axial_stiffness_N_per_m": float(duty.stiffness[2, 2]),
+        "stiffness_matrix_N_m_rad": duty.stiffness.tolist(),
+        "tilt_stiffness_N_m_per_rad": 0.5 * float(duty.stiffness[3, 3] + duty.stiffness[4, 4]),
+        "misalignment_mrad": 1e3 * duty.misalignment,
+        "most_loaded_element_kN": 1e-3 * duty.element_load,
+        "contact_pressure_MPa": 1e-6 * duty.pressure,
+        "dynamic_rating_kN": 1e-3 * duty.ratings.dynamic,
+        "static_rating_kN": 1e-3 * duty.ratings.static,
+        "ratings_estimated": duty.ratings.estimated,
+        "ratings_of_makers": list(duty.ratings.makers),
+        "L10_Mrev": _finite(duty.basic_life),
+        "L10r_Mrev": _finite(duty.reference_life),
+        "remarks": list(duty.remarks),
+    }
+
+
+def mesh_summary(duty: MeshDuty) -> dict[str, Any]:
+    """Figures of a mesh by key; what no contact was solved for is None."""
+    return {
+        "mesh": duty.name,
+        "force_kN": 1e-3 * duty.force,
+        "misalignment_mrad": 1e3 * duty.misalignment,
+        "opening_um": 1e6 * duty.opening,
+        "centre_distance_change_um": 1e6 * duty.centre_distance_change,
+        "load_centre_mm": _finite(1e3 * duty.load_centre),
+        "K_Hbeta": _finite(duty.face_load_factor),
+        "contact_pressure_MPa": _finite(1e-6 * duty.pressure),
+        "remark": duty.remark,
+    }
+
+
+def duties_summary(duties: Iterable[BearingDuty], meshes: Iterable[MeshDuty]) -> dict[str, Any]:
+    """Figures of all bearings and of all meshes."""
+    return {"bearings": [*map(duty_summary, duties)], "meshes": [*map(mesh_summary, meshes)]}
+
+
+def read_duties(path: Path) -> dict[str, Any]:
+    """Read what `write_duties` wrote.
+
+    Raises
+    ------
+    FileError
+        The file is missing, damaged, or of another version.
+    """
+    try:
+        content = json.loads(read_text(path))
+        if content["method_version"] == MODES and isinstance(content["bearings"], list):
+            return dict(content)
+    except (ValueError, KeyError, TypeError):
+        raise FileError(f"{path}: is damaged; run `exugear bearings` again") from None
+    raise FileError(f"{path}: was written by another version; run `exugear bearings` again")
+
+
+def _finite(value: float) -> float | None:
+    if math.isfinite(value):
+        return value
+    return None
+
+
+def write_duties(path: Path, duties: Iterable[BearingDuty], meshes: Iterable[MeshDuty], input_hash: str) -> Path:
+    """Write what bearings and meshes bear (atomically) and return the path."""
+    content = {
+        "input_hash": input_hash,
+        "method_version": MODES,
+        "life": "basic: by ISO 281 and ISO/TS 16281 without lubricant and cleanliness; ribs and cages left out",
+        **duties_summary(duties, meshes),
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_file(path, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
+    return path

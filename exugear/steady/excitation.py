@@ -9,16 +9,17 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.harmonics.lattice import Lattice, lattice
 from exugear.steady.harmonics.lines import (
+    Coupling,
+    Lattice,
     LineSet,
     beside,
     count_of_lines,
     joined,
+    lattice,
     line_set,
     modulated,
 )
-from exugear.steady.harmonics.products import Coupling
 from exugear.steady.mean_system.bearing_waves import (
     TILTS,
     BearingMean,
@@ -28,15 +29,20 @@ from exugear.steady.mean_system.bearing_waves import (
     ports_with_bearings,
 )
 from exugear.steady.mean_system.mean_system import MeanSystem
-from exugear.steady.mean_system.mesh_couplings import Family, Spectra, coupled, families, group_of
-from exugear.steady.mean_system.mesh_places import MeshPlaces, mesh_places
-from exugear.steady.mean_system.mesh_ports import (
+from exugear.steady.mean_system.mesh_places import (
     BACK_TILT,
     DEFLECTION,
     MISALIGNMENT,
     POSITION,
     TILT,
+    Family,
+    MeshPlaces,
     MeshPorts,
+    Spectra,
+    coupled,
+    families,
+    group_of,
+    mesh_places,
     mesh_ports,
 )
 from exugear.steady.mean_system.mesh_waves import MeshWaves, mesh_waves
@@ -47,7 +53,7 @@ from exugear.steady.mean_system.signals import (
     mesh_signal_names,
     signal_rows,
 )
-from exugear.system.tooth_mesh.kernels.meshes import SPIN_1
+from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 

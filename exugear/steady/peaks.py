@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from exugear.results.spectra.order_cut import OrderCut
-from exugear.results.spectra.orders import SAME_ORDER, OrderLine
-from exugear.results.spectra.sweeps import sweep_severity
-from exugear.steady.harmonics.curve_peaks import standing_peaks
+from exugear.results.spectra.resonances import OrderCut, sweep_severity
+from exugear.results.spectra.waterfall import SAME_ORDER, OrderLine
+from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from fe_ste.tools.arrays import Floats, Integers
 
@@ -325,13 +324,13 @@ class ComparedPeak:
     run_amplitude: float
     """Largest of the run-up near that speed, in the signal's unit."""
     severity: float | None
-    """Of the sweep, as `exugear.results.spectra.sweeps.sweep_severity` has it."""
+    """Of the sweep, as `exugear.results.spectra.resonances.sweep_severity` has it."""
     run_rank: int
     """Place among the peaks by the run-up's amplitude, 1 for the loudest."""
 
 
 def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -> OrderCut:
-    """Amplitude and phase along an order, as `exugear.results.spectra.order_cut` has them of run-ups; times are NaN.
+    """Amplitude and phase along an order, as `exugear.results.spectra.resonances` has them of run-ups; times are NaN.
 
     Parameters
     ----------
@@ -379,7 +378,7 @@ def compared_peaks(
     Parameters
     ----------
     data : steady response of the same variant
-    cut : from an order to its cut out of the run-up, as `exugear.results.spectra.sweeps.run_up_cut` makes it
+    cut : from an order to its cut out of the run-up, as `exugear.results.spectra.resonances.run_up_cut` makes it
     rate : at which order one sweeps, Hz/s
     most : how many
     """

@@ -14,18 +14,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from exugear.steady.excitation import Gearset, Interface
-from exugear.steady.harmonics.krylov import HarmonicBalanceError
-from exugear.steady.harmonics.lattice import Lattice
-from exugear.steady.harmonics.lines import LineSet, joined, largest
+from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
+from exugear.steady.harmonics.lines import Lattice, LineSet, joined, largest
 from exugear.steady.mean_system.mean_system import mean_system
-from exugear.steady.mean_system.mesh_ports import DEFLECTION
+from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
-from exugear.steady.nonlinear import Balance, nonlinear_response, response_of_readings, solve_balance
+from exugear.steady.nonlinear import (
+    CHECKED,
+    Balance,
+    candidates,
+    growth_at,
+    growth_of_state,
+    mean_growth,
+    nonlinear_response,
+    response_of_readings,
+    solve_balance,
+)
 from exugear.steady.response import Response, linear_response, parametric_response, signals, transmission_errors
 from exugear.steady.settings import SteadySettings
-from exugear.steady.settling.settled import Leg, SettlingRun, cannot_settle
-from exugear.steady.stability import CHECKED, candidates, growth_at, growth_of_state, mean_growth
-from exugear.system.assembly import Assembly
+from exugear.steady.settling import Leg, SettlingRun, cannot_settle
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Complexes, Floats
 

@@ -19,10 +19,9 @@ from functools import cached_property
 import numpy as np
 
 from exugear.steady.excitation import Gearset, Interface
-from exugear.steady.harmonics.krylov import solve_lines
-from exugear.steady.harmonics.products import Group, add_answered, flat
-from exugear.steady.mean_system.mesh_couplings import Spectra
-from exugear.steady.mean_system.mesh_ports import DEFLECTION, MISALIGNMENT, MeshPorts
+from exugear.steady.harmonics.linear_solvers import solve_lines
+from exugear.steady.harmonics.lines import Group, add_answered, flat
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, MeshPorts, Spectra
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.inner_kernels import kept_bundle
 from fe_ste.tools.octets import SIZE

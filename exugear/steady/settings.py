@@ -11,13 +11,11 @@ from typing import Literal, get_args
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases.operating_range import operating_range
-from exugear.gearbox.load_cases.summary import BURSTING_RIM_SPEED, rim_radii, summarise_loads
+from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, operating_range, rim_radii, summarise_loads
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.versions import STEADY
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.system.assembly import Assembly
-from exugear.system.fingerprint import input_hash
+from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 

@@ -12,22 +12,21 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases.operating_range import operating_range
+from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.versions import STEADY
 from exugear.results.folder import modes_path
-from exugear.steady.campbell.campbell import LAYOUT
+from exugear.steady.campbell import LAYOUT
 from exugear.steady.mean_system.signals import carried_seats
 from exugear.steady.peaks import line_name
 from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
 from exugear.steady.steady_response import Solved, SteadyResponse, response_of
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
 from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.build import assemble
 from exugear.system.statics import beside_unsolved_states
-from exugear.system.tooth_mesh.law import MeshData
-from fe_ste.tools.sealed import Layout, load_dataset
-from fe_ste.tools.stores.store import Store
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.element import MeshData
+from fe_ste.tools.stores import Layout, Store, load_dataset
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from exugear.results.study_files import PICTURES
-from exugear.studies.dataset import slopes
-from exugear.studies.design.sampling import PARAMETER, SAMPLE, SIDE
-from exugear.studies.searched import EVALUATION
+from exugear.results.folder import PICTURES
+from exugear.studies.dataset import EVALUATION, slopes
+from exugear.studies.sampling import PARAMETER, SAMPLE, SIDE
 from fe_ste.tools.arrays import Booleans, Floats
 from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
 

@@ -3,43 +3,288 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from exugear.exchange.load_files.reading import file_digest
+from exugear.exchange.series_files import file_digest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.reading import CaseError, fault_line
+from exugear.gearbox.variant import Variant
 from exugear.gearbox.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
-from exugear.results.study_files import case_digest, read_content
+from exugear.results.folder import case_digest, read_content
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings, check_law
-from exugear.studies.design.paths import PathError, changed, check_path
-from exugear.studies.design.reading import StudyError, parse_study, read_study_file
-from exugear.studies.design.sampling import Design, Point, design_of
-from exugear.studies.design.sections import StudyFile
-from exugear.studies.design.tolerances import Tolerances, tolerances_of
-from exugear.studies.figures.figure import Figure, FigureError
-from exugear.studies.figures.point_lives import life_loads
-from exugear.studies.figures.point_results import PointSettings
-from exugear.studies.figures.registry import FIGURES, KeptFigure, kept_figures
-from exugear.studies.soundness import (
-    faults_of_names,
-    faults_of_needs,
-    faults_of_options,
-    faults_of_paths,
-    faults_of_search,
-    faults_of_signals,
-    faults_of_values,
+from exugear.studies.figures import (
+    FIGURES,
+    LEAST,
+    LIVES,
+    OVERALL,
+    SAFETIES,
+    Figure,
+    FigureError,
+    KeptFigure,
+    kept_figures,
 )
+from exugear.studies.point_results import PointSettings, life_loads
+from exugear.studies.sampling import (
+    PARAMETER,
+    SAMPLE,
+    SIDE,
+    Design,
+    PathError,
+    Point,
+    Tolerances,
+    changed,
+    check_path,
+    design_of,
+    tolerances_of,
+)
+from exugear.studies.sections import StudyError, StudyFile, parse_study, read_study_file
+from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
+from exugear.system.signals import signals_of
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.display import Displayed
 from fe_ste.tools.versions import TABLE
+
+# What speaks against a study before any point is computed: names taken, equal points, options out of range
+
+OF_POINTS = ("error", "doubts", "seconds", "memory")
+"""What a dataset tells of each point beside its figures."""
+OF_SEARCHES = ("evaluation", "on_front", "meets_limits")
+SLOPE = "slope_"
+"""Before the name of a figure: its local derivative."""
+LIMITS: Mapping[str, tuple[float, float]] = {
+    "count": (1, 10_000),
+    "harmonic": (1, 1000),
+    "positions": (4, 2000),
+    "near_Hz": (0.0, 1e9),
+    "from_Hz": (0.0, 1e9),
+    "to_Hz": (0.0, 1e9),
+    "spacing": (1e-6, 1e6),
+    "centre": (0.0, 1e6),
+    "torque_factors": (1e-6, 1e3),
+    "misalignment_um": (-1e5, 1e5),
+    "speed_rpm": (-1e7, 1e7),
+}
+"""Least and most of the options of figures."""
+SHOWN = 3
+"""Most names of what is equal that a line has."""
+
+
+def faults_of_names(study: StudyFile, kept: Mapping[str, KeptFigure]) -> Iterator[str]:
+    """Tell parameters and figures whose names the dataset has for something else."""
+    taken = dict.fromkeys(OF_POINTS, "what is told of each point")
+    drawn = [name for name, parameter in study.parameters.items() if parameter.is_drawn]
+    stepped = any(parameter.kind == "step" for parameter in study.parameters.values())
+    if study.optimise is not None:
+        taken |= dict.fromkeys(OF_SEARCHES, "the points of a search")
+        taken |= _taken_by_tolerances(study)
+    elif drawn:
+        taken[SAMPLE] = "the draws"
+        taken |= {f"{name}_path": f"the paths of parameters.{name}" for name in drawn if study.parameters[name].paths}
+    if stepped:
+        taken |= dict.fromkeys((PARAMETER, SIDE, "step"), "local derivatives")
+        taken |= {f"{SLOPE}{name}": f"the local derivative of figures.{name}" for name in study.figures}
+    for name, figure in kept.items():
+        if figure.figure.dimension:
+            taken.setdefault(figure.figure.dimension, f"a dimension of figures.{name}")
+    named = {"parameters": () if stepped else study.parameters, "tolerances": study.tolerances}
+    for table, names in {**named, "figures": study.figures}.items():
+        for name in names:
+            if name in taken:
+                yield f"{table}.{name}: this name is that of {taken[name]} in the dataset; choose another"
+    for first, second in (("parameters", "figures"), ("parameters", "tolerances"), ("tolerances", "figures")):
+        for name in getattr(study, first):
+            if name in getattr(study, second):
+                yield f"{second}.{name}: {first}.{name} has this name, too; rename one"
+
+
+def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
+    """Names that the dataset of a search over tolerances has for itself."""
+    if not study.tolerances:
+        return {}
+    taken = {
+        f"{name}_path": f"the paths of tolerances.{name}"
+        for name, tolerance in study.tolerances.items()
+        if tolerance.paths
+    }
+    sides = {f"{name}_{side}": f"a percentile of figures.{name}" for name in study.figures for side in ("high", "low")}
+    return {SAMPLE: "the draws", **taken, **sides}
+
+
+def faults_of_search(study: StudyFile, kept: Mapping[str, KeptFigure]) -> Iterator[str]:
+    """Tell figures of many numbers where a search needs one."""
+    if study.optimise is None:
+        return
+    for key, names in (("minimise", study.optimise.minimise), ("limits", list(study.optimise.limits))):
+        for name in names:
+            along = kept[name].figure.dimension
+            if along:
+                yield f"optimise.{key}: figures.{name} has a number for each {along}; a search needs a single one"
+
+
+def faults_of_paths(study: StudyFile) -> Iterator[str]:
+    """Tell paths that two parameters set, or one of them twice: only the last value would act.
+
+    A tolerance may shift or scale what a parameter sets.
+    """
+    owners: list[tuple[str, str, str]] = []
+    for table, name, parameter in (
+        *(("parameters", name, own) for name, own in study.parameters.items()),
+        *(("tolerances", name, tolerance) for name, tolerance in study.tolerances.items()),
+    ):
+        paths = (parameter.path,) if parameter.path else tuple(parameter.paths or parameter.targets)
+        for path in paths:
+            for before, owner, other in owners:
+                if not (f"{path}.".startswith(f"{other}.") or f"{other}.".startswith(f"{path}.")):
+                    continue
+                if table != before and path == other and parameter.acts != "replaces":
+                    continue
+                if (before, owner) == (table, name):
+                    yield f"{table}.{name}: sets {path} twice; name it once"
+                elif table == before:
+                    yield f"{table}.{name}: sets {path}, and {before}.{owner} {other}; give it to one of them"
+                else:
+                    yield f'{table}.{name}: replaces {path}, which {before}.{owner} sets; give it acts = "shifts"'
+                break
+            owners.append((table, name, path))
+
+
+def faults_of_values(design: Design) -> Iterator[str]:
+    """Tell values that make one point of two: listed twice, or scaled from zero."""
+    for dimension, changes in design.levels.items():
+        seen: dict[str, int] = {}
+        for number, change in enumerate(changes):
+            first = seen.setdefault(json.dumps(change, sort_keys=True), number)
+            if first != number:
+                values = ", ".join(f"{path} = {value!r}" for path, value in list(change.items())[:SHOWN])
+                what = "draws" if dimension == SAMPLE else f"parameters.{dimension}: values"
+                yield f"{what} {first + 1} and {number + 1} are one and the same point, {values}; leave one out"
+                break
+
+
+def faults_of_options(kept: Mapping[str, KeptFigure], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
+    """Tell options of the program's own figures that no gearbox bears, or that this one does not have."""
+    own = {id(figure) for figure in FIGURES.values()}
+    known = _names(gearbox, choice)
+    for name, figure in kept.items():
+        if id(figure.figure) not in own:
+            continue
+        for key, value in figure.options.items():
+            entries = value if isinstance(value, list) else [value]
+            low, high = LIMITS.get(key, (-math.inf, math.inf))
+            numbers = [entry for entry in entries if isinstance(entry, int | float) and not isinstance(entry, bool)]
+            if not all(low <= entry <= high and math.isfinite(entry) for entry in numbers):
+                yield f"figures.{name}.{key} = {value!r}: must be finite, and lie between {low:g} and {high:g}"
+            elif key in known and value and value not in known[key]:
+                yield f"figures.{name}.{key} = {str(value)[:200]!r}: no such {key}; there are {_listed(known[key])}"
+        yield from _faults_of_orders(name, figure.options, gearbox)
+
+
+def _faults_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -> Iterator[str]:
+    """Tell options that contradict each other, or the table's positions."""
+    if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
+        yield f"figures.{name}.from_Hz = {options['from_Hz']:g}: lies above to_Hz = {options['to_Hz']:g}"
+    most = gearbox.ste.positions // 2
+    if options.get("harmonic", 1) > most:
+        yield (
+            f"figures.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has "
+            f"{most} harmonics; give fewer, or more ste.positions"
+        )
+
+
+def faults_of_needs(study: StudyFile, kept: Mapping[str, KeptFigure], gearbox: Gearbox) -> Iterator[str]:
+    """Tell figures that are read from what the study does not compute."""
+    for name, figure in kept.items():
+        needs = figure.figure.needs
+        if needs == "steady" and study.steady is None:
+            yield f"figures.{name}: is read from a steady response; give a section [steady] with speeds"
+        if needs == "bearings" and (not Variant.of(study.choice.variant).on_bearings or not _rated_bearings(gearbox)):
+            yield (
+                f"figures.{name}: is one of bearings with a section catalogue, which the variant "
+                f"{study.choice.variant!r} of this gearbox has not"
+            )
+
+
+def faults_of_signals(kept: Mapping[str, KeptFigure], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
+    """Tell signals and lines that neither runs nor steady responses of this gearbox have."""
+    tabled = choice.mesh_law == "table"
+    jointed = choice.variant.spins_only
+    of_runs = [one for one in signals_of(tabled, jointed) if one.stored and one.dimensions[0] == "time"]
+    families = [mesh.family for mesh in gearbox.meshes]
+    parts = {"mesh_dte": families, "mesh_force": families}
+    if not jointed:
+        supports = [word for bearing in gearbox.bearings for word in (bearing.name, bearing.family)]
+        parts |= {"support_force": supports, "seat_acceleration": supports}
+    for name, figure in kept.items():
+        signal = str(figure.options.get("signal", OVERALL))
+        if figure.figure.needs == "run":
+            single = figure.figure.dimension != ""
+            known = [of_run.name for of_run in of_runs if not single or len(of_run.dimensions) == 1]
+            if signal not in known:
+                yield f"figures.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
+        elif figure.figure.needs == "steady":
+            quantity, _, rest = signal.partition(" ")
+            if signal != OVERALL and not any(rest.split(" ")[0] == part for part in parts.get(quantity, ())):
+                known = [OVERALL, *(f"{own} {part}" for own, of in parts.items() for part in dict.fromkeys(of))]
+                yield f"figures.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
+            yield from _faults_of_line(name, figure, families)
+
+
+def _faults_of_line(name: str, figure: KeptFigure, families: Sequence[str]) -> Iterator[str]:
+    line = figure.options.get("line")
+    unknown = [word for word in str(line).split() if not word.isdecimal() and word not in ("x", "+", "-", *families)]
+    if line is not None and (unknown or not line):
+        yield (
+            f"figures.{name}.line = {str(line)[:200]!r}: no such line; lines are as {families[0]} and 2 x {families[0]}"
+            f", of {_listed(list(dict.fromkeys(families)))}"
+        )
+
+
+def _rated_bearings(gearbox: Gearbox) -> list[str]:
+    return [bearing.name for bearing in gearbox.bearings if bearing.catalogue is not None]
+
+
+def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
+    """Names that options may have."""
+    families = list(dict.fromkeys(mesh.family for mesh in gearbox.meshes))
+    law = LAWS.get(choice.mesh_law)
+    elements = [mesh.name for mesh in gearbox.meshes] if law is None or law.has_force else []
+    if choice.variant.on_bearings:
+        elements += [bearing.name for bearing in gearbox.bearings]
+    if choice.variant.is_elastic:
+        elements += [mount.name for mount in mounts_at_work(gearbox)]
+        elements += [f"{name}_body" for name in elastic_names(gearbox)]
+    elements += [coupling.name for coupling in gearbox.couplings]
+    rated = {} if gearbox.case.rating is None else {"gear": list(gearbox.case.rating.gears)}  # else told by itself
+    return {
+        **rated,
+        "pair": list(gearbox.pairs),
+        "mesh": families,
+        "meshes": families,
+        "element": elements,
+        "bearing": _rated_bearings(gearbox),
+        "of": list(SAFETIES),
+        "by": [LEAST, *LIVES],
+    }
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names, as many as a line holds."""
+    shown = list(itertools.islice(names, 12))
+    return (", ".join(shown) or "none") + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
+
+
+# A study: a gearbox, the points that vary it, and the figures that are kept, read from a file and checked
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,38 @@
-"""A study carried out: what is there is taken, what is missing computed, all put together."""
+"""A study carried out: what is there is taken, what is missing computed, all put together.
+
+Each search is scipy's differential evolution: generations of points, computed as any points of a study, so that they
+are kept, shared by all searches, and found again after a kill. Two figures are brought into one by the larger of both,
+weighed and over their values of the case as it is (Chebyshev), which reaches bent-in fronts as well. Limits are
+constraints of the evolution. With tolerances every point is as many as there are draws, the same at every point, and
+a percentile of each figure counts.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from exugear.studies.batches import Task, Work
-from exugear.studies.dataset import dataset_of, write_study
-from exugear.studies.executors import Opens, processes
-from exugear.studies.journal import Record, read_journals
-from exugear.studies.schedule import compute_points
+import numpy as np
+
+from exugear.studies.dataset import Criteria, Looked, dataset_of, searched_dataset, write_study
+from exugear.studies.executors import (
+    Kept,
+    Opens,
+    Record,
+    Task,
+    Work,
+    compute_points,
+    number_of,
+    processes,
+    read_journals,
+)
+from exugear.studies.sampling import acting, shares
 from exugear.studies.study import Study
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import write_file
 
 if TYPE_CHECKING:
@@ -136,3 +156,198 @@ def task_of(study: Study, folder: Path) -> Task:
     names = {path: name for name, parameter in study.file.parameters.items() for path in parameter.targets}
     settings = (study.choice, study.settings, study.figures)
     return Task(gearbox.content, gearbox.source, gearbox.permissions, *settings, folder, names)
+
+
+# Search for parameters that make one figure small, or two weighed against each other, within limits of others
+
+BLEND = 0.05
+"""Share of the sum of both figures beside the larger one: of two points that are equal in one, the better wins."""
+
+
+class OptimisationError(RuntimeError):
+    """A search that cannot begin."""
+
+
+@dataclass
+class _Evaluated:
+    """Points that searches looked at."""
+
+    study: Study
+    task: Task
+    opens: Opens
+    tell: Progress | None
+    points: dict[str, Looked] = field(default_factory=dict)
+    records: dict[str, Record] = field(default_factory=dict)
+    computed: int = 0
+
+    @cached_property
+    def criteria(self) -> Criteria:
+        """What points are judged by."""
+        return Criteria.of(self.study.file)
+
+    def look_at(self, values: Floats) -> list[Looked]:
+        """Compute what is not known yet of parameters (points, parameters)."""
+        return self._seen([self._looked(row, self._changes(row)) for row in values])
+
+    def of_case(self) -> Floats:
+        """Figures (figures,) of the case as it is that are made small.
+
+        Raises
+        ------
+        OptimisationError
+            It has none.
+        """
+        nothing = np.full(len(self.study.file.parameters), math.nan)
+        (looked,) = self._seen([self._looked(nothing, {})])
+        found = self.minimised([looked])[0]
+        if not np.isfinite(found).all():
+            records = [self.records[name] for name, _ in looked.draws]
+            reason = next((record.error for record in records if record.error), records[0].values)
+            raise OptimisationError(f"the case as it is gives no figures: {reason}")
+        return np.asarray(found)
+
+    def minimised(self, points: Sequence[Looked]) -> Floats:
+        """Figures (points, figures) that are made small; infinite where a point failed."""
+        return self.criteria.minimised(self._figure, points)
+
+    def violations(self, points: Sequence[Looked]) -> Floats:
+        """How far points are beyond limits (points, limits), over the limit; negative within."""
+        return self.criteria.violations(self._figure, points)
+
+    def _figure(self, looked: Looked, figure: str) -> Floats:
+        return np.array([number_of(self.records[name].values.get(figure)) for name, _ in looked.draws])
+
+    def _changes(self, row: Floats) -> dict[str, Any]:
+        parameters = self.study.file.parameters.values()
+        return {
+            path: acting(parameter, self.study.gearbox, path, float(f"{value:.6g}"))
+            for parameter, value in zip(parameters, row, strict=True)
+            for path in parameter.targets
+        }
+
+    def _looked(self, row: Floats, changes: dict[str, Any]) -> Looked:
+        tolerances = self.study.tolerances
+        all_changes = [changes] if tolerances is None else tolerances.produced(self.study.gearbox, changes)
+        return Looked(row, tuple((self.study.hash_of(all_change), all_change) for all_change in all_changes))
+
+    def _seen(self, wanted: list[Looked]) -> list[Looked]:
+        self.points |= {looked.key: looked for looked in wanted}
+        draws = {name: changes for looked in wanted for name, changes in looked.draws}
+        unknown = [name for name in draws if name not in self.records]
+        if unknown:
+            self.records |= read_journals(self.task.folder, set(unknown))
+        missing = [Work(name, draws[name]) for name in unknown if name not in self.records]
+        if missing:
+            self.records |= compute_points(self.task, missing, self.opens, self._told)
+        self.computed += len(missing)
+        return wanted
+
+    def _told(self, record: Record) -> None:
+        if self.tell is not None:
+            failed = sum(bool(own.error) for own in self.records.values()) + bool(record.error)
+            self.tell(len(self.records), failed, self.expected)
+
+    @property
+    def expected(self) -> int:
+        """Most points that all searches look at."""
+        wanted = self.study.file.optimise
+        assert wanted is not None
+        searches = wanted.weightings if len(wanted.minimise) == 2 else 1
+        points = 1 + searches * wanted.population * (wanted.generations + 1)
+        return points * (1 if self.study.tolerances is None else len(self.study.tolerances.draws))
+
+
+def optimise(
+    study: Study, folder: str | Path, opens: Opens | None = None, *, progress: Progress | None = None
+) -> Swept:
+    """Search for the parameters of a study that has a section ``optimise``.
+
+    Parameters
+    ----------
+    folder : where points and the dataset are kept
+    opens : callable, optional
+        Starts workers; processes on all cores by default.
+
+    Returns
+    -------
+    Swept
+        Its dataset holds all points that were looked at; `on_front` says which of them no other beats in all figures,
+        `meets_limits` which keep the limits.
+
+    Raises
+    ------
+    OptimisationError
+        The case as it is has no figures, or there is no such section.
+    ExecutorError, OSError
+        As `exugear.studies.sweep.sweep`.
+    """
+    wanted = study.file.optimise
+    folder = Path(folder)
+    if wanted is None:
+        raise OptimisationError("the study has no section [optimise]")
+    with Kept(opens or processes()) as workers:
+        seen = _Evaluated(study, task_of(study, folder), workers.opened, progress)
+        reference = seen.of_case()
+        pair = len(wanted.minimise) == 2
+        weights = np.linspace(1.0, 0.0, wanted.weightings) if pair and wanted.weightings > 1 else np.array([0.5])
+        for number, first in enumerate(weights):
+            weighed = np.array([first, 1.0 - first]) if pair else np.ones(1)
+            scale = np.where(reference == 0.0, 1.0, np.abs(reference))
+            _search(seen, weighed / scale, study.file.seed + number)
+    dataset = searched_dataset(study, seen.criteria, list(seen.points.values()), seen.records)
+    return Swept(seen.records, seen.computed, write_study(folder, dataset), dataset)
+
+
+def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
+    """One search; it begins with points spread evenly and with the best that was seen before."""
+    from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution
+
+    wanted = seen.study.file.optimise
+    assert wanted is not None
+    limits = [parameter.uniform for parameter in seen.study.file.parameters.values()]
+    low = np.array([limit.least for limit in limits if limit is not None])
+    high = np.array([limit.most for limit in limits if limit is not None])
+    begin = low + shares("latin_hypercube", wanted.population, len(low), seed) * (high - low)
+    known = _best(seen, weights, wanted.population // 4)
+    begin[: len(known)] = known
+
+    def objective(columns: Floats, /, *_: Any) -> Any:  # of all columns at once, which its type does not know
+        return mixed(seen.minimised(seen.look_at(np.atleast_2d(columns.T))), weights)
+
+    def beyond(columns: Floats) -> Any:
+        return seen.violations(seen.look_at(np.atleast_2d(columns.T))).T
+
+    differential_evolution(
+        objective,
+        Bounds(low, high),
+        init=begin,
+        maxiter=wanted.generations,
+        rng=np.random.default_rng(seed),
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+        tol=1e-3,
+        constraints=NonlinearConstraint(beyond, -np.inf, 0.0) if seen.criteria.limits else (),
+    )
+
+
+def mixed(figures: Floats, weights: Floats) -> Floats:
+    """Bring figures (points, figures) into one number each: the largest when weighed, and a little of all.
+
+    Examples
+    --------
+    >>> mixed(np.array([[1.0, 4.0], [2.0, 2.0]]), np.array([1.0, 1.0])).tolist()
+    [4.25, 2.2]
+    """
+    weighed = figures * np.where(weights == 0.0, 1e-12, weights)
+    return np.asarray(weighed.max(axis=1) + BLEND * weighed.sum(axis=1))
+
+
+def _best(seen: _Evaluated, weights: Floats, count: int) -> Floats:
+    """Parameters (count, parameters) of the best points that were seen, those within all limits first."""
+    points = [looked for looked in seen.points.values() if np.isfinite(looked.row).all()]
+    if not points or not count:
+        return np.zeros((0, len(seen.study.file.parameters)))
+    beyond = np.maximum(seen.violations(points), 0.0).sum(axis=1)
+    order = np.lexsort((mixed(seen.minimised(points), weights), beyond))[:count]
+    return np.array([points[n].row for n in order])

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from exugear.system.assembly import Assembly
+from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 
 

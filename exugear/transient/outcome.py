@@ -1,13 +1,26 @@
-"""What a run gives, and how it can fail."""
+"""What a run gives, and how it can fail.
+
+A run can end without an error and still be wrong: a torque of the wrong sign drives the train to speeds that no
+wheel survives, a parametric instability lets teeth close by more than their height, a bilateral law pulls where teeth
+would have parted. Each limit is physical, far outside of what good runs do, and comes with its reason. Beyond those
+that end in ``stopped`` a run is stopped; beyond the others it goes on and is marked as not to be trusted.
+"""
 
 from __future__ import annotations
 
+import json
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
+import numpy as np
+
+from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, LoadSummary, rim_radii
+from exugear.system.signals import BALANCE_TERMS, MESH_TIMES
+from exugear.system.system import Assembly
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed, TitledRows
 
 
@@ -16,7 +29,7 @@ class RunError(RuntimeError):
 
 
 class LimitError(RunError):
-    """A run that was stopped beyond a limit of `exugear.transient.trust`, with what was reached."""
+    """A run that was stopped beyond a limit of `exugear.transient.outcome`, with what was reached."""
 
     def __init__(self, message: str, run: Run) -> None:
         super().__init__(message)
@@ -85,7 +98,7 @@ class Run(Displayed):
     wall: float
     """Simulated and wall time, s."""
     reasons: tuple[str, ...] = ()
-    """Why it is not to be trusted (`exugear.transient.trust`), none if it is."""
+    """Why it is not to be trusted (`exugear.transient.outcome`), none if it is."""
     halted: bool = False
     """Whether it was stopped beyond a limit, and cannot go on."""
 
@@ -115,3 +128,258 @@ class Run(Displayed):
             "to be trusted": "yes" if self.trusted else f"no: {'; '.join(self.reasons)}",
         }
         return "Run", rows
+
+
+# What a run may claim: limits beyond which its numbers say nothing of a gearbox, judged while it goes on
+
+ENERGY, RIM, SPEED, DEFLECTION, ACCOUNT = range(5)
+"""Rows of the running figures of a `Judge`; the last holds what the account of energy began with, and its scale."""
+LARGEST, SINCE, WHERE = range(3)
+"""Columns of these: largest value so far; time (s) and number of the body or mesh first beyond a limit."""
+AT_START, SCALE = range(2)
+"""Columns of the row `ACCOUNT`: energy that the account began with, and the largest so far, J."""
+FIGURES = (5, 3)
+"""Shape of the running figures."""
+WORK_OF_LOADS, KINETIC, ELASTIC = map(BALANCE_TERMS.index, ("work_of_loads", "kinetic_energy", "elastic_energy"))
+"""Terms of the account that say how much energy there is; what varying stiffness pumps in shows up in them."""
+EXPLAINING = [number for number, term in enumerate(BALANCE_TERMS) if term != "work_of_loads"]
+"""Terms of the account that explain where the work of the loads went."""
+PULLING = MESH_TIMES.index("pulling_time")
+"""Row of the times of meshes in which they pull."""
+UNSOLVED = MESH_TIMES.index("unsolved_time")
+"""Row of those in which they read a table beside states that are not solved."""
+WHOLLY = 0.9
+"""Part of a run in which a mesh pulls that is not swaying about no load, but load on the other flank."""
+LEAST_ENERGY = 1e-9
+"""Energy that counts as none, J: a train at rest has nothing but round-off to account for."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of what a run may claim."""
+
+    energy_marked: float = 0.01
+    energy_stopped: float = 0.1
+    """Energy that the account does not explain, as part of the largest of work done, kinetic and elastic energy so
+    far. Good runs stay below 1e-5: every term is known, and only the quadrature of the powers is left. At a
+    hundredth, amplitudes are no longer known to the per cent that a level in dB is read by; a tenth from nowhere
+    means that the step does not solve the equations."""
+    rim_speed_stopped: float = BURSTING_RIM_SPEED
+    """Rim of a gear, m/s: see `exugear.gearbox.load_cases.BURSTING_RIM_SPEED`."""
+    overspeed_stopped: float = 2.0
+    swaying: float = 10.0
+    """Multiple of the fastest speed that the loads give the rolling train, and what a rim may have beyond it, m/s.
+    Elastic motions sway about the rolling one: 10 m/s at 1 kHz are 1.6 mm on the rim, a hundred times the deflection
+    of loaded teeth."""
+    deflection_marked: float = 0.05
+    deflection_stopped: float = 0.25
+    """Deflection of a mesh as part of the height of its teeth. Teeth of steel break at their root, at some 2 GPa,
+    when they give way by a sixtieth of their height: at three times this they are gone. At a quarter of the height
+    the gears no longer stand where the stiffness was computed, and bilateral laws know of no gap."""
+    pulling_marked: float = 0.5
+    """Part of the run in which a mesh of a bilateral law pulls. At resonances it may do so now and then, as teeth do
+    that part. A mesh that pulls for half of the run or more is not loaded on the flank that it is the law of."""
+
+    def to_json(self) -> str:
+        """Limits as text, for the file of a run."""
+        return json.dumps(asdict(self))
+
+
+LIMITS = Limits()
+
+
+def energy_left_over(lines: Floats, start: float, scale: float) -> tuple[Floats, Floats]:
+    """Energy that lines of the account (n, terms), J, do not explain, as a part of the largest energy so far.
+
+    Parameters
+    ----------
+    start : kinetic and elastic energy at the start, J
+    scale : largest of work done, kinetic and elastic energy before these lines, J
+
+    Returns
+    -------
+    share, scales : (n,) without sign; and the largest energy up to each line, J, at least `LEAST_ENERGY`
+
+    Examples
+    --------
+    >>> lines = np.array([[0.0, 0.0, 1.0, 0, 0, 0, 0], [9.0, 9.0, 1.0, 0, 0, 0, 0], [10.0, 9.0, 1.0, 0, 0, 0, 0]])
+    >>> energy_left_over(lines, start=1.0, scale=0.0)[0]
+    array([0. , 0. , 0.1])
+    """
+    largest = np.abs(lines[:, [WORK_OF_LOADS, KINETIC, ELASTIC]]).max(axis=1)
+    scales = np.maximum.accumulate(np.maximum(largest, max(scale, LEAST_ENERGY)))
+    explained = lines[:, EXPLAINING].sum(axis=1) - start
+    return np.abs(lines[:, WORK_OF_LOADS] - explained) / scales, scales
+
+
+class Judge:
+    """What a run has reached so far, against the limits.
+
+    Parameters
+    ----------
+    loads : what the load case intends, over the time that is simulated
+
+    Attributes
+    ----------
+    figures : array of the shape `FIGURES`
+        All that the judge remembers: a run that goes on takes it over.
+    """
+
+    def __init__(self, assembly: Assembly, loads: LoadSummary, limits: Limits = LIMITS) -> None:
+        radii = rim_radii(assembly.gearbox)
+        self.limits = limits
+        self.figures = np.full(FIGURES, np.nan)
+        self.figures[:ACCOUNT, LARGEST] = 0.0
+        self._law = assembly.mesh_law
+        self._bodies = tuple(radii)
+        self._spins = np.array([assembly.spin[name] for name in self._bodies], dtype=np.int64)
+        self._radii = np.array([radii[name] for name in self._bodies])
+        self._intended = np.array([loads.rim_speeds[name] for name in self._bodies])
+        self._allowed = limits.overspeed_stopped * self._intended + limits.swaying
+        self._meshes = assembly.mesh_names
+        gears = [(e.mesh.pair.pinion, e.mesh.pair.gear) for e in assembly.elements]
+        self._heights = np.array([min(abs(g.tip_radius - g.root_radius) for g in pair) for pair in gears])
+        # Teeth of a table fly from flank to flank without deflection.
+        self._gaps = np.array([0.0 if e.table is None else e.table.backlash for e in assembly.elements])
+
+    def see(self, times: Floats, deflections: Floats, v: Floats, account_times: Floats, account: Floats) -> None:
+        """Take what a run has done since the last time.
+
+        Parameters
+        ----------
+        times : (n,) s
+        deflections : (n, meshes) m
+        v : (n, size) velocities
+        account_times, account : (k,) (k, terms)
+            Lines of the account of energy, J, as in `exugear.system.signals.BALANCE_TERMS`.
+        """
+        # A run that diverges passes through numbers whose sums overflow: infinite or not a number, they are too large.
+        with np.errstate(over="ignore", invalid="ignore"):
+            self._see_energy(account_times, account)
+            spins = v.T[self._spins]
+            self._keep(RIM, times, spins, 0.0, self._radii, self.limits.rim_speed_stopped)
+            self._keep(SPEED, times, spins, 0.0, self._radii / self._allowed, 1.0)
+            given_way = np.ascontiguousarray(deflections.T)
+            self._keep(DEFLECTION, times, given_way, self._gaps, 1.0 / self._heights, self.limits.deflection_marked)
+
+    def _see_energy(self, times: Floats, lines: Floats) -> None:
+        start, scale = self.figures[ACCOUNT, [AT_START, SCALE]]
+        if np.isnan(start):
+            start = lines[0, KINETIC] + lines[0, ELASTIC]
+            scale = 0.0
+        left, scales = energy_left_over(lines, start, scale)
+        self.figures[ACCOUNT, [AT_START, SCALE]] = start, scales[-1]
+        self._keep(ENERGY, times, left[None], 0.0, np.ones(1), self.limits.energy_marked)
+
+    def _keep(
+        self, row: int, times: Floats, values: Floats, gaps: Floats | float, scales: Floats, limit: float
+    ) -> None:
+        """Remember how large values become, and when and where one first passes a limit.
+
+        Values (bodies or meshes, n) count with either sign, negative ones without a gap, each row times its scale.
+        """
+        if not values.size:
+            return
+        most = (np.maximum(values.max(axis=1), -values.min(axis=1) - gaps) * scales).max()
+        if most <= limit:  # not so if any is no number
+            self.figures[row, LARGEST] = max(self.figures[row, LARGEST], most)
+            return
+        values = (np.maximum(values.T, -values.T - gaps)) * scales
+        known = np.where(np.isnan(values), np.inf, values)
+        largest, since, _ = self.figures[row]
+        self.figures[row, LARGEST] = max(largest, known.max())
+        beyond = known.max(axis=1) > limit
+        if beyond.any() and np.isnan(since):
+            instant = int(np.argmax(beyond))
+            self.figures[row, [SINCE, WHERE]] = times[instant], np.argmax(known[instant])
+
+    @property
+    def stop(self) -> bool:
+        """Whether the run must not go on."""
+        limits = self.limits
+        most = (limits.energy_stopped, limits.rim_speed_stopped, 1.0, limits.deflection_stopped)
+        return bool(np.any(self.figures[:ACCOUNT, LARGEST] > most))
+
+    def reasons(self, mesh_times: Floats, simulated: float) -> tuple[str, ...]:
+        """Reasons why the run is not to be trusted, none if it is.
+
+        Parameters
+        ----------
+        mesh_times : (times, meshes) times of each mesh, s, as in `exugear.system.signals.MESH_TIMES`
+        simulated : time so far, s
+        """
+        return (
+            *self._energy_words(),
+            *self._speed_words(),
+            *self._deflection_words(),
+            *self._pulling_words(mesh_times[PULLING] / max(simulated, 1e-300)),
+            *self._unsolved_words(mesh_times[UNSOLVED]),
+        )
+
+    def _energy_words(self) -> Iterator[str]:
+        largest, since, _ = self.figures[ENERGY]
+        if largest > self.limits.energy_marked:
+            yield (
+                f"energy: from t = {since:.4g} s on more than {_percent(self.limits.energy_marked)} of the largest "
+                f"energy in the run is not accounted for, up to {_percent(largest)}; the motion is unstable, or the "
+                "step does not solve the equations"
+            )
+
+    def _speed_words(self) -> Iterator[str]:
+        """Say what is too fast: a motion that leaves the one which loads give it, or this motion itself."""
+        largest, since, number = self.figures[SPEED]
+        if largest > 1.0:
+            name, intended, allowed = self._body(number)
+            yield (
+                f"speed: at t = {since:.4g} s a rim on {name} passes {allowed:.4g} m/s, where the loads bring it to "
+                f"{intended:.4g} m/s at most; the motion is unstable"
+            )
+            return
+        largest, since, number = self.figures[RIM]
+        if largest > self.limits.rim_speed_stopped:
+            name, _, _ = self._body(number)
+            yield (
+                f"speed: at t = {since:.4g} s a rim on {name} passes {self.limits.rim_speed_stopped:g} "
+                "m/s, where wheels of steel burst; look for a torque of the wrong sign, or one that nothing takes up"
+            )
+
+    def _body(self, figure: float) -> tuple[str, float, float]:
+        """Name of a body by its number, its intended and its allowed speed of the rim, m/s."""
+        number = int(figure)
+        return self._bodies[number], float(self._intended[number]), float(self._allowed[number])
+
+    def _deflection_words(self) -> Iterator[str]:
+        largest, since, number = self.figures[DEFLECTION]
+        limit = self.limits.deflection_marked
+        if largest > limit:
+            height = float(self._heights[int(number)])
+            mesh = self._meshes[int(number)]
+            yield (
+                f"deflection: at t = {since:.4g} s the teeth of mesh {mesh}, {1e3 * height:.3g} mm "
+                f"high, give way by more than {_percent(limit)} of their height, where they would have broken; meshes "
+                f"reach {_percent(largest)}"
+            )
+
+    def _pulling_words(self, share: Floats) -> Iterator[str]:
+        limit = self.limits.pulling_marked
+        names = [name for name, part in zip(self._meshes, share, strict=True) if part >= limit]
+        if names:
+            all_along = share.max() > WHOLLY
+            cause = "look for a torque of the wrong sign" if all_along else "they are hardly loaded, or unstable"
+            yield (
+                f"pulling: {', '.join(names)} pull for up to {_percent(share.max())} of the run (limit "
+                f"{_percent(limit)}), which no teeth do, but the law {self._law} does; {cause}, or take the law table, "
+                "which has both flanks"
+            )
+
+    def _unsolved_words(self, times: Floats) -> Iterator[str]:
+        names = [name for name, time in zip(self._meshes, times, strict=True) if time > 0.0]
+        if names:
+            yield (
+                f"table: {', '.join(names)} come beside states of their tables that are not solved, where others stand "
+                f"in, for up to {times.max():.3g} s; exugear ste says which states these are and why"
+            )
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"

@@ -2,39 +2,164 @@
 
 Two solvers take the same assembly: `exugear.transient.compiled.solver`, and Exudyn as the model of record. Both hand
 their states to one `exugear.transient.recorder.Recorder`, which filters, accounts for energy and writes. Without a step
-asked for, `exugear.transient.compiled.step.choose_integration` finds method and step, stable and accurate up to the end
-of the band: 6.4 kHz is the high-speed mesh of the GRC at 215 rpm. Exudyn is loaded only where it integrates.
+asked for, `exugear.transient.compiled.integrator.choose_integration` finds method and step, stable and accurate up to
+the end of the band: 6.4 kHz is the high-speed mesh of the GRC at 215 rpm. Exudyn is loaded only where it integrates.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import TYPE_CHECKING, Literal, get_args
+
+import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.folder import run_directory
 from exugear.results.run_file import RunFile
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
 from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.build import assemble
 from exugear.system.signals import signal_layout
-from exugear.system.tooth_mesh.law import Angles, MeshData
-from exugear.transient.compiled.solver import compile_loop_ahead, unsupported_reason
-from exugear.transient.compiled.step import INTEGRATORS, choose_integration, fastest_motion
-from exugear.transient.extent import SAMPLE_RATE, check_disk, check_duration, too_fine
-from exugear.transient.integration import integrate
-from exugear.transient.interruption import interruptible
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.element import Angles, MeshData
+from exugear.transient.compiled.integrator import INTEGRATORS, choose_integration, fastest_motion
+from exugear.transient.compiled.solver import CompiledSystem, compile_loop_ahead, unsupported_reason
 from exugear.transient.outcome import LimitError, Progress, ProgressMeter, Run, RunError
-from exugear.transient.plan import RunPlan, plan_run
+from exugear.transient.plan import SAMPLE_RATE, RunPlan, check_disk, check_duration, plan_run, too_fine
 from exugear.transient.recorder import Recorder
-from exugear.transient.run_folder import held
-from exugear.transient.start import RunStart, prepare_start
+from exugear.transient.start import RunStart, held, prepare_start
+from fe_ste.tools.arrays import Floats
 
 if TYPE_CHECKING:
     from exugear.transient.exudyn_model.system import MeshRoute
 
+# Ctrl-C and its like end a run after its step instead of tearing it down
+
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+"""Signals that end a run; the last two where the program that runs it listens to them itself."""
+
+
+class Interruption:
+    """Whether somebody asked to stop."""
+
+    def __init__(self) -> None:
+        self.asked = False
+
+
+@contextmanager
+def interruptible() -> Iterator[Interruption]:
+    """Take note of Ctrl-C instead of raising; a second one tears down.
+
+    So do other signals by which the program that runs this has itself stopped. Only the main thread receives them.
+    """
+    interruption = Interruption()
+    if threading.current_thread() is not threading.main_thread():
+        yield interruption
+        return
+    numbers = [getattr(signal, name) for name in SIGNALS if hasattr(signal, name)]
+    handlers = {number: handler for number in numbers if callable(handler := signal.getsignal(number))}
+
+    def note(number: int, frame: FrameType | None) -> None:
+        if interruption.asked and number == signal.SIGINT:
+            handlers[number](number, frame)
+        interruption.asked = True
+
+    for number in handlers:
+        signal.signal(number, note)
+    try:
+        yield interruption
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+
+# A run from its start to its end, or to the first fault or interruption, by either solver
+
+STEPS_AT_ONCE = 2000
+"""Steps of one call of the compiled solver: Ctrl-C is heard between calls, and a step takes up to half a ms."""
+STEP_TOLERANCE = 1e-3
+"""How far Exudyn's clock may be from the step that is due, in steps."""
+
+
+def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
+    """Integrate as planned; the recorder takes the states and any fault."""
+    if start.state.step >= plan.steps:  # a kill fell between the last step and the joining of the pieces
+        recorder.last_time = start.state.step * plan.step
+    elif plan.solver == "compiled":
+        _integrate_compiled(plan, start, recorder, interruption)
+    else:
+        _integrate_in_exudyn(plan, start, recorder, interruption)
+
+
+def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
+    """Let the compiled solver fill the recorder's buffer."""
+    state = start.state
+    step = plan.step
+    method = plan.integration.method
+    system = CompiledSystem(plan.assembly, state.q, state.v, start.loads, step, method, state.past)
+    done = state.step
+    recorder.begin(done * step, state.q, state.v)
+    while done < plan.steps and not interruption.asked and not recorder.halted:
+        room = recorder.buffer.room(min(plan.steps - done, STEPS_AT_ONCE))
+        good = system.advance(done, *room)
+        if good < len(room.q):
+            recorder.fault = f"the state is not finite at t = {(done + good + 1) * step:.6g} s"
+        recorder.past = system.past
+        recorder.take_observed(step * np.arange(done + 1, done + good + 1, dtype=np.float64))
+        done += good
+
+
+def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
+    """Let Exudyn hand over each state."""
+    from exugear.transient.exudyn_model.library import SolverFailure
+    from exugear.transient.exudyn_model.system import ExudynSystem
+
+    state = start.state
+    step = plan.step
+    system = ExudynSystem(plan.assembly, state.q, state.v, start.loads.as_functions(), plan.mesh_route)
+    follow = _StepFollower(plan, start, recorder, interruption)
+    try:
+        system.run(state.step * step, plan.steps - state.step, step, follow, not plan.is_implicit)
+    except SolverFailure as error:
+        recorder.fault = recorder.fault or f"Exudyn gave up at t = {recorder.last_time:.6g} s: {error}"
+
+
+class _StepFollower:
+    """Observer of Exudyn's steps: the first call is the start itself."""
+
+    def __init__(self, plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
+        self._step = plan.step
+        self._next = start.state.step
+        self._begun = False
+        self._recorder = recorder
+        self._interruption = interruption
+
+    def __call__(self, t: float, q: Floats, v: Floats) -> bool:
+        """Hand a state over; False ends the run."""
+        recorder = self._recorder
+        due = self._next * self._step
+        self._next += 1
+        if not self._begun:
+            self._begun = True
+            recorder.begin(t, q, v)
+            return not self._interruption.asked and not recorder.halted
+        if np.isfinite(q).all() and np.isfinite(v).all() and abs(t - due) > STEP_TOLERANCE * self._step:
+            recorder.last_time = t
+            recorder.fault = (
+                f"Exudyn cut the step at t = {t:.9g} s, expected {due:.9g} s: "
+                "the equations were not solved at this step; use a smaller one"
+            )
+            return False
+        recorder.keep(t, q, v)
+        return not self._interruption.asked and not recorder.halted
+
+
+# Load cases in time: start in balance, integrate, stream the results
 
 Solver = Literal["compiled", "exudyn"]
 Integrator = Literal["adams", "rk4"]
@@ -103,7 +228,7 @@ def simulate(
     OSError
         The results cannot be written; what was written before is kept.
     LimitError
-        A limit of `exugear.transient.trust` that no run may go beyond; softer ones end in `Run.reasons`.
+        A limit of `exugear.transient.outcome` that no run may go beyond; softer ones end in `Run.reasons`.
     """
     choice = choice.of(gearbox)
     if choice.load_case not in gearbox.load_cases:

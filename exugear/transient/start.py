@@ -2,31 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases.summary import (
+from exugear.gearbox.load_cases import (
     doubt_about_bearings,
     drive_rate,
     driven_start_speed,
     summarise_loads,
+    torque_series,
 )
-from exugear.gearbox.load_cases.torque_series import torque_series
 from exugear.gearbox.parts import LoadCase
-from exugear.results.pieces import Checkpoint, RunPieces
-from exugear.results.run_file import EARLIER_PARTIAL_NAME
-from exugear.system.assembly import Assembly
+from exugear.results.run_file import (
+    EARLIER_PARTIAL_NAME,
+    FINAL_NAME,
+    PARTIAL_NAME,
+    Checkpoint,
+    RunPieces,
+    has_pieces,
+    load_run,
+)
 from exugear.system.loads import DriveLaw, LoadTable
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayout, signal_layout
 from exugear.system.statics import accelerating_start
-from exugear.transient.outcome import RunError
+from exugear.system.system import Assembly
+from exugear.transient.outcome import Judge, RunError
 from exugear.transient.plan import EXPECTATIONS, RunPlan
-from exugear.transient.run_folder import refuse_to_resume
-from exugear.transient.trust import Judge
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.files import FileError, exclusive
+
+# The folder of a run: one process at a time, and nothing lost
+
+LOCK_NAME = "run.partial.lock"
+
+
+@contextmanager
+def held(directory: Path) -> Iterator[None]:
+    """Keep a run to this process; the lock ends with the process, however that ends.
+
+    Raises
+    ------
+    FileError
+        Another process is at work on the run.
+    """
+    with exclusive(directory / LOCK_NAME, f"the run {directory}"):
+        yield
+
+
+def refuse_if_busy(directory: Path) -> None:
+    """Raise what `simulate` would raise if another process is at work on a run; change nothing."""
+    if (directory / LOCK_NAME).exists():
+        with held(directory):
+            pass
+
+
+def refuse_to_resume(directory: Path) -> str:
+    """Why a run cannot be gone on with; empty if it can."""
+    if has_pieces(directory / PARTIAL_NAME):
+        return ""
+    if (directory / EARLIER_PARTIAL_NAME).exists():
+        return f"{directory / EARLIER_PARTIAL_NAME}: was written by an earlier version, which cannot be gone on with"
+    if (directory / FINAL_NAME).exists():
+        try:
+            load_run(directory / FINAL_NAME, ())
+        except FileError as error:
+            return str(error)
+        return f"{directory / FINAL_NAME}: is complete, nothing was stopped"
+    return f"{directory}: no run of these choices was stopped here"
+
+
+# Where a run starts from and what acts on it, anew or from the last piece of a run that was stopped
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,15 +16,31 @@ where it opens the gap at the +z end.
 
 Involutes. A point of a flank is told by its roll angle tan(alpha), alpha the profile angle at its radius r:
 r = r_b sqrt(1 + tan(alpha)^2), and its polar angle falls with inv(alpha) = tan(alpha) - alpha (ISO 21771).
+
+Each slice of the face width has a window of cells about its contact line. Cells are equal in arc length along the
+involute, in which the contact of two flanks is nearly that of two parabolas.
+
+Below the form circle a tooth goes on as a fillet, which comes nearer to the mate than the involute would. The rigid
+gap knows involutes alone, so contact ends at the form circle, as it does at an edge. What it leaves out is told by the
+same state with involutes that go on to the base circles: the share of the load that is beyond. In a gearbox a tip
+corner presses on the fillet there, so that the share is what the results are uncertain by.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+
+import numpy as np
 
 from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import compiled
+from fe_ste.tools.display import Displayed
+
+if TYPE_CHECKING:
+    from fe_ste.elasticity.flank import FlankCompliance
 
 
 class ContactError(RuntimeError):
@@ -146,3 +162,206 @@ def circle_limit(pair: FlankPair, radius: float, axial: float, tooth: int, rotat
         else:
             high = middle
     return 0.5 * (low + high)
+
+
+# Cells over the plane of action, in which pressures are looked for; frame and signs as in `fe_ste.contact.kinematics`
+
+#: A cell cut by a tip edge to less than this part of its width is joined to its neighbour: so narrow a cell would
+#: have a pressure of its own that is all rounding.
+_LEAST_CELL = 0.2
+
+
+@dataclass(frozen=True)
+class ContactSettings:
+    """Discretisation of the contact."""
+
+    slices: int = 48
+    """Slices along the common face width."""
+    cells: int = 9
+    """Cells of a slice across the window that travels with the contact line."""
+    window: float = 1.8
+    """Half width of that window in Hertzian half widths at the largest mean line load."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot resolve a contact."""
+        for key, least in (("slices", 3), ("cells", 3), ("window", 1.0)):
+            if not getattr(self, key) >= least:
+                raise ValueError(f"contact setting {key} = {getattr(self, key)}: must be at least {least}")
+
+
+@compiled
+def _lay_cells(
+    pair: FlankPair, rotation: float, teeth: Integers, axial: Floats, half_window: float, count: int
+) -> tuple[Integers, Integers, Floats, Floats, Floats, Floats, Booleans, Floats]:
+    """Cells around the contact lines, in the order of the attributes of `Cells`; arc lengths for rolls on gear 1.
+
+    Arc lengths u = r_b roll^2 / 2 run along the transverse involute of gear 1.
+    """
+    most = len(teeth) * len(axial) * count
+    tooth_of = np.empty(most, np.int64)
+    slice_of = np.empty(most, np.int64)
+    middle = np.empty(most)
+    half = np.empty(most)
+    gap = np.empty(most)
+    gear_roll = np.empty(most)
+    offset = np.empty(most)
+    cut = np.zeros(most, np.bool_)
+    edges = np.empty(count + 1)
+    step = 2.0 * half_window / count
+    used = 0
+    for tooth in teeth:
+        for layer in range(len(axial)):
+            # The contact line: roll grows with the rotation, by a pitch from tooth to tooth and along the helix.
+            line = pair.working_roll + rotation + tooth * pair.pitch_1 + pair.twist_1 * axial[layer]
+            # Gear 1's own tip bounds the window above, the tip of gear 2 below; where a flank ends in an edge towards
+            # its root, this bounds it likewise.
+            lowest_roll = circle_limit(pair, pair.tip_radius_2, axial[layer], tooth, rotation)
+            highest_roll = pair.tip_roll_1
+            if 0.0 < pair.root_radius_2 < math.inf:
+                highest_roll = circle_limit(pair, pair.root_radius_2, axial[layer], tooth, rotation)
+            bottom = 0.5 * pair.base_radius_1 * lowest_roll**2
+            top = 0.5 * pair.base_radius_1 * highest_roll**2
+            if top - bottom < step:
+                continue
+            # Elastic teeth touch a little before and after the path of contact: the window then stays at the edge.
+            line = min(max(line, lowest_roll), highest_roll)
+            centre = 0.5 * pair.base_radius_1 * line**2
+            number = 0
+            for edge in range(count + 1):
+                at = centre - half_window + edge * step
+                at = min(max(at, bottom), top)
+                if number == 0 or at > edges[number - 1]:
+                    edges[number] = at
+                    number += 1
+            if number > 2 and edges[1] - edges[0] < _LEAST_CELL * step:
+                for edge in range(1, number - 1):
+                    edges[edge] = edges[edge + 1]
+                number -= 1
+            if number > 2 and edges[number - 1] - edges[number - 2] < _LEAST_CELL * step:
+                edges[number - 2] = edges[number - 1]
+                number -= 1
+            for cell in range(number - 1):
+                mean = 0.5 * (edges[cell] + edges[cell + 1])
+                roll = math.sqrt(2.0 * mean / pair.base_radius_1)
+                distance, other = rigid_gap(pair, roll, axial[layer], tooth, rotation)
+                tooth_of[used], slice_of[used] = tooth, layer
+                middle[used], half[used] = mean, 0.5 * (edges[cell + 1] - edges[cell])
+                gap[used], gear_roll[used] = distance, other
+                cut[used] = edges[cell] == bottom or edges[cell + 1] == top
+                offset[used] = (mean - centre) / step
+                used += 1
+    return (
+        tooth_of[:used], slice_of[:used], middle[:used], gear_roll[:used], half[:used], gap[:used], cut[:used],
+        offset[:used],
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Cells(Displayed):
+    """Contact cells of one position."""
+
+    tooth: Integers
+    layer: Integers
+    """(n,) tooth pair and slice."""
+    roll: Floats
+    gear_roll: Floats
+    """(n,) roll angles of the middle on both gears, rad."""
+    half_across: Floats
+    """(n,) half width along the profile, m."""
+    gap: Floats
+    """(n,) rigid gap of the unmodified flanks, m."""
+    cut: Booleans
+    """(n,) whether a tip edge bounds the cell."""
+    offset: Floats
+    """(n,) distance of the middle from the contact line, or from the tip edge where that line is off the flanks, in
+    cells."""
+
+    def select(self, keep: Booleans) -> Cells:
+        """Return the cells for which `keep` holds."""
+        return Cells(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
+
+    def _line(self) -> str:
+        tooth_pairs = np.unique(self.tooth)
+        cut = np.count_nonzero(self.cut)
+        return f": {len(self.tooth)} on {len(tooth_pairs)} tooth pairs, {cut} cut by a tip edge"
+
+
+def lay_cells(
+    pair: FlankPair, rotation: float, teeth: Integers, axial: Floats, half_window: float, count: int
+) -> Cells:
+    """Lay the cells of all `teeth` around their contact lines at one rotation of gear 1."""
+    cells = _lay_cells(pair, rotation, teeth, axial, half_window, count)
+    tooth, layer, middle, gear_roll, half, gap, cut, offset = cells
+    return Cells(tooth, layer, np.sqrt(2.0 * middle / pair.base_radius_1), gear_roll, half, gap, cut, offset)
+
+
+# Where contact meets the end of the involute: what is cut off at the form circles, and how much load that was
+
+Flanks: TypeAlias = "tuple[FlankCompliance, FlankCompliance]"
+"""Loaded flanks of gear 1 and gear 2."""
+
+#: Part of a flank, in roll, within which contact counts as being at the form circle.
+_AT_FORM_CIRCLE = 0.01
+
+
+def reaches_form_circle(flanks: Flanks, cells: Cells, force: Floats) -> bool:
+    """Whether cells that carry load lie at or beyond a form circle, where the involute ends and the fillet begins."""
+    touching = force > 0.0
+    for flank, roll in _flanks_with_fillets(flanks, cells):
+        margin = _above(flank, roll[touching])
+        if (margin < _AT_FORM_CIRCLE * np.ptp(flank.roll)).any():
+            return True
+    return bool((_parts_beyond(flanks, cells)[touching] > 0.0).any())
+
+
+def share_beyond(flanks: Flanks, cells: Cells, force: Floats) -> float:
+    """Share of the load on cells beyond the form circles; of a cell that one of them divides, the part beyond."""
+    return float(_parts_beyond(flanks, cells) @ force / force.sum())
+
+
+def cut_at_form_circles(kinematics: FlankPair, flanks: Flanks) -> FlankPair:
+    """Return the kinematics of flanks on which contact ends at both form circles; it does so on gear 1 anyway."""
+    gear = flanks[1].gear
+    if gear.has_relieved_root:
+        return kinematics
+    return kinematics._replace(root_radius_2=gear.base_radius * math.hypot(1.0, _form_roll(flanks[1])))
+
+
+def continued_involutes(kinematics: FlankPair, flanks: Flanks) -> FlankPair:
+    """Return the kinematics of involutes that go on beyond their form circles, of gear 1 to its base circle.
+
+    Where a root is relieved the flank ends in an edge, and so does contact.
+    """
+    if flanks[0].gear.has_relieved_root:
+        return kinematics
+    return kinematics._replace(form_roll_1=0.0)
+
+
+def _flanks_with_fillets(flanks: Flanks, cells: Cells) -> list[tuple[FlankCompliance, Floats]]:
+    """Flanks that go over into a fillet, with the roll angles of the cells on them."""
+    both = zip(flanks, (cells.roll, cells.gear_roll), strict=True)
+    return [(flank, roll) for flank, roll in both if not flank.gear.has_relieved_root]
+
+
+def _form_roll(flank: FlankCompliance) -> float:
+    return float(flank.roll[-1] if flank.gear.internal else flank.roll[0])
+
+
+def _above(flank: FlankCompliance, roll: Floats) -> Floats:
+    """Roll angles by which places on a gear are on its flank's side of the form circle."""
+    if flank.gear.internal:
+        return _form_roll(flank) - roll
+    return roll - _form_roll(flank)
+
+
+def _parts_beyond(flanks: Flanks, cells: Cells) -> Floats:
+    """Part of each cell that lies beyond a form circle.
+
+    A cell is as wide on one flank as on the other; arc lengths are r_b roll^2 / 2.
+    """
+    beyond = np.zeros(len(cells.roll))
+    for flank, roll in _flanks_with_fillets(flanks, cells):
+        outward = -1.0 if flank.gear.internal else 1.0
+        depth = outward * 0.5 * flank.gear.base_radius * (_form_roll(flank) ** 2 - roll**2)
+        beyond = np.maximum(beyond, np.clip(0.5 * (1.0 + depth / cells.half_across), 0.0, 1.0))
+    return beyond

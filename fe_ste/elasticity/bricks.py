@@ -1,16 +1,36 @@
 """Trilinear bricks with incompatible modes: gradients, stiffness of single elements and of whole meshes.
 
 Eight nodes, eight Gauss points. The three incompatible modes 1 - xi^2 of each element let it bend without shear.
+
+Near a load the elements cannot follow the field, and the displacement of the flank under a tent load departs from the
+true one. The departure depends on the elements within two or three of their sizes only. So it is found on a flat
+block: the bricks behind the flank, laid with their shapes on the surface of a half-space, where the truth is known.
+The block's other faces move as the half-space does (Boussinesq); what its surface then moves too far is the error.
+
+Frame of the block: x across the contact lines, y along them, z into the material.
+
+An end face stands on the flank of a helical tooth under an acute or obtuse angle, and layers of bricks are too thick to
+follow the field at such an edge. As in `fe_ste.elasticity.bricks` the bricks behind the flank are laid on a plane
+surface, which ends at an edge here. The truth is that of a wedge (`fe_ste.elasticity.halfspace.wedge_images`).
+
+Along the edge all bricks are taken as those at the middle of the profile. Then bricks and truth are solved wave number
+by wave number: one row of bricks, and the Fourier transform of 1 / distance, 2 K_0(wave number times distance).
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+import scipy.linalg
 import scipy.sparse
 import skfem
+from scipy.special import k0
 
+from fe_ste.elasticity.halfspace import interior_displacement, tent_integrals
+from fe_ste.elasticity.hexmesh import SectorMesh
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 
 _VTK_TO_SKFEM = [6, 2, 5, 7, 1, 3, 4, 0]
 
@@ -149,3 +169,323 @@ def _condense_bubbles(stiffness: Floats) -> Floats:
     return np.asarray(
         stiffness[:, :24, :24] - coupling.transpose(0, 2, 1) @ np.linalg.solve(stiffness[:, 24:, 24:], coupling)
     )
+
+
+# What bricks err by under the loads on a flank: the part that comes from the size of those next to the load
+
+#: Layers on either side of a load at which its error is read, and elements from a load to the faces of the block.
+ERROR_REACH = 3
+BLOCK_MARGIN = 4
+
+#: Part of the tooth's elements that the block is deep.
+_DEPTH = 2.0 / 3.0
+
+#: Radius of a flank that is as good as flat, in lengths of the flank.
+_FLAT = 1e5
+
+
+def brick_error(mesh: SectorMesh, side: int, incompatible_modes: bool = True) -> Floats:
+    """Displacement of the flank nodes under tent loads by the bricks less the true one, on a half-space.
+
+    Parameters
+    ----------
+    mesh : with layers of one thickness
+    side : loaded flank: +1 counter-clockwise, -1 clockwise
+    incompatible_modes : see `fe_ste.elasticity.bricks.stiffness_matrix`
+
+    Returns
+    -------
+    (f, 2 r + 1, f)
+        By flank node read, layers from the load to it, -r to r with r = `ERROR_REACH`, and flank node loaded, m/N.
+
+    Raises
+    ------
+    ValueError
+        If the layers differ in thickness.
+    """
+    steps = np.diff(mesh.axial_positions)
+    if np.ptp(steps) > 1e-9 * steps.mean():
+        raise ValueError(f"gear {mesh.gear.name}: layers from {steps.min():.3g} to {steps.max():.3g} m; must be equal")
+    points, numbers = flat_block(mesh, side)
+    hexahedra = block_bricks(points, numbers)
+    stiffness = stiffness_matrix(points, hexahedra, mesh.gear.material, incompatible_modes)
+    given = np.ones(numbers.shape, dtype=bool)
+    given[:-1, 1:-1, 1:-1] = False
+    # Node by node along the profile, so that the free ones couple in a narrow band.
+    by_profile = numbers.swapaxes(0, 1)
+    fixed = unknowns_of(numbers[given])
+    free = unknowns_of(by_profile[~given.swapaxes(0, 1)])
+    count = len(mesh.section.flank_roll)
+    moved = _half_space(mesh, side, points[numbers[given]]).reshape(len(fixed), count)
+    loads = np.zeros((stiffness.shape[0], count))
+    loads[3 * numbers[0] + 2] = _tent_loads(count, numbers.shape[1:])
+    found = _solved(stiffness[free][:, free], loads[free] - stiffness[free][:, fixed] @ moved)
+    everywhere = np.empty((stiffness.shape[0], count))
+    everywhere[fixed], everywhere[free] = moved, found
+    middle = numbers.shape[2] // 2
+    read = numbers[0, BLOCK_MARGIN:-BLOCK_MARGIN, middle - ERROR_REACH : middle + ERROR_REACH + 1]
+    return everywhere[3 * read + 2] - _on_surface(mesh, side)
+
+
+class FlankSpacing(NamedTuple):
+    """Arc lengths (f,) of the flank nodes (m), thickness of a layer (m), shear of the layers, cos(beta_b)."""
+
+    arc: Floats
+    layer: float
+    shear: float
+    cosine: float
+
+
+def _solved(matrix: SparseMatrix, right: Floats) -> Floats:
+    """Solve a positive definite system whose matrix has a narrow band: a sparse solver takes longer to load."""
+    entries = scipy.sparse.tril(matrix, format="coo")
+    below = entries.row - entries.col
+    band = np.zeros((below.max() + 1, len(right)))
+    band[below, entries.col] = entries.data
+    return np.asarray(scipy.linalg.solveh_banded(band, right, overwrite_ab=True, lower=True, check_finite=False))
+
+
+def flank_spacing(mesh: SectorMesh, side: int) -> FlankSpacing:
+    """Return how the nodes of a flank of equal layers lie on a plane."""
+    gear = mesh.gear
+    roll = mesh.section.flank_roll
+    handed = side * (-1.0 if gear.internal else 1.0)
+    shear = handed * np.tan(gear.base_helix_angle) * roll.mean()
+    arc = gear.base_radius * roll**2 / 2.0
+    layer = mesh.axial_positions[1] - mesh.axial_positions[0]
+    return FlankSpacing(arc, float(layer), float(shear), float(np.cos(gear.base_helix_angle)))
+
+
+def flat_block(mesh: SectorMesh, side: int) -> tuple[Floats, Integers]:
+    """Return the nodes (n, 3) of the block and their numbers by depth, place along the profile and layer.
+
+    Along the profile there are `BLOCK_MARGIN` nodes more on either side of the flank's.
+    """
+    gear = mesh.gear
+    section = mesh.section
+    arc, layer, shear, cosine = flank_spacing(mesh, side)
+    behind = section.between_flanks[::-side]
+    behind = behind[: 1 + max(2, round(_DEPTH * (len(behind) - 1)))]
+    offset = section.points[behind] - section.points[behind[0]]
+    # Directions of the section in the frame of the flank: its tangent, and its normal into the material.
+    radius = np.hypot(*section.points[behind[0]].T)
+    radial = section.points[behind[0]] / radius[:, None]
+    tangential = np.stack([-radial[:, 1], radial[:, 0]], axis=-1)
+    angle = np.arctan(section.flank_roll)[:, None]
+    outward = (-1.0 if gear.internal else 1.0) * np.sin(angle) * radial + side * np.cos(angle) * tangential
+    tangent = np.stack([outward[:, 1], -outward[:, 0]], axis=-1)
+    tangent = tangent * np.sign(np.sum(tangent[0] * np.diff(section.points[behind[0]], axis=0)[0]))
+    across = np.sum(offset * tangent, axis=-1)
+    inward = -np.sum(offset * outward, axis=-1)
+    ends = ((0, 0), (BLOCK_MARGIN, BLOCK_MARGIN))
+    across = np.pad(across, ends, mode="edge")
+    inward = np.pad(inward, ends, mode="edge")
+    step = arc[1] - arc[0]
+    beyond = step * np.arange(1, BLOCK_MARGIN + 1)
+    arcs = np.concatenate([arc[0] - beyond[::-1], arc, arc[-1] + beyond])
+    layers = layer * np.arange(-ERROR_REACH - 1, ERROR_REACH + 2)
+    # In the section the normal of the flank leans by beta_b out of it.
+    lean = side * np.sin(gear.base_helix_angle)
+    numbers = np.arange(across.size * len(layers)).reshape(*across.shape, len(layers))
+    points = np.empty((*numbers.shape, 3))
+    points[..., 0] = (arcs + across)[..., None] - shear * layers
+    points[..., 1] = layers / cosine - lean * inward[..., None]
+    points[..., 2] = cosine * inward[..., None]
+    return points.reshape(-1, 3), numbers
+
+
+def block_bricks(points: Floats, numbers: Integers) -> Integers:
+    """Hexahedra of the block in VTK order."""
+    square = ((0, 0), (1, 0), (1, 1), (0, 1))
+    deep, along, layers = (count - 1 for count in numbers.shape)
+    corners = [numbers[k : k + deep, i : i + along, j : j + layers].ravel() for k in (0, 1) for i, j in square]
+    hexahedra = np.stack(corners, axis=-1)
+    edges = points[hexahedra[0, [1, 3, 4]]] - points[hexahedra[0, 0]]
+    if np.linalg.det(edges) > 0.0:
+        return hexahedra
+    return hexahedra[:, [0, 3, 2, 1, 4, 7, 6, 5]]
+
+
+def unknowns_of(nodes: Integers) -> Integers:
+    """Unknowns of nodes, three each, in their order."""
+    return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel())
+
+
+def _tent_loads(count: int, surface: tuple[int, ...]) -> Floats:
+    """Consistent nodal loads (profile, layers, count) of unit tent loads in the middle layer."""
+    mass = np.zeros((count, count))
+    for left in range(count - 1):
+        mass[left : left + 2, left : left + 2] += np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
+    loads = np.zeros((*surface, count))
+    middle = surface[1] // 2
+    for layer, share in ((middle - 1, 1.0 / 6.0), (middle, 4.0 / 6.0), (middle + 1, 1.0 / 6.0)):
+        loads[BLOCK_MARGIN:-BLOCK_MARGIN, layer] = share * mass / mass.sum(axis=0)
+    return loads
+
+
+def _half_space(mesh: SectorMesh, side: int, places: Floats) -> Floats:
+    """Displacement (n, 3, f) of a half-space at places away from the loads, under the tent loads, m/N."""
+    arc, layer, shear, cosine = flank_spacing(mesh, side)
+    material = mesh.gear.material
+    gauss, weight = np.polynomial.legendre.leggauss(3)
+    step = arc[1] - arc[0]
+    within = (gauss + 1.0) / 2.0
+    parts = max(2, int(np.ceil(layer / step)))  # along the layer about as fine as along the profile
+    along = ((np.arange(parts)[:, None] + within) / parts).ravel()
+    z = layer * np.concatenate([-along, along])
+    height = np.tile(np.tile(weight, parts) * (1.0 - along), 2)
+    # Loads by interval of the profile, point in it, and point along the layers; each has a part in two tents.
+    shape = (len(arc) - 1, len(within), len(z))
+    interval = np.repeat(np.arange(shape[0]), shape[1] * shape[2])
+    s, at = (np.broadcast_to(part, shape).ravel() for part in (within[:, None], z))
+    strength = np.broadcast_to(weight[:, None] * height, shape).ravel()
+    shares = np.stack([(1.0 - s) * strength, s * strength], axis=-1)
+    loads = np.stack([arc[interval] + s * step - shear * at, at / cosine], axis=-1)
+    moved = interior_displacement(places, loads, interval, shares, len(arc), material.poissons_ratio)
+    total = np.bincount(interval, shares[:, 0], len(arc)) + np.bincount(interval + 1, shares[:, 1], len(arc))
+    return np.asarray(moved / total * (1.0 + material.poissons_ratio) / (2.0 * np.pi * material.youngs_modulus))
+
+
+def _on_surface(mesh: SectorMesh, side: int) -> Floats:
+    """Surface displacement of a half-space at the flank nodes, by node, layer and load as in `brick_error`, m/N."""
+    arc, layer, shear, cosine = flank_spacing(mesh, side)
+    material = mesh.gear.material
+    layers = layer * np.arange(-ERROR_REACH - 1.0, ERROR_REACH + 2.0, dtype=np.float64)
+    # Flank coordinates of a cylinder so large that arc lengths are roll angles.
+    radius = _FLAT * float(np.ptp(arc))
+    integrals = tent_integrals(1.0 + arc / radius, layers, radius, shear / radius, cosine, np.zeros((2, 0, 3)))
+    shape = (len(arc), len(layers)) * 2
+    read = integrals.reshape(shape)[:, 1:-1, :, len(layers) // 2]
+    return np.asarray(read * (1.0 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus))
+
+
+# What bricks err by under loads near an end face, beyond what they err by inside the face width
+
+#: Wave numbers; errors are found up to this many nodes along the profile.
+WAVES = 8
+
+#: Layers next to an end whose loads are corrected, and layers of nodes of the bricks.
+END_LAYERS = 5
+_LAYERS = 8
+
+#: Rows of bricks behind those of the flat block, each this much deeper than the one before it: to no displacement.
+_DEEPER = 6
+_GROWTH = 1.5
+
+#: Points of the integrals over a layer, and wave numbers on either side that the nodes cannot tell from one.
+_POINTS = 12
+_ALIASES = 5
+
+
+def end_errors(mesh: SectorMesh, side: int, images: Floats, incompatible_modes: bool = True) -> tuple[Floats, Floats]:
+    """Displacement of the flank nodes under tent loads by the bricks less the true one, less that inside the face.
+
+    Parameters
+    ----------
+    mesh : with layers of one thickness
+    side : loaded flank: +1 counter-clockwise, -1 clockwise
+    images : (2, n, 3) image loads behind the lower and the upper end
+    incompatible_modes : see `fe_ste.elasticity.bricks.stiffness_matrix`
+
+    Returns
+    -------
+    lower, upper : (2 w - 1, r, l)
+        By nodes along the profile from the load to the place read, from -w + 1 to w - 1 with w = `WAVES`; by layer
+        read and layer loaded, `END_LAYERS` each, counted from the end; m/N.
+    """
+    loaded = np.arange(END_LAYERS)
+    middle = END_LAYERS
+    inside = _Row(mesh, side, 1, 2 * END_LAYERS + 1, incompatible_modes)
+    known = inside.error(np.array([middle]), None)[..., 0]
+    errors = []
+    for end, of_end in zip((-1, 1), images, strict=True):
+        error = _Row(mesh, side, end, _LAYERS, incompatible_modes).error(loaded, of_end)[:, :END_LAYERS]
+        # Layers of the row inside run from the upper end downwards.
+        error -= known[:, middle + end * (loaded[:, None] - loaded)]
+        errors.append(_by_distance(error))
+    return errors[0], errors[1]
+
+
+def _wave_numbers() -> Floats:
+    """Phases from node to node along the profile: half a step off zero, as the far field is not asked for."""
+    return np.asarray((np.arange(WAVES) + 0.5) * np.pi / WAVES)
+
+
+def _by_distance(transform: Floats) -> Floats:
+    """Sum waves to a function of the nodes from load to place."""
+    away = np.arange(1 - WAVES, WAVES)
+    waves = np.exp(1j * _wave_numbers()[:, None] * away) / WAVES
+    return np.asarray(np.einsum("krl,kj->jrl", transform, waves).real)
+
+
+class _Row:
+    """One row of bricks along the layers, as deep as the block, repeated along the profile."""
+
+    def __init__(self, mesh: SectorMesh, side: int, end: int, layers: int, incompatible_modes: bool) -> None:
+        self._mesh, self._end, self._layers = mesh, end, layers
+        arc, self._layer, self._shear, self._cosine = flank_spacing(mesh, side)
+        self._step = float(arc[1] - arc[0])
+        points, numbers = flat_block(mesh, side)
+        block = points.reshape(*numbers.shape, 3)[:, BLOCK_MARGIN + len(arc) // 2]
+        behind = block[:, block.shape[1] // 2]
+        across = block[0, 1] - block[0, 0]
+        deeper = np.cumsum(_GROWTH ** np.arange(1, _DEEPER + 1))[:, None] * (behind[-1] - behind[-2])
+        behind = np.concatenate([behind, behind[-1] + deeper])
+        near = behind[:, None] - end * np.arange(layers)[:, None] * across
+        places = np.stack([near, near + [self._step, 0.0, 0.0]], axis=1).reshape(-1, 3)
+        nodes = np.arange(len(places)).reshape(len(behind), 2, layers)
+        matrix = stiffness_matrix(places, block_bricks(places, nodes), mesh.gear.material, incompatible_modes)
+        first, second = (unknowns_of(nodes[:, x].ravel()) for x in (0, 1))
+        self._own = (matrix[first][:, first] + matrix[second][:, second]).toarray()
+        self._next = matrix[first][:, second].toarray()
+        self._nodes = np.arange(len(behind) * layers).reshape(len(behind), layers)
+
+    def error(self, loaded: Integers, images: Floats | None) -> Floats:
+        """Transform (w, layers, loads) of bricks less truth; without images the row has no end, but is held there."""
+        return np.asarray(self._bricks(loaded, images is not None) - self._truth(loaded, images))
+
+    def _bricks(self, loaded: Integers, ends: bool) -> Floats:
+        held = np.zeros(self._nodes.shape, dtype=bool)
+        held[-1] = held[:, -1] = True
+        held[:, 0] |= not ends
+        free = unknowns_of(self._nodes[~held])
+        mass = np.zeros((self._layers, self._layers))
+        for left in range(self._layers - 1):
+            mass[left : left + 2, left : left + 2] += np.array([[2.0, 1.0], [1.0, 2.0]]) / 6.0
+        normal = 3 * self._nodes[0] + 2
+        loads = np.zeros((self._nodes.size * 3, len(loaded)))
+        loads[normal] = (mass / mass.sum(axis=0))[:, loaded]
+        own, following = (part[np.ix_(free, free)] for part in (self._own, self._next))
+        moved = np.zeros((WAVES, len(loads), len(loaded)), dtype=complex)
+        for wave, phase in enumerate(_wave_numbers()):
+            across = following * np.exp(1j * phase)
+            tent = (2.0 + np.cos(phase)) / 3.0
+            moved[wave, free] = np.linalg.solve(own + across + across.conj().T, tent * loads[free])
+        return moved[:, normal]
+
+    def _truth(self, loaded: Integers, images: Floats | None) -> Floats:
+        material = self._mesh.gear.material
+        places, shares = np.polynomial.legendre.leggauss(_POINTS)
+        # The substitution gathers points at both ends, where the field of a layer's own load is a logarithm.
+        s = (places + 1.0) / 2.0
+        within = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+        shares = 15.0 * shares * (s * (1.0 - s)) ** 2
+        aliases = _wave_numbers()[:, None] + 2.0 * np.pi * np.arange(-_ALIASES, _ALIASES + 1)
+        wave = (aliases / self._step)[:, :, None, None]
+        tent = np.sinc(aliases / (2.0 * np.pi)) ** 2 / self._step
+        read = self._layer * np.arange(self._layers)[:, None]
+        found = np.zeros((WAVES, self._layers, len(loaded)), dtype=complex)
+        for column, layer in enumerate(loaded.tolist()):
+            total = 1.0 if layer else 0.5  # integral of the tent in layers, its halves 1/2 each
+            for below, part in ((layer - 1, within), (layer, 1.0 - within)):
+                if below < 0:
+                    continue
+                place = self._layer * (below + within)
+                field = 2.0 * k0(np.abs(wave) * np.abs(read - place) / self._cosine)
+                for strength, squares, product in () if images is None else images.tolist():
+                    apart = np.sqrt(squares * (read**2 + place**2) + product * read * place) / self._cosine
+                    field += strength * 2.0 * k0(np.abs(wave) * apart)
+                field = field * np.exp(1j * wave * self._end * self._shear * (read - place))
+                found[..., column] += np.einsum("km,kmrz,z->kr", tent, field, part * shares)
+            found[..., column] /= total
+        return found * ((1.0 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus))

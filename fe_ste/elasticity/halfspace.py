@@ -17,7 +17,7 @@ import math
 
 import numpy as np
 
-from fe_ste.geometry.splines import cubic_coefficients, cubic_knots, cubic_matrix
+from fe_ste.geometry.profile import cubic_coefficients, cubic_knots, cubic_matrix
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 

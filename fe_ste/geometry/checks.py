@@ -10,10 +10,8 @@ import numbers
 
 import numpy as np
 
-from fe_ste.geometry.cutter import PinionCutter
-from fe_ste.geometry.fillet import root_fillet
-from fe_ste.geometry.gear_relations import ROUNDING, UncheckedGear
-from fe_ste.geometry.involute import involute
+from fe_ste.geometry.gear_relations import ROUNDING, UncheckedGear, root_fillet
+from fe_ste.geometry.involute import PinionCutter, involute
 from fe_ste.geometry.pair_relations import UncheckedPair
 
 LEAST_TEETH = 5

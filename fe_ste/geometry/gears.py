@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 
 from fe_ste.geometry.checks import check_gear, check_gear_pair
-from fe_ste.geometry.cutter import PinionCutter
 from fe_ste.geometry.gear_relations import BasicRack, Material, UncheckedGear
+from fe_ste.geometry.involute import PinionCutter
 from fe_ste.geometry.pair_relations import UncheckedPair
 from fe_ste.tools.display import Displayed, TitledRows, value_range
 

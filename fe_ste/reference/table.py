@@ -21,13 +21,12 @@ import xarray as xr
 
 from fe_ste.geometry.gear_relations import inputs_that_are_given
 from fe_ste.geometry.gears import GearPair
-from fe_ste.reference.contact_model import Iteration, convergence_table
 from fe_ste.reference.finite_deformation import von_mises
-from fe_ste.reference.newton import EquilibriumError
+from fe_ste.reference.newton import EquilibriumError, Iteration, convergence_table
 from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, nonlinear_position
 from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.tools.files import FileError
-from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
+from fe_ste.tools.stores import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import NONLINEAR_TABLE
 from fe_ste.transmission_error.table import TableError
 

@@ -1,22 +1,34 @@
 """What all diagrams share: style, colours, figures written whole or not at all.
 
 matplotlib is imported when a diagram is drawn and needs no display: figures are made without pyplot.
+
+pyvista is imported when a picture is rendered. VTK renders into memory without a display through EGL or OSMesa.
+Where neither is there it ends the process, so the first picture tries it in a process of its own.
 """
 
 from __future__ import annotations
 
+import functools
+import importlib.util
 import io
+import math
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from unicodedata import category
 
+import numpy as np
+
+from fe_ste.tools.arrays import Pixels
 from fe_ste.tools.files import write_file
 
 if TYPE_CHECKING:
+    import pyvista
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
 
 #: Colours that stay apart in print and for colour-blind readers (Okabe and Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -98,3 +110,126 @@ def _print_png(figure: Figure, content: io.BytesIO) -> None:
         canvas.print_png(content)
     finally:
         figure.set_dpi(before)
+
+
+# What all rendered pictures share: an off-screen plotter, images without margins, a scale
+
+_PROBE = """
+import vtkmodules.vtkRenderingOpenGL2
+from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+window = vtkRenderWindow()
+window.SetOffScreenRendering(1)
+window.AddRenderer(vtkRenderer())
+window.Render()
+"""
+
+
+class RenderingError(RuntimeError):
+    """Three-dimensional pictures cannot be made on this machine."""
+
+
+@functools.cache
+def _probe_rendering() -> bool:
+    finished = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, check=False, timeout=120)
+    return finished.returncode == 0
+
+
+def require_rendering() -> None:
+    """Make sure that pyvista is there and can render without a display.
+
+    Raises
+    ------
+    RenderingError
+        With what to install. VTK ends the process where no OpenGL can be had, hence the trial in another one.
+    """
+    if importlib.util.find_spec("pyvista") is None:
+        raise RenderingError("3-D pictures need pyvista: pip install 'exugear[pictures]'")
+    if not _probe_rendering():
+        raise RenderingError(
+            "VTK cannot render off-screen here: it found no OpenGL. No display is needed, but on Debian or "
+            "Ubuntu either EGL with Mesa's software renderer (apt-get install libegl1 libgl1 libxrender1) or "
+            "OSMesa "
+            "(apt-get install libosmesa6 libx11-6)."
+        )
+
+
+@contextmanager
+def offscreen_plotter(width: int, height: int) -> Iterator[pyvista.Plotter]:
+    """Open a plotter on a white image of given size in pixels, with parallel projection and smooth edges.
+
+    Raises
+    ------
+    RenderingError
+        See `require_rendering`.
+    """
+    require_rendering()
+    import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    verbosity = vtkLogger.GetCurrentVerbosityCutoff()
+    # Before it takes EGL, VTK complains on standard error that there is no X server.
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    plotter = pyvista.Plotter(off_screen=True, window_size=[width, height], lighting="three lights")
+    try:
+        plotter.background_color = pyvista.Color("white")
+        plotter.camera.parallel_projection = True
+        plotter.enable_anti_aliasing("ssaa")
+        yield plotter
+    finally:
+        plotter.close()
+        vtkLogger.SetStderrVerbosity(verbosity)
+
+
+def rendered_image(plotter: pyvista.Plotter) -> tuple[Pixels, float]:
+    """Render a plotter in parallel projection.
+
+    Returns
+    -------
+    image : (height, width, 3) array of uint8
+    pixel : size of a pixel in the units of the scene
+    """
+    plotter.render()  # what has moved since the last picture
+    image = np.asarray(plotter.screenshot(return_img=True), dtype=np.uint8)
+    return image, 2.0 * plotter.camera.parallel_scale / image.shape[0]
+
+
+def drawn_part(image: Pixels, margin: int = 20) -> tuple[slice, slice]:
+    """Rows and columns of an image that are not white, and `margin` pixels around them."""
+    drawn = np.any(image != 255, axis=-1)
+    rows = np.flatnonzero(drawn.any(axis=1))
+    columns = np.flatnonzero(drawn.any(axis=0))
+    if not rows.size:
+        return slice(None), slice(None)
+    top = max(0, int(rows[0]) - margin)
+    left = max(0, int(columns[0]) - margin)
+    return slice(top, int(rows[-1]) + 1 + margin), slice(left, int(columns[-1]) + 1 + margin)
+
+
+def without_margins(image: Pixels, margin: int = 20) -> Pixels:
+    """Cut the white borders of an image down to `margin` pixels."""
+    return image[drawn_part(image, margin)]
+
+
+def nice_length(longest: float) -> float:
+    """Longest round length (1, 2 or 5 times a power of ten) that does not exceed `longest`.
+
+    Examples
+    --------
+    >>> nice_length(0.037), nice_length(0.6), nice_length(0.012)
+    (0.02, 0.5, 0.01)
+    """
+    power = 10.0 ** math.floor(math.log10(longest))
+    return float(f"{max(step * power for step in (1.0, 2.0, 5.0) if step * power <= longest * (1 + 1e-12)):.3g}")
+
+
+def place_picture(panel: Axes, image: Pixels, pixel: float, title: str = "") -> None:
+    """Show a rendered image in parallel projection with a scale bar below; `pixel` is a pixel's size in m."""
+    panel.imshow(image, interpolation="antialiased")
+    panel.set_axis_off()
+    panel.set_title(drawable(title), loc="left")
+    height, width = image.shape[:2]
+    bar = nice_length(0.2 * width * pixel)
+    below = 1.04 * height
+    panel.plot([0.0, bar / pixel], [below, below], color="black", linewidth=2.5, solid_capstyle="butt")
+    panel.text(bar / pixel + 0.015 * width, below, f"{1e3 * bar:g} mm", ha="left", va="center")
+    panel.set(xlim=(0, width), ylim=(1.08 * height, 0))

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fe_ste.contact.cells import ContactSettings
-from fe_ste.contact.regular import RegularCompliance
+from fe_ste.contact.compliance import RegularCompliance
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.flanks.modifications import FlankModification
+from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import Displayed, TitledRows, value_range
@@ -84,7 +84,7 @@ class PairCompliance(Displayed):
         gaps
             Number of the tooth pair, counted ahead of the one that touches at the pitch point at pmc 0 -> gap of its
             flanks, m on the transverse line of action, negative where they touch before the others; see
-            `fe_ste.flanks.deviations`.
+            `fe_ste.flanks`.
 
         Raises
         ------
@@ -149,11 +149,10 @@ def pair_compliance(
 
     See Also
     --------
-    fe_ste.elasticity.known_flanks.known_flanks : Where computed gears are kept.
+    fe_ste.elasticity.flank.known_flanks : Where computed gears are kept.
     """
     # finite elements, which a table that is there spares
-    from fe_ste.elasticity.flank import TOOTH_REACH
-    from fe_ste.elasticity.known_flanks import known_flanks
+    from fe_ste.elasticity.flank import TOOTH_REACH, known_flanks
 
     sides = ((pair.pinion, 1), (pair.gear, -1 if pair.gear.internal else 1))
     # Of wide helical gears more pairs touch at once than neighbours are usually kept.

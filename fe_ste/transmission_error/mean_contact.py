@@ -5,31 +5,82 @@ about teeth at rest, laws about their changes over the mesh cycle, takes forty-f
 under two misalignments on either side of the real one, and at a centre distance beside it. Between these all is
 linear. They stand on a lattice whose steps are small against what teeth yield, so that all states nearby share one
 contact: those of equal planets, of a later step of the same search, of a gearbox that varies a little.
+
+The key is a hash of its whole input and of the versions of the method.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import hashlib
 import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fe_ste.contact.cells import ContactSettings
-from fe_ste.contact.kinematics import ContactError
+from fe_ste.contact.kinematics import ContactError, ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed
+from fe_ste.tools.stores import Arrays, Cache
+from fe_ste.tools.threads import one_dense_thread, side_by_side
+from fe_ste.tools.versions import MEAN_CONTACT
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
-from fe_ste.transmission_error.face_load import face_load_factor, load_along_face
 from fe_ste.transmission_error.states import StateAxes
 from fe_ste.transmission_error.table import TableInput
 from fe_ste.transmission_error.transmission_error import solve_positions
 
 if TYPE_CHECKING:
     import xarray as xr
+
+# How evenly a mesh carries its load along the face
+
+
+def load_along_face(states: xr.Dataset) -> xr.DataArray:
+    """Line load over the face, N/m: that of all tooth pairs together, mean of the mesh cycle.
+
+    Parameters
+    ----------
+    states : of `fe_ste.transmission_error.transmission_error.static_transmission_error`, or of a table
+    """
+    line_load: xr.DataArray = states["line_load"].sum("tooth").mean("pmc")
+    return line_load.assign_attrs(units="N/m", long_name="line load of all tooth pairs, mean of the mesh cycle")
+
+
+def face_load_factor(states: xr.Dataset) -> xr.DataArray:
+    """Highest over mean line load along the face: the face load factor K_Hbeta (ISO 6336-1) as the teeth have it.
+
+    The standard's is an estimate from the mesh misalignment and a constant mesh stiffness; here teeth bend and flatten
+    by finite elements. Helical teeth have more than 1 when aligned, because their ends give way.
+
+    Parameters
+    ----------
+    states : of `fe_ste.transmission_error.transmission_error.static_transmission_error`, or of a table
+
+    Returns
+    -------
+    over torque, centre_distance and misalignment
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import xarray as xr
+    >>> load = xr.DataArray(np.array([[[1.0, 2.0, 3.0]]]), dims=("pmc", "tooth", "axial_position"))
+    >>> float(face_load_factor(xr.Dataset({"line_load": load})))
+    1.5
+    """
+    along = load_along_face(states)
+    factor: xr.DataArray = along.max("axial_position") / along.mean("axial_position")
+    return factor.assign_attrs(units="1", long_name="highest over mean line load along the face")
+
+
+# Contact of a pair about the state that it stands in: means over the mesh cycle, and their slopes by misalignment
 
 POSITIONS = 5
 """Positions of the mesh cycle for means: twice as many move the misalignment of a gearbox in balance by 0.4 %."""
@@ -76,7 +127,7 @@ class MeanContact(Displayed):
     deflection_by_distance: float
     """Slope of the deflection by the centre distance under constant force, between both misalignments."""
     face_load_factor: Floats
-    """(2,) K_Hbeta: highest over mean line load along the face, see `fe_ste.transmission_error.face_load`."""
+    """(2,) K_Hbeta: highest over mean line load along the face, see `fe_ste.transmission_error.mean_contact`."""
     max_pressure: Floats
     edge_pressure: Floats
     """(2,) largest of the cycle, away from and at tip edges, Pa."""
@@ -227,3 +278,80 @@ def _cycle(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
 @lru_cache(maxsize=_SHARED_PAIRS)
 def _compliance(pair: GearPair, mesh: MeshSettings, contact: ContactSettings) -> PairCompliance:
     return pair_compliance(pair, mesh, contact)
+
+
+# Contacts about a state solved once: kept in memory, and in files for the next process, beside the flanks of gears
+
+#: Each takes 4 kB.
+_contacts = Cache[MeanContact]("contact", in_memory=1000, in_files=20_000_000)
+_told: ContextVar[Callable[[int, int], None] | None] = ContextVar("_told", default=None)
+
+
+@contextmanager
+def contacts_told(progress: Callable[[int, int], None]) -> Iterator[None]:
+    """Let somebody hear of contacts that are solved inside the context, however deep they are asked for.
+
+    Parameters
+    ----------
+    progress
+        Called with the number of contacts that are there, and of all that have to be solved. What it raises, such as
+        Ctrl-C, ends the work.
+    """
+    token = _told.set(progress)
+    try:
+        yield
+    finally:
+        _told.reset(token)
+
+
+def known_contacts(wanted: Sequence[TableInput]) -> list[MeanContact | ContactError]:
+    """Return contacts as `fe_ste.transmission_error.mean_contact.mean_contact` does, each solved at most once.
+
+    Files are kept where `fe_ste.elasticity.flank.known_flanks` keeps its own; each is written when it is solved,
+    so that what is stopped goes on from there.
+
+    Returns
+    -------
+    in the order asked for; why one could not be solved stands in its place
+    """
+    keys = [_key(one) for one in wanted]
+    asked = dict(zip(keys, wanted, strict=True))
+    stored = {key: _contacts.get(key, _unpacked) for key in asked}
+    found: dict[str, MeanContact | ContactError] = {key: kept for key, kept in stored.items() if kept is not None}
+    missing = [key for key in asked if key not in found]
+    progress = _told.get()
+
+    def solve(key: str) -> MeanContact | ContactError:
+        try:
+            contact = mean_contact(asked[key])
+        except ContactError as error:
+            return error
+        _contacts.keep(key, contact, vars(contact))
+        return contact
+
+    # Two at a time; between pairs of them the caller hears of it, and may end the work.
+    with one_dense_thread():
+        for first in range(0, len(missing), 2):
+            if progress is not None:
+                progress(first, len(missing))
+            chosen = missing[first : first + 2]
+            found |= dict(zip(chosen, side_by_side(solve, chosen), strict=True))
+    if progress is not None and missing:
+        progress(len(missing), len(missing))
+    return [found[key] for key in keys]
+
+
+def forget_contacts() -> None:
+    """Drop all contacts from memory."""
+    _contacts.forget()
+
+
+def _key(wanted: TableInput) -> str:
+    return hashlib.sha256(f"{MEAN_CONTACT} {wanted.hash}".encode()).hexdigest()
+
+
+def _unpacked(arrays: Arrays) -> MeanContact:
+    """Contact from its fields."""
+    values: dict[str, Any] = {field.name: arrays[field.name] for field in dataclasses.fields(MeanContact)}
+    values |= {name: float(value) for name, value in values.items() if value.ndim == 0}
+    return MeanContact(**values)

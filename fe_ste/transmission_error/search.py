@@ -14,11 +14,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fe_ste.contact.cells import Cells, lay_cells
 from fe_ste.contact.complementarity import ContactSolution, solve_complementarity
 from fe_ste.contact.compliance import compliance_matrix
-from fe_ste.contact.flank_ends import continued_involutes, cut_at_form_circles, reaches_form_circle, share_beyond
-from fe_ste.contact.kinematics import ContactError, FlankPair
+from fe_ste.contact.kinematics import (
+    Cells,
+    ContactError,
+    FlankPair,
+    continued_involutes,
+    cut_at_form_circles,
+    lay_cells,
+    reaches_form_circle,
+    share_beyond,
+)
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.transmission_error.compliance import PairCompliance
@@ -26,7 +33,6 @@ from fe_ste.transmission_error.states import ContactState, SearchStart, StateAxe
 
 if TYPE_CHECKING:
     import xarray as xr
-
 
 #: Cells further apart than this many approaches in the unloaded position cannot touch.
 _GAP_REACH = 1.3
@@ -118,7 +124,7 @@ def contact_states(
     Notes
     -----
     Contact that reaches a form circle is solved again, cut off there, and once more on involutes that go on: see
-    `fe_ste.contact.flank_ends`.
+    `fe_ste.contact.kinematics`.
     """
     pair = compliance.pair
     roll = compliance.flanks[0].roll
@@ -420,3 +426,34 @@ def _widen(chosen: Booleans, axis: int, steps: int) -> None:
 def normal_load(pair: GearPair, torque: float) -> float:
     """Sum of the normal contact forces under a torque on gear 1, N: all contacts have the lever r_b cos(beta_b)."""
     return torque / (pair.pinion.base_radius * math.cos(pair.pinion.base_helix_angle))
+
+
+# Pressure at the pitch point by Hertz: what the greatest pressure of a table is compared with
+
+
+def pitch_point_pressure(pair: GearPair, torque: float) -> float:
+    """Greatest pressure at the pitch point, the load spread evenly over the least length of the contact lines, Pa.
+
+    Parameters
+    ----------
+    torque : on gear 1, N m, positive
+
+    Notes
+    -----
+    p = 2 w / (pi b) with the line load w and the half width b of two cylinders (Johnson, Contact Mechanics, eqs. 4.43
+    and 4.45). ISO 6336-2 spreads the load likewise, by its contact ratio factor. Tip edges and uneven loads come on
+    top.
+
+    Examples
+    --------
+    A tenth of the load, a third of the pressure:
+
+    >>> from fe_ste.geometry.gears import Gear
+    >>> size = {"normal_module": 0.003, "face_width": 0.03, "held_diameter": 0.03}
+    >>> pinion, gear = Gear(name="one", teeth=24, **size), Gear(name="other", teeth=36, **size)
+    >>> pair = GearPair(name="pair", pinion=pinion, gear=gear, centre_distance=0.09)
+    >>> round(pitch_point_pressure(pair, 100.0) / pitch_point_pressure(pair, 10.0), 6)
+    3.162278
+    """
+    line_load = normal_load(pair, torque) / least_contact_length(pair)
+    return 2.0 * line_load / (math.pi * hertz_half_width(pair, line_load))

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fe_ste.contact.cells import Cells
 from fe_ste.contact.complementarity import ContactSolution
-from fe_ste.contact.kinematics import ContactError
+from fe_ste.contact.kinematics import Cells, ContactError
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.display import Displayed, TitledRows, value_range
@@ -39,7 +38,7 @@ class ContactState(Displayed):
     """(n,) Pa."""
     cut_off_share: float = 0.0
     """Share of the load that would be beyond the form circles, where contact is cut off: see
-    `fe_ste.contact.flank_ends`."""
+    `fe_ste.contact.kinematics`."""
 
     def _line(self) -> str:
         cells = len(self.cells.tooth)
@@ -136,7 +135,7 @@ class StateAxes(Displayed):
 
 
 CUT_OFF = "cut_off_share"
-"""Variable of what contact leaves out at form circles: see `fe_ste.contact.flank_ends`."""
+"""Variable of what contact leaves out at form circles: see `fe_ste.contact.kinematics`."""
 
 _UNITS = {
     "pmc": ("1", "position in the mesh cycle"),

@@ -19,16 +19,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.flanks.modifications import FlankModification
+from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gear_relations import inputs_that_are_given
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.tools.files import FileError
-from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
+from fe_ste.tools.stores import Layout, load_dataset, write_dataset
+from fe_ste.tools.threads import Workers
 from fe_ste.tools.versions import TABLE
-from fe_ste.tools.workers import Workers
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.grid import Checkpoint, Submits, solve_grid
 from fe_ste.transmission_error.search import unloaded_states

@@ -8,11 +8,11 @@ from typing import Any
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
 from exugear.system.bodies.elastic_body import ElasticBody
-from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
-from exugear.system.eigenmodes.modes import Modes, eigenmodes
+from exugear.system.bodies.of_gearbox import reduced_bodies
+from exugear.system.build import assemble
+from exugear.system.modes import Modes, eigenmodes
+from exugear.system.system import Assembly
 from exugear.transient.outcome import Run
 from exugear.transient.runup import simulate
 

@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 
 from exugear.gearbox.sections.case import CaseFile
-from exugear.gearbox.sections.quantities import Range
+from exugear.gearbox.sections.entries import Range
 
 from .spur_case import SPUR_CASE
 

@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.tables import wanted_table
-from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.transmission_error.mean_contact import POSITIONS
 from fe_ste.transmission_error.surface import SteSurface

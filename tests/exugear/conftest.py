@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.tooth_mesh.element import MeshCurve
 
 from .contact_case import curves_of
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.contact_state import ContactState
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.tooth_mesh.element import MeshCurve
 
 LOADS = {"sun_planet": 140e3, "ring_planet": 140e3, "intermediate": 180e3, "high_speed": 50e3}
 

@@ -18,8 +18,7 @@ from pathlib import Path
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.life.load_spectrum.counted import count_loads
-from exugear.life.load_spectrum.spectra_files import write_spectra
+from exugear.life.load_spectrum.counted import count_loads, write_spectra
 from exugear.project import Project
 
 from .killed_runs import in_fork, kill_at

@@ -19,7 +19,7 @@ from pathlib import Path
 import xarray as xr
 
 import fe_ste.tools.files
-import fe_ste.tools.sealed
+import fe_ste.tools.stores
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.folder import run_directory
@@ -27,7 +27,7 @@ from exugear.results.run_file import load_run
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.transient import recorder, runup
 from exugear.transient.outcome import Run
-from exugear.transient.run_folder import refuse_to_resume
+from exugear.transient.start import refuse_to_resume
 
 CALLS = ("open", "fsync", "replace", "unlink", "rmdir", "mkdir")
 DURATION = 0.024
@@ -61,7 +61,7 @@ def kill_at(number: int) -> None:
             os.kill(os.getpid(), signal.SIGKILL)
         plain(file, content)
 
-    for module in (fe_ste.tools.files, fe_ste.tools.sealed):
+    for module in (fe_ste.tools.files, fe_ste.tools.stores):
         module.write_all = write_all
 
 

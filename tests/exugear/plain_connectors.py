@@ -9,8 +9,9 @@ import math
 
 import numpy as np
 
-from exugear.system.bearings.kernels.connectors import ConnectorArrays
-from exugear.system.bearings.kernels.rolling import (
+from exugear.system.kernels.connectors import ConnectorArrays
+from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from exugear.system.kernels.rolling import (
     CAGE_TORQUE,
     CONTACT_SIZE,
     COUNT,
@@ -19,7 +20,6 @@ from exugear.system.bearings.kernels.rolling import (
     RollingArrays,
     rolling_force,
 )
-from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, TILT
 from fe_ste.tools.compilation import compiled
 
 Floats = np.ndarray
@@ -31,7 +31,7 @@ DISPLACEMENT, RATE, TRUE_RATE = range(3)
 
 @compiled
 def memory_for(rolling: RollingArrays) -> Floats:
-    """Memory for `exugear.system.bearings.kernels.rolling.rolling_forces`."""
+    """Memory for `exugear.system.kernels.rolling.rolling_forces`."""
     most = 0
     for r in range(rolling.layout.shape[0]):
         most = max(most, rolling.layout[r, COUNT])

@@ -11,8 +11,10 @@ import math
 import numpy as np
 
 from exugear.gearbox.sections.entries import GROUND
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.kernels.rolling import (
+from exugear.system.kernels.coordinates import kinetic_energies
+from exugear.system.kernels.elastic import elastic_energies, scratch_for
+from exugear.system.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, ROW_SIZE, STATE_SIZE
+from exugear.system.kernels.rolling import (
     CAGE_DAMPING,
     CAGE_TORQUE,
     DAMPED_PART,
@@ -20,25 +22,12 @@ from exugear.system.bearings.kernels.rolling import (
     STORED,
     rolling_forces,
 )
-from exugear.system.bodies.kernels.elastic import elastic_energies, scratch_for
-from exugear.system.bodies.kernels.turning import (
-    set_turning_motion,
-    turning_energies,
-    turning_memory,
-)
-from exugear.system.eigenmodes.modes import overall_row
-from exugear.system.kernels.inertia import kinetic_energies
+from exugear.system.kernels.table_law import scratch_memory
+from exugear.system.kernels.turning import set_turning_motion, turning_energies, turning_memory
+from exugear.system.modes import overall_row
 from exugear.system.signals import signal_layout
-from exugear.system.tooth_mesh.kernels.meshes import (
-    DEFLECTION,
-    ENERGY,
-    FORCE,
-    OUTSIDE,
-    ROW_SIZE,
-    STATE_SIZE,
-)
-from exugear.system.tooth_mesh.kernels.table_law import scratch_memory
-from exugear.system.tooth_mesh.laws.forms import MEMORY, pass_meshes
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.laws.mesh_forces import MEMORY, pass_meshes
 from fe_ste.tools.compilation import compiled
 
 from .plain_connectors import connector_load, connector_motion, memory_for, turn_between

@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.rolling.point_contact import ball_constant
-from exugear.system.bearings.rolling.potential import rolling_arrays
+from exugear.system.bearings.rolling.point_contact import ball_constant, rolling_arrays
 from exugear.system.bearings.rolling.rows import BallRow, RollerRow, RollingRow
+from exugear.system.system import Assembly
 
 CYLINDRICAL = RollerRow(
     element_diameter=0.030,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 
-from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.transmission_error.table import TableInput
 

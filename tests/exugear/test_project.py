@@ -15,8 +15,8 @@ from exugear.cli.app import app
 from exugear.gearbox.variant import VariantError
 from exugear.project import default_folder
 from exugear.results.run_file import load_run
-from exugear.system.assemble import assemble
-from exugear.system.eigenmodes.modes import load_modes
+from exugear.system.build import assemble
+from exugear.system.modes import load_modes
 
 from .spur_case import SPUR_CASE
 

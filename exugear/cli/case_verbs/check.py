@@ -9,15 +9,31 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import assembled_by_iso, read_gearbox, steady_lack
-from exugear.cli.console import counted, note, print_json, print_table, say
-from exugear.cli.errors import BadInputError, FailedError, exit_codes, model_errors
-from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
+from exugear.cli.case import (
+    CaseArgument,
+    FilesBelowOption,
+    JsonOption,
+    OutOption,
+    assembled_by_iso,
+    read_gearbox,
+    steady_lack,
+)
+from exugear.cli.console import (
+    BadInputError,
+    FailedError,
+    counted,
+    exit_codes,
+    model_errors,
+    note,
+    print_json,
+    print_table,
+    say,
+)
 from exugear.gearbox.variant import OFFERED, Variant
 
 if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
-    from exugear.system.assembly import Assembly
+    from exugear.system.system import Assembly
 
 
 BEYOND = 1.05
@@ -46,7 +62,7 @@ def check(
         if rating:
             _rate(case, out, files_below, as_json)
             return
-        from exugear.system.readiness.readiness import lacking, remarks
+        from exugear.system.readiness import lacking, remarks
 
         gearbox = _read(case, files_below, as_json)
         _tell_scripts(gearbox)
@@ -149,7 +165,7 @@ def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[
 
 def _tell_scripts(gearbox: Gearbox) -> None:
     """Check the solids, and say which of them only a script makes."""
-    from exugear.system.bodies.of_gearbox.solids import solids_of
+    from exugear.system.bodies.of_gearbox import solids_of
 
     for key, model in solids_of(gearbox):
         if model.mesh.is_script:
@@ -161,7 +177,7 @@ def _tell_scripts(gearbox: Gearbox) -> None:
 
 
 def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
-    from exugear.system.readiness.margins import backlash_range, pair_margins
+    from exugear.system.plausibility import backlash_range, pair_margins
 
     spec = gearbox.pairs[name]
     pair = spec.pair
@@ -213,7 +229,7 @@ def _play(ends: list[float]) -> str:
 
 def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up the tooth thickness of gears that have allowances of it."""
-    from exugear.system.readiness.margins import thickness_range
+    from exugear.system.plausibility import thickness_range
 
     summaries = []
     for name, section in gearbox.case.gears.items():
@@ -247,9 +263,9 @@ def _bearing_summaries(
 
     With the mesh stiffness of ISO 6336: tables may not be there, and the static loads hardly depend on it.
     """
-    from exugear.results.bearings_file import duty_summary
-    from exugear.system.bearing_duties import bearing_duties, bearing_points
+    from exugear.results.folder import duty_summary
     from exugear.system.bearings.duty import estimate_effects
+    from exugear.system.operating_points import bearing_duties, bearing_points
 
     if assembly is None or not any(bearing.catalogue for bearing in gearbox.bearings):
         return [], []
@@ -301,13 +317,9 @@ def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
 
 def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
-    from exugear.gearbox.load_cases.summary import (
-        doubt_about_bearings,
-        doubts_about,
-        summarise_loads,
-    )
+    from exugear.gearbox.load_cases import doubt_about_bearings, doubts_about, summarise_loads
     from exugear.gearbox.parts import RPM
-    from exugear.transient.extent import check_duration
+    from exugear.transient.plan import check_duration
     from exugear.transient.runup import BAND
 
     summaries = []

@@ -7,10 +7,7 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.case import read_gearbox
-from exugear.cli.console import note, print_json, say
-from exugear.cli.errors import BadInputError, exit_codes
-from exugear.cli.options import (
+from exugear.cli.case import (
     CaseArgument,
     DistanceRule,
     DistancesOption,
@@ -19,7 +16,9 @@ from exugear.cli.options import (
     OutOption,
     ShiftRule,
     ShiftsOption,
+    read_gearbox,
 )
+from exugear.cli.console import BadInputError, exit_codes, note, print_json, say
 
 SHOWN = 10
 """Most replaced attributes that are told."""
@@ -48,8 +47,8 @@ def export(
     """
     with exit_codes():
         from exugear.exchange.rexs.export.export import with_results
-        from exugear.exchange.rexs.faults import RexsError
         from exugear.exchange.rexs.to_case.notes import Rules
+        from exugear.exchange.rexs.tree import RexsError
         from exugear.project import default_folder
         from fe_ste.tools.files import write_file
 

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from exugear.cli.console import note, print_json, say
-from exugear.cli.errors import BadInputError, exit_codes
-from exugear.cli.options import DistanceRule, DistancesOption, JsonOption, ShiftRule, ShiftsOption
+from exugear.cli.case import DistanceRule, DistancesOption, JsonOption, ShiftRule, ShiftsOption
+from exugear.cli.console import BadInputError, exit_codes, note, print_json, say
 
 if TYPE_CHECKING:
     from exugear.exchange.rexs.to_case.conversion import Imported
@@ -80,8 +79,8 @@ def _stem(file: Path) -> str:
 
 def _imported(file: Path, target: Path, rules: Rules) -> Imported:
     from exugear.exchange.rexs.containers import read_rexs
-    from exugear.exchange.rexs.faults import RexsError
     from exugear.exchange.rexs.to_case.conversion import to_case
+    from exugear.exchange.rexs.tree import RexsError
 
     try:
         model = read_rexs(file)

@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.console import print_json, say
-from exugear.cli.errors import BadInputError, exit_codes
-from exugear.cli.options import JsonOption
+from exugear.cli.case import JsonOption
+from exugear.cli.console import BadInputError, exit_codes, print_json, say
 from exugear.gearbox.templates.kinds import KINDS
 
 

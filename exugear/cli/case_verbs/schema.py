@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.console import say
-from exugear.cli.errors import BadInputError, exit_codes
+from exugear.cli.console import BadInputError, exit_codes, say
 
 
 def schema(
@@ -20,8 +19,8 @@ def schema(
 ) -> None:
     """Describe every key of the gearbox file as a JSON schema, which editors read."""
     with exit_codes():
-        from exugear.gearbox.sections.schema.json_schema import json_schema
-        from exugear.gearbox.sections.schema.page import page as described
+        from exugear.gearbox.sections.schema.keys import json_schema
+        from exugear.gearbox.sections.schema.keys import page as described
         from fe_ste.tools.files import write_file
 
         text = described() if page else json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"

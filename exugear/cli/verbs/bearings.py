@@ -5,10 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from exugear.cli.case import open_project
-from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.errors import BadInputError, exit_codes
-from exugear.cli.options import (
+from exugear.cli.case import (
     USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
@@ -18,12 +15,14 @@ from exugear.cli.options import (
     OutOption,
     ScriptsOption,
     VariantOption,
+    open_project,
 )
+from exugear.cli.console import BadInputError, exit_codes, note, print_json, print_table, say
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from exugear.system.bearings.duty import BearingDuty
-    from exugear.system.tooth_mesh.mesh_duty import MeshDuty
+    from exugear.system.tooth_mesh.contact_state import MeshDuty
 
 
 def bearings(
@@ -44,7 +43,7 @@ def bearings(
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
-        from exugear.results.bearings_file import duties_summary
+        from exugear.results.folder import duties_summary
 
         if not variant.on_bearings:
             raise BadInputError(f"--variant {variant}: has ideal joints in place of bearings; use bushing or flexible")

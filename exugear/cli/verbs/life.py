@@ -8,11 +8,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING
 
-from exugear.cli.case import open_project
-from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.errors import FailedError, exit_codes
-from exugear.cli.folders import make_results_folder
-from exugear.cli.options import (
+from exugear.cli.case import (
     USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
@@ -22,7 +18,9 @@ from exugear.cli.options import (
     OutOption,
     ScriptsOption,
     VariantOption,
+    open_project,
 )
+from exugear.cli.console import FailedError, exit_codes, make_results_folder, note, print_json, print_table, say
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
@@ -49,8 +47,7 @@ def life(
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
-        from exugear.life.life_diagrams import draw_life
-        from exugear.life.life_file import summary
+        from exugear.life.life_file import draw_life, summary
 
         project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
         counted = project.checked_loads()

@@ -6,12 +6,18 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.bars import Bars, files_read
-from exugear.cli.case import read_gearbox
-from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.errors import exit_codes
-from exugear.cli.folders import check_results_folder, make_results_folder
-from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption, ScriptsOption
+from exugear.cli.case import CaseArgument, FilesBelowOption, JsonOption, OutOption, ScriptsOption, read_gearbox
+from exugear.cli.console import (
+    Bars,
+    check_results_folder,
+    exit_codes,
+    files_read,
+    make_results_folder,
+    note,
+    print_json,
+    print_table,
+    say,
+)
 
 if TYPE_CHECKING:
     from exugear.life.load_spectrum.counted import CountedLoads
@@ -29,9 +35,7 @@ def loads(
     No tables are needed. Writes load duration distributions as CSV, and a picture of them.
     """
     with exit_codes():
-        from exugear.life.load_spectrum.counted import count_loads
-        from exugear.life.load_spectrum.diagrams import draw_duration
-        from exugear.life.load_spectrum.spectra_files import write_spectra
+        from exugear.life.load_spectrum.counted import count_loads, draw_duration, write_spectra
         from exugear.project import default_folder
 
         gearbox = read_gearbox(case, files_below, scripts)

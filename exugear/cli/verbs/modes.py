@@ -5,10 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.case import open_project
-from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.errors import exit_codes
-from exugear.cli.options import (
+from exugear.cli.case import (
     USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
@@ -18,11 +15,12 @@ from exugear.cli.options import (
     OutOption,
     ScriptsOption,
     VariantOption,
+    open_project,
 )
-from exugear.cli.tables import refuse_unsolved
+from exugear.cli.console import exit_codes, note, print_json, print_table, refuse_unsolved, say
 
 if TYPE_CHECKING:
-    from exugear.system.eigenmodes.modes import Modes
+    from exugear.system.modes import Modes
 
 
 def modes(
@@ -64,9 +62,9 @@ def modes(
 
 def _draw_campbell(found: Modes, path: Path) -> Path:
     """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
-    from exugear.report.pictures.mode_diagrams import plot_campbell
-    from exugear.results.spectra.mode_report import mobility_shares
-    from exugear.results.spectra.orders import order_lines
+    from exugear.report.pictures.diagrams import plot_campbell
+    from exugear.results.spectra.run_spectra import mobility_shares
+    from exugear.results.spectra.waterfall import order_lines
 
     gearbox = found.assembly.gearbox
     least = 1e-3
@@ -88,7 +86,7 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
 
 
 def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
-    from exugear.results.spectra.mode_report import report_mode
+    from exugear.results.spectra.run_spectra import report_mode
 
     data = found.to_dataset()
     reports = [report_mode(data, index) for index in range(len(found.names))]

@@ -9,10 +9,17 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.case import check_files_below
-from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.errors import BadInputError, exit_codes, interruption
-from exugear.cli.options import FilesBelowOption, JsonOption
+from exugear.cli.case import FilesBelowOption, JsonOption, check_files_below
+from exugear.cli.console import (
+    BadInputError,
+    exit_codes,
+    interruption,
+    note,
+    print_json,
+    print_table,
+    progress_bar,
+    say,
+)
 
 
 def report(
@@ -52,8 +59,7 @@ def report(
 
 def _beside() -> AbstractContextManager[Executor | None]:
     """Another process to work beside this one, where there is a core for it; it starts when it is given work."""
-    from fe_ste.tools.threads import available_cores
-    from fe_ste.tools.workers import Workers
+    from fe_ste.tools.threads import Workers, available_cores
 
     if available_cores() > 1:
         return Workers(1)

@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import open_project
-from exugear.cli.console import note, print_json, say
-from exugear.cli.errors import (
-    BadInputError,
-    FailedError,
-    StoppedError,
-    exit_codes,
-)
-from exugear.cli.options import (
+from exugear.cli.case import (
     USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
@@ -27,7 +19,9 @@ from exugear.cli.options import (
     OutOption,
     ScriptsOption,
     VariantOption,
+    open_project,
 )
+from exugear.cli.console import BadInputError, FailedError, StoppedError, exit_codes, note, print_json, say
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
@@ -132,7 +126,7 @@ def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
 def _check_extent(project: Project, duration: float | None, folder: Path) -> None:
     """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
     from exugear.system.tooth_mesh.laws.registry import LAWS
-    from exugear.transient.extent import check_disk, check_duration, sample_bytes
+    from exugear.transient.plan import check_disk, check_duration, sample_bytes
 
     gearbox = project.gearbox
     load_case = _load_case(project)
@@ -173,7 +167,7 @@ def _check_mesh_route(route: MeshRoute, variant: Variant, solver: Solver) -> Non
 
 def _check_run_directory(directory: Path, resume: bool) -> None:
     """Refuse a run that another process is at work on, and one to go on with that cannot be gone on with."""
-    from exugear.transient.run_folder import refuse_if_busy, refuse_to_resume
+    from exugear.transient.start import refuse_if_busy, refuse_to_resume
 
     refuse_if_busy(directory)
     if resume and (reason := refuse_to_resume(directory)):
@@ -182,11 +176,7 @@ def _check_run_directory(directory: Path, resume: bool) -> None:
 
 def _tell_doubts(project: Project, duration: float | None) -> None:
     """Say what looks like the wrong sign of a torque, or leads bearings far from the load that their law is of."""
-    from exugear.gearbox.load_cases.summary import (
-        doubt_about_bearings,
-        doubts_about,
-        summarise_loads,
-    )
+    from exugear.gearbox.load_cases import doubt_about_bearings, doubts_about, summarise_loads
 
     load_case = _load_case(project)
     loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
@@ -197,8 +187,7 @@ def _tell_doubts(project: Project, duration: float | None) -> None:
 
 def _simulate(project: Project, resume: bool, **options: Any) -> Run:
     """Run the load case; options as those of `exugear.transient.runup.simulate`."""
-    from exugear.results.pieces import has_pieces
-    from exugear.results.run_file import PARTIAL_NAME
+    from exugear.results.run_file import PARTIAL_NAME, has_pieces
     from exugear.transient.outcome import LimitError, RunError
 
     directory = project.run_directory

@@ -11,12 +11,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import read_gearbox
-from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
-from exugear.cli.folders import make_results_folder
-from exugear.cli.options import CaseArgument, FilesBelowOption, JsonOption, OutOption
-from exugear.cli.tables import tell_of_tables
+from exugear.cli.case import CaseArgument, FilesBelowOption, JsonOption, OutOption, read_gearbox
+from exugear.cli.console import (
+    BadInputError,
+    FailedError,
+    exit_codes,
+    interruption,
+    make_results_folder,
+    note,
+    print_json,
+    print_table,
+    progress_bar,
+    say,
+    tell_of_tables,
+)
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -25,7 +33,7 @@ if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
     from exugear.system.tooth_mesh.reference_tables import ReferenceRequest
     from exugear.system.tooth_mesh.tables import TableRequest
-    from fe_ste.reference.contact_model import Iteration
+    from fe_ste.reference.newton import Iteration
     from fe_ste.reference.table import NonlinearTable
     from fe_ste.transmission_error.table import MeshTable
 
@@ -107,7 +115,7 @@ def ste(
 def _tell_misalignment(project: WatchedProject) -> None:
     """Say how far the gears stand off straight, for which static tables are; nothing where bearings are unknown."""
     from exugear.system.bearings.rolling.rows import BearingError
-    from exugear.system.bearings.supports import unsupported
+    from exugear.system.bearings.stiffness import unsupported
     from exugear.system.statics import BalanceError, static_state
     from exugear.system.tooth_mesh.placement import MeshError
     from exugear.system.tooth_mesh.tables import missing_tables
@@ -202,9 +210,8 @@ def _curves_beside(
     tables: dict[str, MeshTable], folder: Path, requests: list[TableRequest]
 ) -> Iterator[Future[list[Path]]]:
     """Draw the curves of all tables, in another process where this one has some pictures of teeth to draw meanwhile."""
-    from exugear.report.pictures.tables import contact_picture, draw_curves
-    from fe_ste.tools.threads import available_cores
-    from fe_ste.tools.workers import Workers
+    from exugear.report.pictures.diagrams import contact_picture, draw_curves
+    from fe_ste.tools.threads import Workers, available_cores
 
     new = sum(not (request.stored and contact_picture(request.name, folder).exists()) for request in requests)
     if new >= WORTH_A_PROCESS and available_cores() > 1:
@@ -218,9 +225,9 @@ def _curves_beside(
 
 def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
     """Draw the teeth in contact where the picture is missing or the table is new; return all such pictures."""
-    from exugear.report.pictures.tables import contact_picture, draw_contact
+    from exugear.report.pictures.diagrams import contact_picture, draw_contact
     from fe_ste.contact.kinematics import ContactError
-    from fe_ste.tools.rendering import RenderingError
+    from fe_ste.tools.drawing import RenderingError
 
     pictures: list[Path] = []
     with progress_bar() as bar:

@@ -10,10 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import assembled_by_iso, open_project, steady_lack
-from exugear.cli.console import note, print_json, print_table, say
-from exugear.cli.errors import BadInputError, FailedError, exit_codes
-from exugear.cli.options import (
+from exugear.cli.case import (
     USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
@@ -23,8 +20,20 @@ from exugear.cli.options import (
     OutOption,
     ScriptsOption,
     VariantOption,
+    assembled_by_iso,
+    open_project,
+    steady_lack,
 )
-from exugear.cli.tables import refuse_unsolved
+from exugear.cli.console import (
+    BadInputError,
+    FailedError,
+    exit_codes,
+    note,
+    print_json,
+    print_table,
+    refuse_unsolved,
+    say,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +42,7 @@ if TYPE_CHECKING:
     from exugear.report.findings.loudness import Ranking, Resonance
     from exugear.steady.peaks import BearingSwing, Peak, Pull
     from exugear.steady.settings import SteadySettings
-    from exugear.system.tooth_mesh.wandering_load import WanderingLoad
+    from exugear.system.tooth_mesh.tables import WanderingLoad
 
 LEAST_AMPLITUDE = 1e-12
 """Amplitude of the overall transmission error below which a peak is round-off, m."""
@@ -290,7 +299,7 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
 def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
     """Say where the load moves along the face so far that its moment counts, if the law leaves it out."""
     from exugear.system.tooth_mesh.laws.registry import LAWS
-    from exugear.system.tooth_mesh.wandering_load import wandering_loads
+    from exugear.system.tooth_mesh.tables import wandering_loads
 
     law = LAWS[project.choice.mesh_law]
     if law.moves_load or not law.needs_tables or project.choice.variant.spins_only:

@@ -9,18 +9,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import check_choice, check_files_below
-from exugear.cli.console import note, print_json, print_table, progress_bar, say
-from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
-from exugear.cli.folders import make_results_folder
-from exugear.cli.libraries import let_in_dask
-from exugear.cli.options import FilesBelowOption, JsonOption, OutOption, ScriptsOption
+from exugear.cli.case import FilesBelowOption, JsonOption, OutOption, ScriptsOption, check_choice, check_files_below
+from exugear.cli.console import (
+    BadInputError,
+    FailedError,
+    exit_codes,
+    interruption,
+    make_results_folder,
+    note,
+    print_json,
+    print_table,
+    progress_bar,
+    say,
+)
+from exugear.cli.process import let_in_dask
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from exugear.studies.design.sections import LimitSection
     from exugear.studies.executors import Opens
+    from exugear.studies.sections import LimitSection
     from exugear.studies.study import Study
     from exugear.studies.sweep import Shard, Swept
 
@@ -63,7 +71,7 @@ def sweep(
     """
     with exit_codes():
         from exugear.studies.executors import ExecutorError
-        from exugear.studies.optimisation import OptimisationError
+        from exugear.studies.sweep import OptimisationError
 
         part = _shard(shard, merge)
         opens = _executor(executor, workers, scheduler)
@@ -115,9 +123,9 @@ def _executor(executor: Executor, workers: int | None, scheduler: str | None) ->
 def _read(path: Path, files_below: Path | None, scripts: bool) -> Study:
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.reading import CaseError
-    from exugear.studies.design.reading import StudyError
+    from exugear.studies.sections import StudyError
     from exugear.studies.study import Study
-    from exugear.system.readiness.readiness import check_parts
+    from exugear.system.readiness import check_parts
 
     check_files_below(files_below)
     try:
@@ -139,7 +147,7 @@ def _laws() -> list[str]:
 
 def _default_folder(study: Study, path: Path) -> Path:
     from exugear.project import default_folder
-    from exugear.results.study_files import STUDIES
+    from exugear.results.folder import STUDIES
 
     stem = path.name.removesuffix(".toml").removesuffix(".study") or "study"
     return default_folder(study.gearbox.source) / STUDIES / stem
@@ -147,7 +155,7 @@ def _default_folder(study: Study, path: Path) -> Path:
 
 def _sweep(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> Swept:
     """Carry the study out behind a progress bar."""
-    from exugear.studies.optimisation import optimise
+    from exugear.studies.sweep import optimise
     from exugear.studies.sweep import sweep as carry_out
 
     with progress_bar() as bar:
@@ -210,7 +218,7 @@ def _tell(study: Study, path: Path, folder: Path, swept: Swept, pictures: list[P
 
 def _print(study: Study, folder: Path, swept: Swept, summary: dict[str, Any]) -> None:
     from exugear.studies.dataset import slopes
-    from exugear.studies.design.sampling import SIDE
+    from exugear.studies.sampling import SIDE
 
     say(
         f"{study.file.name}: {summary['finished']} of {summary['points']} points finished, "
@@ -232,14 +240,14 @@ def _print(study: Study, folder: Path, swept: Swept, summary: dict[str, Any]) ->
 
 def _judged(study: Study) -> list[str]:
     """Variables that the points of a search are judged by: figures, or their percentiles over tolerances."""
-    from exugear.studies.searched import Criteria, judged_name
+    from exugear.studies.dataset import Criteria, judged_name
 
     return [judged_name(study, name, side) for name, side in Criteria.of(study.file).sides]
 
 
 def _fail_if_beyond(study: Study, swept: Swept) -> None:
     """End with code 1 where a search found no point within its limits."""
-    from exugear.studies.searched import EVALUATION
+    from exugear.studies.dataset import EVALUATION
 
     data = swept.dataset
     if data is None or "meets_limits" not in data or data["meets_limits"].any():

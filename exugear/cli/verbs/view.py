@@ -7,10 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from exugear.cli.case import open_project
-from exugear.cli.console import note, print_json, say
-from exugear.cli.errors import BadInputError, exit_codes
-from exugear.cli.options import (
+from exugear.cli.case import (
     USUAL_LAW,
     CaseArgument,
     FilesBelowOption,
@@ -20,11 +17,13 @@ from exugear.cli.options import (
     OutOption,
     ScriptsOption,
     VariantOption,
+    open_project,
 )
+from exugear.cli.console import BadInputError, exit_codes, note, print_json, say
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
-    from exugear.system.eigenmodes.modes import Modes
+    from exugear.system.modes import Modes
 
 
 def view(
@@ -65,9 +64,8 @@ def view(
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
     """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
     from exugear.report.findings.words import Words
-    from exugear.report.pictures.motions import motions_of
-    from exugear.report.pictures.shapes import bodies_of
-    from exugear.report.web.mode_page import write_mode_page
+    from exugear.report.pictures.shapes import bodies_of, motions_of
+    from exugear.report.web.stage import write_mode_page
 
     assembly = found.assembly
     drawn = {body.name for body in bodies_of(assembly.gearbox)}
@@ -95,15 +93,16 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
 
 def _draw_pictures(modes: Modes, folder: Path, place: int, animation: bool) -> list[Path]:
     """Draw the gearbox and one mode; nothing where this machine cannot render."""
-    from exugear.report.pictures.elastic_scene import (
+    from exugear.report.pictures.scene import (
         animate_elastic_bodies,
+        animate_mode,
         draw_elastic_bodies,
+        draw_gearbox,
+        draw_mode,
         elastic_scene,
     )
-    from exugear.report.pictures.motions import mode_scene, motions_of
-    from exugear.report.pictures.scene import animate_mode, draw_gearbox, draw_mode
-    from exugear.report.pictures.shapes import bodies_of
-    from fe_ste.tools.rendering import RenderingError
+    from exugear.report.pictures.shapes import bodies_of, mode_scene, motions_of
+    from fe_ste.tools.drawing import RenderingError
 
     assembly = modes.assembly
     bodies = bodies_of(assembly.gearbox)

@@ -6,8 +6,7 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.faults import RexsError
-from exugear.exchange.rexs.synonyms import degree_sign
+from exugear.exchange.rexs.tree import RexsError, degree_sign
 
 OWN = "custom_exugear_"
 """Beginning of the attributes that REXS has no name for; other programs pass them over."""

@@ -14,9 +14,8 @@ from pathlib import Path
 
 from exugear.exchange.rexs import json_additions, xml_additions
 from exugear.exchange.rexs.additions import Addition, by_place
-from exugear.exchange.rexs.faults import RexsError, plain
 from exugear.exchange.rexs.parsing import is_json, parse_model
-from exugear.exchange.rexs.tree import Model
+from exugear.exchange.rexs.tree import Model, RexsError, plain
 from fe_ste.tools.files import FileError, open_regular
 
 LARGEST = 64_000_000

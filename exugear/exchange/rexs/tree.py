@@ -3,13 +3,184 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from exugear.exchange.rexs.faults import RexsError, plain
-from exugear.exchange.rexs.synonyms import unit_factor
 from fe_ste.tools.display import Displayed
+
+# Names and units over the versions of REXS: what a thing is called today, and what its unit is worth
+
+LEAST_VERSION, LAST_VERSION = (1, 0), (2, 0)
+"""Versions that are read; those in between changed names, which the tables below tell."""
+
+TYPES = {
+    "flank_geometry": "cylindrical_gear_flank",
+    "stage_gear_data": "cylindrical_stage_gear_data",
+    "fixed_coupling": "coupling",
+}
+"""Old name of a component's type to the present one."""
+
+ATTRIBUTES = {
+    "axial_backlash": "operating_axial_bearing_clearance",
+    "base_circle_diameter": "base_diameter",
+    "dynamic_capacity": "radial_dynamic_load_rating",
+    "load_duration_fraction": "operating_time_fraction",
+    "radial_backlash": "operating_radial_bearing_clearance",
+    "reference_circle_diameter": "reference_diameter_cylindrical_gear",
+    "reference_diameter": "reference_diameter_rolling_bearing",
+    "static_capacity": "radial_static_load_rating",
+    "tip_radius_factor": "tip_corner_radius_factor_reference_profile",
+}
+"""Old name of an attribute to the present one, for those that are read."""
+
+ROLES = {"side_1": "inner_part", "side_2": "outer_part"}
+"""Old name of a role in a relation to the present one."""
+
+RELATIONS = {"coupling": "side"}
+"""Old name of a relation to the present one."""
+
+_UNITS = {
+    "none": ("number", 1.0),
+    "%": ("share", 0.01),
+    "mum": ("length", 1e-6),
+    "mm": ("length", 1e-3),
+    "m": ("length", 1.0),
+    "deg": ("angle", math.pi / 180.0),
+    "°": ("angle", math.pi / 180.0),
+    "rad": ("angle", 1.0),
+    "1 / min": ("speed", math.pi / 30.0),
+    "rad / s": ("speed", 1.0),
+    "N": ("force", 1.0),
+    "kN": ("force", 1e3),
+    "N mm": ("torque", 1e-3),
+    "N m": ("torque", 1.0),
+    "kN m": ("torque", 1e3),
+    "W": ("power", 1.0),
+    "kW": ("power", 1e3),
+    "N / m": ("stiffness", 1.0),
+    "N / mm": ("stiffness", 1e3),
+    "N / mum": ("stiffness", 1e6),
+    "N mm / rad": ("angular stiffness", 1e-3),
+    "N m / rad": ("angular stiffness", 1.0),
+    "Pa": ("stress", 1.0),
+    "MPa": ("stress", 1e6),
+    "N / mm^2": ("stress", 1e6),
+    "kg / dm^3": ("density", 1e3),
+    "kg / m^3": ("density", 1.0),
+    "kg": ("mass", 1.0),
+    "kg m^2": ("inertia", 1.0),
+    "m / s^2": ("acceleration", 1.0),
+    "h": ("time", 3600.0),
+    "s": ("time", 1.0),
+    "mm^2 / s": ("viscosity", 1e-6),
+}
+
+
+def unit_factor(unit: str, wanted: str) -> float | None:
+    """Factor from a unit to a wanted one; None if they do not measure the same or the unit is unknown.
+
+    An empty unit is the wanted one: some programs leave it out.
+
+    Examples
+    --------
+    >>> unit_factor("mum", "mm"), unit_factor("", "mm"), unit_factor("furlong", "mm")
+    (0.001, 1.0, None)
+    """
+    unit = " ".join(unit.split())
+    if unit in ("", "none", wanted):
+        return 1.0
+    if unit not in _UNITS or _UNITS[unit][0] != _UNITS[wanted][0]:
+        return None
+    ratio = _UNITS[unit][1] / _UNITS[wanted][1]
+    return float(f"{ratio:.15g}")
+
+
+def degree_sign(version: tuple[int, int]) -> str:
+    """Return how a version writes degrees."""
+    if version < (1, 4):
+        return "°"
+    return "deg"
+
+
+# Faults of a REXS file: one clear sentence each, told all at once
+
+SHOWN_FAULTS = 20
+"""Most faults that one message shows."""
+LONGEST_TEXT = 80
+"""Characters of a file's text that a message or comment shows."""
+
+
+class RexsError(ValueError):
+    """A REXS file that cannot be read or imported.
+
+    Attributes
+    ----------
+    faults : tuple of str
+        All of them, a sentence each; the message shows the first `SHOWN_FAULTS`.
+    """
+
+    def __init__(self, *faults: str) -> None:
+        self.faults = tuple(dict.fromkeys(faults))
+        more = len(self.faults) - SHOWN_FAULTS
+        many = "s" if more > 1 else ""
+        rest = [f"and {more} more fault{many}"] if more > 0 else []
+        super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
+
+
+class Faults(Displayed, line=": {_found!n}"):
+    """Faults gathered over several attempts."""
+
+    def __init__(self) -> None:
+        self._found: list[str] = []
+
+    def add(self, sentence: str) -> None:
+        """Keep a fault."""
+        self._found.append(sentence)
+
+    @contextmanager
+    def gathered(self) -> Iterator[None]:
+        """Keep the faults that end what is tried inside the context."""
+        try:
+            yield
+        except RexsError as error:
+            self._found += error.faults
+
+    def of_each(self, attempts: Iterator[Callable[[], object]]) -> None:
+        """Try all and keep the faults of each."""
+        for attempt in attempts:
+            with self.gathered():
+                attempt()
+
+    def tell(self) -> None:
+        """End here if there are any.
+
+        Raises
+        ------
+        RexsError
+            All faults so far.
+        """
+        if self._found:
+            raise RexsError(*self._found)
+
+
+def plain(text: object, longest: int = LONGEST_TEXT) -> str:
+    r"""Text of a file as messages and comments show it: one line, printable, not too long.
+
+    Examples
+    --------
+    >>> plain("Planetenrad\n [54]\x07"), plain("x" * 20, 10)
+    ('Planetenrad [54]', 'xxxxxxxxx…')
+    """
+    words = "".join(sign if sign.isprintable() else " " for sign in str(text)[: 4 * longest]).split()
+    line = " ".join(words).encode("utf-8", errors="replace").decode("utf-8")
+    if len(line) <= longest:
+        return line
+    return f"{line[: longest - 1]}…"
+
+
+# What a REXS file holds: components with attributes, relations between them, load cases
 
 LARGEST_NUMBER = 1e40
 """Numbers beyond it are no quantity of a gearbox; files write 1e23 for 'rigid'. Powers of it are still numbers."""

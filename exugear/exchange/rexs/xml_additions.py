@@ -9,7 +9,7 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
 from exugear.exchange.rexs.additions import Addition, Edit, edited, number
-from exugear.exchange.rexs.encodings import decoded
+from exugear.exchange.rexs.parsing import decoded
 
 LONGEST_INDENT = 200
 """Most blanks before an element that are repeated."""

@@ -1,7 +1,7 @@
 """The gearbox file as it is written: loads, settings, and the whole of its sections, unit in the key.
 
 The models of this room know no mechanics. They refuse unknown keys, values of the wrong type and values that no
-gearbox can have (:mod:`exugear.gearbox.sections.quantities`). :mod:`exugear.gearbox.gearbox` turns them into SI data
+gearbox can have (:mod:`exugear.gearbox.sections.entries`). :mod:`exugear.gearbox.gearbox` turns them into SI data
 and checks them against each other.
 """
 
@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from exugear.gearbox.sections import quantities as q
+from exugear.gearbox.sections import entries as q
 from exugear.gearbox.sections.bodies import BodySection
 from exugear.gearbox.sections.connections import (
     BearingSection,
@@ -31,8 +31,7 @@ from exugear.gearbox.sections.entries import (
     Text,
 )
 from exugear.gearbox.sections.gears import DeviationSection, GearSection, PairSection, PinSection
-from exugear.gearbox.sections.loads import LoadsSection, RatingSection
-from exugear.gearbox.sections.lubricant import LubricantSection
+from exugear.gearbox.sections.loads import LoadsSection, LubricantSection, RatingSection
 
 
 class LoadCaseSection(Section):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from exugear.gearbox.sections import quantities as q
+from exugear.gearbox.sections import entries as q
 from exugear.gearbox.sections.entries import (
     GROUND,
     MOST_PLANETS,

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from exugear.gearbox.sections import quantities as q
+from exugear.gearbox.sections import entries as q
 from exugear.gearbox.sections.entries import FileName, Name, Section
 
 

@@ -1,25 +1,23 @@
-"""The loads of a gearbox counted: by source, by bin, and as cycles of what turns through them."""
+"""The loads of a gearbox counted: by source, by bin, and as cycles of what turns through them.
+
+It follows from the rolling train alone. The two flanks of a gear are told apart: flank ``+`` faces the sense of +z
+rotation.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM
-from exugear.life.counting.duration import DurationDistribution, LoadPoints, equivalent_load
-from exugear.life.load_spectrum.exposure import (
-    FLANKS,
-    ToothExposure,
-    bearing_turns,
-    distinct,
-    tooth_exposures,
-)
-from exugear.life.load_spectrum.pools import COMPONENTS, RANGE_EXPONENTS
+from exugear.gearbox.parts import RPM, Mesh
+from exugear.life.load_spectrum.counting import DurationDistribution, LoadPoints, equivalent_load
+from exugear.life.load_spectrum.series import COMPONENTS, RANGE_EXPONENTS
 from exugear.life.load_spectrum.sources import (
     LoadSource,
     Progress,
@@ -30,6 +28,115 @@ from exugear.life.load_spectrum.sources import (
     told,
 )
 from fe_ste.tools.display import Displayed
+from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
+from fe_ste.tools.files import write_file
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# How often parts turn through their load: cycles of teeth, revolutions of bearings, per revolution of a body
+
+FLANKS = {1: "+", -1: "-"}
+
+
+@dataclass(frozen=True)
+class ToothExposure:
+    """What one tooth of a gear meets in one family of meshes."""
+
+    gear: str
+    family: str
+    holder: str
+    """Gear, the family of its meshes, and the body whose teeth these are: one of equal planets."""
+    member: int
+    """{0, 1}: whether it is gear 1 or gear 2 of the pair."""
+    flank: int
+    """Flank that a positive torque on the loaded body presses: +1 or -1; a negative one presses the other."""
+    meshes: tuple[int, ...]
+    """Numbers of the meshes that one tooth passes, one after the other."""
+    cycles: float
+    """Contacts of one flank per revolution of the loaded body, all these meshes together."""
+
+
+def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
+    """Tell what the teeth of all gears meet per revolution of a body; of equal planets each by itself.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [round(one.cycles, 4) for one in tooth_exposures(gearbox, "carrier") if one.gear == "sun"]
+    [14.1429]
+    """
+    spins = gearbox.train.rolling_speeds(body, 1.0)
+    forces = gearbox.train.static_mesh_forces(_torque_on(gearbox, body))
+    exposures: dict[tuple[str, str, str], ToothExposure] = {}
+    for mesh in gearbox.meshes:
+        for member, holder in enumerate((mesh.pinion, mesh.gear)):
+            gear = (mesh.pair.pinion, mesh.pair.gear)[member]
+            if (gear.name, mesh.family, holder) in exposures:
+                continue
+            passed = tuple(
+                number
+                for number, other in enumerate(gearbox.meshes)
+                if other.family == mesh.family and (other.pinion, other.gear)[member] == holder
+            )
+            opposite = member == 1 and gear.internal
+            sign = 1 if forces[mesh.name] >= 0.0 else -1
+            exposures[gear.name, mesh.family, holder] = ToothExposure(
+                gear=gear.name,
+                family=mesh.family,
+                holder=holder,
+                member=member,
+                flank=-sign if opposite else sign,
+                meshes=passed,
+                cycles=len(passed) * abs(_against_frame(spins, mesh, holder)),
+            )
+    return tuple(exposures.values())
+
+
+def distinct(teeth: Iterable[ToothExposure]) -> tuple[ToothExposure, ...]:
+    """One of equal planets for all of them: each gear in each family once."""
+    found: dict[tuple[str, str], ToothExposure] = {}
+    for one in teeth:
+        found.setdefault((one.gear, one.family), one)
+    return tuple(found.values())
+
+
+def bearing_turns(gearbox: Gearbox, body: str) -> dict[str, float]:
+    """Revolutions of the rings of each bearing against each other per revolution of a body, without sign.
+
+    Examples
+    --------
+    A planet turns on its pin by the teeth of the ring over its own per turn of the carrier:
+
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> round(bearing_turns(gearbox, "carrier")["pl_a_1"], 6), round(99 / 39, 6)
+    (2.538462, 2.538462)
+    """
+    spins = gearbox.train.rolling_speeds(body, 1.0)
+    return {
+        bearing.name: abs(spins.get(bearing.body, 0.0) - spins.get(bearing.on, 0.0)) for bearing in gearbox.bearings
+    }
+
+
+def _against_frame(spins: Mapping[str, float], mesh: Mesh, holder: str) -> float:
+    return spins.get(holder, 0.0) - spins.get(mesh.frame, 0.0)
+
+
+def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
+    """Torque of 1 N m on a body, held where the static load is held.
+
+    Raises
+    ------
+    CaseError
+        The body is one of those that hold the static load.
+    """
+    if body in gearbox.case.static_load.locked:
+        held = ", ".join(gearbox.case.static_load.locked)
+        raise gearbox.fault(f"loads.body = {body!r}: static_load.locked holds {held}; name the body at the other end")
+    return {body: 1.0}
+
+
+# The loads of a gearbox counted: by source, by bin, and as cycles of what turns through them
 
 EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
 """Slopes of the S-N curves of steel structures, of roller bearings, and of contact and bending of gears over torque."""
@@ -193,3 +300,75 @@ def _equivalent_ranges(sources: tuple[LoadSource, ...]) -> dict[str, dict[float,
                 for m in RANGE_EXPONENTS
             }
     return ranges
+
+
+# Load duration distributions as tables with commas, for other programs
+
+
+def write_spectra(counted: CountedLoads, folder: Path) -> list[Path]:
+    """Write the distribution of the body, and one for each gear and flank; return the paths."""
+    distribution = counted.distribution
+    rows = zip(
+        distribution.lower,
+        distribution.upper,
+        distribution.torque,
+        distribution.speed / RPM,
+        distribution.hours,
+        distribution.revolutions,
+        strict=True,
+    )
+    headings = ("lower_N_m", "upper_N_m", "torque_N_m", "speed_rpm", "hours", "revolutions")
+    paths = [write_table(folder / f"{counted.body}.csv", headings, rows)]
+    for tooth in distinct(counted.teeth):
+        for sense in (1, -1):
+            own = distribution.torque * sense > 0.0
+            if not own.any():
+                continue
+            forces = abs(distribution.torques(counted.bin_value)[own]) * counted.mesh_forces[tooth.family]
+            side = "plus" if sense * tooth.flank > 0 else "minus"
+            lines = zip(forces, distribution.hours[own], distribution.revolutions[own] * tooth.cycles, strict=True)
+            path = folder / f"{tooth.gear}_{tooth.family}_{side}.csv"
+            paths.append(write_table(path, ("mesh_force_N", "hours", "cycles"), lines))
+    return paths
+
+
+def write_table(path: Path, headings: Sequence[str], rows: Iterable[Sequence[float | str]]) -> Path:
+    """Write a table with commas, whole or not at all; numbers to nine digits."""
+    lines = [",".join(headings)]
+    lines += [",".join(cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row) for row in rows]
+    write_file(path, ("\n".join(lines) + "\n").encode())
+    return path
+
+
+# Diagrams of loads over a life: how long each torque lasts
+
+
+def draw_duration(distribution: DurationDistribution, body: str, path: str | Path | None = None) -> Figure:
+    """Draw the load duration distribution of a body: hours in each bin, and hours above each torque.
+
+    Parameters
+    ----------
+    found : DurationDistribution
+    body : for the labels
+    path : where to write the picture
+    """
+    with drawing_style():
+        figure = new_figure(7.0, 3.2)
+        bars, above = figure.subplots(1, 2)
+        width = 1e-3 * np.abs(distribution.upper - distribution.lower)
+        middle = 0.5e-3 * (distribution.lower + distribution.upper)
+        bars.bar(middle, distribution.hours, width=width, color=COLOURS[0])
+        bars.set(xlabel=f"torque on {body} / kN m", ylabel="hours in the life", title="time at each torque")
+        for sign, colour, name in ((1.0, COLOURS[0], "positive"), (-1.0, COLOURS[1], "negative")):
+            own = distribution.torque * sign > 0.0
+            if own.any():
+                order = np.argsort(-np.abs(distribution.torque[own]))
+                lasting = np.cumsum(distribution.hours[own][order])
+                above.step(
+                    lasting, 1e-3 * np.abs(distribution.torque[own][order]), where="pre", color=colour, label=name
+                )
+        above.set(xlabel="hours with at least this torque", ylabel="torque without sign / kN m", xscale="log")
+        above.xaxis.set_major_formatter("{x:g}")
+        above.set_title("duration")
+        above.legend()
+        return finish_figure(figure, path)

@@ -5,33 +5,133 @@ from __future__ import annotations
 import csv
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from exugear.exchange.load_files.channels import LoadFileError
-from exugear.exchange.load_files.lines import first_lines
-from exugear.exchange.load_files.reading import LARGEST_SERIES, SERIES_ENDINGS, file_digest
-from exugear.exchange.load_files.tables import headings_of, is_series, table_rows
-from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.channels import LoadFileError
+from exugear.exchange.rexs.containers import read_rexs
+from exugear.exchange.rexs.to_case.bodies import find_bodies
+from exugear.exchange.rexs.to_case.loads import Loads, loads_of
+from exugear.exchange.rexs.to_case.notes import Notes, Places
+from exugear.exchange.rexs.tree import LoadCase, Model, RexsError
+from exugear.exchange.series_files import (
+    LARGEST_SERIES,
+    SERIES_ENDINGS,
+    file_digest,
+    first_lines,
+    headings_of,
+    is_series,
+    table_rows,
+)
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import shortened
-from exugear.gearbox.sections.loads import LoadsSection, SourceSection
-from exugear.life.counting.duration import (
-    DurationDistribution,
-    LoadPoints,
-    load_duration,
-    load_points,
+from exugear.gearbox.sections.loads import LoadsSection, SourceSection, WindSection
+from exugear.life.load_spectrum.counting import DurationDistribution, LoadPoints, load_duration, load_points
+from exugear.life.load_spectrum.series import (
+    HUB_LOADS,
+    LARGEST_SPEED,
+    LARGEST_TORQUE,
+    Pool,
+    Samples,
+    SeriesReader,
+    together,
 )
-from exugear.life.load_spectrum.pools import HUB_LOADS, Pool, Samples, together
-from exugear.life.load_spectrum.rexs_load_cases import rexs_load_cases
-from exugear.life.load_spectrum.series import LARGEST_SPEED, LARGEST_TORQUE, SeriesReader
-from exugear.life.load_spectrum.wind import bin_of_wind, hours_of_bins
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed
+
+# Hours of files by the wind that they were simulated in: a Weibull distribution over bins of wind speed
+
+
+def bin_of_wind(wind: WindSection, speed: float) -> float:
+    """Middle (m/s) of the bin of a wind speed (m/s): multiples of the width.
+
+    Examples
+    --------
+    >>> bin_of_wind(WindSection(mean_m_per_s=8.5), 8.93)
+    8.0
+    """
+    width = wind.bin_m_per_s
+    return width * math.floor(max(speed, 0.0) / width + 0.5)
+
+
+def hours_of_bins(wind: WindSection, middles: Iterable[float]) -> list[float]:
+    """Hours in a year of bins by their middles (m/s).
+
+    Notes
+    -----
+    ``F(v) = 1 - exp(-(v / A)^k)``, ``A = mean / Gamma(1 + 1 / k)`` (IEC 61400-1, 6.3.1.1, with k = 2).
+
+    Examples
+    --------
+    Wind of 8.5 m/s on average blows at 7 to 9 m/s for 1,512 hours:
+
+    >>> [round(hours) for hours in hours_of_bins(WindSection(mean_m_per_s=8.5), [8.0])]
+    [1512]
+    """
+    scale = wind.mean_m_per_s / math.gamma(1.0 + 1.0 / wind.shape)
+
+    def above(speed: float) -> float:
+        return math.exp(-((max(speed, 0.0) / scale) ** wind.shape))
+
+    half = 0.5 * wind.bin_m_per_s
+    return [wind.hours_per_year * (above(middle - half) - above(middle + half)) for middle in middles]
+
+
+# Load cases of a REXS file as a table of loads: torque and speed of a body, and the share of the time of each
+
+
+def rexs_load_cases(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Floats, Floats]:
+    """Torques (N m), speeds (rad/s) and shares of the time, each (load cases,), on a body of the gearbox file.
+
+    Parameters
+    ----------
+    gearbox : as `exugear import` makes it of the same REXS file: it gives bodies their names
+
+    Raises
+    ------
+    RexsError
+        No load cases, or one without torque on the body, a speed, or its share of the time.
+    """
+    model = read_rexs(path)
+    notes = Notes()
+    if not model.load_cases:
+        raise RexsError(f"{path}: holds no load spectrum; expected load cases with their share of the time")
+    places = Places(model)
+    bodies = find_bodies(model, places, notes)
+    notes.faults.tell()
+    rows = []
+    for case, loads in zip(model.load_cases, loads_of(model, places, bodies, notes), strict=True):
+        where = f"{path}: load case {case.number}"
+        if body not in loads.torques:
+            known = ", ".join(loads.torques) or "no body"
+            raise RexsError(f"{where}: no torque on {body!r}; it loads {known}")
+        rows.append((loads.torques[body], _speed(gearbox, loads, body, where), _share(model, case, where)))
+    torques, speeds, shares = np.array(rows).T
+    return torques, speeds, shares / shares.sum()
+
+
+def _speed(gearbox: Gearbox, loads: Loads, body: str, where: str) -> float:
+    """Speed of the body, rad/s, from that of any body of the train."""
+    for name, speed in loads.speeds.items():
+        if name == body or name in gearbox.spinning:
+            return gearbox.train.rolling_speeds(name, speed * RPM)[body]
+    raise RexsError(f"{where}: no rotational_speed of a shaft")
+
+
+def _share(model: Model, case: LoadCase, where: str) -> float:
+    """Share of the time in percent; the old and the new name of the attribute are one here."""
+    for unit in model.of_type("gear_unit"):
+        share = unit.with_attributes(case.changes.get(unit.number, {})).quantity("operating_time_fraction", "%")
+        if share is not None and share >= 0.0:
+            return share
+    raise RexsError(f"{where}: no operating_time_fraction of the gear_unit")
+
+
+# Sources of loads of a gearbox file: files found, read, weighed by hours of the life, and the hash of each
 
 HOURS_PER_YEAR = 8766.0
 HUB_CELLS = 8
@@ -65,7 +165,7 @@ class LoadSource(Displayed):
     torque: Floats
     speed: Floats
     """(samples,) on the loaded body about +z, N m and rad/s; an extreme torque with its partial factor. Many samples
-    are put together: see `exugear.life.load_spectrum.pools`."""
+    are put together: see `exugear.life.load_spectrum.series`."""
     hours: Floats
     """(samples,) of each sample in the whole of the life; zero for extreme sources."""
     hub: Floats

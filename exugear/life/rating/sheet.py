@@ -2,25 +2,42 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM, Mesh
 from exugear.gearbox.sections.loads import RatingSection
-from exugear.life.acting_loads import ActingLoads
-from exugear.life.load_spectrum.counted import CountedLoads
-from exugear.life.load_spectrum.exposure import FLANKS, ToothExposure, distinct
+from exugear.gearbox.variant import Variant
+from exugear.life.dynamic_factors import stated_factors
+from exugear.life.gear_life import check_strengths, flank_lives
+from exugear.life.life import LEFT_OUT, checked_loads, rating_of
+from exugear.life.load_spectrum.counted import (
+    FLANKS,
+    CountedLoads,
+    ToothExposure,
+    bearing_turns,
+    distinct,
+    tooth_exposures,
+)
+from exugear.life.load_spectrum.counting import LoadPoints, load_duration
+from exugear.life.load_spectrum.sources import HOURS_PER_YEAR, LoadSource
 from exugear.life.rating.standard import FlankRules, MeshLoads, rate
-from exugear.life.static_balance import StaticBalance
-from exugear.life.verdict import LEFT_OUT
+from exugear.life.static_balance import ActingLoads, StaticBalance, acting_loads, static_balance
+from exugear.system.system import Assembly
+from fe_ste.root_stress import MeshCycleStress
 from fe_ste.standards.pitting import tangential_force
 from fe_ste.standards.tooth_root import root_stress_factors
 from fe_ste.tools.display import Displayed
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 LEAST_FORCE = 1.0
 """Tangential force, N, below which a mesh carries nothing: there is no line load to rate."""
@@ -116,7 +133,7 @@ def rating_sheet(
 
     Parameters
     ----------
-    counted : of the file, or `exugear.life.rating.nominal.nominal_loads`
+    counted : of the file, or `exugear.life.rating.sheet.nominal_loads`
     acting : of these
     balance : over their torques
     finite_elements : (gear, family, flank) what is known beside the standard
@@ -257,3 +274,202 @@ def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
         yield "application_factor is for nominal loads: K_A = 1 under [loads]"
     if rating.dynamic_factor is None:
         yield "K_v that is not the standard's is least_dynamic_factor: no run or response is looked at here"
+
+
+# What the finite elements say beside the standard: of a stored life, or under the nominal load by tables
+
+_NAMES = {
+    "sigma_H": "contact_stress",
+    "sigma_F": "root_stress",
+    "K_Hbeta": "face_load",
+    "S_H": "contact_safety",
+    "S_F": "root_safety",
+}
+"""Figures of a life by the symbols of a sheet."""
+FlankKey = tuple[str, str, str]
+"""Gear, family of meshes and flank."""
+
+
+def of_life(data: xr.Dataset) -> dict[FlankKey, dict[str, float]]:
+    """Figures of all flanks of a stored life."""
+    found = {}
+    for place, label in enumerate(data["flank"].to_numpy().tolist()):
+        gear, flank, family = label.split(" ", 2)
+        figures = {name: float(data[f"flank_{figure}"][place]) for name, figure in _NAMES.items()}
+        found[gear, family, flank] = figures
+    return found
+
+
+def of_nominal_load(
+    gearbox: Gearbox,
+    rating: RatingSection,
+    counted: CountedLoads,
+    balance: StaticBalance,
+    stresses: Mapping[str, MeshCycleStress],
+) -> dict[FlankKey, dict[str, float]]:
+    """Figures of the flanks of pairs with stresses under the nominal load with K_A, which acts on its torque.
+
+    Parameters
+    ----------
+    counted : the nominal load times K_A
+    stresses : by pair name
+    """
+    dynamic = stated_factors(gearbox, rating.dynamic_factor or rating.least_dynamic_factor or 1.0)
+    lives = flank_lives(gearbox, rating, counted.teeth, acting_loads(counted), balance, stresses, dynamic)
+    return {
+        (life.gear, life.family, life.flank): {name: float(getattr(life, figure)) for name, figure in _NAMES.items()}
+        for life in lives
+    }
+
+
+def remarks_on(stresses: Mapping[str, MeshCycleStress]) -> list[str]:
+    """Say of which gears that stand aligned the finite elements are."""
+    straight = [name for name, stress in stresses.items() if len(stress.misalignment) < 2]
+    if straight:
+        return [f"sigma and K_Hbeta by finite elements of {', '.join(straight)} are of aligned gears"]
+    return []
+
+
+# The nominal load of a gearbox as a spectrum of one load: that of the static load, at rated speed
+
+HUB_LOADS = 5
+"""Forces and moments of a hub beside the torque: none here."""
+LONGEST = 1e10
+"""Load cycles at the last point of the standards' S-N curves: what a load without stated hours is rated for."""
+
+
+def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) -> CountedLoads:
+    """Spectrum of the static load alone.
+
+    Parameters
+    ----------
+    rating : its `nominal_hours`; without them the teeth that are loaded least often are loaded `LONGEST` times
+    factor : on the torque
+
+    Raises
+    ------
+    CaseError
+        No rated speed, or a static load on several bodies.
+    """
+    overall = gearbox.case.overall
+    torques = gearbox.case.static_load.torques_N_m
+    rated = gearbox.case.operation.rated_speed_rpm
+    if rated is None:
+        raise gearbox.fault(
+            "operation.rated_speed_rpm: this key is missing; without [loads] gears are rated at the speed of "
+            f"{overall.input}"
+        )
+    if len(torques) != 1:
+        raise gearbox.fault(
+            f"static_load.torques_N_m: {', '.join(torques) or 'nothing'} has a torque; without [loads] gears are rated "
+            "under a load on one body, give [loads]"
+        )
+    body, torque = next(iter(torques.items()))
+    speed = abs(gearbox.train.rolling_speeds(overall.input, rated * RPM).get(body, 0.0))
+    if speed == 0.0 or torque == 0.0:
+        raise gearbox.fault(f"static_load.torques_N_m.{body} = {torque:g}: {body} has no power at rated speed")
+    teeth = tooth_exposures(gearbox, body)
+    least = min((one.cycles for one in teeth if one.cycles > 0.0), default=1.0)
+    torque *= factor
+    hours = rating.nominal_hours or LONGEST / least * 2.0 * math.pi / speed / 3600.0
+    duration = load_duration(np.array([torque]), np.array([speed]), np.array([hours]), 1)
+    forces = gearbox.train.static_mesh_forces({body: 1.0})
+    families: dict[str, float] = {}
+    for mesh in gearbox.meshes:
+        families[mesh.family] = max(families.get(mesh.family, 0.0), abs(forces[mesh.name]))
+    return CountedLoads(
+        body=body,
+        life_years=hours / HOURS_PER_YEAR,
+        sources=(_source(torque, speed, hours),),
+        distribution=duration,
+        points=LoadPoints(
+            duration.torque, np.zeros((1, HUB_LOADS)), duration.hours, duration.revolutions, np.zeros(1, int)
+        ),
+        equivalent_ranges={},
+        teeth=teeth,
+        bearings=bearing_turns(gearbox, body),
+        mesh_forces=families,
+        bin_value="mean",
+    )
+
+
+def _source(torque: float, speed: float, hours: float) -> LoadSource:
+    one = np.array([torque])
+    return LoadSource(
+        name="nominal",
+        kind="fatigue",
+        case="static load at rated speed",
+        file="",
+        files=0,
+        count=1,
+        digest=hashlib.sha256(f"{torque!r} {speed!r} {hours!r}".encode()).hexdigest(),
+        torque=one,
+        speed=np.array([speed]),
+        hours=np.array([hours]),
+        hub=np.zeros((1, 0)),
+        series=False,
+        skipped=0.0,
+        duration=0.0,
+        factors=(1.0, 1.0),
+        least=torque,
+        largest=torque,
+        slowest=speed,
+        fastest=speed,
+        equivalent_ranges={},
+    )
+
+
+# From a gearbox file to its rating sheet: the loads of the file or the nominal one, balanced on bearings
+
+RATED_AS = Choice(Variant.bushing, "iso6336")
+"""Forces and misalignment of the standard: shafts on their bearings, teeth as stiff as ISO 6336-1 has them."""
+
+
+def rated_loads(gearbox: Gearbox) -> CountedLoads:
+    """Read the loads that gears are rated under: those of `[loads]`, or the static load at rated speed.
+
+    Raises
+    ------
+    CaseError
+        No section `[rating]`, loads that cannot be used, or strengths that do not fit the gears.
+    """
+    if gearbox.case.loads is not None:
+        return checked_loads(gearbox)
+    rating = rating_of(gearbox)
+    counted = nominal_loads(gearbox, rating)
+    check_strengths(gearbox, rating, counted.teeth, False)
+    return counted
+
+
+def balanced(
+    assembly: Assembly, counted: CountedLoads, progress: Callable[[int, int], None] | None = None
+) -> StaticBalance:
+    """Solve the static balance of a gearbox as it is rated (`RATED_AS`), over the torques of its loads.
+
+    Raises
+    ------
+    BalanceError
+        A static state that is not held.
+    """
+    acting = acting_loads(counted)
+    angles = rating_of(assembly.gearbox).carrier_angles
+    return static_balance(assembly, counted.body, acting.torques, angles, progress, 0.5 * acting.hub_sizes)
+
+
+def rated(
+    gearbox: Gearbox,
+    counted: CountedLoads,
+    balance: StaticBalance,
+    finite_elements: Mapping[FlankKey, Mapping[str, float]],
+    remarks: tuple[str, ...] = (),
+) -> RatingSheet:
+    """Rating sheet of a gearbox.
+
+    Parameters
+    ----------
+    counted : of `rated_loads`
+    balance : of `balanced`
+    finite_elements : (gear, family, flank) what stands beside the standard, see `exugear.life.rating.sheet`
+    remarks : what is to be said of that
+    """
+    return rating_sheet(gearbox, rating_of(gearbox), counted, acting_loads(counted), balance, finite_elements, remarks)

@@ -17,30 +17,32 @@ from exugear.gearbox.sections.loads import StrengthSection
 from exugear.life.gear_life import hardening_of, life_curves, root_factors, root_strength, roughness_of
 from fe_ste.geometry.gears import GearPair
 from fe_ste.standards.iso1328 import tolerance
-from fe_ste.standards.iso6336 import MethodBStiffness, mesh_stiffness
-from fe_ste.standards.load_factors import (
+from fe_ste.standards.iso6336 import (
     FlankDeviations,
     Hardening,
+    MethodBStiffness,
     dynamic_factor,
     face_load_factor,
     helix_running_in,
+    mesh_stiffness,
     pitch_running_in,
     resonance_ratio,
     transverse_load_factors,
 )
 from fe_ste.standards.pitting import (
     contact_ratio_factor,
+    damages,
     elasticity_factor,
     helix_factor,
     lubricant_factor,
     nominal_contact_stress,
     reduced_radius,
     roughness_factor,
+    safety_factor,
     single_contact_factors,
     velocity_factor,
     zone_factor,
 )
-from fe_ste.standards.service_life import damages, safety_factor
 from fe_ste.standards.tooth_root import root_face_load_factor, root_stress_factors
 from fe_ste.tools.arrays import Floats
 

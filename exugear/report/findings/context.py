@@ -2,23 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import xarray as xr
+
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.variant import Variant
+from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import Variant, VariantError
 from exugear.results.folder import bodies_folder
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run, verdict_of
+from exugear.results.spectra.run_spectra import RunSignals, VariantRun, analysed, run_signals
+from exugear.results.spectra.waterfall import order_lines
+from exugear.steady.steady_file import load_response, settings_of
+from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bodies.elastic_body import ElasticBody
-from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.bodies.of_gearbox import reduced_bodies
+from exugear.system.build import assemble
+from exugear.system.modes import load_modes
+from exugear.system.statics import BalanceError
+from exugear.system.system import Assembly, input_hash
+from exugear.system.tooth_mesh.element import MeshCurve
+from exugear.system.tooth_mesh.laws.iso6336 import iso6336_stiffness
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.placement import MeshError
+from exugear.system.tooth_mesh.tables import fitting_table
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.surface import SteSurface
+from fe_ste.transmission_error.table import MeshTable, TableError
 
 REFERENCE_VARIANT = Variant.rigid
 """Variant that others are compared with."""
@@ -93,3 +109,220 @@ class Context:
     def name_of(self, path: Path) -> Path:
         """Path of a file as seen from the results folder."""
         return path.relative_to(self.folder)
+
+
+# Results in the folder that belong to its case: tables, modes and runs
+
+OTHER_INPUT = "was computed from another input; compute it again"
+_UNFIT = (CaseError, MeshError, VariantError, BearingError, BalanceError, KeyError)
+"""What the case of the folder may say to the choice that a file was computed of."""
+
+
+@dataclass(frozen=True)
+class StoredResults:
+    """What a report is made from."""
+
+    tables: Mapping[str, MeshTable]
+    """By pair name."""
+    modes: Mapping[Choice, xr.Dataset]
+    """As `exugear.system.modes.Modes.to_dataset` makes them."""
+    runs: Sequence[VariantRun]
+    steady: Sequence[xr.Dataset] = ()
+    """Steady responses as `exugear.steady.steady_file.load_response` reads them."""
+
+    def __bool__(self) -> bool:
+        """Tell whether there is anything to report."""
+        return bool(self.tables or self.modes or self.runs or self.steady)
+
+
+def stored_models(context: Context) -> StoredResults:
+    """Read the tables and modes that belong to the case of the folder, which is soon done; note what does not."""
+    return StoredResults(_stored_tables(context), dict(_stored_modes(context)), ())
+
+
+def with_responses(context: Context, models: StoredResults) -> StoredResults:
+    """Add the runs and steady responses that belong to the case of the folder; what does not is noted as left out."""
+    runs = list(_stored_runs(context, models.modes))
+    return replace(models, runs=runs, steady=list(_stored_steady(context)))
+
+
+def _stored_steady(context: Context) -> Iterator[xr.Dataset]:
+    for path in sorted(context.folder.glob("*/*/steady-*.nc")):
+        try:
+            data = load_response(path)
+            settings = settings_of(data.attrs)
+            fits = settings.hash_with(context.assembled(choice_of(data.attrs))) == data.attrs["input_hash"]
+        except FileError as error:
+            context.notes.left_out.append(str(error))
+            continue
+        except (*_UNFIT, ValueError) as error:
+            context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+            continue
+        if fits:
+            yield data
+        else:
+            context.notes.left_out.append(f"{context.name_of(path)}: {OTHER_INPUT}")
+
+
+def _stored_tables(context: Context) -> dict[str, MeshTable]:
+    tables = {}
+    for name in dict.fromkeys(mesh.pair.name for mesh in context.gearbox.meshes):
+        if name in context.gearbox.stated_stiffness:
+            continue
+        try:
+            tables[name] = fitting_table(context.gearbox, name, context.folder)
+        except TableError as error:
+            context.notes.left_out.append(f"table of {name}: {error}")
+    return tables
+
+
+def _stored_modes(context: Context) -> Iterator[tuple[Choice, xr.Dataset]]:
+    for path in sorted(context.folder.glob("*/*/modes.nc")):
+        try:
+            data = load_modes(path)
+        except FileError as error:
+            context.notes.left_out.append(str(error))
+            continue
+        if _fits(context, path, data.attrs):
+            yield choice_of(data.attrs), data
+
+
+def _stored_runs(context: Context, modes: Mapping[Choice, xr.Dataset]) -> Iterator[VariantRun]:
+    """Read the runs that fit; those to be compared share one window, the longest, whichever is read first."""
+    lines = order_lines(context.gearbox)
+    groups: dict[tuple[str, ...], list[tuple[RunSignals, float]]] = {}
+    for path in _run_files(context.folder):
+        found = _fitting_signals(context, path)
+        if found is not None:
+            groups.setdefault(run_key(found[0].attributes), []).append(found)
+    for group in groups.values():
+        longest = max(window for _, window in group)
+        for signals, _ in group:
+            context.tell(f"spectra of {context.name_of(signals.path)}")
+            try:
+                yield analysed(signals, lines, modes.get(choice_of(signals.attributes)), longest)
+            except ValueError as error:
+                context.notes.left_out.append(f"{context.name_of(signals.path)}: {error}")
+
+
+def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] | None:
+    """Signals of a run that fits the case, and the window that suits it (s); None where it is left out."""
+    try:
+        attributes = load_run(path, ()).attrs
+        if not _fits(context, path, attributes):
+            return None
+        _note_distrust(context, path, attributes)
+        signals = run_signals(path)
+        return signals, signals.suitable_window
+    except FileError as error:
+        context.notes.left_out.append(str(error))
+    except ValueError as error:
+        context.notes.left_out.append(f"{context.name_of(path)}: {error}")
+    return None
+
+
+def bytes_of_runs(context: Context) -> int:
+    """Size of the runs in the folder that ended."""
+    return sum(path.stat().st_size for path in _run_files(context.folder) if path.is_file())
+
+
+def _run_files(folder: Path) -> list[Path]:
+    """List runs that ended, and those that were stopped and not taken up again."""
+    ended = set(folder.glob(f"*/*/{FINAL_NAME}"))
+    stopped = {path for path in folder.glob(f"*/*/{PARTIAL_NAME}") if path.with_name(FINAL_NAME) not in ended}
+    return sorted(ended | stopped)
+
+
+def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
+    """Tell whether a file was computed from the case of the folder; if not, note why it is left out."""
+    load_case = attributes.get("load_case")
+    try:
+        if load_case is not None and load_case not in context.gearbox.load_cases:
+            raise CaseError(f"the case has no load case {load_case!r}")
+        if input_hash(context.assembled(choice_of(attributes)), load_case) == attributes.get("input_hash"):
+            return True
+        reason = OTHER_INPUT
+    except _UNFIT as error:
+        reason = str(error)
+    context.notes.left_out.append(f"{context.name_of(path)}: {reason}")
+    return False
+
+
+def _note_distrust(context: Context, path: Path, attributes: Mapping[str, Any]) -> None:
+    """Name a run that is not to be trusted, with the reason that its file gives."""
+    verdict = verdict_of(attributes)
+    if verdict:
+        name = context.name_of(path)
+        context.notes.distrusted.append(f"{name}: {verdict}")
+        context.notes.statements.append(f"Not to be trusted: {name}: {verdict}")
+
+
+def run_key(attributes: Mapping[str, Any]) -> tuple[str, str, str]:
+    """Load case, law and inertia set: what runs to be compared have in common."""
+    return str(attributes["load_case"]), str(attributes["mesh_law"]), str(attributes["inertias"])
+
+
+# What excites: the static transmission error of each pair over the mesh cycle, and its harmonics
+
+HARMONICS = 6
+"""Harmonics of the mesh frequency that are told."""
+
+
+@dataclass(frozen=True)
+class PairExcitation:
+    """Static transmission error of a pair at its static load."""
+
+    pair: str
+    torque: float
+    """On gear 1, N m."""
+    position: Floats
+    """(n,) in the mesh cycle, 0 to 1."""
+    error: Floats
+    """(n,) transmission error, m."""
+    stiffness: Floats
+    """(n,) mesh stiffness, N/m."""
+    harmonics: Floats
+    """(HARMONICS,) amplitudes of the transmission error at multiples of the mesh frequency, m."""
+    pressure: float
+    """Highest contact pressure over the cycle, Pa; NaN if the table has none."""
+    iso_stiffness: float
+    """By ISO 6336-1 method B, N/m."""
+
+
+def harmonics_of(error: Floats, count: int = HARMONICS) -> Floats:
+    """Amplitudes of the harmonics of a curve over one cycle, evenly sampled.
+
+    Examples
+    --------
+    >>> angle = 2.0 * np.pi * np.arange(16) / 16
+    >>> harmonics_of(1.0 + 3.0 * np.cos(angle) - 0.5 * np.sin(2.0 * angle), 3).round(9).tolist()
+    [3.0, 0.5, 0.0]
+    """
+    amplitudes = 2.0 * np.abs(np.fft.rfft(error)) / error.size
+    if error.size % 2 == 0:
+        amplitudes[-1] *= 0.5
+    harmonics = np.zeros(count)
+    known = amplitudes[1 : count + 1]
+    harmonics[: known.size] = known
+    return harmonics
+
+
+def excitations(context: Context, results: StoredResults) -> tuple[PairExcitation, ...]:
+    """Read the static states of all tables."""
+    found = []
+    for name, table in results.tables.items():
+        state = table.static_state
+        error = np.asarray(state["ste"].to_numpy(), dtype=np.float64)
+        found.append(
+            PairExcitation(
+                pair=name,
+                torque=float(state["torque"]),
+                position=np.asarray(state["pmc"].to_numpy(), dtype=np.float64),
+                error=error,
+                stiffness=np.asarray(state["mesh_stiffness"].to_numpy(), dtype=np.float64),
+                harmonics=harmonics_of(error),
+                pressure=float(state["max_pressure"].max()) if "max_pressure" in state else float("nan"),
+                iso_stiffness=iso6336_stiffness(context.gearbox.pairs[name]),
+            )
+        )
+    return tuple(found)

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.results.spectra.mode_report import element_words
-from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.run_spectra import element_words
+from exugear.results.spectra.waterfall import OrderLine
 
 MOTIONS = {
     "spin": ("rotates", "rotate"),

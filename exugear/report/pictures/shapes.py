@@ -1,20 +1,127 @@
 """What the bodies of a gearbox look like: gears whose teeth mesh, plain shafts and carriers.
 
 NumPy alone. Frame of the gearbox: z along the shafts, lengths in m.
+
+NumPy alone: `exugear.report.pictures.scene` draws them, `exugear.report.pictures.viewer` writes them into a web page.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, Mesh
-from exugear.report.pictures.surfaces import Surface, gear_surface, tube_surface
-from fe_ste.tools.arrays import Floats
+from fe_ste.geometry.gears import Gear
+from fe_ste.geometry.profile import tooth_profile
+from fe_ste.tools.arrays import Floats, Integers
+
+# Surfaces of gears, shafts and pins as triangles; z along the axis, lengths in m
+
+TWIST_PER_LAYER = 0.06
+"""Rotation of the section from one ring of points to the next along a helical gear, rad."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Triangulated surface."""
+
+    points: Floats
+    """(n, 3) m."""
+    triangles: Integers
+    """(m, 3)"""
+
+    def moved(self, shift: ArrayLike) -> Surface:
+        """Copy at another place."""
+        return Surface(self.points + np.asarray(shift, dtype=np.float64), self.triangles)
+
+    @classmethod
+    def joined(cls, surfaces: Sequence[Surface]) -> Surface:
+        """All surfaces as one."""
+        offsets = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
+        return cls(
+            np.concatenate([surface.points for surface in surfaces]),
+            np.concatenate([s.triangles + offset for s, offset in zip(surfaces, offsets, strict=False)]),
+        )
+
+
+def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = None) -> Surface:
+    """Surface of a whole gear with its teeth, about the z axis, z = 0 in the middle of the face width.
+
+    Parameters
+    ----------
+    gear : the gear
+    angle : polar angle of the middle of a tooth at z = 0, rad
+    rim_diameter : bore of an external, outside diameter of an internal gear, m; by default where it is held
+
+    Examples
+    --------
+    >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
+    >>> surface = gear_surface(gear)
+    >>> bool(abs(np.hypot(*surface.points[:, :2].T).max() - gear.tip_radius) < 1e-12)
+    True
+    """
+    outline = _gear_outline(gear)
+    rim = 0.5 * (rim_diameter or gear.held_diameter)
+    twist = math.tan(gear.base_helix_angle) / gear.base_radius * gear.face_width
+    layers = max(2, 1 + math.ceil(abs(twist) / TWIST_PER_LAYER))
+    heights = np.linspace(-0.5, 0.5, layers)
+    polar = outline[:, 1] + angle
+    toothed = np.stack([_circle(outline[:, 0], polar + twist * part, gear.face_width * part) for part in heights])
+    plain = np.stack([_circle(rim, polar + twist * part, gear.face_width * part) for part in heights[[0, -1]]])
+    # Walls run round the axis; the caps join the teeth with the rim at the same polar angles.
+    bands = [toothed, plain[::-1], np.stack([plain[0], toothed[0]]), np.stack([toothed[-1], plain[1]])]
+    return Surface.joined([_band(band) for band in bands])
+
+
+def _gear_outline(gear: Gear) -> Floats:
+    """Radius and polar angle along the toothed circumference, shape (n, 2), counter-clockwise."""
+    profile = tooth_profile(gear)
+    fillet = profile.fillet[np.linspace(len(profile.fillet) - 1, 0, 6).astype(np.int64)[:-1]]
+    from_root = np.column_stack([np.hypot(*fillet.T), np.arctan2(fillet[:, 1], fillet[:, 0])])
+    radii = np.linspace(profile.form_radius, profile.tip_radius, 6)
+    to_tip = np.column_stack([radii, gear.half_angle(radii)])
+    side = np.concatenate([from_root, to_tip])
+    tooth = np.concatenate([side * np.array([1.0, -1.0]), side[::-1]])
+    starts = gear.angular_pitch * np.arange(gear.teeth)
+    return np.concatenate([tooth + np.array([0.0, start]) for start in starts])
+
+
+def _circle(radius: Floats | float, polar: Floats, height: float) -> Floats:
+    return np.column_stack([radius * np.cos(polar), radius * np.sin(polar), np.full(polar.shape, height)])
+
+
+def _band(rings: Floats) -> Surface:
+    """Close bands between rings of equal numbers of points, shape (rings, points, 3)."""
+    count, size = rings.shape[:2]
+    point = np.arange(count * size).reshape(count, size)
+    following = np.roll(point, -1, axis=1)
+    corners = np.stack([point[:-1], following[:-1], following[1:], point[1:]], axis=-1).reshape(-1, 4)
+    return Surface(rings.reshape(-1, 3), np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]))
+
+
+def tube_surface(
+    diameter: float, start: float, end: float, bore: float = 0.0, centre: ArrayLike = (0.0, 0.0)
+) -> Surface:
+    """Surface of a shaft, disc or pin along z.
+
+    Parameters
+    ----------
+    diameter, bore : m
+    start, end : z of both ends, m
+    centre : (2,) x and y of its axis, m
+    """
+    polar = np.linspace(0.0, 2.0 * math.pi, 49)[:-1]
+    corners = [(bore, start), (diameter, start), (diameter, end), (bore, end), (bore, start)]
+    rings = np.stack([_circle(0.5 * size, polar, height) for size, height in corners])
+    return _band(rings).moved([*np.asarray(centre, dtype=np.float64), 0.0])
+
+
+# What the bodies of a gearbox look like: gears whose teeth mesh, plain shafts and carriers
 
 
 @dataclass(frozen=True)
@@ -150,3 +257,137 @@ def _carrier(gearbox: Gearbox, body: Body, planets: Sequence[Body]) -> list[Surf
                 around = (2.0 * orbit + 0.8 * gear.held_diameter, 2.0 * orbit - 0.8 * gear.held_diameter)
                 parts.append(tube_surface(around[0], z + reach, z + reach + 0.04, around[1], body.axis))
     return parts
+
+
+# How the bodies of a gearbox move: rigid motions read out of a mode shape, and scaled to be seen
+
+
+def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
+    """Displacement of each point of a body for a small motion of it.
+
+    Parameters
+    ----------
+    body : the body, n points
+    motion : (6,) displacement (m) of the reference point and rotations (rad) about x, y, z
+
+    Returns
+    -------
+    (n, 3) m
+    """
+    small = np.asarray(motion, dtype=np.float64)
+    return small[:3] + np.cross(small[3:], body.surface.points - body.reference)
+
+
+def placed(body: BodyShape, motion: ArrayLike) -> Floats:
+    """Points of a body after a motion that may be large: turned about the axis of its rotation, then shifted.
+
+    Linear displacements would blow a gear up when it turns by a drawn amplitude; this keeps it a gear.
+
+    Parameters
+    ----------
+    body : the body, n points
+    motion : (6,) as in `displacement_of`, the rotations as a rotation vector
+
+    Returns
+    -------
+    (n, 3) m
+    """
+    matrix = motion_matrix(body.reference, motion)
+    points: Floats = body.surface.points @ matrix[:3, :3].T + matrix[:3, 3]
+    return points
+
+
+def motion_matrix(reference: ArrayLike, motion: ArrayLike) -> Floats:
+    """Homogeneous matrix (4, 4) of a rotation about a reference point and a shift.
+
+    Examples
+    --------
+    >>> quarter = motion_matrix((1.0, 0.0, 0.0), (0.0, 0.0, 0.5, 0.0, 0.0, math.pi / 2))
+    >>> [round(float(entry), 12) for entry in (quarter @ [2.0, 0.0, 0.0, 1.0])[:3]]
+    [1.0, 1.0, 0.5]
+    """
+    centre = np.asarray(reference, dtype=np.float64)
+    vector = np.asarray(motion, dtype=np.float64)
+    angle = float(np.linalg.norm(vector[3:]))
+    rotation = np.eye(3)
+    if angle > 0.0:
+        x, y, z = vector[3:] / angle
+        skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        rotation += math.sin(angle) * skew + (1.0 - math.cos(angle)) * (skew @ skew)  # Rodrigues' formula
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation
+    matrix[:3, 3] = centre - rotation @ centre + vector[:3]
+    return matrix
+
+
+@dataclass(frozen=True)
+class ModeScene:
+    """A mode shape on the bodies of a gearbox, ready to draw."""
+
+    bodies: tuple[BodyShape, ...]
+    motions: tuple[Floats, ...]
+    """(6,) motion of each body at the drawn amplitude."""
+    displacement: tuple[Floats, ...]
+    """(n,) displacement of each point over the largest of all, 0 to 1."""
+    title: str
+
+
+def mode_scene(
+    bodies: Sequence[BodyShape], motions: Mapping[str, ArrayLike], *, title: str = "", amplitude: float = 0.035
+) -> ModeScene:
+    """Scale a mode shape for drawing.
+
+    Parameters
+    ----------
+    bodies : shapes
+    motions : by body name, (6,)
+        Mode shape in any normalisation, as in `displacement_of`; bodies that are not named rest.
+    title : frequency, damping and name of the mode
+    amplitude : largest displacement drawn, over the diagonal of the scene
+
+    Raises
+    ------
+    ValueError
+        If a motion belongs to no body, or nothing moves.
+    """
+    unknown = sorted(set(motions) - {body.name for body in bodies})
+    if unknown:
+        raise ValueError(f"mode shape: no body {unknown[0]!r} among {[body.name for body in bodies]}")
+    moving = [np.asarray(motions.get(body.name, np.zeros(6)), dtype=np.float64) for body in bodies]
+    sizes = [np.linalg.norm(displacement_of(body, motion), axis=1) for body, motion in zip(bodies, moving, strict=True)]
+    largest = max(float(size.max()) for size in sizes)
+    if not largest > 0.0:
+        raise ValueError("mode shape: no body moves")
+    points = np.concatenate([body.surface.points for body in bodies])
+    factor = amplitude * float(np.linalg.norm(np.ptp(points, axis=0))) / largest
+    return ModeScene(
+        bodies=tuple(bodies),
+        motions=tuple(factor * motion for motion in moving),
+        displacement=tuple(size / largest for size in sizes),
+        title=title,
+    )
+
+
+def motions_of(bodies: Iterable[Body], coordinates: Mapping[str, Sequence[int]], shape: ArrayLike) -> dict[str, Floats]:
+    """Read the motions of all bodies out of a vector of coordinates.
+
+    Parameters
+    ----------
+    bodies : bodies of the model
+    coordinates : mapping of body name to six int
+        Indices of x, y, z and the rotations about them in the vector; -1 where there is none.
+    shape : (size,) mode shape or displacement
+
+    Returns
+    -------
+    by body name, (6,) as in `displacement_of`. A planet that turns on an ideal pin goes where its carrier takes it.
+    """
+    vector = np.append(np.asarray(shape, dtype=np.float64), 0.0)  # -1 reads the zero
+    by_name = {body.name: body for body in bodies}
+    motions = {name: vector[list(coordinates[name])] for name in by_name if name in coordinates}
+    for name, motion in motions.items():
+        carrier = by_name[name].carrier
+        if carrier in motions and max(coordinates[name][:5]) < 0:
+            arm = np.subtract(by_name[name].axis, by_name[carrier].axis)
+            motion[:2] = motions[carrier][5] * np.array([-arm[1], arm[0]])
+    return motions

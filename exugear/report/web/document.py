@@ -1,17 +1,213 @@
-"""The whole page: one file that runs its own scripts and no other, and asks nothing of any network."""
+"""The whole page: one file that runs its own scripts and no other, and asks nothing of any network.
+
+`benchmarks` and tests need no node; ``web/vendor.mjs`` of the repository renews the files from npm.
+
+A page that lies in a file cannot import modules. So each module becomes a function that is called once and gives what
+the module exports; an import becomes constants taken from what an earlier one gave. Nothing else is changed.
+"""
 
 from __future__ import annotations
 
 import base64
 import hashlib
+import json
+import re
+import zlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import Any, Final
 
-from exugear.report.web.arrays import ArrayStore, json_element
-from exugear.report.web.libraries import vendored
-from exugear.report.web.pieces import text
-from exugear.report.web.scripts import bundle
+import numpy as np
+from numpy.typing import NDArray
+
+from exugear.report.web.html import text
+
+# Libraries that stand in every page: fixed versions in ``vendor``, with their licences and hashes
+
+
+@dataclass(frozen=True)
+class Library:
+    """A library of others that the pages carry."""
+
+    name: str
+    version: str
+    licence: str
+    """Name of its licence."""
+    files: tuple[tuple[str, str], ...]
+    """Files with the SHA-256 of each."""
+    licence_file: str
+
+
+def vendored(name: str) -> str:
+    """Text of a file of the vendored libraries."""
+    return files("exugear.report.web").joinpath("vendor", name).read_text(encoding="utf-8")
+
+
+@cache
+def libraries() -> tuple[Library, ...]:
+    """All libraries, as ``vendor.json`` lists them.
+
+    Examples
+    --------
+    >>> [library.name for library in libraries()]
+    ['uplot', 'three']
+    """
+    listed = json.loads(vendored("vendor.json"))
+    return tuple(
+        Library(one["name"], one["version"], one["licence"], tuple(one["files"].items()), one["licence_file"])
+        for one in listed
+    )
+
+
+def licences() -> str:
+    """Licences of all libraries, as the pages show them."""
+    return "\n\n".join(
+        f"{library.name} {library.version}\n\n{vendored(library.licence_file)}" for library in libraries()
+    )
+
+
+# Scripts of the pages: small modules, joined in the order of their imports into one that needs no address
+
+_IMPORT = re.compile(r'^import (\{[^}]*\}) from "\./([a-z_]+)\.js";$', re.MULTILINE)
+_EXPORT = re.compile(r"^export ((?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
+
+
+@cache
+def script_source(name: str) -> str:
+    """Text of a module."""
+    return files("exugear.report.web").joinpath("scripts", f"{name}.js").read_text(encoding="utf-8")
+
+
+def module_order(name: str) -> tuple[str, ...]:
+    """Names of a module and all that it imports, each after those that it needs.
+
+    Examples
+    --------
+    >>> module_order("theme")
+    ('dom', 'theme')
+    """
+    order: dict[str, None] = {}
+
+    def visit(one: str) -> None:
+        if one in order:
+            return
+        for _, needed in _IMPORT.findall(script_source(one)):
+            visit(needed)
+        order[one] = None
+
+    visit(name)
+    return tuple(order)
+
+
+def as_function(name: str, source: str) -> str:
+    r"""Make a module a function that is called once.
+
+    Examples
+    --------
+    >>> print(as_function("sum", 'import { one } from "./ones.js";\nexport const two = one + one;'))
+    const $sum = (() => {
+    const { one } = $ones;
+    const two = one + one;
+    return { two };
+    })();
+    """
+    exported = ", ".join(found for _, found in _EXPORT.findall(source))
+    body = _EXPORT.sub(r"\1", _IMPORT.sub(r"const \1 = $\2;", source))
+    return f"const ${name} = (() => {{\n{body.rstrip()}\nreturn {{ {exported} }};\n}})();"
+
+
+def bundle(name: str) -> str:
+    """One script of a module and all that it imports."""
+    parts = [as_function(one, script_source(one)) for one in module_order(name)]
+    return '"use strict";\n(() => {\n' + "\n".join(parts) + "\n})();\n"
+
+
+# Arrays in a page: deflated and in base64, each in an element of its own that is unpacked when it is shown
+
+KINDS: Final = {"u1": "u8", "u2": "u16", "i1": "i8", "i2": "i16", "u4": "u32", "f4": "f32"}
+"""Types that the scripts know, by those of NumPy."""
+
+
+class ArrayStore:
+    """Arrays of one page, by name.
+
+    Examples
+    --------
+    >>> store = ArrayStore()
+    >>> store.add(np.arange(3, dtype="u1"), differences=True)
+    {'blob': 'a0', 'type': 'u8', 'shape': [3], 'differences': True}
+    """
+
+    def __init__(self) -> None:
+        self._packed: list[str] = []
+        self._known: dict[bytes, str] = {}
+
+    def add(self, values: NDArray[Any], *, differences: bool = False) -> dict[str, object]:
+        """Keep an array and return what the scripts find it by.
+
+        Parameters
+        ----------
+        values : of a type in `KINDS`
+        differences : whether to keep differences along the first axis, which pack better where neighbours are alike
+        """
+        array = np.ascontiguousarray(values)
+        kept = array
+        if differences:
+            kept = np.diff(array, axis=0, prepend=np.zeros_like(array[:1])).astype(array.dtype)
+        little = kept.astype(kept.dtype.newbyteorder("<"), copy=False)
+        packed = zlib.compress(little.tobytes(), 9)
+        if packed not in self._known:  # planets look alike
+            self._known[packed] = f"a{len(self._packed)}"
+            self._packed.append(base64.b64encode(packed).decode("ascii"))
+        return {
+            "blob": self._known[packed],
+            "type": KINDS[array.dtype.str[1:]],
+            "shape": list(array.shape),
+            "differences": differences,
+        }
+
+    def elements(self) -> str:
+        """All arrays as elements of the page."""
+        return "\n".join(
+            f'<script type="text/plain" id="{name}">{data}</script>'
+            for name, data in zip(self._known.values(), self._packed, strict=True)
+        )
+
+
+def json_element(name: str, content: Mapping[str, Any]) -> str:
+    r"""Keep data as JSON in an element of the page; nothing in it ends the element or begins another.
+
+    Examples
+    --------
+    >>> json_element("data", {"title": "</script>"})
+    '<script type="application/json" id="data">{"title":"\\u003c/script\\u003e"}</script>'
+    """
+    written = json.dumps(content, separators=(",", ":"), allow_nan=False)
+    safe = written.translate({ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&"})
+    return f'<script type="application/json" id="{name}">{safe}</script>'
+
+
+def rounded(value: float, digits: int = 5) -> float | None:
+    """Round a number to significant digits for JSON; None for what is no number.
+
+    Examples
+    --------
+    >>> rounded(3.14159265, 3), rounded(float("nan"))
+    (3.14, None)
+    """
+    if np.isfinite(value):
+        return float(f"{value:.{digits}g}")
+    return None
+
+
+def rounded_list(values: NDArray[Any], digits: int = 5) -> list[float | None]:
+    """Round all numbers of a row."""
+    return [rounded(float(value), digits) for value in values]
+
+
+# The whole page: one file that runs its own scripts and no other, and asks nothing of any network
 
 STYLES = ("base", "parts", "narrow", "paper")
 """Style sheets of all pages, in their order."""

@@ -2,16 +2,179 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from exugear.report.pictures.scene import DISPLACEMENT_COLOURS
-from exugear.report.web.arrays import ArrayStore, rounded, rounded_list
-from exugear.report.web.drawn_bodies import DrawnBody, drawn_bodies, drawn_mode, turn_between
-from exugear.system.assembly import Assembly
+from exugear.gearbox.parts import seat_key
+from exugear.report.pictures.scene import DISPLACEMENT_COLOURS, body_colours
+from exugear.report.pictures.shapes import BodyShape, Surface, bodies_of, displacement_of, gear_surface, motions_of
+from exugear.report.web import html
+from exugear.report.web.document import ArrayStore, rounded, rounded_list, whole_page
+from exugear.report.web.html import Cell
+from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.files import write_file
+
+# Frame of the stage of a page, where a mode moves, with its controls
+
+HINT = "Drag turns, right drag or two fingers move, wheel or pinch zooms; arrow keys turn."
+
+
+def stage_figure() -> str:
+    """Make the frame; the scripts ``stage`` and ``mode_view`` fill it."""
+    element = html.element
+    canvas = element("canvas", "", id="view-3d", tabindex=0, role="img", aria_label="Mode in motion")
+    still = element("img", id="still", alt="Mode at its largest deflection")
+    missing = element("p", "This browser has no WebGL 2: the mode cannot be drawn.", id="no-gl", hidden=True)
+    stage = element("div", canvas + still + missing, class_="stage")
+    slider = element("input", type="range", id="amplitude", min=0, max=3, step=0.05, value=1)
+    amplitude = element("label", f"Amplitude {slider}")
+    play = element("button", "Pause", type="button", id="play", aria_pressed="true")
+    by_body = element("label", element("input", type="checkbox", id="by-body") + " body colours")
+    ends = element("span", "rests <i></i> moves most", class_="ends")
+    controls = element("div", play + amplitude + by_body + ends, class_="controls")
+    chips = element("div", "", class_="chips", id="bodies", role="group", aria_label="Bodies shown")
+    title = element("strong", "Mode", id="mode-title")
+    caption = element("figcaption", title + element("span", HINT, class_="hint"))
+    tools = element("div", "", class_="tools", id="mode-tools")
+    return element("figure", caption + tools + stage + controls + chips, class_="panel", id="mode")
+
+
+# Bodies of a gearbox as a page draws them: rigid ones with their teeth, elastic ones with gears on their seats
+
+SAME_SHAPE = 1e-6
+"""Largest distance (m) between points of bodies that are drawn as one, turned."""
+
+
+@dataclass(frozen=True)
+class DrawnBody:
+    """A body that a page draws."""
+
+    shape: BodyShape
+    colour: str
+    """As ``#rrggbb``."""
+    owner: str
+    """Body whose seat a gear rides on; its own name otherwise."""
+    field: NDArray[np.float32] | None = None
+    """(p, 3, n) displacement of its points per coordinate of an elastic body; None for a body that moves as a whole."""
+
+
+def drawn_bodies(assembly: Assembly) -> tuple[DrawnBody, ...]:
+    """List all bodies of a gearbox that have a shape to draw, with the colours that they have in pictures."""
+    shapes = bodies_of(assembly.gearbox)
+    colours = {family: _written(colour) for family, colour in body_colours(shapes).items()}
+    rigid = [
+        DrawnBody(shape, colours[shape.family], shape.name)
+        for shape in shapes
+        if shape.name not in assembly.elastic_bodies
+    ]
+    return (*rigid, *_elastic(assembly, colours))
+
+
+def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
+    drawn = []
+    for body in assembly.bodies:
+        if body.name not in assembly.elastic_bodies:
+            continue
+        surface = assembly.elastic_bodies[body.name].reduced.surface
+        quads = surface.quads
+        # A triangle repeats its last corner: its second half has no area and is left out.
+        whole = quads[:, 2] != quads[:, 3]
+        triangles = np.concatenate([quads[:, [0, 1, 2]], quads[whole][:, [0, 2, 3]]])
+        centre = np.array([*body.axis, body.centre_of_mass_z])
+        shape = BodyShape(body.name, body.family, Surface(surface.points, triangles), centre, body.fixed)
+        colour = colours.get(body.family, "#a0a8b0")
+        drawn.append(DrawnBody(shape, colour, body.name, surface.displacement))
+        for gear, z in {} if body.fixed else body.wheels.items():
+            place = np.array([*body.axis, z])
+            teeth = gear_surface(assembly.gearbox.gears[gear]).moved(place)
+            drawn.append(DrawnBody(BodyShape(gear, gear, teeth, place), colour, body.name))
+    return drawn
+
+
+def _written(colour: tuple[float, float, float]) -> str:
+    return "#" + "".join(f"{round(255 * channel):02x}" for channel in colour)
+
+
+@dataclass(frozen=True)
+class DrawnMode:
+    """A mode as a page draws it; the largest displacement of any point is 1 m."""
+
+    motions: Floats
+    """(bodies, 6) motion of each body as a whole; of one with a field zero."""
+    fields: dict[int, Floats]
+    """Mapping of place among the bodies to (p, 3) array. Displacement of the points of elastic bodies."""
+
+
+def drawn_mode(assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats, with_fields: bool) -> DrawnMode:
+    """Read how the bodies of an assembly move in a mode shape (size,).
+
+    Parameters
+    ----------
+    shape : (size,)
+    with_fields : whether elastic bodies deform; else they move as their main seats do
+    """
+    moving = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(shape))
+    motions = np.zeros((len(bodies), 6))
+    fields: dict[int, Floats] = {}
+    for place, body in enumerate(bodies):
+        if body.field is not None and with_fields:
+            fields[place] = np.asarray(body.field @ shape[assembly.elastic_slices[body.owner]], dtype=np.float64)
+        elif body.owner != body.shape.name and with_fields:
+            seat = assembly.coordinates[seat_key(body.owner, body.shape.name)]
+            motions[place] = np.append(shape, 0.0)[list(seat)]
+        else:
+            motions[place] = moving.get(body.owner, np.zeros(6))
+            motions[place, :3] += np.cross(motions[place, 3:], body.shape.reference - _reference(assembly, body))
+    largest = _largest(bodies, motions, fields)
+    if largest > 0.0:
+        motions /= largest
+        fields = {place: field / largest for place, field in fields.items()}
+    return DrawnMode(motions, fields)
+
+
+def _reference(assembly: Assembly, body: DrawnBody) -> Floats:
+    """Point that the motion of the owner as a whole belongs to: its centre of mass."""
+    own = next((one for one in assembly.gearbox.bodies(assembly.inertias) if one.name == body.owner), None)
+    if own is None:
+        return body.shape.reference
+    return np.array([*own.axis, own.centre_of_mass_z])
+
+
+def _largest(bodies: tuple[DrawnBody, ...], motions: Floats, fields: dict[int, Floats]) -> float:
+    sizes = [
+        np.linalg.norm(fields[place] if place in fields else displacement_of(body.shape, motions[place]), axis=1).max()
+        for place, body in enumerate(bodies)
+    ]
+    return float(max(sizes, default=0.0))
+
+
+def turn_between(first: BodyShape, other: BodyShape) -> float | None:
+    """Angle (rad) about z by which the points of one shape become those of another; None where no turn does.
+
+    Planets of a set are drawn from the points of the first of them.
+    """
+    one = first.surface.points - first.reference
+    two = other.surface.points - other.reference
+    if one.shape != two.shape or not np.array_equal(first.surface.triangles, other.surface.triangles):
+        return None
+    cross = float(np.sum(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]))
+    angle = math.atan2(cross, float(np.sum(one[:, :2] * two[:, :2])))
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
+    turned = one @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    if float(np.abs(turned - two).max()) < SAME_SHAPE:
+        return angle
+    return None
+
+
+# Bodies and modes as data for the stage of a page, where a mode moves in three dimensions
 
 LARGEST = 0.035
 """Largest displacement drawn, over the diagonal of the scene, as in pictures."""
@@ -85,3 +248,108 @@ def _bodies(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays: Ar
             }
         )
     return listed
+
+
+# The page of one model's modes: chosen from a list, moving in three dimensions, offline
+
+MODEL = "model"
+"""Name of the only model of the page."""
+MOST_DEFORMED = 60
+"""Modes in which elastic bodies deform: the first of those that are shown."""
+
+
+def write_mode_page(
+    assembly: Assembly,
+    shapes: Floats,
+    titles: Sequence[tuple[float, str]],
+    path: str | Path,
+    *,
+    heading: str = "Mode shapes",
+    first: int = 0,
+    labels: Mapping[str, str] | None = None,
+) -> Path:
+    """Write a web page that shows modes of one gearbox.
+
+    Parameters
+    ----------
+    assembly : what vibrates
+    shapes : (size, modes) modes to choose from
+    titles : frequency (Hz) of each, and what moves
+    path : where to write the page
+    heading : gearbox, variant, mesh law and inertia set
+    first : mode that is shown when the page opens
+    labels : mapping of name to words, optional
+        Of bodies.
+
+    Raises
+    ------
+    ValueError
+        If there is no mode, or not a title for each.
+    """
+    if not titles or shapes.shape[1] != len(titles):
+        raise ValueError(
+            f"mode page: {shapes.shape[1]} modes with {len(titles)} titles; at least one of each is needed"
+        )
+    arrays = ArrayStore()
+    near = sorted(range(len(titles)), key=lambda mode: abs(mode - first))[:MOST_DEFORMED]
+    data: dict[str, Any] = {
+        "name": heading,
+        "input": "",
+        "rated": None,
+        "lines": [],
+        "groups": [],
+        "charts": {},
+        "first": first,
+        "models": {
+            MODEL: {
+                "words": heading,
+                "variant": assembly.variant,
+                "fastest": 1.0,
+                "stage": stage_data(assembly, shapes, labels or {}, arrays, near if assembly.elastic_bodies else ()),
+                "modes": [
+                    {
+                        "frequency": rounded(frequency, 6),
+                        "damping": 0.0,
+                        "words": words,
+                        "seen": True,
+                        "amplification": 0.0,
+                        "mesh": "",
+                    }
+                    for frequency, words in titles
+                ],
+            }
+        },
+    }
+    target = Path(path)
+    page = whole_page(heading, _body(heading, titles), "mode_page", data, arrays, ("three.min.js",))
+    write_file(target, page.encode("utf-8", errors="replace"))
+    return target
+
+
+def _body(heading: str, titles: Sequence[tuple[float, str]]) -> str:
+    rows = [
+        {
+            "No.": Cell(str(number + 1), number),
+            "Frequency / Hz": Cell(f"{frequency:.1f}", frequency, f"mode:{MODEL}:{number}"),
+            "What moves": words,
+        }
+        for number, (frequency, words) in enumerate(titles)
+    ]
+    table = html.table(rows, ("What moves",), caption="Modes", name="modes", sortable=True)
+    theme = html.element("button", "◐", type="button", id="theme", aria_label="Dark or light colours")
+    tools = html.element("div", theme, class_="page-tools scripts-only")
+    brand = html.element("div", html.element("h1", html.text(heading)), class_="brand")
+    steps = html.element("button", "‹", type="button", id="before", aria_label="Mode before") + html.element(
+        "button", "›", type="button", id="next", aria_label="Next mode"
+    )
+    element = html.element("p", "", id="mode-words", aria_live="polite")
+    shown = html.element("div", steps, class_="controls") + element + stage_figure()
+    main = html.element(
+        "main",
+        html.element(
+            "section",
+            html.element("div", html.element("div", shown, class_="scripts-only") + table, class_="split"),
+        ),
+    )
+    toast = html.element("p", "", id="said", class_="toast", role="status", aria_live="polite")
+    return html.element("header", brand + tools, class_="top") + main + toast

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.results.spectra.orders import OrderLine
 from exugear.results.spectra.resonances import Pick
-from exugear.results.spectra.waterfall import Waterfall
+from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from fe_ste.tools.arrays import Floats
 
 FRAMES, ROWS = 880, 1536

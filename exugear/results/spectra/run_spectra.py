@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
@@ -14,19 +15,106 @@ import xarray as xr
 
 from exugear.gearbox.parts import RPM
 from exugear.results.run_file import read_run as read_arrays
-from exugear.results.spectra.mode_report import mobility_shares
-from exugear.results.spectra.orders import OrderLine
 from exugear.results.spectra.resonances import (
     Pick,
     Resonance,
     group_by_frequency,
     match_eigenfrequencies,
+    peaks_on_line,
     pick_resonances,
 )
-from exugear.results.spectra.spectrum import sweep_matched_window
-from exugear.results.spectra.waterfall import Waterfall, waterfall
+from exugear.results.spectra.waterfall import OrderLine, Waterfall, sweep_matched_window, waterfall
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import Displayed, TitledRows
+
+# Eigenmodes in figures: what each one moves and strains, and how strongly the overall transmission error sees it
+
+NEAR = 0.05
+"""A mode within this part of a frequency counts as near it."""
+
+
+def mobility_shares(modes: xr.Dataset) -> Floats:
+    """Share of each mode in the mobility of the overall transmission error, shape (n,); they add up to one.
+
+    With unit modal mass the squares of what the overall transmission error sees of each mode add up to r M^-1 r^T,
+    whatever the stiffness: a measure without dimension of how strongly it sees each.
+    """
+    squares = modes["overall_dte"].to_numpy() ** 2
+    total = float(squares.sum())
+    shares: Floats = squares / total if total > 0.0 else np.zeros(squares.shape)
+    return shares
+
+
+@dataclass(frozen=True)
+class ModeReport(Displayed):
+    """One eigenmode in figures."""
+
+    index: int
+    """In the list of modes, from 0."""
+    frequency: float
+    damping_ratio: float
+    """Hz, share of critical damping."""
+    name: str
+    """What moves, in words."""
+    share: float
+    """See `mobility_shares`."""
+    amplification: float
+    """Overall transmission error at resonance per transmission error of the mesh that excites it most, m/m."""
+    mesh: str
+    """That mesh."""
+    strain: Mapping[str, float]
+    """Share of strain energy by mesh, bearing and coupling."""
+    kinetic: Mapping[str, float]
+    """Share of kinetic energy by body."""
+
+    def _line(self) -> str:
+        share = f"share {100 * self.share:.2g} %"
+        return f" {self.index}: {self.frequency:.1f} Hz, {share}, {shorten(self.name, 90)}"
+
+    def is_near(self, frequency: float, tolerance: float = NEAR) -> bool:
+        """Tell whether the mode lies within a part of a frequency (Hz)."""
+        return abs(self.frequency - frequency) <= tolerance * frequency
+
+
+def report_mode(modes: xr.Dataset, index: int) -> ModeReport:
+    """Gather the figures of one mode."""
+    mode = modes.isel(mode=index)
+    amplification = mode["amplification"].to_numpy()
+    strongest_mesh = int(np.argmax(amplification)) if amplification.size else -1
+    kinetic = mode["kinetic_energy_share"].sum("motion").to_numpy()
+    return ModeReport(
+        index=index,
+        frequency=float(mode["frequency"]),
+        damping_ratio=float(mode["damping_ratio"]),
+        name=str(mode["name"].item()),
+        share=float(mobility_shares(modes)[index]),
+        amplification=float(amplification[strongest_mesh]) if amplification.size else 0.0,
+        mesh=str(modes["mesh"].to_numpy()[strongest_mesh]) if amplification.size else "",
+        strain=_labelled(element_words(modes), mode["strain_energy_share"].to_numpy()),
+        kinetic=_labelled(modes["body"].to_numpy(), kinetic),
+    )
+
+
+def element_words(modes: xr.Dataset) -> list[str]:
+    """Name what is strained: meshes, bearings and couplings by their names, elastic bodies as themselves."""
+    bodies = {f"{name}_body": f"{name} itself" for name in modes["body"].to_numpy()}
+    return [bodies.get(str(name), str(name)) for name in modes["element"].to_numpy()]
+
+
+def _labelled(names: Iterable[str], values: Floats) -> dict[str, float]:
+    return {str(name): float(value) for name, value in zip(names, values, strict=True)}
+
+
+def nearest_mode(modes: xr.Dataset, frequency: float, least_share: float = 0.0) -> ModeReport | None:
+    """Find the elastic mode nearest to a frequency (Hz) among those of a least share of mobility, or None."""
+    frequencies = modes["frequency"].to_numpy()
+    allowed = np.flatnonzero((frequencies > 0.0) & (mobility_shares(modes) >= least_share))
+    if not allowed.size:
+        return None
+    return report_mode(modes, int(allowed[np.argmin(np.abs(frequencies[allowed] - frequency))]))
+
+
+# Spectra of stored run-ups: their waterfall, and their resonances with the eigenmodes they belong to
 
 LEAST_SHARE = 1e-5
 """Modes with a smaller share of the overall transmission error's mobility are no match for a resonance of it."""
@@ -142,7 +230,7 @@ class VariantRun(Displayed):
     spectra: Waterfall
     picks: tuple[Pick, ...]
     modes: xr.Dataset | None
-    """As `exugear.system.eigenmodes.modes.Modes.to_dataset` makes it."""
+    """As `exugear.system.modes.Modes.to_dataset` makes it."""
 
     def _line(self) -> str:
         return f" {shorten(f'{self.variant}, {self.conditions}', 150)}, {len(self.picks)} peaks"
@@ -225,3 +313,197 @@ def analysed(
     """Compute the waterfall of a run-up that was read, and pick its resonances; arguments as in `read_run`."""
     spectra = signals.waterfall(window_length)
     return VariantRun(signals.path, signals.attributes, spectra, pick_resonances(spectra, lines), modes)
+
+
+# Two run-ups side by side: resonances that one shows and the other does not
+
+
+@dataclass(frozen=True)
+class AbsenceRule:
+    """When a peak of one run counts as absent from another."""
+
+    prominence: float = 3.0
+    """On the same order line the other run has no peak of this prominence, dB, within the resolution, and."""
+    margin: float = 6.0
+    """Its level at that place lies at least so far below, dB."""
+
+    @property
+    def description(self) -> str:
+        """The rule in words, for captions."""
+        return (
+            f"no peak of {self.prominence:g} dB prominence on the same order within the resolution, "
+            f"and a level at least {self.margin:g} dB lower"
+        )
+
+
+def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | None = None) -> tuple[Pick, ...]:
+    """Select the peaks of one run that another run does not show.
+
+    Parameters
+    ----------
+    picks : peaks of the first run
+    other : the second run, with the same unit
+    rule : stated thresholds
+
+    Returns
+    -------
+    peaks that satisfy the rule; a peak where the second run has no data does not
+    """
+    stated = rule or AbsenceRule()
+    asked = tuple(picks)
+    peaks = {line: peaks_on_line(other, line, stated.prominence) for line in {pick.line for pick in asked}}
+    return tuple(pick for pick in asked if _is_absent(pick, other, peaks[pick.line], stated))
+
+
+def _is_absent(pick: Pick, other: Waterfall, peaks: Sequence[Pick], rule: AbsenceRule) -> bool:
+    """Tell whether a peak is absent from another run, of which the peaks on the same order line are given."""
+    frequency = pick.line.frequency(other.speed)
+    level = other.along(pick.line)
+    near = np.isfinite(level) & (np.abs(frequency - pick.frequency) <= pick.resolution)
+    if not np.any(near):
+        return False
+    same_place = any(abs(peak.frequency - pick.frequency) <= max(pick.resolution, peak.resolution) for peak in peaks)
+    return not same_place and float(level[near].max()) <= pick.level - rule.margin
+
+
+@dataclass(frozen=True)
+class Comparison(Displayed):
+    """Run-ups of two variants under the same law, inertia set and load case."""
+
+    first: VariantRun
+    second: VariantRun
+    """The first is the compliant one: what it has and the second lacks is asked for."""
+    rule: AbsenceRule
+    """When a peak counts as absent."""
+
+    def _line(self) -> str:
+        counts = f"only first {len(self.only_first)}, only second {len(self.only_second)}"
+        return f" {shorten(self._title, 130)}: {counts}"
+
+    def _table(self) -> TitledRows:
+        rows = {
+            f"only {run.variant}": ", ".join(f"{finding.resonance.frequency:.0f} Hz" for finding in findings) or "none"
+            for run, findings in ((self.first, self.only_first), (self.second, self.only_second))
+        }
+        return self._title, rows | {"rule": self.rule.description}
+
+    @property
+    def _title(self) -> str:
+        return f"{self.first.variant} with {self.second.variant}, {self.first.conditions}"
+
+    @cached_property
+    def only_first(self) -> tuple[Finding, ...]:
+        """Resonances of the first run whose loudest peaks the second does not show."""
+        return self._lacking(self.first, self.second)
+
+    @cached_property
+    def only_second(self) -> tuple[Finding, ...]:
+        """Resonances of the second run whose loudest peaks the first does not show."""
+        return self._lacking(self.second, self.first)
+
+    def _lacking(self, run: VariantRun, other: VariantRun) -> tuple[Finding, ...]:
+        # A weak order may be absent where the loudest is not: what is told of a resonance is told of its loudest peak.
+        absent = set(only_in_first((own.strongest for own in run.findings()), other.spectra, self.rule))
+        return tuple(finding for finding in run.findings() if finding.strongest in absent)
+
+    @property
+    def runs(self) -> tuple[VariantRun, VariantRun]:
+        """Both, the stiff one first, as pictures show them."""
+        return self.second, self.first
+
+
+def compare(first: VariantRun, second: VariantRun, rule: AbsenceRule | None = None) -> Comparison:
+    """Set two run-ups side by side.
+
+    Raises
+    ------
+    ValueError
+        They differ in more than the variant, or were analysed with different windows.
+    """
+    for key in ("gearbox", "load_case", "level", "mesh_law", "inertias"):
+        values = first.attributes.get(key), second.attributes.get(key)
+        if values[0] != values[1]:
+            raise ValueError(f"runs to compare differ in {key}: {values[0]!r} and {values[1]!r}")
+    if not math.isclose(first.spectra.window_length, second.spectra.window_length, rel_tol=1e-9):  # of rounded times
+        raise ValueError("runs to compare were analysed with windows of different length")
+    return Comparison(first, second, rule or AbsenceRule())
+
+
+# Resonances under other lengths of the window: what depends on the length is no fact about the gearbox
+
+WINDOW_FACTORS = (0.94, 0.98, 1.02, 1.06)
+"""Lengths of other windows over the one that suits the sweep."""
+
+
+@dataclass(frozen=True)
+class OtherWindow:
+    """What runs to be compared show with another window."""
+
+    picks: Mapping[str, tuple[Pick, ...]]
+    """By variant, peaks of each run."""
+    absent: Mapping[tuple[str, str], tuple[Pick, ...]]
+    """(variant, other variant) peaks of the first that the second lacks."""
+
+
+def other_windows(
+    runs: Sequence[VariantRun],
+    lines: Sequence[OrderLine],
+    factors: Iterable[float] = WINDOW_FACTORS,
+    rule: AbsenceRule | None = None,
+) -> tuple[OtherWindow, ...]:
+    """Look for the resonances of runs with other windows; one window of all runs is in memory at a time.
+
+    Parameters
+    ----------
+    runs : of different variants, analysed with one window
+    factors : lengths over that of the window
+    rule : when a peak counts as absent
+
+    Raises
+    ------
+    FileError
+        A run is missing or damaged.
+    """
+    signals = {run.variant: run_signals(run.path) for run in runs}
+    length = runs[0].spectra.window_length
+    return tuple(_with_window(signals, lines, factor * length, rule) for factor in factors)
+
+
+def _with_window(
+    signals: Mapping[str, RunSignals], lines: Sequence[OrderLine], length: float, rule: AbsenceRule | None
+) -> OtherWindow:
+    spectra = {variant: signal.waterfall(length) for variant, signal in signals.items()}
+    picks = {variant: pick_resonances(own, lines) for variant, own in spectra.items()}
+    absent = {
+        (variant, other): only_in_first(picks[variant], spectra[other], rule)
+        for variant in spectra
+        for other in spectra
+        if variant != other
+    }
+    return OtherWindow(picks, absent)
+
+
+def is_among(pick: Pick, picks: Iterable[Pick]) -> bool:
+    """Tell whether a peak is among others: on the same order, within the wider of both resolutions.
+
+    Examples
+    --------
+    >>> line = OrderLine("mesh", 20.0)
+    >>> peak = Pick(line, 1.0, 10.0, 600.0, 20.0, 9.0, 15.0)
+    >>> is_among(peak, [Pick(line, 1.1, 10.2, 610.0, 20.5, 7.0, 14.0)]), is_among(peak, [])
+    (True, False)
+    """
+    return any(
+        own.line.name == pick.line.name and abs(own.frequency - pick.frequency) <= max(own.resolution, pick.resolution)
+        for own in picks
+    )
+
+
+def survives(pick: Pick, variant: str, windows: Iterable[OtherWindow]) -> bool:
+    """Tell whether every window shows a peak of a variant."""
+    return all(is_among(pick, window.picks[variant]) for window in windows)
+
+
+def stays_absent(pick: Pick, variant: str, other: str, windows: Iterable[OtherWindow]) -> bool:
+    """Tell whether a peak of a variant is there and absent from the other variant with every window."""
+    return all(is_among(pick, window.absent[variant, other]) for window in windows)

@@ -1,22 +1,164 @@
-"""Waterfalls: amplitude spectra of a run-up over the speed of the reference shaft.
+"""Waterfalls: amplitude spectra of a run-up over the speed of the reference shaft, and the order lines in them.
 
 Amplitudes are peak amplitudes of a sine; levels are ``20 log10(amplitude / reference)`` in dB. Speeds are those of the
-reference shaft as in `exugear.results.spectra.orders`.
+reference shaft as in `exugear.results.spectra.waterfall`.
+
+The reference shaft is that of the overall input. Its speeds are in rad/s and count by magnitude: the line of order
+``o`` lies at the frequency ``o |speed| / 2 pi``.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM
-from exugear.results.spectra.orders import OrderLine
-from exugear.results.spectra.spectrum import amplitude_spectrum, sweep_limited_resolution
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed, TitledRows, value_range
+
+# Order lines: what turns with a gearbox excites a fixed number of times per turn of the reference shaft
+
+SAME_ORDER = 1e-6
+"""Share by which orders of one line may differ."""
+
+
+@dataclass(frozen=True)
+class OrderLine:
+    """A named line of constant order in a waterfall."""
+
+    name: str
+    """For legends and tables, such as ``"HS mesh"``."""
+    order: float
+    """Periods per turn of the reference shaft."""
+
+    def place(self, orders: Floats) -> int | None:
+        """Place of the line among orders (n,); None if it is none of them."""
+        nearest = int(np.argmin(np.abs(orders - self.order)))
+        if abs(orders[nearest] - self.order) <= SAME_ORDER * self.order:
+            return nearest
+        return None
+
+    def frequency(self, speed: ArrayLike) -> Floats:
+        """Frequency on the line, Hz, at speeds of the reference shaft in rad/s."""
+        return self.order * np.abs(np.asarray(speed, dtype=np.float64)) / (2.0 * math.pi)
+
+
+def harmonics(name: str, order: float, count: int) -> tuple[OrderLine, ...]:
+    """Lines of a mesh and its harmonics.
+
+    Parameters
+    ----------
+    name : name of the first
+    order : order of the first
+    count : how many, the first included
+
+    Examples
+    --------
+    >>> [(line.name, line.order) for line in harmonics("planetary", 99.0, 2)]
+    [('planetary', 99.0), ('2 × planetary', 198.0)]
+    """
+    return tuple(
+        OrderLine(name if number == 1 else f"{number} × {name}", number * order) for number in range(1, count + 1)
+    )
+
+
+def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
+    """Mesh orders with harmonics; meshes of one frequency (sun and ring) share a line.
+
+    Parameters
+    ----------
+    count : harmonics of each mesh, the first included
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [(line.name, round(line.order, 3)) for line in order_lines(gearbox, 1)]
+    [('sun_planet', 99.0), ('intermediate', 468.571), ('high_speed', 1792.795)]
+    """
+    mesh_orders = gearbox.train.mesh_frequencies(2.0 * math.pi)  # at one turn per second
+    lines: list[OrderLine] = []
+    known_orders: list[float] = []
+    for mesh in gearbox.meshes:
+        order = mesh_orders[mesh.name]
+        if not any(abs(order - known) < 1e-6 * known for known in known_orders):
+            known_orders.append(order)
+            lines.extend(harmonics(mesh.family, order, count))
+    return tuple(lines)
+
+
+# Amplitude spectra of signals, and how finely a window resolves a tone that sweeps
+
+
+def amplitude_spectrum(values: ArrayLike, rate: float, window: str = "hann", padding: int = 1) -> tuple[Floats, Floats]:
+    """One-sided amplitude spectrum.
+
+    Parameters
+    ----------
+    values : (..., n) signal, along the last axis. One in single precision is analysed so, in half the time.
+    rate : sampling rate, Hz
+    window : name of a SciPy window. ``"flattop"`` reads amplitudes between bins to 0.1 %, ``"hann"`` to 15 %.
+    padding : length after appending zeros over `n`: spectral lines in between, no finer resolution
+
+    Returns
+    -------
+    frequency : (padding n // 2 + 1,) Hz
+    amplitude : (..., padding n // 2 + 1) peak amplitude of a sine at that frequency; at frequency zero the mean
+
+    Examples
+    --------
+    >>> time = np.arange(1000) / 1000.0
+    >>> frequency, amplitude = amplitude_spectrum(3.0 * np.cos(2 * np.pi * 50.0 * time), 1000.0)
+    >>> float(frequency[50]), round(float(amplitude[50]), 12)
+    (50.0, 3.0)
+    """
+    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+
+    signal = np.asarray(values)
+    kind = np.float32 if signal.dtype == np.float32 else np.float64
+    count = padding * signal.shape[-1]
+    weights = scipy.signal.get_window(window, signal.shape[-1])  # periodic: a tone on a bin comes out exactly
+    scaled = (2.0 / weights.sum() * weights).astype(kind)
+    amplitude: Floats = np.abs(scipy.fft.rfft(signal * scaled, n=count, axis=-1))
+    amplitude[..., 0] *= 0.5
+    if count % 2 == 0:
+        amplitude[..., -1] *= 0.5
+    frequency = np.arange(amplitude.shape[-1]) * (rate / count)
+    return frequency, amplitude
+
+
+def sweep_limited_resolution(sweep_rate: ArrayLike) -> Floats:
+    """Finest frequency resolution of a tone that sweeps, Hz: the root of its rate (Hz/s).
+
+    During a window T the tone sweeps over rate x T, while the window resolves 1/T: best where both are equal.
+
+    Examples
+    --------
+    >>> float(np.round(sweep_limited_resolution(214.0), 1))
+    14.6
+    """
+    resolution: Floats = np.sqrt(np.abs(np.asarray(sweep_rate, dtype=np.float64)))
+    return resolution
+
+
+def sweep_matched_window(sweep_rate: float) -> float:
+    """Window length, s, that resolves a tone sweeping at a rate (Hz/s) best.
+
+    Examples
+    --------
+    >>> round(1e3 * sweep_matched_window(214.0))  # milliseconds
+    68
+    """
+    if not abs(sweep_rate) > 0.0:
+        raise ValueError("sweep rate = 0: a steady tone has no best window, choose its length")
+    return 1.0 / math.sqrt(abs(sweep_rate))
+
+
+# Waterfalls: amplitude spectra of a run-up over the speed of the reference shaft
 
 
 @dataclass(frozen=True)

@@ -16,15 +16,14 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.steady.mean_system.mean_system import PLACE_STEP, PLACES, RATE_STEP, MeanSystem
-from exugear.steady.mean_system.mesh_places import MeshPlaces, wave_shapes
-from exugear.steady.mean_system.mesh_ports import POSITION, MeshPorts
+from exugear.steady.mean_system.mesh_places import POSITION, MeshPlaces, MeshPorts, wave_shapes
 from exugear.steady.mean_system.mesh_waves import WAVES, MeshWaves, wave_name
 from exugear.steady.mean_system.rotating_frame import PlanetSet, SteadyError
-from exugear.steady.mean_system.sampled_bearings import sample_rolling
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.kernels.connectors import rolling_pushes, rolling_strains
-from exugear.system.bearings.kernels.rolling import RollingArrays, selected_rolling
-from exugear.system.bearings.support_laws import bearing_rows
+from exugear.steady.mean_system.sampled_laws import sample_rolling
+from exugear.system.bearings.stiffness import bearing_rows
+from exugear.system.kernels.connectors import rolling_pushes, rolling_strains
+from exugear.system.kernels.rolling import RollingArrays, selected_rolling
+from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats, Integers
 
 COMPONENTS = 5

@@ -13,23 +13,18 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
-from exugear.steady.harmonics.side_by_side import Elimination, elimination, solve_side_by_side
-from exugear.steady.mean_system.rotating_frame import (
-    PlanetSet,
-    RotatingFrame,
-    SteadyError,
-    planet_sets,
-)
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.equal_planets import planet_supports, with_equal_planets
-from exugear.system.bearings.support_laws import load_stands_still
-from exugear.system.statics import BalanceError, static_state
+from exugear.steady.harmonics.linear_solvers import Elimination, elimination, solve_side_by_side
+from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame, SteadyError, planet_sets
+from exugear.system.bearings.stiffness import load_stands_still, planet_supports, with_equal_planets
+from exugear.system.statics import RIGID_BODY_LIMIT, BalanceError, static_state
+from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import Displayed
 
@@ -482,3 +477,47 @@ def _checked_change(here: Floats, there: Floats, most: float) -> float:
             "that turns with them), which the steady response cannot treat; run the load case in time instead"
         )
     return change
+
+
+# Modes of the mean system at one speed: eigenvalues with right and left shapes, gyroscopic and damped as it is
+
+
+def mean_modes(system: MeanSystem, speed: float) -> tuple[Complexes, Complexes, Complexes]:
+    """Vibrations of a mean system at a speed of the input (rad/s), as `vibrations` gives them."""
+    return vibrations(system.mass, system.damping_at(speed), system.stiffness_at(speed))
+
+
+def vibrations(mass: Floats, damping: Floats, stiffness: Floats) -> tuple[Complexes, Complexes, Complexes]:
+    """Eigenvalues (n,) of M u'' + C u' + K u = 0 with positive frequency, and right and left shapes (n, 2 size).
+
+    Left shapes are scaled so that the response to a load b at the angular frequency w is the sum of
+    right (left . [0, M^-1 b]) / (i w - eigenvalue). Free rolling and overdamped motions are left out.
+
+    Parameters
+    ----------
+    mass, damping, stiffness : (size, size)
+
+    Examples
+    --------
+    >>> values, _, _ = vibrations(np.eye(2), np.zeros((2, 2)), np.diag([100.0, 400.0]))
+    >>> values.imag.round(6)
+    array([10., 20.])
+    """
+    n = len(mass)
+    lower = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
+    values, left, right = _eig(np.vstack([np.eye(n, 2 * n, n), lower]))
+    kept = values.imag > 2.0 * np.pi * RIGID_BODY_LIMIT
+    kept &= np.abs(values.imag) > np.abs(values.real)
+    order = np.flatnonzero(kept)[np.argsort(values[kept].imag)]
+    right = right[:, order].T
+    left = left[:, order].conj().T
+    # Left shapes of a repeated eigenvalue are any basis of their space: they become the partners of the right ones.
+    partners: Complexes = np.linalg.solve(left @ right.T, left).astype(np.complex128)
+    return values[order], right, partners
+
+
+def _eig(matrix: Floats) -> tuple[Complexes, Complexes, Complexes]:
+    """Eigenvalues, and left and right eigenvectors as columns."""
+    found: Any = scipy.linalg.eig(matrix, left=True, right=True)
+    values, left, right = found
+    return values, left, right

@@ -3,18 +3,37 @@
 A single mesh is one place. Meshes of planets in phase are looked at in places spread evenly over the turn of the
 carrier, in which the waves add up as they do for a planet there: the mean over its turn counts. Of planets out of
 phase each is a place, whose angle turns with the base of its carrier.
+
+A law along a row reads its deflection and the position in the mesh cycle, and has one force; what it resists
+misalignment with is in the mean system. Where its load moves along the face it reads the misalignment, too, and has a
+moment along that. The law `table` reads the
+approach of both flanks, the centre distance, the misalignment of both flanks and the position, and pushes along all
+but the last (`exugear.system.tooth_mesh.laws.table`). Kernels of `fe_ste.tools.compilation` read the numbers of its
+rows.
+
+A function f of the mesh cycle multiplies what each mesh reads. Seen in waves around the carrier that is
+
+    sum over places of   back (waves, places)  f(position)  there (places, waves),
+
+as `exugear.steady.mean_system.mesh_places` has both. The position follows the angle of the base; of planets out of
+phase, shapes turn with the angle of the carrier. Both make harmonics: those of the cycle are known, those of a turn
+follow from few samples of it.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from exugear.steady.harmonics.lines import Group
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.rotating_frame import PlanetSet
-from fe_ste.tools.arrays import Floats
+from exugear.system.kernels.meshes import TILT_LEVER, TILT_REST, MeshArrays
+from exugear.system.kernels.table_law import NOMINAL_DEFLECTION, NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT
+from fe_ste.tools.arrays import Complexes, Floats
 
 TURNED = 5
 """Places around a carrier whose planets mesh in phase: exact for products of four waves."""
@@ -87,3 +106,187 @@ def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None) 
         return planets.values(math.copysign(1.0, speed * planets.ratio) * turned)
     theta = 2.0 * np.pi * np.arange(TURNED) / TURNED
     return np.stack([np.ones_like(theta), np.cos(theta), np.sin(theta)], axis=1)
+
+
+# What mesh laws read of the motion and what they push along: rows by the frame's coordinates, as waves
+
+DEFLECTION, MISALIGNMENT, POSITION = 0, 1, -1
+"""Places among what a law along a row reads: the first, the second where its load moves along the face, the last."""
+FRONT, BACK, CENTRE, TILT, BACK_TILT = range(5)
+"""Places among what the law `table` reads and pushes along."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPorts:
+    """Rows of all mesh waves at one speed; m waves, r readings, f forces."""
+
+    readings: Floats
+    """(m, r, size) rows of what the law reads; the last is the position in the mesh cycle, in cycles."""
+    static: Floats
+    """(m, r) their values in the static state; the mean position counts from there."""
+    forces: Floats
+    """(m, f, size) rows along which its forces push."""
+    positions: Floats
+    """(meshes,) position in the mesh cycle at zero angle of the input, of the waves of meshes alone."""
+    levers: Floats
+    """(m, size + 1) rows by which the deflection at mid-face is more than what a law reads of it that bears beside
+    the middle, of the waves of meshes alone; in the last column that in the static state."""
+    rates: Floats | None = None
+    """(m, r, size) rows of what the law reads by the rates of the coordinates; non-linear bearings have some."""
+
+
+def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
+    """Rows of all mesh waves at a speed of the input (rad/s); `parting` for the law `table`."""
+    meshes = waves.assembly.meshes
+    rows, offsets = _table_rows(meshes) if parting else _row_rows(meshes, waves.wander)
+    means = np.array([wave.wave == 0 for wave in waves.waves])
+    firsts = [wave.first for wave in waves.waves]
+    readings = [waves.gradients(row, speed) for row in rows] + [waves.position_rows()]
+    static = [waves.values(row, speed) + means * offset[firsts] for row, offset in zip(rows, offsets, strict=True)]
+    # The mean position counts from the static state; what planets are ahead of each other by stays.
+    ahead = np.where(means, 0.0, readings[-1] @ waves.system.static_at(speed))
+    levers = meshes.tilt[:, [TILT_LEVER]] * meshes.table.misalignment
+    forces = readings[:-1] if parting else [waves.gradients(meshes.force - levers, speed), *readings[1:-1]]
+    shift = meshes.tilt[:, TILT_LEVER] * (meshes.table.nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST])
+    beside = waves.values(levers, speed) + means * shift[firsts]
+    return MeshPorts(
+        readings=np.stack(readings, axis=1),
+        static=np.stack([*static, ahead], axis=1),
+        forces=np.stack(forces, axis=1),
+        positions=waves.positions(speed),
+        levers=np.column_stack([waves.gradients(levers, speed), beside]),
+    )
+
+
+def _row_rows(meshes: MeshArrays, wander: bool) -> tuple[list[Floats], list[Floats]]:
+    """Rows that a law along a row reads (`system.tooth_mesh.contact_state`), and their values at zero coordinates.
+
+    They are its deflection with the mean lever of the load and, where loads wander along the face, the misalignment
+    against that of the contact's state; zeros of a mesh whose load stays.
+    """
+    lever = meshes.tilt[:, TILT_LEVER]
+    nominal = meshes.table.nominal
+    turned = nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST]
+    row = meshes.deflection - lever[:, None] * meshes.table.misalignment
+    offset = lever * turned
+    if not wander:
+        return [row], [nominal[:, NOMINAL_DEFLECTION] - offset]
+    moves = meshes.way_pieces > 0
+    rows = [row, moves[:, None] * meshes.table.misalignment]
+    return rows, [nominal[:, NOMINAL_DEFLECTION] - offset, moves * turned]
+
+
+def _table_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:
+    """Rows of both flanks and of where the gears stand, and their values at zero coordinates."""
+    table = meshes.table
+    nominal = table.nominal.T
+    front = nominal[NOMINAL_DEFLECTION]
+    tilt = nominal[NOMINAL_MISALIGNMENT]
+    rows = [meshes.deflection, table.back, table.centre, table.misalignment, table.back_misalignment]
+    # The other flank closes when the loaded one opens by the backlash.
+    return rows, [front, -front - table.backlash, nominal[NOMINAL_DISTANCE], tilt, tilt]
+
+
+# How functions of the mesh cycle couple the waves of meshes: one matrix for each harmonic of the angles that turn
+
+SAMPLED = 4
+"""Samples of a carrier's turn over the highest multiple of it that shapes have with each other."""
+Spectra = Mapping[tuple[int, int], Complexes]
+"""Harmonics (m, h + 1) over the mesh cycle of the functions that lead to a force from a reading."""
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """The waves of one family of meshes, or a single mesh."""
+
+    first: int
+    count: int
+    """Its first wave, which is the mean one, and number of waves."""
+    base: int
+    carrier: int
+    """Place of the base that the mesh cycle follows, and of that of the carrier among the bases; -1 of none."""
+    planets: PlanetSet | None
+    ahead: tuple[float, ...]
+    """Cycles by which the mesh in each place is ahead; one number where all are alike."""
+
+    @property
+    def waves(self) -> slice:
+        """Its waves."""
+        return slice(self.first, self.first + self.count)
+
+    @property
+    def turns(self) -> int:
+        """Largest multiple of the carrier's angle in products of two shapes."""
+        if self.carrier < 0 or self.planets is None:
+            return 0
+        return 2 * (self.planets.waves // 2)
+
+
+def families(waves: MeshWaves) -> tuple[Family, ...]:
+    """Families of all mesh waves, in their order."""
+    carriers = [name for name, _ in waves.carriers]
+    found = []
+    for first, wave in enumerate(waves.waves):
+        if wave.wave != 0:
+            continue
+        planets = waves.planets(wave)
+        count = sum(other.first == wave.first for other in waves.waves)
+        carrier = len(waves.base_orders) + carriers.index(planets.carrier) if planets and wave.ahead else -1
+        found.append(Family(first, count, wave.base, carrier, planets, wave.ahead or (0.0,)))
+    return tuple(found)
+
+
+def group_of(family: Family, harmonics: int, forces: int, bases: int) -> Group:
+    """Group of the forces of a family, which follow each other wave by wave, with harmonics up to a highest one."""
+    every = np.arange(-harmonics, harmonics + 1)
+    turns = np.arange(-family.turns, family.turns + 1)
+    multiples = np.zeros((len(every), len(turns), bases), dtype=np.int64)
+    multiples[..., family.base] = every[:, None]
+    if family.carrier >= 0:
+        multiples[..., family.carrier] = turns
+    return Group(forces * family.first, forces * family.count, multiples.reshape(-1, bases))
+
+
+def coupled(
+    waves: MeshWaves, family: Family, spectra: Spectra, ports: MeshPorts, speed: float, forces: int
+) -> Complexes:
+    """Coefficients (q, forces of waves, readings of waves) at the harmonics of `group_of`, at a speed (rad/s).
+
+    Where no planets are out of phase, what each mesh is ahead in the static state counts to first order: it gives a
+    mean wave to cosine and sine.
+    """
+    forward = waves.waves[family.first].sense * math.copysign(1.0, speed) > 0.0
+    cycles = np.array([own[family.first] for own in spectra.values()])
+    parts = (_between_places if waves.carriers else _between_waves)(family, cycles, ports, speed)
+    if not forward:  # the mesh runs through its cycle backwards, the carrier turns as it does
+        parts = parts[:, :, ::-1].conj()
+    harmonics = cycles.shape[1] - 1
+    found = np.zeros((2 * harmonics + 1, 2 * family.turns + 1, family.count, forces, family.count, forces), complex)
+    for (force, read), own in zip(spectra, parts, strict=True):
+        found[harmonics:, :, :, force, :, read] = own
+        found[:harmonics, :, :, force, :, read] = own[:0:-1, ::-1].conj()
+    return np.asarray(found.reshape(-1, family.count * forces, family.count * forces))
+
+
+def _between_waves(family: Family, cycles: Complexes, ports: MeshPorts, speed: float) -> Complexes:
+    """Coefficients (f, h + 1, 1, waves, waves) of each wave with itself, and of the mean wave to others."""
+    orders = 2j * math.pi * np.arange(cycles.shape[1])
+    turned = cycles * np.exp(orders * ports.positions[family.first])
+    found = np.zeros((*cycles.shape, 1, family.count, family.count), dtype=complex)
+    found[:, :, 0, range(family.count), range(family.count)] = turned[..., None]
+    found[:, :, 0, :, 0] += (orders * turned)[..., None] * ports.static[family.waves, POSITION]
+    return found
+
+
+def _between_places(family: Family, cycles: Complexes, ports: MeshPorts, speed: float) -> Complexes:
+    """Coefficients (f, h + 1, turns, waves, waves) by all places, each as far ahead as the static state has it."""
+    samples = SAMPLED * family.turns if family.carrier >= 0 else 1
+    theta = 2.0 * math.pi * np.arange(samples) / samples
+    there = wave_shapes(family.planets, speed, theta if family.carrier >= 0 else None)
+    there = np.broadcast_to(there, (samples, *there.shape[-2:]))
+    back = np.swapaxes(there / (there**2).sum(axis=-2, keepdims=True), -1, -2)
+    ahead = ports.positions[family.first] + np.array(family.ahead) + there @ ports.static[family.waves, POSITION]
+    turned = np.exp(2j * math.pi * np.arange(cycles.shape[1])[:, None, None] * ahead)
+    between = (back * turned[:, :, None, :]) @ there
+    turns = np.fft.fft(between, axis=1)[:, np.arange(-family.turns, family.turns + 1)] / samples
+    return np.asarray(cycles[:, :, None, None, None] * turns)

@@ -20,13 +20,12 @@ from typing import Literal
 
 import numpy as np
 
-from exugear.steady.harmonics.lines import Modulator
-from exugear.steady.harmonics.products import fourier_coefficients
+from exugear.steady.harmonics.lines import Modulator, fourier_coefficients
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.mean_system.rotating_frame import PlanetSet, RotatingFrame
-from exugear.system.assembly import Assembly
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
-from exugear.system.tooth_mesh.kernels.meshes import FRAME, MOMENT_BEYOND, ROW_SIZE, frame_row
+from exugear.system.kernels.meshes import FRAME, MOMENT_BEYOND, ROW_SIZE, frame_row
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.line_of_action import CURVE_FORM, EXPONENT
 from fe_ste.tools.arrays import Complexes, Floats
 

@@ -20,10 +20,10 @@ from typing import TypeAlias
 import numpy as np
 
 from exugear.gearbox.parts import Body
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.equal_planets import FEWEST, equally_spaced, planet_families
+from exugear.system.bearings.stiffness import FEWEST, equally_spaced, planet_families
 from exugear.system.kernels.coordinates import TILT
-from exugear.system.tooth_mesh.kernels.meshes import MeshArrays
+from exugear.system.kernels.meshes import MeshArrays
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats, Integers
 

@@ -2,7 +2,7 @@
 
 A law along a row reads deflection and position, and the misalignment between them where its load moves along the face,
 with a moment along that (`exugear.system.tooth_mesh.contact_state`); the law `table` both flanks, the centre distance,
-both misalignments and the position (`exugear.steady.mean_system.mesh_ports`). Loops are compiled by
+both misalignments and the position (`exugear.steady.mean_system.mesh_places`). Loops are compiled by
 `fe_ste.tools.compilation`.
 """
 
@@ -12,9 +12,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from exugear.steady.mean_system.mesh_ports import BACK, BACK_TILT, CENTRE, FRONT, POSITION, TILT
-from exugear.system.tooth_mesh.kernels.meshes import MeshArrays
-from exugear.system.tooth_mesh.kernels.table_law import (
+from exugear.steady.mean_system.mesh_places import BACK, BACK_TILT, CENTRE, FRONT, POSITION, TILT
+from exugear.system.kernels.meshes import MeshArrays
+from exugear.system.kernels.rolling import (
+    ELASTIC_PART,
+    RollingArrays,
+    rolling_memory,
+    rolling_tangent,
+    set_force,
+    sum_rows,
+)
+from exugear.system.kernels.table_law import (
     BY_DISTANCE,
     BY_MISALIGNMENT,
     DAMPING_SIZE,
@@ -32,7 +40,8 @@ from exugear.system.tooth_mesh.kernels.table_law import (
 )
 from exugear.system.tooth_mesh.laws.line_of_action import STRAIGHT
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.compilation import compiled
+from fe_ste.tools.compilation import compiled, kernel
+from fe_ste.tools.inner_kernels import kept_bundle
 
 TOUCHING = 0.25e-6
 """Approach over which the damping of teeth that touch sets in, m.
@@ -243,3 +252,37 @@ def _fill_flank(
             changing = time * approaching * (ramp * second[3, b] + ramp_slope * touch * stiffness)
             for a in range(3):
                 slope[s, places[a], places[b]] += signs[a] * signs[b] * (second[a, b] + along[a] * changing)
+
+
+# The law of rolling bearings on many samples at once: forces and their slopes, by the kernel of runs in time
+
+
+def sample_rolling(rolling: RollingArrays, law: int, readings: Floats) -> tuple[Floats, Floats]:
+    """Sample the law of one bearing.
+
+    Parameters
+    ----------
+    law : which of them
+    readings : (s, 5) displacement and tilts, ahead by the time of the damping, m and rad
+
+    Returns
+    -------
+    force : (s, 5) N and N m
+    slope : (s, 5, 5) its derivatives by the readings
+    """
+    force = np.empty(readings.shape)
+    slope = np.empty((*readings.shape, readings.shape[1]))
+    _fill(law, np.ascontiguousarray(readings), np.zeros(6), kept_bundle(rolling), rolling_memory(rolling), force, slope)
+    return force, slope
+
+
+@kernel
+def _fill(
+    law: int, readings: Floats, still: Floats, rolling: RollingArrays, memory: Floats, force: Floats, slope: Floats
+) -> None:
+    for s in range(readings.shape[0]):
+        about_axis = sum_rows(law, readings[s], still, 0.0, 0.0, rolling, memory)
+        set_force(law, ELASTIC_PART, readings[s], about_axis, rolling, memory)
+        for i in range(readings.shape[1]):
+            force[s, i] = memory[ELASTIC_PART + i]
+        rolling_tangent(law, readings[s], 0.0, rolling, slope[s])

@@ -13,14 +13,7 @@ from typing import Any
 import numpy as np
 
 from exugear.gearbox.versions import REDUCTION
-from exugear.system.bodies.finite_elements.shaft_sections import (
-    STANDARD_SIZE,
-    MeshSize,
-    SeatBand,
-    ShaftSection,
-)
-from exugear.system.bodies.finite_elements.turned_section import Harmonic, HarmonicName, Shaft
-from exugear.system.bodies.reduced_body import (
+from exugear.system.bodies.reduction import (
     TILT_X,
     TILT_Y,
     UX,
@@ -28,18 +21,18 @@ from exugear.system.bodies.reduced_body import (
     UZ,
     Blank,
     ReducedBody,
+    ReducedComponent,
     ReductionError,
     ReductionSummary,
     Seat,
     Surface,
-)
-from exugear.system.bodies.reduction import (
-    ReducedComponent,
+    load_or_reduce,
     reduce_component,
     selective_mass_scaling,
     symmetric,
 )
-from exugear.system.bodies.store import load_or_reduce
+from exugear.system.bodies.shaft_sections import STANDARD_SIZE, MeshSize, SeatBand, ShaftSection
+from exugear.system.bodies.turned_section import Harmonic, HarmonicName, Shaft
 from exugear.system.kernels.coordinates import SPIN
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
@@ -88,7 +81,7 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
 
     Raises
     ------
-    exugear.system.bodies.finite_elements.shaft_sections.ShaftError
+    exugear.system.bodies.shaft_sections.ShaftError
         A shaft that cannot be, or a seat that does not lie on it.
     ReductionError
         A blank without its seat, or too few seats.

@@ -9,10 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.system.bodies.kernels.turning import TurningArrays
-from exugear.system.bodies.reduced_body import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
+from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.kernels.products import filled_up, laid_out, rectangular_tiles, symmetric_tiles
+from exugear.system.kernels.turning import TurningArrays
 from fe_ste.tools.arrays import Floats
 
 

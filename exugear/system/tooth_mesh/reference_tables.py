@@ -11,7 +11,7 @@ import xarray as xr
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.tables import TABLE_FOLDER, requested_tables
-from fe_ste.reference.contact_model import Iteration
+from fe_ste.reference.newton import Iteration
 from fe_ste.reference.table import NonlinearInput, NonlinearTable
 
 #: Positions of the mesh cycle unless asked for otherwise: one takes a minute or two.

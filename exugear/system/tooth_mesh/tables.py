@@ -1,24 +1,123 @@
-"""The transmission error tables of a gearbox: which are wanted, which are there, and what they say in figures."""
+"""The transmission error tables of a gearbox: which are wanted, which are there, and what they say in figures.
+
+An axis reaches three times as far as the static state, for loads that grow and gears that swing, and at least 20 um:
+over the common face for the misalignment, for the centre distance where the backlash leaves it. Ends are round numbers,
+so that a gearbox that varies a little keeps its tables.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
-from exugear.system.tooth_mesh.grid_axes import GridAxes, axes_reaching, reaches
-from fe_ste.transmission_error.hertz import pitch_point_pressure
+from fe_ste.geometry.checks import GeometryError
+from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Floats
+from fe_ste.transmission_error.search import pitch_point_pressure
 from fe_ste.transmission_error.states import CUT_OFF
+from fe_ste.transmission_error.surface import DOUBTFUL_CUT_OFF, MOST_MISSING, GapError, complete_cycle
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 if TYPE_CHECKING:
     import xarray as xr
 
+# Axes of a table over misalignment and centre distance that follow from how the gears stand at rest
+
+REACH = 3.0
+"""Times the static state that an axis reaches."""
+NEEDED = 0.5
+"""Part of its reach that an axis of a table must have that is there already."""
+LEAST = 20e-6
+"""Least end of an axis, m."""
+STEP = 40e-6
+"""Longest step of openings, m: half of it is interpolated within half a per cent of what usual teeth yield."""
+MOST_STEPS = 4
+"""Steps to either side at most."""
+ROUND_NUMBERS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+
+
+@dataclass(frozen=True)
+class GridAxes:
+    """Values along the axes of a pair's table."""
+
+    openings: tuple[float, ...]
+    """Openings at the +z end over the common face width, m."""
+    offsets: tuple[float, ...]
+    """Centre distances less that of the pair, m."""
+
+
+def reaches(table: MeshTable, wanted: TableInput) -> bool:
+    """Whether a table reaches far enough to serve in place of the one with axes that were laid for it."""
+    for axis, nominal in (("misalignment", 0.0), ("centre_distance", wanted.pair.centre_distance)):
+        have = table.dataset[axis].to_numpy() - nominal
+        want = np.array(getattr(wanted, axis)) - nominal
+        if have.max() < NEEDED * want.max() or have.min() > NEEDED * want.min():
+            return False
+    return True
+
+
+def axes_reaching(pair: GearPair, opening: float = 20e-6, change: float = 33e-6) -> GridAxes:
+    """Lay axes for a pair whose gears stand `opening` (m over the face) askew at rest, and `change` (m) from nominal.
+
+    Examples
+    --------
+    >>> from fe_ste.geometry.gears import Gear
+    >>> gear = Gear(name="g", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=5e-2, tooth_thinning=1e-4)
+    >>> axes = axes_reaching(GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3), 12e-6, 4e-6)
+    >>> [round(1e6 * value) for value in axes.openings], [round(1e6 * value) for value in axes.offsets]
+    ([-40, -20, 0, 20, 40], [-20, -10, 0, 10, 20])
+    """
+    end = rounded_up(max(LEAST, REACH * abs(opening)))
+    steps = min(MOST_STEPS, max(2, math.ceil(end / STEP)))
+    openings = _to_end(end, steps)
+    farther = rounded_up(max(LEAST, REACH * abs(change)))
+    offsets = [0.0]
+    for sense in (-1.0, 1.0):
+        side = _possible(pair, sense, farther)
+        offsets += [0.5 * sense * side, sense * side] if side else []
+    return GridAxes((*(-value for value in openings[::-1]), 0.0, *openings), tuple(sorted(offsets)))
+
+
+def rounded_up(value: float) -> float:
+    """Return the next round number, by `ROUND_NUMBERS`.
+
+    Examples
+    --------
+    >>> [float(f"{rounded_up(value):g}") for value in (2e-5, 2.1e-5, 9e-5, 1.2e-4)]
+    [2e-05, 3e-05, 0.0001, 0.00015]
+    """
+    power = 10.0 ** math.floor(math.log10(value) + 1e-9)
+    number = next(number for number in ROUND_NUMBERS if number * power >= value * (1.0 - 1e-9))
+    return float(f"{number * power:.3g}")
+
+
+def _to_end(end: float, steps: int) -> tuple[float, ...]:
+    return tuple(float(f"{end * step / steps:.6g}") for step in range(1, steps + 1))
+
+
+def _possible(pair: GearPair, sense: float, most: float) -> float:
+    """Greatest change of the centre distance to one side, m, up to `most`, at which the gears run; 0 if none."""
+    change = most
+    while change > 0.05 * LEAST:
+        try:
+            pair.with_centre_distance(pair.centre_distance + sense * change)
+        except GeometryError:
+            change = float(f"{0.8 * change:.2g}")
+        else:
+            return change
+    return 0.0
+
+
+# The transmission error tables of a gearbox: which are wanted, which are there, and what they say in figures
 
 TABLE_FOLDER = "tables"
 
@@ -340,3 +439,125 @@ def stored_tables(gearbox: Gearbox, out: Path, positions: int | None = None) -> 
     """Return the tables of a results folder that fit the gearbox, by the name of the pair."""
     requests = requested_tables(gearbox, out, positions=positions)
     return {request.name: request.stored for request in requests if request.stored}
+
+
+# What there is to say of tables: states that are not solved, and contact that is cut off at form circles
+
+
+def remarks_about_table(name: str, table: MeshTable) -> Iterator[str]:
+    """Say what is missing or cut off in the table of a pair, and what becomes of it; a line each."""
+    missing, states = _missing(table)
+    if missing:
+        first = f", first {table.failures[0]}" if table.failures else ""
+        yield (
+            f"{name}: {missing} of {states} states are not solved{first}; they are marked in the table, others stand "
+            "in for them, and what comes near them says so"
+        )
+    shares = table.dataset[CUT_OFF].to_numpy()
+    cut = int(np.count_nonzero(shares > 0.0))
+    largest = float(np.nanmax(shares, initial=0.0))
+    if cut:
+        yield (
+            f"{name}: in {cut} of {states} states contact passes a form circle and is cut off there; up to "
+            f"{_percent(largest)} of the load would be beyond, {_percent(static_cut_off(table))} in the static state"
+        )
+
+
+def doubts_about_table(name: str, table: MeshTable) -> Iterator[str]:
+    """Say why the table of a pair is not to be trusted; a line each, none if it is."""
+    missing, states = _missing(table)
+    if missing > MOST_MISSING * states:
+        yield f"{name}: {missing} of {states} states are not solved, more than {_percent(MOST_MISSING)}"
+        yield from (f"{name}: {line}" for line in table.failures)
+        return
+    static = table.static_state
+    lost = int(np.count_nonzero(~static["converged"].to_numpy().astype(bool)))
+    positions = static.sizes["pmc"]
+    if lost > MOST_MISSING * positions:
+        yield f"{name}: {lost} of {positions} positions of the static state are not solved"
+    share = static_cut_off(table)
+    if share > DOUBTFUL_CUT_OFF:
+        yield (
+            f"{name}: in the static state {_percent(share)} of the load would be beyond a form circle, where a "
+            f"tip presses on a fillet (limit {_percent(DOUBTFUL_CUT_OFF)}); a tip of the mate that ends earlier, or a "
+            "tool with a smaller tip radius, keeps clear"
+        )
+
+
+def static_cut_off(table: MeshTable) -> float:
+    """Largest share of the load that is cut off in the static state."""
+    return float(np.nanmax(table.static_state[CUT_OFF].to_numpy(), initial=0.0))
+
+
+def _missing(table: MeshTable) -> tuple[int, int]:
+    """Numbers of states that are not solved, and of all."""
+    solved = table.dataset["converged"].to_numpy().astype(bool)
+    return int(np.count_nonzero(~solved)), solved.size
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
+
+
+# How far the load moves along the face over a mesh cycle, which the law `seed` leaves out, and how much that is
+
+LEAST_PUSH = 1e-6
+"""Push of a transmission error over the load below which it is round-off."""
+
+
+@dataclass(frozen=True)
+class WanderingLoad:
+    """Way of the load along the face, in its first harmonic.
+
+    Examples
+    --------
+    >>> WanderingLoad("helical", 1.8e-3, 4.3).in_words
+    'helical: the load moves by +-1.8 mm along the face in each mesh cycle'
+    """
+
+    pair: str
+    amplitude: float
+    """Of the load centre, m."""
+    over_error: float
+    """Its moment as forces at the ends of the face, over the force that the first harmonic of the transmission error
+    makes of the mean stiffness."""
+
+    @property
+    def in_words(self) -> str:
+        """Say how far."""
+        return f"{self.pair}: the load moves by +-{1e3 * self.amplitude:.2g} mm along the face in each mesh cycle"
+
+
+def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[WanderingLoad, ...]:
+    """Way of the load of each pair that has a table, at the static load, that which counts most first.
+
+    Parameters
+    ----------
+    folder : results folder
+    """
+    loads = []
+    for name, pair in {mesh.pair.name: mesh.pair for mesh in gearbox.meshes}.items():
+        if name in gearbox.stated_stiffness:
+            continue
+        with suppress(TableError, GapError):  # no law along a row takes such a table
+            point = complete_cycle(fitting_table(gearbox, name, folder).static_state)
+            loads.append(_way(name, point, pair.face_width))
+    return tuple(sorted(loads, key=lambda own: -own.over_error))
+
+
+def _way(name: str, point: xr.Dataset, width: float) -> WanderingLoad:
+    centre, error, stiffness = (
+        np.asarray(point[key].to_numpy(), dtype=np.float64).reshape(-1)
+        for key in ("load_centre", "ste", "mesh_stiffness")
+    )
+    force = float(point["line_of_action_force"].mean())
+    at_ends = force * _first_harmonic(centre) / (0.5 * width)
+    pushed = max(stiffness.mean() * _first_harmonic(error), LEAST_PUSH * force)
+    return WanderingLoad(name, _first_harmonic(centre), float(at_ends / pushed))
+
+
+def _first_harmonic(values: Floats) -> float:
+    """Amplitude of the first harmonic of a cycle."""
+    if len(values) > 2:
+        return float(2.0 * np.abs(np.fft.rfft(values)[1]) / len(values))
+    return 0.0

@@ -8,16 +8,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from exugear.system.bearings.kernels.rolling import (
-    CAGE_DAMPING,
-    DAMPED_PART,
-    ELASTIC_PART,
-    STORED,
-    RollingArrays,
-    rolling_forces,
-)
-from exugear.system.bodies.kernels.elastic import motion_energies
-from exugear.system.bodies.kernels.turning import turning_energies, turning_weight_power
 from exugear.system.kernels.coordinates import (
     AXIAL,
     BODY_SIZE,
@@ -28,8 +18,8 @@ from exugear.system.kernels.coordinates import (
     SPIN,
     TILT,
 )
-from exugear.system.signals import SignalLayout
-from exugear.system.tooth_mesh.kernels.fast_meshes import (
+from exugear.system.kernels.elastic import motion_energies
+from exugear.system.kernels.meshes import (
     DISSIPATED,
     ELASTIC,
     KINETIC,
@@ -48,9 +38,20 @@ from exugear.system.tooth_mesh.kernels.fast_meshes import (
     OF_VARYING_STIFFNESS,
     Meshes,
 )
-from exugear.system.tooth_mesh.kernels.table_law import TableArrays
+from exugear.system.kernels.rolling import (
+    CAGE_DAMPING,
+    DAMPED_PART,
+    ELASTIC_PART,
+    STORED,
+    RollingArrays,
+    rolling_forces,
+)
+from exugear.system.kernels.table_law import TableArrays
+from exugear.system.kernels.turning import turning_energies, turning_weight_power
+from exugear.system.signals import SignalLayout
 from exugear.system.tooth_mesh.laws.table import TABLE_FORM
-from exugear.transient.compiled.arrays import (
+from exugear.transient.compiled.equations import set_loads, tilt_sines, turn_between
+from exugear.transient.compiled.packing import (
     COS_B,
     DAMPED,
     LAG,
@@ -69,9 +70,6 @@ from exugear.transient.compiled.arrays import (
     Springs,
     Work,
 )
-from exugear.transient.compiled.connectors import turn_between
-from exugear.transient.compiled.equations import set_loads
-from exugear.transient.compiled.places import tilt_sines
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.octets import SIZE, all_eight, eight, put, sum_of
@@ -344,7 +342,7 @@ def take_sample(
 ) -> None:
     """Fill signals (columns,) and energies and powers (7,) of the state at time t (s) that was evaluated last.
 
-    Signals but those that a state has by itself (`exugear.transient.compiled.observers`); energies in the columns
+    Signals but those that a state has by itself (`exugear.transient.compiled.solver`); energies in the columns
     `KINETIC` and so on. Powers but those of meshes and loads stand for `stride` samples, none at 0: they take longer
     than the signals. Energies of bodies are left out unless it is `whole`.
     """

@@ -2,22 +2,364 @@
 
 Rigid bodies are ``NodeRigidBodyRxyz`` with z as spin axis, so that the unwrapped angle is a coordinate. An elastic body
 has such a node at each seat, one node for its modal coordinates, and its matrices in one ``ObjectGenericODE2`` on all.
+
+What is special about Exudyn's floating frame is told in `exugear.transient.exudyn_model.floating`.
+
+What Exudyn would compute from a mesh (nodes, mass matrix, modes) it is given as integrals, so that rigid rings on seats
+count and a run needs no mesh.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 
 from exugear.gearbox.parts import Body, node_position, seat_key
-from exugear.system.bodies.reduced_body import ReducedBody
+from exugear.system.bodies.elastic_body import (
+    FRAME_COORDINATES,
+    MODAL,
+    FloatingBody,
+    FloatingCoordinates,
+    FloatingMotion,
+    skew,
+)
+from exugear.system.bodies.reduction import ReducedBody
 from exugear.system.bodies.turning_frame import TurningBody
-from exugear.transient.exudyn_model.floating_bodies import FloatingBodies
-from exugear.transient.exudyn_model.library import items
-from exugear.transient.exudyn_model.parts import Parts
+from exugear.system.kernels.connectors import add_connector_forces
+from exugear.system.kernels.coordinates import SPIN, SpringArrays, add_spring_forces
+from exugear.system.kernels.meshes import MeshArrays
+from exugear.system.system import Assembly
+from exugear.transient.exudyn_model.library import elements, exudyn, items
 from fe_ste.tools.arrays import Floats
+
+# Exudyn's object of a floating frame of reference, made from the integrals of a body's modes
+
+Rotation = Literal["euler_parameters", "tait_bryan"]
+
+
+def add_floating_body(mbs: Any, body: FloatingBody, rotation: Rotation = "euler_parameters") -> tuple[Any, Any]:
+    """Add a floating body at rest in its place to an Exudyn system; return its rigid and its modal node."""
+    euler = rotation == "euler_parameters"
+    kind = exudyn.NodeType.RotationEulerParameters if euler else exudyn.NodeType.RotationRxyz
+    made = frame_integrals(body, kind).AddObjectFFRFreducedOrder(mbs, positionRef=body.centre.tolist())
+    if body.added_mass.any():
+        mbs.AddObject(items.ObjectGenericODE2(nodeNumbers=[made["nGenericODE2"]], massMatrix=np.diag(body.added_mass)))
+    return made["nRigidBody"], made["nGenericODE2"]
+
+
+def frame_integrals(body: FloatingBody, kind: Any) -> Any:
+    """Fill Exudyn's description of a floating body: what it would compute from a mesh follows from its integrals.
+
+    A skew matrix s(f) with s(f) v = f x v gives s(f)' s(g) = (f . g) 1 - g f' and s(f)' g = g x f.
+    """
+    second_moments = body.second_moments
+    first_moments = body.first_moments
+    modes = len(body.stiffness)
+    seats = len(body.seats)
+    products = np.einsum("aafg,bc->bcfg", second_moments, np.eye(3)) - second_moments.transpose(1, 0, 2, 3)
+    turned = np.stack([second_moments[a, b] - second_moments[b, a] for a, b in ((2, 1), (0, 2), (1, 0))])
+
+    interface = elements.ObjectFFRFreducedOrderInterface(rigidBodyNodeType=kind)
+    interface.rigidBodyNodeType = kind
+    interface.nModes, interface.trigList, interface.postProcessingModes = modes, [], {}
+    interface.xRef = (body.places - body.centre).ravel()
+    interface.modeBasis = body.at_seats.reshape(seats, 2, 3, -1)[:, 0].reshape(3 * seats, -1)
+    interface.massMatrixReduced = np.einsum("aafg->fg", second_moments)[1:, 1:]
+    interface.stiffnessMatrixReduced = np.diag(body.stiffness)
+    interface.totalMass, interface.inertiaLocal = body.mass, products[:, :, 0, 0]
+    interface.chiU = first_moments[:, 0] / body.mass
+    interface.chiUtilde = skew(interface.chiU)
+    interface.mPhitTPsi = first_moments[:, 1:]
+    interface.mPhitTPsiTilde = np.hstack([skew(column) for column in first_moments[:, 1:].T])
+    interface.mXRefTildePsi = turned[:, 0, 1:]
+    interface.mXRefTildePsiTilde = products[:, :, 0, 1:].transpose(0, 2, 1).reshape(3, -1)
+    interface.mPsiTildePsi = turned[:, 1:, 1:].transpose(1, 0, 2).reshape(3 * modes, -1)
+    interface.mPsiTildePsiTilde = products[:, :, 1:, 1:].transpose(2, 0, 3, 1).reshape(3 * modes, -1)
+    return interface
+
+
+# The bodies of a gearbox that move in floating frames, and the forces that they share with others
+
+Law = Callable[[float, Floats, Floats], Floats]
+"""Generalized forces on an assembly's coordinates as a function of time, coordinates and velocities."""
+DIFFERENCE = 1e-6
+"""Step that forces of supports are differentiated with, m or rad, and per second."""
+
+
+class FloatingBodies:
+    """The bodies of an assembly that move in floating frames, and the forces that they share with others.
+
+    The laws of meshes, bearings and couplings stay those of the assembly on its own coordinates: those of each floating
+    body follow from its frame and modes, and forces go back by the transposed matrix of their rates. In the solver's
+    vector of coordinates those of the frame and modes stand where the assembly has those of the body.
+
+    Parameters
+    ----------
+    mbs : exudyn.MainSystem
+    q, v : (size,) initial coordinates and velocities of the assembly
+
+    Attributes
+    ----------
+    nodes : rigid and modal node of each body by name
+    connectors, couplings : numbers of the bearings and couplings that act on these bodies
+    slices : place of each elastic body in the solver's vector
+    size : its length
+    """
+
+    def __init__(self, mbs: Any, assembly: Assembly, q: Floats, v: Floats) -> None:
+        self._assembly = assembly
+        self._coordinates: dict[str, FloatingCoordinates] = {}
+        self.nodes: dict[str, list[Any]] = {}
+        self._spin_terms: dict[str, tuple[Floats, Floats, Floats]] = {}
+        for name, body in assembly.floating.items():
+            in_assembly = assembly.elastic_slices[name]
+            coordinates = FloatingCoordinates(body)
+            frame_q, frame_v = coordinates.of(q[in_assembly], v[in_assembly])
+            rigid, modal = add_floating_body(mbs, body)
+            self.nodes[name] = [rigid, modal]
+            mbs.SetNodeParameter(rigid, "initialCoordinates", frame_q[:FRAME_COORDINATES].tolist())
+            mbs.SetNodeParameter(rigid, "initialVelocities", frame_v[:FRAME_COORDINATES].tolist())
+            mbs.SetNodeParameter(modal, "initialCoordinates", frame_q[MODAL].tolist())
+            mbs.SetNodeParameter(modal, "initialCoordinates_t", frame_v[MODAL].tolist())
+            self._coordinates[name] = coordinates
+            self._spin_terms[name] = body.spin_stiffness, body.spin_damping, body.centrifugal
+        self._start = q, v
+        self._last_spins = {name: float(q[assembly.spin[name]]) for name in self._coordinates}
+        self._is_floating = np.zeros(assembly.size, dtype=bool)
+        for name in self._coordinates:
+            self._is_floating[assembly.elastic_slices[name]] = True
+        ends = assembly.connectors.bodies
+        pairs = assembly.springs.coordinates
+        self.connectors = np.flatnonzero(((ends >= 0) & self._is_floating[ends]).any(axis=1))
+        self.couplings = np.flatnonzero(self._is_floating[pairs].any(axis=1))
+        self.slices: dict[str, slice] = {}
+        elastic = sum(body.reduced.size for body in assembly.elastic_bodies.values())
+        self._rigid_count = begin = assembly.size - elastic
+        for name, in_assembly in assembly.elastic_slices.items():
+            floats = name in self._coordinates
+            count = self._coordinates[name].count if floats else in_assembly.stop - in_assembly.start
+            self.slices[name] = slice(begin, begin + count)
+            begin += count
+        self.size = begin
+
+    def accept(self, q: Floats) -> None:
+        """Take coordinates (size,) of the assembly as those of the last step: spins will be nearest to theirs."""
+        self._last_spins = {name: float(q[self._assembly.spin[name]]) for name in self._last_spins}
+
+    def state(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Coordinates and velocities of the assembly from those of the solver."""
+        return self._state(q, v)[:2]
+
+    def _state(self, q: Floats, v: Floats) -> tuple[Floats, Floats, dict[str, FloatingMotion]]:
+        """Coordinates and velocities of the assembly, and the motion of each floating body."""
+        assembly_q = np.empty(self._assembly.size)
+        assembly_v = np.empty(self._assembly.size)
+        motions: dict[str, FloatingMotion] = {}
+        rigid = slice(0, self._rigid_count)
+        assembly_q[rigid], assembly_v[rigid] = q[rigid], v[rigid]
+        for name, in_assembly in self._assembly.elastic_slices.items():
+            in_solver = self.slices[name]
+            if name in self._coordinates:
+                motion = self._coordinates[name].motion(q[in_solver], v[in_solver], self._last_spins[name])
+                assembly_q[in_assembly], assembly_v[in_assembly] = motion.coordinates, motion.velocities
+                motions[name] = motion
+            else:
+                assembly_q[in_assembly], assembly_v[in_assembly] = q[in_solver], v[in_solver]
+        return assembly_q, assembly_v, motions
+
+    def add_forces(self, mbs: Any, nodes: list[Any], meshes: MeshArrays | None, applied: Law) -> None:
+        """Add one object on all nodes for meshes, and for all else that acts on the floating bodies.
+
+        Parameters
+        ----------
+        mbs : exudyn.MainSystem
+        nodes : of all bodies in the order of the assembly's coordinates
+        meshes : None leaves them out
+        applied : what acts from outside, on any coordinates; taken for the floating bodies alone
+        """
+        assembly = self._assembly
+        connectors = assembly.connectors.chosen(self.connectors)
+        springs = SpringArrays._make(values[self.couplings] for values in assembly.springs)
+        damping_time = assembly.gearbox.case.damping.body_time_s
+        matrices = {name: assembly.elastic_bodies[name].reduced for name in self._coordinates}
+
+        def supports(t: float, q: Floats, v: Floats) -> Floats:
+            f = np.where(self._is_floating, applied(t, q, v) + assembly.weight, 0.0)
+            add_connector_forces(q, v, connectors, f)
+            add_spring_forces(q, v, springs, f)
+            for name, body in matrices.items():
+                of_body = assembly.elastic_slices[name]
+                deforming = v[of_body] - v[of_body][SPIN] * body.spin
+                f[of_body] -= damping_time * (body.stiffness @ deforming)
+            return f
+
+        def force(mbs: Any, t: float, item: int, coordinates: Any, velocities: Any) -> Floats:
+            solver_q = np.array(coordinates)
+            solver_v = np.array(velocities)
+            q, v, motions = self._state(solver_q, solver_v)
+            f = supports(t, q, v)
+            if meshes is not None:
+                f += assembly.mesh_forces(q, v, meshes)
+            return self._onto_frames(f, solver_q, solver_v, motions)
+
+        # Supports are nearly linear: their derivatives at the start serve Newton's method throughout.
+        by_coordinates, by_rates = _differentiated(lambda q, v: supports(0.0, q, v), *self._start)
+
+        def derivatives(
+            mbs: Any, t: float, item: int, coordinates: Any, velocities: Any, factor_q: float, factor_v: float
+        ) -> Floats:
+            solver_q = np.array(coordinates)
+            solver_v = np.array(velocities)
+            q, v, motions = self._state(solver_q, solver_v)
+            matrix = -factor_q * by_coordinates - factor_v * by_rates
+            if meshes is not None:
+                by_q, by_v = assembly.mesh_jacobians(q, v, meshes)
+                matrix -= factor_q * by_q + factor_v * by_v
+            return self._matrix_onto_frames(matrix, solver_q, solver_v, motions, factor_q, factor_v)
+
+        mbs.AddObject(
+            items.ObjectGenericODE2(nodeNumbers=nodes, forceUserFunction=force, jacobianUserFunction=derivatives)
+        )
+
+    def _onto_frames(self, f: Floats, q: Floats, v: Floats, motions: Mapping[str, FloatingMotion]) -> Floats:
+        """Bring forces on the assembly's coordinates to the solver's, and add what Exudyn leaves out of spinning."""
+        on_solver = np.empty(self.size)
+        on_solver[: self._rigid_count] = f[: self._rigid_count]
+        for name, in_assembly in self._assembly.elastic_slices.items():
+            of_body = f[in_assembly]
+            on_solver[self.slices[name]] = of_body @ motions[name].jacobian if name in motions else of_body
+        for name in motions:
+            (stiffness, damping, steady), speed = self._spin_terms[name], self._speed(name, q, v)
+            modal = self._modal(name)
+            on_solver[modal] -= speed**2 * (stiffness @ q[modal] + steady) + speed * (damping @ v[modal])
+        return on_solver
+
+    def _speed(self, name: str, q: Floats, v: Floats) -> float:
+        """Spin speed of a floating body at coordinates and velocities of the solver, rad/s."""
+        in_solver = self.slices[name]
+        return self._coordinates[name].speed(q[in_solver], v[in_solver])
+
+    def _modal(self, name: str) -> slice:
+        """Modal coordinates of a floating body in the solver's vector."""
+        in_solver = self.slices[name]
+        return slice(in_solver.start + FRAME_COORDINATES, in_solver.stop)
+
+    def _matrix_onto_frames(
+        self,
+        matrix: Floats,
+        q: Floats,
+        v: Floats,
+        motions: Mapping[str, FloatingMotion],
+        factor_q: float,
+        factor_v: float,
+    ) -> Floats:
+        """Do the same with derivatives (size, size) of forces that stand on the left-hand side."""
+        rows = np.empty((self.size, self._assembly.size))
+        on_solver = np.empty((self.size, self.size))
+        rigid = slice(0, self._rigid_count)
+        rows[rigid] = matrix[rigid]
+        for name, in_assembly in self._assembly.elastic_slices.items():
+            of_body = matrix[in_assembly]
+            rows[self.slices[name]] = motions[name].jacobian.T @ of_body if name in motions else of_body
+        on_solver[:, rigid] = rows[:, rigid]
+        for name, in_assembly in self._assembly.elastic_slices.items():
+            of_body = rows[:, in_assembly]
+            on_solver[:, self.slices[name]] = of_body @ motions[name].jacobian if name in motions else of_body
+        for name in motions:
+            (stiffness, damping, _), speed = self._spin_terms[name], self._speed(name, q, v)
+            modal = self._modal(name)
+            on_solver[modal, modal] += factor_q * speed**2 * stiffness + factor_v * speed * damping
+        return on_solver
+
+
+def _differentiated(law: Callable[[Floats, Floats], Floats], q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Differentiate forces that are nearly linear to q and to v, each (size, size)."""
+    size = len(q)
+    by_q = np.empty((size, size))
+    by_v = np.empty((size, size))
+    for n, step in enumerate(DIFFERENCE * np.eye(size)):
+        by_q[:, n] = (law(q + step, v) - law(q - step, v)) / (2.0 * DIFFERENCE)
+        by_v[:, n] = (law(q, v + step) - law(q, v - step)) / (2.0 * DIFFERENCE)
+    return by_q, by_v
+
+
+# What stands in an Exudyn system, by the names of the assembly, and where others are fixed to it
+
+SPIN_COORDINATE = 5
+"""Coordinate of a rigid-body node that is its spin."""
+
+
+@dataclass
+class Parts:
+    """Nodes and objects of an Exudyn system."""
+
+    mbs: Any
+    """exudyn.MainSystem."""
+    assembly: Assembly
+    nodes: dict[str, Any] = field(default_factory=dict)
+    """Node of each body; of an elastic one that of its main seat, and those of its seats under.
+    `exugear.gearbox.parts.seat_key`."""
+    bodies: dict[str, Any] = field(default_factory=dict)
+    """Object of each rigid body."""
+    elastic_nodes: dict[str, list[Any]] = field(default_factory=dict)
+    """All nodes of each elastic body: those of its seats, then one for its modal coordinates."""
+    seat_positions: dict[str, Floats] = field(default_factory=dict)
+    """(3,) of each seat by its key, m."""
+    floating: FloatingBodies | None = None
+    """Bodies in floating frames, if there are any."""
+    _ground: Any = None
+
+    @property
+    def all_nodes(self) -> list[Any]:
+        """Nodes of all bodies in the order of the assembly's coordinates."""
+        rigid = [body.name for body in self.assembly.bodies if body.name not in self.elastic_nodes]
+        elastic = [node for nodes in self.elastic_nodes.values() for node in nodes]
+        return [self.nodes[name] for name in rigid] + elastic
+
+    def support_marker(self, body: str, item: str, position: Floats) -> Any:
+        """Marker of a support at a position (m, at zero angles) on a body, on an elastic one's seat, or the ground."""
+        key = seat_key(body, item)
+        if key in self.nodes and not (position - self.seat_positions[key]).any():
+            return self.mbs.AddMarker(items.MarkerNodeRigid(nodeNumber=self.nodes[key]))
+        if key in self.nodes:  # beside the seat's centre: a body without mass is the arm
+            arm = items.ObjectRigidBody(physicsMass=0.0, physicsInertia=[0.0] * 6, nodeNumber=self.nodes[key])
+            number = self.mbs.AddObject(arm)
+            local = position - self.seat_positions[key]
+        elif body in self.bodies:
+            carrying = next(b for b in self.assembly.bodies if b.name == body)
+            number = self.bodies[body]
+            local = position - node_position(carrying)
+        else:
+            number = self._ground_object()
+            local = position
+        return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=np.asarray(local).tolist()))
+
+    def support_spin(self, body: str, item: str) -> Callable[[], float]:
+        """Tell how to ask for the spin (rad, unwrapped) of what carries a support: a body, its seat, or the ground."""
+        node = self.nodes.get(seat_key(body, item), self.nodes.get(body))
+        if node is None:
+            return lambda: 0.0
+        coordinates = exudyn.OutputVariableType.Coordinates
+        return lambda: float(self.mbs.GetNodeOutput(node, coordinates)[SPIN_COORDINATE])
+
+    def _ground_object(self) -> Any:
+        if self._ground is None:
+            self._ground = self.mbs.AddObject(items.ObjectGround())
+        return self._ground
+
+    def spin_marker(self, body: str, seat: str | None = None) -> Any:
+        """Marker of a body's spin, of an elastic one at a seat or where torques act."""
+        key = seat_key(body, seat or "")
+        has_six = self.assembly.coordinates[body][0] >= 0
+        node = self.nodes[key if key in self.nodes else body]
+        coordinate = SPIN_COORDINATE if has_six else 0
+        return self.mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
+
+
+# Bodies of an assembly in an Exudyn system: rigid ones, those with their spin alone, and elastic ones
 
 
 def add_bodies(parts: Parts, q: Floats, v: Floats) -> None:

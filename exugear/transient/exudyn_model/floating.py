@@ -1,8 +1,8 @@
 """A floating body in an Exudyn system of its own, with any forces on its seats.
 
-The modes of a solid (`exugear.system.bodies.floating`) are those of an ``ObjectFFRFreducedOrder`` on a rigid-body node
+The modes of a solid (`exugear.system.bodies.solids`) are those of an ``ObjectFFRFreducedOrder`` on a rigid-body node
 with Euler parameters. Forces on its seats are an ``ObjectGenericODE2`` on the object's two nodes. In a gearbox such
-bodies are `exugear.transient.exudyn_model.floating_bodies`. For shafts it is the second way beside the frame that does
+bodies are `exugear.transient.exudyn_model.bodies`. For shafts it is the second way beside the frame that does
 not turn (`exugear.system.bodies.reduction`), whose constant matrices run far faster.
 
 What the object of Exudyn 1.13 gets wrong, and what is done about it:
@@ -24,12 +24,10 @@ from typing import Any
 
 import numpy as np
 
-from exugear.system.bodies.floating_body import FloatingBody
-from exugear.system.bodies.floating_coordinates import NO_TURN
-from exugear.system.bodies.reduced_body import TILT_X, TILT_Y
-from exugear.system.bodies.rotations import euler_rotation, skew
+from exugear.system.bodies.elastic_body import NO_TURN, FloatingBody, euler_rotation, skew
+from exugear.system.bodies.reduction import TILT_X, TILT_Y
 from exugear.system.kernels.coordinates import SPIN
-from exugear.transient.exudyn_model.floating_object import Rotation, add_floating_body
+from exugear.transient.exudyn_model.bodies import Rotation, add_floating_body
 from exugear.transient.exudyn_model.library import SolverFailure, exudyn, items, kinematics
 from fe_ste.tools.arrays import Floats
 

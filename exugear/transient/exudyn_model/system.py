@@ -20,16 +20,20 @@ from typing import Any, Literal
 import numpy as np
 
 from exugear.gearbox.variant import VariantError
-from exugear.system.assembly import Assembly
+from exugear.system.kernels.meshes import MeshArrays
 from exugear.system.loads import Loading
-from exugear.system.tooth_mesh.kernels.meshes import MeshArrays
-from exugear.transient.exudyn_model.bodies import add_bodies
-from exugear.transient.exudyn_model.connections import add_couplings, add_joint, add_supports
+from exugear.system.system import Assembly
+from exugear.transient.exudyn_model.bodies import Parts, add_bodies
+from exugear.transient.exudyn_model.forces import (
+    add_couplings,
+    add_joint,
+    add_loading,
+    add_mesh_element,
+    add_mesh_loads,
+    add_minimal_system,
+    add_supports,
+)
 from exugear.transient.exudyn_model.library import SolverFailure, exudyn
-from exugear.transient.exudyn_model.loading import add_loading
-from exugear.transient.exudyn_model.meshes import add_mesh_element, add_mesh_loads
-from exugear.transient.exudyn_model.minimal import add_minimal_system
-from exugear.transient.exudyn_model.parts import Parts
 from fe_ste.tools.arrays import Floats, Integers
 
 MeshRoute = Literal["element", "loads"]

@@ -21,12 +21,11 @@ from typer.testing import CliRunner
 
 from exugear.cli import case_verbs, verbs
 from exugear.cli.app import OBJECTS_OF_A_START, VERBS, app, garbage_seldom_looked_for
-from exugear.cli.errors import BadInputError, FailedError, exit_codes, interruption
+from exugear.cli.console import BadInputError, FailedError, exit_codes, interruption
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.tables import requested_tables
-from fe_ste.contact.cells import ContactSettings
-from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.elasticity.sectors import ContactMesh
+from fe_ste.contact.kinematics import ContactSettings
+from fe_ste.elasticity.hexmesh import ContactMesh, MeshSettings
 from fe_ste.reference.position import NonlinearSettings
 from fe_ste.reference.table import NonlinearInput
 from fe_ste.transmission_error.table import MeshTable, TableInput

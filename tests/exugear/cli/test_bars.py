@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from exugear.cli.bars import Bars, files_read
-from exugear.cli.errors import BadInputError, FailedError, exit_codes, model_errors
+from exugear.cli.console import BadInputError, Bars, FailedError, exit_codes, files_read, model_errors
 from exugear.gearbox.reading import CaseError
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError

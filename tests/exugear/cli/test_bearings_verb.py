@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from exugear.cli.app import app
 from exugear.results.run_file import load_run
-from exugear.system.eigenmodes.modes import load_modes
+from exugear.system.modes import load_modes
 from exugear.system.signals import energy_residual
 from exugear.system.statics import BalanceError
 
@@ -137,7 +137,7 @@ def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
 @pytest.mark.sample
 @pytest.mark.parametrize(
     ("place", "code"),
-    [("exugear.report.findings.variations.vary_parameter", 0), ("exugear.report.findings.context.assemble", 2)],
+    [("exugear.report.findings.verdicts.vary_parameter", 0), ("exugear.report.findings.context.assemble", 2)],
 )
 def test_a_report_leaves_out_what_no_longer_balances(
     case: Path, monkeypatch: pytest.MonkeyPatch, place: str, code: int

@@ -13,7 +13,7 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.cli.options import MeshLaw
+from exugear.cli.case import MeshLaw
 from exugear.cli.verbs.run import Solver
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
@@ -25,7 +25,7 @@ from exugear.system.tooth_mesh.tables import missing_tables, requested_tables
 from exugear.transient.outcome import RunError
 from exugear.transient.runup import SOLVERS
 from exugear.transient.runup import simulate as real_simulate
-from fe_ste.tools.rendering import RenderingError
+from fe_ste.tools.drawing import RenderingError
 
 from ..floating_case import FLOATING_CASE
 from ..spur_case import COARSE_INPUT, SPUR_CASE

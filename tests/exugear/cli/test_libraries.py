@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from exugear.cli.libraries import leave_out_dask, let_in_dask
+from exugear.cli.process import leave_out_dask, let_in_dask
 
 LEFT_OUT = """
 import sys
-from exugear.cli.libraries import leave_out_dask, let_in_dask
+from exugear.cli.process import leave_out_dask, let_in_dask
 leave_out_dask()
 import numpy as np, xarray as xr
 xr.Dataset({{"a": ("x", np.arange(3.0))}}).to_netcdf({path!r}, engine="h5netcdf")

@@ -19,7 +19,7 @@ from exugear.project import Project
 from exugear.studies.executors import processes
 from exugear.studies.study import Study
 from exugear.studies.sweep import sweep
-from exugear.system.readiness.readiness import check_parts, remarks
+from exugear.system.readiness import check_parts, remarks
 from exugear.system.tooth_mesh import tables
 from exugear.system.tooth_mesh.laws.iso6336 import iso6336_stiffness
 from exugear.system.tooth_mesh.placement import loaded_flanks

@@ -15,8 +15,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from exugear.cli.console import say_what_is_logged
-from exugear.cli.errors import StoppedError, exit_codes
+from exugear.cli.console import StoppedError, exit_codes, say_what_is_logged
 from exugear.results.run_file import load_run
 
 from ..spur_case import SPUR_CASE
@@ -82,7 +81,7 @@ def test_ctrl_c_in_a_callback_of_a_library_stops_without_a_traceback():
     """Where Python drops it, as while kernels are compiled."""
     program = """
 import ctypes, signal
-from exugear.cli.errors import exit_codes
+from exugear.cli.console import exit_codes
 called_back = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
 with exit_codes():
     called_back()
@@ -115,7 +114,7 @@ def test_what_a_stopped_work_says_stays(capsys):
 def test_the_second_ctrl_c_ends_at_once():
     program = """
 import sys, time
-from exugear.cli.errors import exit_codes
+from exugear.cli.console import exit_codes
 with exit_codes():
     try:
         print("working", file=sys.stderr, flush=True)

@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases.summary import summarise_loads
+from exugear.gearbox.load_cases import summarise_loads
 from exugear.gearbox.reading import CaseError
-from exugear.system.eigenmodes.modes import eigenmodes
-from exugear.system.readiness.readiness import check_parts, lacking, remarks
+from exugear.system.modes import eigenmodes
+from exugear.system.readiness import check_parts, lacking, remarks
 from exugear.system.statics import locked_equilibrium
 from exugear.system.tooth_mesh.tables import wanted_table
 

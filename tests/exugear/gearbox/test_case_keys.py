@@ -16,16 +16,25 @@ from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import stiffness_matrix
-from exugear.gearbox.sections import bodies, case, connections, entries, gears, loads, lubricant
+from exugear.gearbox.sections import (
+    bodies,
+    case,
+    connections,
+    entries,
+    gears,
+    loads,
+)
+from exugear.gearbox.sections import (
+    loads as lubricant,
+)
 from exugear.gearbox.sections.entries import Section
 from exugear.results.folder import keep_case
-from exugear.system.assemble import assemble
-from exugear.system.bearing_duties import bearing_duties
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
-from exugear.system.bearings.support_laws import catalogue_stiffness, linear_law
-from exugear.system.bearings.supports import elastic_names
-from exugear.system.bodies.of_gearbox.elastic_bodies import check_elastic_body
-from exugear.system.readiness.readiness import check_parts, lacking, remarks
+from exugear.system.bearings.stiffness import catalogue_stiffness, elastic_names, linear_law
+from exugear.system.bodies.of_gearbox import check_elastic_body
+from exugear.system.build import assemble
+from exugear.system.operating_points import bearing_duties
+from exugear.system.readiness import check_parts, lacking, remarks
 from exugear.system.tooth_mesh.tables import wanted_table
 
 from .. import gear_trains

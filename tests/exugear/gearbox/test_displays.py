@@ -11,7 +11,7 @@ import pytest
 from pydantic import BaseModel
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases.summary import summarise_loads
+from exugear.gearbox.load_cases import summarise_loads
 from exugear.gearbox.parts import WheelDeviation
 
 HOSTILE = "<script>alert('1')</script>\n</td>"

@@ -19,8 +19,8 @@ from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import LARGEST_TABLE, Permissions
 from exugear.gearbox.reading import CaseError
-from exugear.system.bodies.finite_elements.second_order import SolidError
-from exugear.system.bodies.finite_elements.solid_files import mesh_geometry, read_solid
+from exugear.system.bodies.solid_elements import SolidError
+from exugear.system.bodies.solid_files import mesh_geometry, read_solid
 
 from ..spur_case import SPUR_CASE
 

@@ -16,7 +16,7 @@ from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.templates.kinds import template
-from exugear.system.readiness.margins import backlash_range, thickness_range
+from exugear.system.plausibility import backlash_range, thickness_range
 
 HELIX = math.radians(12.0)
 ALLOWANCES = {"upper_allowance_um": -70.0, "lower_allowance_um": -110.0}

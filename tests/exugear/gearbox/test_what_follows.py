@@ -11,8 +11,8 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.templates.kinds import template
-from exugear.system.bodies.of_gearbox.shafts import shaft_model
-from exugear.system.eigenmodes.sensitivity import assumed_parameters
+from exugear.system.bodies.of_gearbox import shaft_model
+from exugear.system.sensitivity import assumed_parameters
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.geometry.cylinders import Tube, mass_properties
 

@@ -12,15 +12,14 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import CaseError
-from exugear.life.dynamic_factors.dynamic_factor import DynamicFactor, window_factors
-from exugear.life.dynamic_factors.response_factors import factors, family_factors, response_path
+from exugear.life.dynamic_factors import DynamicFactor, factors, family_factors, response_path, window_factors
 from exugear.life.life import rating_of
 from exugear.project import Project
 from exugear.steady.mean_system.rotating_frame import PlanetSet
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import stored_or_computed
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.system.build import assemble
+from exugear.system.system import Assembly
 from exugear.transient.runup import simulate
 
 from .test_life import TABLE, content_of

@@ -23,22 +23,19 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.loads import RatingSection
 from exugear.gearbox.variant import VariantError
-from exugear.life.acting_loads import acting_loads
-from exugear.life.dynamic_factors.dynamic_factor import stated_factors
-from exugear.life.gear_life import beyond_tables, flank_lives
+from exugear.life.dynamic_factors import stated_factors
+from exugear.life.gear_life import beyond_tables, flank_lives, pair_stresses
 from exugear.life.life import checked_loads, compute_life, rating_of, shortfalls
-from exugear.life.life_diagrams import damage_matrix
-from exugear.life.life_file import limits, read_life
+from exugear.life.life_file import damage_matrix, limits, read_life
 from exugear.life.load_spectrum.counted import count_loads
-from exugear.life.pair_stresses import pair_stresses
-from exugear.life.static_balance import StaticBalance, static_balance
+from exugear.life.static_balance import StaticBalance, acting_loads, static_balance
 from exugear.project import Project
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
 from exugear.system.bearings.rolling.life import basic_rating_life
+from exugear.system.build import assemble
+from exugear.system.kernels.meshes import FORCE
 from exugear.system.statics import locked_equilibrium, rolled_coordinates
-from exugear.system.tooth_mesh.kernels.meshes import FORCE
-from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+from exugear.system.system import Assembly
+from fe_ste.root_stress import MeshCycleStress
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import root_stress_factors
 

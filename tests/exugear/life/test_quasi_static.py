@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exugear.exchange.load_files.reading import read_channels
+from exugear.exchange.series_files import read_channels
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.life.static_balance import static_balance

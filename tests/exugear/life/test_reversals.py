@@ -11,7 +11,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.life.static_balance import static_balance
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 from exugear.system.statics import accelerating_start
 
 from .. import table_case

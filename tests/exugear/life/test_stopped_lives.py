@@ -12,10 +12,9 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.life.kept_angles import KeptAngles
-from exugear.life.static_balance import static_balance
-from exugear.system.assemble import assemble
-from fe_ste.tools.stores.store import Store
+from exugear.life.static_balance import KeptAngles, static_balance
+from exugear.system.build import assemble
+from fe_ste.tools.stores import Store
 
 from ..table_case import surfaces
 

@@ -13,12 +13,12 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.life.stress_tables import LARGEST_STEP, stress_requests
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bearing_duties import mesh_duties
+from exugear.life.static_balance import LARGEST_STEP, stress_requests
+from exugear.system.build import assemble
+from exugear.system.operating_points import mesh_duties
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.tables import TableRequest
-from fe_ste.transmission_error.face_load import face_load_factor
+from fe_ste.transmission_error.mean_contact import face_load_factor
 
 from ..coarse_contact import coarse_curves, coarse_input
 

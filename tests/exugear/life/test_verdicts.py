@@ -19,24 +19,21 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.loads import StrengthSection
-from exugear.life.acting_loads import acting_loads
 from exugear.life.bearing_life import BearingLife, bearing_lives
-from exugear.life.dynamic_factors.dynamic_factor import DynamicFactor, stated_factors
+from exugear.life.dynamic_factors import DynamicFactor, stated_factors
 from exugear.life.gear_life import FlankLife, flank_lives, roughness_of, worst_of
-from exugear.life.life import checked_loads, rating_of
-from exugear.life.life_diagrams import damage_matrix, draw_life
-from exugear.life.life_file import INFINITE, limits, read_life, summary
-from exugear.life.static_balance import static_balance
-from exugear.life.verdict import LARGEST_REACH, check_reach, failures, shortfalls
+from exugear.life.life import LARGEST_REACH, check_reach, checked_loads, failures, rating_of, shortfalls
+from exugear.life.life_file import INFINITE, damage_matrix, draw_life, limits, read_life, summary
+from exugear.life.static_balance import acting_loads, static_balance
 from exugear.project import Project
 from exugear.report.writer import write_report
-from exugear.system.bearings.rolling.lubrication import (
+from exugear.system.bearings.rolling.life import (
     fatigue_limit,
     life_factor,
     viscosity_at,
     viscosity_ratio,
 )
-from fe_ste.root_stress.mesh_cycle import MeshCycleStress
+from fe_ste.root_stress import MeshCycleStress
 
 from ..spur_case import COARSE_INPUT, SPUR_CASE
 from .test_life import TABLE, content_of, hub_assembly

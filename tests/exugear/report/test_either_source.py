@@ -16,7 +16,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.writer import write_report
 from exugear.results.folder import keep_case
-from exugear.results.spectra.orders import order_lines
+from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import load_response, steady_path, stored_or_computed
@@ -129,7 +129,7 @@ def test_lines_that_mesh_frequencies_share_and_remarks_on_speeds_are_told(folder
         remark[3] = "passing planets put 1.2 % of the overall transmission error beside these lines"
         return data.assign(remark=remark).assign_attrs(shared_lines="2 x spur = 1 x other")
 
-    monkeypatch.setattr("exugear.report.findings.stored.load_response", read)
+    monkeypatch.setattr("exugear.report.findings.context.load_response", read)
     page = html.unescape(write_report(folder).path.read_text(encoding="utf-8"))
     assert "mesh frequencies share lines: 2 × spur = 1 × other" in page
     assert page.count("passing planets put 1.2 % of the overall") >= 2

@@ -23,11 +23,11 @@ from typer.testing import CliRunner
 
 from exugear.cli import console
 from exugear.cli.app import app
-from exugear.report.pictures.mode_diagrams import plot_campbell
+from exugear.report.pictures.diagrams import plot_campbell
 from exugear.report.pictures.scene import mode_figure
-from exugear.report.web import pieces as page
-from exugear.results.spectra.orders import OrderLine
-from fe_ste.tools.rendering import RenderingError
+from exugear.report.web import html as page
+from exugear.results.spectra.waterfall import OrderLine
+from fe_ste.tools.drawing import RenderingError
 
 from ..spur_case import SPUR_CASE
 

@@ -17,12 +17,12 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
-from exugear.report.findings.variations import begin_variations
+from exugear.report.findings.verdicts import begin_variations
 from exugear.report.writer import ReportError, write_report
 from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, note_time, times_spent
-from exugear.system.eigenmodes.modes import eigenmodes
-from exugear.system.fingerprint import input_hash
+from exugear.system.modes import eigenmodes
 from exugear.system.signals import energy_residual
+from exugear.system.system import input_hash
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.tables import requested_tables
 
@@ -142,7 +142,7 @@ sections = [{ length_mm = 80.0, outer_diameter_mm = 25.0 }]
     modes = modes_with_bodies(gearbox, Choice("flexible", LAW), stiffness, folder=kept)
     modes.save(modes_path(tmp_path, Choice("flexible", LAW, "disc")))
     simulated(gearbox, Choice("flexible", load_case="run_up"), stiffness, tmp_path, duration=0.2)
-    reduction = "exugear.system.bodies.of_gearbox.elastic_bodies.reduce_shaft"
+    reduction = "exugear.system.bodies.of_gearbox.reduce_shaft"
     monkeypatch.setattr(reduction, lambda model: pytest.fail("reduced again"))
     before = set(kept.iterdir())
     report = write_report(tmp_path, target=1000.0)

@@ -17,10 +17,10 @@ from exugear.gearbox.reading import CaseError
 from exugear.gearbox.versions import MODES as METHOD
 from exugear.results.folder import kept_case, times_spent
 from exugear.results.run_file import load_run, read_run
-from exugear.system.eigenmodes.modes import load_modes
-from exugear.system.fingerprint import input_hash
+from exugear.system.modes import load_modes
+from exugear.system.system import input_hash
 from fe_ste.tools.files import FileError
-from fe_ste.tools.sealed import write_dataset
+from fe_ste.tools.stores import write_dataset
 
 from ...fe_ste.damage import damages
 from ..spur_case import SPUR_CASE
@@ -127,8 +127,8 @@ def test_an_account_of_times_with_nonsense_in_it_serves_as_far_as_it_can(out: Pa
 
 
 def test_results_of_an_earlier_version_of_a_method_do_not_fit(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("exugear.system.fingerprint.MODES", 1000)
-    monkeypatch.setattr("exugear.system.fingerprint.RUN", 1000)
+    monkeypatch.setattr("exugear.system.system.MODES", 1000)
+    monkeypatch.setattr("exugear.system.system.RUN", 1000)
     outcome = exugear("report", out)
     assert outcome.exit_code == 2
     assert f"{MODES}: was computed from another input; compute it again" in outcome.stderr
@@ -155,12 +155,12 @@ def test_a_run_read_without_labels_has_the_same_numbers(out: Path) -> None:
 
 
 def test_the_hashes_of_runs_and_modes_differ_by_their_methods(monkeypatch: pytest.MonkeyPatch) -> None:
-    from exugear.system.assemble import assemble
+    from exugear.system.build import assemble
 
     gearbox = Gearbox.from_toml(Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml")
     stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
     assembly = assemble(gearbox, Choice("rigid"), stiffness)
     before = input_hash(assembly), input_hash(assembly, "reference")
-    monkeypatch.setattr("exugear.system.fingerprint.RUN", 1000)
+    monkeypatch.setattr("exugear.system.system.RUN", 1000)
     assert input_hash(assembly) == before[0]
     assert input_hash(assembly, "reference") != before[1]

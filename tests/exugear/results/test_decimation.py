@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from exugear.results.decimation import Decimator, Filter, low_pass
+from exugear.transient.filters import Decimator, Filter, low_pass
 
 
 def test_decimation_keeps_the_band_and_removes_what_would_fold() -> None:

@@ -15,7 +15,7 @@ from exugear.steady.peaks import STRAINED, bearing_swings
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 
 from ..bearing_case import BEARING_CASE, NON_LINEAR
 

@@ -12,17 +12,16 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.steady import gearbox_branches
-from exugear.steady.gearbox_branches import follow_branch
+from exugear.steady import steady_response
 from exugear.steady.harmonics.branches import trace
-from exugear.steady.harmonics.krylov import HarmonicBalanceError
-from exugear.steady.mean_system.mesh_ports import DEFLECTION
+from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
+from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.steady.settling.settled import SettlingRun
-from exugear.steady.steady_response import response_of
-from exugear.system.assemble import assemble
+from exugear.steady.settling import SettlingRun
+from exugear.steady.steady_response import follow_branch, response_of
+from exugear.system.build import assemble
 
 from .. import gear_trains, table_case
 from ..spur_case import SPUR_CASE
@@ -285,11 +284,11 @@ def test_the_branch_of_a_helical_pair_turns_back_where_its_sweeps_jump():
 
 @pytest.mark.validation
 def test_a_branch_that_runs_out_of_points_says_where(monkeypatch):
-    monkeypatch.setattr(gearbox_branches, "trace", functools.partial(trace, most=5))
+    monkeypatch.setattr(steady_response, "trace", functools.partial(trace, most=5))
     branch = follow_branch(helical(), 510.0, 485.0)
     assert len(branch.speed) == 5
     assert f"ends at {branch.speed[-1] * 30.0 / np.pi:.5g} rpm after 5 points" in branch.ended
-    monkeypatch.setattr(gearbox_branches, "trace", trace)
+    monkeypatch.setattr(steady_response, "trace", trace)
     assert not follow_branch(helical(), 520.0, 519.0).ended
 
 

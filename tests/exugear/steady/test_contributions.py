@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
-from exugear.steady.campbell.campbell import modes_over_speed
-from exugear.steady.contributions import contributions, loudest_near
-from exugear.steady.crossings import crossings
+from exugear.steady.campbell import modes_over_speed
+from exugear.steady.crossings import contributions, crossings, loudest_near
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import linear_response, signals, transmission_errors
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 
 RANGE = np.array([1.0, 22.5])
 

@@ -10,14 +10,14 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.templates.kinds import template
-from exugear.steady.harmonics.curve_peaks import standing_peaks
-from exugear.steady.mean_system.quantities import quantities_of
+from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 
 BUSHING = Choice("bushing")
 CYCLE = 2.0 * np.pi * np.arange(50) / 50

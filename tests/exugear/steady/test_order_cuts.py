@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
-from exugear.results.spectra.orders import OrderLine
-from exugear.results.spectra.sweeps import sweep_severity
+from exugear.results.spectra.resonances import sweep_severity
+from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.peaks import compared_peaks, damping_at, peaks, steady_cut
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 
 PLANETARY = OrderLine("planetary", 99.0)
 

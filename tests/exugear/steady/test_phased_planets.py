@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
-from exugear.steady.gearbox_branches import follow_branch
-from exugear.steady.mean_system.mesh_places import mesh_places
-from exugear.steady.mean_system.mesh_ports import POSITION
+from exugear.steady.mean_system.mesh_places import POSITION, mesh_places
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance, solve_balance
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals, transmission_errors
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.system.assemble import assemble
+from exugear.steady.steady_response import follow_branch
+from exugear.system.build import assemble
 
 from .test_steady_in_time import apart, solver_of
 

@@ -10,7 +10,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.project import Project
 from exugear.steady.response import signals
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 
 from ..conftest import CASE
 from .test_steady_in_time import fitted, solver_of

@@ -9,13 +9,13 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.steady.gearbox_branches import follow_branch
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.nonlinear import Balance
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import stored_or_computed
-from exugear.system.assemble import assemble
+from exugear.steady.steady_response import follow_branch
+from exugear.system.build import assemble
 
 from .. import table_case
 from ..assembled import assembled

@@ -11,7 +11,7 @@ import pytest
 import scipy.linalg
 
 from exugear import Choice, Project
-from exugear.steady.mean_system.mean_modes import mean_modes
+from exugear.steady.mean_system.mean_system import mean_modes
 
 FOLDER = Path(__file__).parents[3] / "cases" / "grc750"
 NEARLY_THE_FILE = {"housing_factor": 1.0, "inertias": "assemblies", "spin": 1.0, "mass": 0.7, "coupling": 1e6}

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
-from exugear.steady.campbell.campbell import campbell_from
+from exugear.steady.campbell import campbell_from
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.peaks import line_name, peaks, planet_sidebands, sidebands
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import load_response, partial_path, stored_or_computed
 from exugear.steady.steady_response import response_of
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 from fe_ste.tools.files import FileError
-from fe_ste.tools.sealed import load_arrays, write_arrays
+from fe_ste.tools.stores import load_arrays, write_arrays
 
 SETTINGS = SteadySettings(SpeedRange(0.0, 20.0, 21), at_resonances=False)
 

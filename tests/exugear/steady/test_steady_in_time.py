@@ -10,15 +10,15 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.mean_system.mean_system import torque_of_vibration
-from exugear.steady.mean_system.mesh_ports import DEFLECTION, MISALIGNMENT, POSITION
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION
 from exugear.steady.nonlinear import Balance
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
-from exugear.system.assemble import assemble
-from exugear.system.eigenmodes.modes import overall_row
+from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.modes import overall_row
+from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.transient.compiled.solver import CompiledSystem
 
 from .. import gear_trains, table_case

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
-from exugear.steady.campbell.campbell import modes_over_speed
+from exugear.steady.campbell import modes_over_speed
 from exugear.steady.crossings import Mode, crossings, improved, with_crossings
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import (
@@ -18,7 +18,7 @@ from exugear.steady.response import (
 )
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 
 RANGE = np.array([1.0, 22.5])
 

@@ -7,9 +7,8 @@ import pytest
 import scipy.stats
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.studies.design.distributions import Normal, correlated, shares
-from exugear.studies.design.reading import StudyError, parse_study
-from exugear.studies.design.sampling import design_of
+from exugear.studies.sampling import Normal, correlated, design_of, shares
+from exugear.studies.sections import StudyError, parse_study
 from exugear.studies.study import Study
 from fe_ste.standards.iso1328 import tolerance
 

@@ -19,12 +19,11 @@ from exugear.gearbox.reading import CaseError
 from exugear.life.life_file import summary
 from exugear.project import Project
 from exugear.studies.dataset import load_study
-from exugear.studies.design.reading import StudyError
 from exugear.studies.executors import processes
-from exugear.studies.figures.of_life import contact_safeties, worst_planets
-from exugear.studies.figures.point_results import PointResults, PointSettings
-from exugear.studies.figures.shared import Shared
+from exugear.studies.figures import contact_safeties, worst_planets
 from exugear.studies.pictures import draw_study
+from exugear.studies.point_results import PointResults, PointSettings, Shared
+from exugear.studies.sections import StudyError
 from exugear.studies.study import Study
 from exugear.studies.sweep import sweep
 

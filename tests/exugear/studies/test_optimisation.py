@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from exugear.studies.dataset import EVALUATION, on_front
 from exugear.studies.executors import processes
-from exugear.studies.figures.figure import Figure
-from exugear.studies.figures.registry import FIGURES
-from exugear.studies.optimisation import optimise
-from exugear.studies.searched import EVALUATION, on_front
+from exugear.studies.figures import FIGURES, Figure
 from exugear.studies.study import Study
+from exugear.studies.sweep import optimise
 
 from ..study_case import study_content
 

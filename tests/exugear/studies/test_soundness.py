@@ -7,8 +7,8 @@ import re
 
 import pytest
 
-from exugear.studies.design.reading import StudyError
 from exugear.studies.executors import processes
+from exugear.studies.sections import StudyError
 from exugear.studies.sweep import sweep
 
 from ..study_case import small_study

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.studies.design.sampling import SAMPLE
 from exugear.studies.pictures import draw_study
+from exugear.studies.sampling import SAMPLE
 
 
 def dataset(**variables):

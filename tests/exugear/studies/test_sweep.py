@@ -18,12 +18,20 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.studies import batches, schedule
-from exugear.studies.batches import Work, compute_batch
+from exugear.studies import executors
 from exugear.studies.dataset import load_study
-from exugear.studies.executors import ExecutorError, Pool, given, processes
-from exugear.studies.figures.shared import Shared
-from exugear.studies.journal import Journal, Record, read_journals
+from exugear.studies.executors import (
+    ExecutorError,
+    Journal,
+    Pool,
+    Record,
+    Work,
+    compute_batch,
+    given,
+    processes,
+    read_journals,
+)
+from exugear.studies.point_results import Shared
 from exugear.studies.sweep import Shard, sweep, task_of
 from fe_ste.transmission_error.table import MeshTable
 
@@ -51,7 +59,7 @@ def journal_lines(folder):
 
 
 def test_points_are_those_of_gearboxes_varied_one_by_one(here, home):
-    from exugear.system.eigenmodes.modes import eigenmodes
+    from exugear.system.modes import eigenmodes
     from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
     study = small_study(home)
@@ -192,7 +200,7 @@ def test_a_point_that_kills_every_worker_is_given_up_and_no_other_is_blamed(tmp_
     def opened():
         yield Pool(breaking, 2)
 
-    found = schedule.compute_points(task_of(study, tmp_path / "out"), points, opened, lambda record: None)
+    found = executors.compute_points(task_of(study, tmp_path / "out"), points, opened, lambda record: None)
     assert [name for name, record in found.items() if record.error] == [points[3].point]
     assert "lost 3 times" in found[points[3].point].error
     assert breaking.batches[-1] == [points[3].point]
@@ -278,10 +286,10 @@ def test_a_run_that_was_stopped_is_gone_on_with(tmp_path, monkeypatch):
     def stop_once():
         asked.append(1)
         if len(asked) == 3:
-            raise batches.StoppedError
+            raise executors.StoppedError
 
-    monkeypatch.setattr("exugear.studies.figures.point_results.stop_if_asked", stop_once)
-    with pytest.raises(batches.StoppedError):
+    monkeypatch.setattr("exugear.studies.point_results.stop_if_asked", stop_once)
+    with pytest.raises(executors.StoppedError):
         compute_batch(task, [Work(name, point.changes)])
     again = sweep(study, tmp_path / "again", HERE)
     xr.testing.assert_identical(figures_of(again.dataset), figures_of(whole.dataset))

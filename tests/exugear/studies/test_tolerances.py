@@ -11,16 +11,14 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.studies.dataset import load_study
-from exugear.studies.design.reading import StudyError
-from exugear.studies.design.tolerances import percentile_of
+from exugear.studies.dataset import EVALUATION, beyond, load_study
 from exugear.studies.executors import processes
-from exugear.studies.figures.figure import Figure
-from exugear.studies.figures.registry import FIGURES
-from exugear.studies.optimisation import optimise
+from exugear.studies.figures import FIGURES, Figure
 from exugear.studies.pictures import draw_study
-from exugear.studies.searched import EVALUATION, beyond
+from exugear.studies.sampling import percentile_of
+from exugear.studies.sections import StudyError
 from exugear.studies.study import Study
+from exugear.studies.sweep import optimise
 
 from ..case_mutations import toml_text
 from ..study_case import study_content

@@ -8,9 +8,9 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.eigenmodes.modes import modes_of
-from exugear.system.fingerprint import input_hash
+from exugear.system.build import assemble
+from exugear.system.modes import modes_of
+from exugear.system.system import input_hash
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
 from ..gear_trains import pair, planetary

@@ -13,11 +13,10 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.eigenmodes.modes import FREE_ROTATION, eigenmodes, modes_of
-from exugear.system.linearised import linearise
+from exugear.system.build import assemble
 from exugear.system.loads import Loading
-from exugear.system.statics import locked_equilibrium
+from exugear.system.modes import FREE_ROTATION, eigenmodes, modes_of
+from exugear.system.statics import linearise, locked_equilibrium
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ..assembled import modes_with_bodies

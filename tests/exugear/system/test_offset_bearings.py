@@ -13,19 +13,20 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.life.static_balance import is_linear
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.equal_planets import planet_families, planet_supports
-from exugear.system.bearings.support_laws import (
+from exugear.system.bearings.stiffness import (
     SupportLaw,
     law_in_words,
     load_stands_still,
+    planet_families,
+    planet_supports,
     through_point,
 )
-from exugear.system.eigenmodes.modes import modes_of
-from exugear.system.eigenmodes.sensitivity import planet_bearings, scaled_bearings
+from exugear.system.build import assemble
 from exugear.system.loads import Loading, LoadTable
+from exugear.system.modes import modes_of
+from exugear.system.sensitivity import planet_bearings, scaled_bearings
 from exugear.system.statics import accelerating_start, locked_equilibrium, static_state
+from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.exudyn_model.system import ExudynSystem
 

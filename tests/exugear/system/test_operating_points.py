@@ -10,9 +10,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.operating_point import OperatingPoint
+from exugear.system.bearings.duty import OperatingPoint
 from exugear.system.bearings.rolling.contact import (
     bearing_load,
     equilibrium,
@@ -20,11 +18,13 @@ from exugear.system.bearings.rolling.contact import (
     row_contacts,
 )
 from exugear.system.bearings.rolling.rows import BearingError, BearingOfRows
-from exugear.system.bearings.support_laws import LEAST_LOAD, catalogue_stiffness
-from exugear.system.eigenmodes.modes import modes_of
+from exugear.system.bearings.stiffness import LEAST_LOAD, catalogue_stiffness
+from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
-from exugear.system.readiness.readiness import lacking
+from exugear.system.modes import modes_of
+from exugear.system.readiness import lacking
 from exugear.system.statics import BalanceError, static_state
+from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem
 
 from ..bearing_case import NON_LINEAR, STIFFNESS, bearing_gearbox

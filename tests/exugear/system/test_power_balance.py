@@ -14,12 +14,8 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assembly import Assembly
-from exugear.system.kernels.springs import add_spring_forces
-from exugear.system.loads import LoadTable
-from exugear.system.signals import signal_layout
-from exugear.system.statics import accelerating_start
-from exugear.system.tooth_mesh.kernels.meshes import (
+from exugear.system.kernels.coordinates import add_spring_forces
+from exugear.system.kernels.meshes import (
     CYCLE_POWER,
     DAMPED_POWER,
     ENERGY,
@@ -35,11 +31,14 @@ from exugear.system.tooth_mesh.kernels.meshes import (
     load_way,
     row_dot,
 )
-from exugear.system.tooth_mesh.kernels.table_law import scratch_memory
-from exugear.system.tooth_mesh.laws.along_row import TILTING, tilted
-from exugear.system.tooth_mesh.laws.forms import MEMORY, pass_meshes
+from exugear.system.kernels.table_law import scratch_memory
+from exugear.system.loads import LoadTable
+from exugear.system.signals import signal_layout
+from exugear.system.statics import accelerating_start
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.laws.mesh_forces import MEMORY, TILTING, pass_meshes, tilted
+from exugear.transient.compiled.integrator import choose_integration
 from exugear.transient.compiled.solver import CompiledSystem
-from exugear.transient.compiled.step import choose_integration
 from fe_ste.tools.compilation import compiled
 
 from ..assembled import assembled

@@ -9,8 +9,8 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.eigenmodes.modes import modes_of
-from exugear.system.eigenmodes.sensitivity import (
+from exugear.system.modes import modes_of
+from exugear.system.sensitivity import (
     FrequencyMatch,
     Parameter,
     ParameterVariation,

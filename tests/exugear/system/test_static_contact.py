@@ -15,16 +15,15 @@ import exugear.system.operating_points
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
-from exugear.system.assemble import assemble
-from exugear.system.fingerprint import input_hash
+from exugear.system.build import assemble
 from exugear.system.statics import StaticState, static_state
-from exugear.system.tooth_mesh.law import MeshCurve
-from exugear.system.tooth_mesh.static_contact import StaticContacts, static_contacts
+from exugear.system.system import input_hash
+from exugear.system.tooth_mesh.contact_state import StaticContacts, static_contacts
+from exugear.system.tooth_mesh.element import MeshCurve
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.stores.cache import FOLDER_VARIABLE
-from fe_ste.transmission_error.known_contacts import forget_contacts
-from fe_ste.transmission_error.mean_contact import mean_contact
+from fe_ste.tools.stores import FOLDER_VARIABLE
+from fe_ste.transmission_error.mean_contact import forget_contacts, mean_contact
 from fe_ste.transmission_error.table import prepared_compliance
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 
@@ -176,7 +175,7 @@ def test_teeth_far_askew_press_with_their_force_at_their_deflection(monkeypatch:
 def test_what_is_kept_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     curves = curves_of("grc")
     before = solved("grc").assembly
-    monkeypatch.setattr("fe_ste.transmission_error.known_contacts.mean_contact", None)
+    monkeypatch.setattr("fe_ste.transmission_error.mean_contact.mean_contact", None)
     assert input_hash(assemble(gearbox_of("grc"), before.choice, curves)) == input_hash(before)
 
 
@@ -193,7 +192,7 @@ def test_where_contact_cannot_be_solved_teeth_bear_evenly_and_it_is_said(
     # Contacts that other tests have kept would be taken.
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     forget_contacts()
-    monkeypatch.setattr("fe_ste.transmission_error.known_contacts.mean_contact", failing)
+    monkeypatch.setattr("fe_ste.transmission_error.mean_contact.mean_contact", failing)
     assembly = assemble(gearbox, Choice("bushing", "line_of_action"), curves)
     assert assembly.contacts.unsolved == {"intermediate": "pair intermediate: not today"}
     assert len(assembly.contacts.contacts) == len(assembly.elements) - 1
@@ -205,11 +204,11 @@ def test_where_contact_cannot_be_solved_teeth_bear_evenly_and_it_is_said(
 
 @pytest.mark.parametrize("law", ["constant", "iso6336", "seed"])
 def test_laws_without_tables_solve_no_contact(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fe_ste.transmission_error.known_contacts.mean_contact", None)
+    monkeypatch.setattr("fe_ste.transmission_error.mean_contact.mean_contact", None)
     stiffness = {name: np.array([2e9]) for name in gearbox_of("grc").gear_pairs}
     assert not assemble(gearbox_of("grc"), Choice("bushing", law), stiffness).contacts.contacts
 
 
 def test_gears_that_cannot_tilt_solve_no_contact(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fe_ste.transmission_error.known_contacts.mean_contact", None)
+    monkeypatch.setattr("fe_ste.transmission_error.mean_contact.mean_contact", None)
     assert not assemble(gearbox_of("grc"), Choice("rigid", "line_of_action"), curves_of("grc")).contacts.contacts

@@ -9,12 +9,11 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.kernels.connectors import add_connector_forces
-from exugear.system.linearised import linearise, tangent_stiffness
-from exugear.system.statics import BalanceError, accelerating_start, locked_equilibrium
-from exugear.system.tooth_mesh.kernels.meshes import TILT_STIFFNESS
+from exugear.system.build import assemble
+from exugear.system.kernels.connectors import add_connector_forces
+from exugear.system.kernels.meshes import TILT_STIFFNESS
+from exugear.system.statics import BalanceError, accelerating_start, linearise, locked_equilibrium, tangent_stiffness
+from exugear.system.system import Assembly
 
 from ..assembled import assembled
 

@@ -9,14 +9,13 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.system.build import assemble
+from exugear.system.kernels.meshes import TILT_STIFFNESS
 from exugear.system.loads import LoadTable
-from exugear.system.signals import SIGNALS
+from exugear.system.signals import SIGNALS, LoadsUnknownError, support_loads
 from exugear.system.statics import accelerating_start, locked_equilibrium, rolled_coordinates
-from exugear.system.support_loads import LoadsUnknownError, support_loads
-from exugear.system.tooth_mesh.kernels.meshes import TILT_STIFFNESS
-from exugear.transient.compiled.observers import Observer
+from exugear.system.system import Assembly
+from exugear.transient.compiled.solver import Observer
 
 from ..table_case import surfaces
 

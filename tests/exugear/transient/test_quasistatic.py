@@ -12,10 +12,10 @@ from scipy.interpolate import CubicSpline
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.system.build import assemble
 from exugear.system.statics import locked_equilibrium
-from exugear.system.tooth_mesh.laws.packing import pack
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.laws.stiffness import pack
 from fe_ste.transmission_error.surface import SteSurface
 from fe_ste.transmission_error.table import MeshTable, TableInput
 

@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.results.decimation import Decimator, plain_filter
-from exugear.system.assembly import Assembly
 from exugear.system.loads import LoadTable
 from exugear.system.signals import signal_layout
 from exugear.system.statics import accelerating_start
-from exugear.transient.compiled.methods import RUNGE_KUTTA, Method, adams, stabilised
-from exugear.transient.compiled.observers import Observer
-from exugear.transient.compiled.solver import CompiledSystem
-from exugear.transient.read_out import stored_filter
+from exugear.system.system import Assembly
+from exugear.transient.compiled.integrator import RUNGE_KUTTA, Method, adams, stabilised
+from exugear.transient.compiled.solver import CompiledSystem, Observer
+from exugear.transient.filters import Decimator, plain_filter, stored_filter
 
 from ..assembled import assembled
 from ..table_case import surfaces

@@ -21,17 +21,16 @@ from typer.testing import CliRunner
 from exugear.cli import app as cli
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases.summary import summarise_loads
+from exugear.gearbox.load_cases import summarise_loads
 from exugear.report.writer import write_report
 from exugear.results.run_file import load_run, verdict_of
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
+from exugear.system.kernels.table_law import piece_at
 from exugear.system.signals import MESH_TIMES
-from exugear.system.tooth_mesh.kernels.table_law import piece_at
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.transient.compiled.step import highest_rate
-from exugear.transient.outcome import LimitError, Progress, RunError
+from exugear.transient.compiled.integrator import highest_rate
+from exugear.transient.outcome import LIMITS, Judge, LimitError, Progress, RunError
 from exugear.transient.runup import simulate
-from exugear.transient.trust import LIMITS, Judge
 
 from ..assembled import simulated
 from ..spur_case import SPUR_CASE
@@ -247,13 +246,13 @@ DIVERGED = """
 import sys
 import tomllib
 import numpy as np
-from exugear.system.assemble import assemble
-from exugear.transient.compiled.observers import Observer
+from exugear.system.build import assemble
+from exugear.transient.compiled.solver import Observer
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.system.loads import LoadTable
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.tooth_mesh.laws.forms import add_mesh_forces
+from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
 sys.path.insert(0, sys.argv[1])
@@ -382,7 +381,7 @@ def test_what_a_run_writes_does_not_depend_on_its_buffers(tmp_path, monkeypatch)
     stiffness = stiffness_of(gearbox)
     options = {"duration": 0.1}
     plain = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "plain", **options).path
-    monkeypatch.setattr("exugear.transient.extent.BUFFER_BYTES", 400_000)
+    monkeypatch.setattr("exugear.transient.plan.BUFFER_BYTES", 400_000)
     small = simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "small", **options).path
     one, other = (xr.load_dataset(path, engine="h5netcdf") for path in (plain, small))
     assert one.overall_dte.identical(other.overall_dte)

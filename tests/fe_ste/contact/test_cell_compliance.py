@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
 
-from fe_ste.contact.cells import Cells, ContactSettings, lay_cells
-from fe_ste.contact.compliance import compliance_matrix
-from fe_ste.contact.kinematics import FlankPair
-from fe_ste.contact.near_field import add_near_field, mean_inverse_distance
+from fe_ste.contact.compliance import add_near_field, compliance_matrix, mean_inverse_distance
+from fe_ste.contact.kinematics import Cells, ContactSettings, FlankPair, lay_cells
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear, GearPair

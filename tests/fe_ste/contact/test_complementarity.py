@@ -8,10 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from fe_ste.contact.cells import ContactSettings, lay_cells
 from fe_ste.contact.complementarity import ContactSolution, solve_complementarity
-from fe_ste.contact.kinematics import ContactError, FlankPair, rigid_gap
-from fe_ste.contact.near_field import mean_inverse_distance
+from fe_ste.contact.compliance import mean_inverse_distance
+from fe_ste.contact.kinematics import ContactError, ContactSettings, FlankPair, lay_cells, rigid_gap
 from fe_ste.geometry.gears import Gear, GearPair
 
 

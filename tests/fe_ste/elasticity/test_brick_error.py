@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fe_ste.elasticity.brick_error import ERROR_REACH, brick_error
+from fe_ste.elasticity.bricks import ERROR_REACH, brick_error
 from fe_ste.elasticity.flank import flank_near_field
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import Gear

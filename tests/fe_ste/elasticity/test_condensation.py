@@ -9,10 +9,9 @@ import pytest
 import scipy.sparse
 
 from fe_ste.elasticity.bricks import stiffness_matrix
-from fe_ste.elasticity.condensation import CondensedSector, flank_functionals
+from fe_ste.elasticity.condensation import CondensedSector, flank_functionals, open_chain_faces
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
-from fe_ste.elasticity.ring import open_chain_faces
-from fe_ste.elimination.sparse import factorise
+from fe_ste.elimination import factorise
 from fe_ste.geometry.gears import Gear
 
 SPUR = Gear(name="spur", teeth=20, normal_module=3e-3, face_width=20e-3, held_diameter=30e-3, profile_shift=0.2)

@@ -11,8 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from fe_ste.elasticity.brick_error import ERROR_REACH, brick_error
-from fe_ste.elasticity.end_error import END_LAYERS, WAVES, end_errors
+from fe_ste.elasticity.bricks import END_LAYERS, ERROR_REACH, WAVES, brick_error, end_errors
 from fe_ste.elasticity.flank import flank_images
 from fe_ste.elasticity.halfspace import tent_means, wedge_images
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh

@@ -13,12 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-import fe_ste.elasticity.known_flanks
-from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
+import fe_ste.elasticity.flank
+from fe_ste.elasticity.flank import FlankCompliance, flank_compliance, forget_flanks, known_flanks
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.elasticity.known_flanks import forget_flanks, known_flanks
 from fe_ste.geometry.gears import Gear
-from fe_ste.tools.stores.cache import FOLDER_VARIABLE
+from fe_ste.tools.stores import FOLDER_VARIABLE
 
 COARSE = MeshSettings(layers=3, flank=6, thickness=4, fillet=1, root=1, rim=3)
 HELICAL = Gear(
@@ -71,7 +70,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         computed.append(gear.name)
         return flank_compliance(gear, *rest, **options)
 
-    monkeypatch.setattr(fe_ste.elasticity.known_flanks, "flank_compliance", counted)
+    monkeypatch.setattr(fe_ste.elasticity.flank, "flank_compliance", counted)
     return computed
 
 
@@ -120,7 +119,7 @@ def test_another_input_is_computed(kept: Path, calls: list[str], other: dict[str
 def test_another_method_does_not_use_the_files(kept: Path, calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     known_flanks([(HELICAL, 1)], COARSE)
     forget_flanks()
-    monkeypatch.setattr(fe_ste.elasticity.known_flanks, "_method", lambda: "changed sources")
+    monkeypatch.setattr(fe_ste.elasticity.flank, "_method", lambda: "changed sources")
     known_flanks([(HELICAL, 1)], COARSE)
     assert len(calls) == 2
 
@@ -184,7 +183,7 @@ def test_files_used_least_lately_are_removed(kept: Path, monkeypatch: pytest.Mon
         os.utime(path, (path.stat().st_atime, path.stat().st_mtime - age))
     forget_flanks()
     known_flanks([(gears[0], 1)], COARSE)  # used again
-    monkeypatch.setattr(fe_ste.elasticity.known_flanks._flanks, "in_files", int(2.5 * paths[0].stat().st_size))
+    monkeypatch.setattr(fe_ste.elasticity.flank._flanks, "in_files", int(2.5 * paths[0].stat().st_size))
     known_flanks([(gears[2], 1)], COARSE)
     left = set(kept.iterdir())
     assert len(left) == 2

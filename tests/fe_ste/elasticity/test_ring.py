@@ -7,12 +7,18 @@ import pytest
 import scipy.sparse
 
 from fe_ste.elasticity.bricks import stiffness_matrix
-from fe_ste.elasticity.condensation import flank_functionals
+from fe_ste.elasticity.condensation import (
+    Chain,
+    chain_of,
+    flank_functionals,
+    open_chain_faces,
+    ring_faces,
+    uniform_faces,
+)
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance, flank_images, flank_near_field, regular_part
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
-from fe_ste.elasticity.ring import Chain, chain_of, open_chain_faces, ring_faces, uniform_faces
-from fe_ste.elimination.sparse import factorise
+from fe_ste.elimination import factorise
 from fe_ste.geometry.gears import Gear
 
 GEAR = Gear(

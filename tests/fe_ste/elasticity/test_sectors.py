@@ -8,8 +8,14 @@ import numpy as np
 import pytest
 
 from fe_ste.elasticity.bricks import brick_gradients
-from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.elasticity.sectors import ContactMesh, OpenSector, contact_line_rolls, placed_sectors, refined_sectors
+from fe_ste.elasticity.hexmesh import (
+    ContactMesh,
+    MeshSettings,
+    OpenSector,
+    contact_line_rolls,
+    placed_sectors,
+    refined_sectors,
+)
 from fe_ste.geometry.gears import Gear, GearPair
 
 UNIFORM = MeshSettings(layers=3, flank=6, thickness=2, fillet=1, root=1, rim=6)

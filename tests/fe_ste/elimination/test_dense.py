@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fe_ste.elimination.dense import divided_by_factor, eliminate, mirrored_lower
-from fe_ste.elimination.sparse import FactorisationError
+from fe_ste.elimination import FactorisationError, divided_by_factor, eliminate, mirrored_lower
 
 
 def random_matrix(size: int) -> np.ndarray:

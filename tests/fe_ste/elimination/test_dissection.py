@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fe_ste.elimination.dissection import Front, dissected, parts_without, schur_complement
+from fe_ste.elimination import Front, dissected, parts_without, schur_complement
 from fe_ste.tools.arrays import Floats, Integers
 
 

@@ -8,7 +8,7 @@ import scipy.sparse
 from skfem import Basis, ElementHex1, ElementVector, MeshHex
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from fe_ste.elimination.sparse import FactorisationError, available_backends, factorise
+from fe_ste.elimination import FactorisationError, available_backends, factorise
 
 needs_pardiso = pytest.mark.skipif(
     "pardiso" not in available_backends(), reason="pypardiso (extra `fast`) is not installed"

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.flank import flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.flanks.deviations import displaced_axis, gaps_of_pairs, pitch_gap, runout_displacement
+from fe_ste.flanks import displaced_axis, gaps_of_pairs, pitch_gap, runout_displacement
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.search import contact_state

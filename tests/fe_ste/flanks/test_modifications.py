@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fe_ste.flanks.modifications import (
+from fe_ste.flanks import (
     FlankModification,
     Relief,
     ReliefShape,

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fe_ste.flanks.modifications import FlankModification
-from fe_ste.flanks.topography import FlankTopography
+from fe_ste.flanks import FlankModification, FlankTopography
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear, GearPair
 

@@ -8,16 +8,16 @@ import math
 import pytest
 
 from fe_ste.geometry.checks import GeometryError
-from fe_ste.geometry.fitting import (
+from fe_ste.geometry.gears import BasicRack, Gear, GearPair
+from fe_ste.geometry.pair_relations import (
     ROOT_MARGIN,
+    UncheckedPair,
     clear_tip_diameter,
     fitted_tip_diameter,
     root_margin,
     shift_beside,
     shift_sum,
 )
-from fe_ste.geometry.gears import BasicRack, Gear, GearPair
-from fe_ste.geometry.pair_relations import UncheckedPair
 
 MODULE = 4e-3
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline, make_interp_spline
 
-from fe_ste.geometry.splines import cubic_coefficients, cubic_knots, cubic_matrix, cubic_values
+from fe_ste.geometry.profile import cubic_coefficients, cubic_knots, cubic_matrix, cubic_values
 
 
 @pytest.mark.parametrize("count", [4, 5, 9, 21])

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 
-from fe_ste.contact.cells import lay_cells
-from fe_ste.contact.kinematics import FlankPair
+from fe_ste.contact.kinematics import FlankPair, lay_cells
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.pictures.teeth import HexahedraMesh, contact_quads, draw_tooth_contact, meshed_teeth
-from fe_ste.tools import rendering
-from fe_ste.tools.rendering import RenderingError, nice_length, require_rendering, without_margins
+from fe_ste.tools import drawing
+from fe_ste.tools.drawing import RenderingError, nice_length, require_rendering, without_margins
 
 COARSE = MeshSettings(layers=6, flank=16, thickness=2)
 
@@ -121,7 +120,7 @@ def test_scale_bar_is_to_scale():
     from matplotlib.figure import Figure
 
     panel = Figure().add_subplot()
-    rendering.place_picture(panel, np.full((100, 400, 3), 255, dtype=np.uint8), 1e-3)
+    drawing.place_picture(panel, np.full((100, 400, 3), 255, dtype=np.uint8), 1e-3)
     (bar,) = panel.lines
     assert panel.texts[0].get_text() == "50 mm" and np.ptp(bar.get_xdata()) == pytest.approx(50.0)
 
@@ -147,7 +146,7 @@ def test_arrays_that_do_not_fit_are_refused():
 
 
 def test_missing_opengl_is_an_error_that_names_the_packages(monkeypatch):
-    monkeypatch.setattr(rendering, "_probe_rendering", lambda: False)
+    monkeypatch.setattr(drawing, "_probe_rendering", lambda: False)
     with pytest.raises(RenderingError, match=r"libegl1 .*libosmesa6"):
         require_rendering()
 
@@ -156,10 +155,10 @@ def test_missing_opengl_is_an_error_that_names_the_packages(monkeypatch):
 @pytest.mark.skipif("DISPLAY" in os.environ, reason="an X server offers OpenGL of its own")
 def test_a_machine_without_opengl_is_recognised_although_vtk_crashes(monkeypatch):
     monkeypatch.setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent")  # leaves EGL without a driver
-    assert rendering._probe_rendering.__wrapped__() is False
+    assert drawing._probe_rendering.__wrapped__() is False
 
 
 def test_missing_pyvista_names_the_extra(monkeypatch):
-    monkeypatch.setattr(rendering.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(drawing.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(RenderingError, match=r"exugear\[pictures\]"):
         require_rendering()

@@ -10,7 +10,7 @@ import pytest
 
 import fe_ste
 from fe_ste.elasticity.hexmesh import sector_mesh
-from fe_ste.reference.stress import stress_of_position
+from fe_ste.reference.position import stress_of_position
 from fe_ste.reference.table import NonlinearInput, NonlinearTable
 from fe_ste.transmission_error.search import contact_state
 from fe_ste.transmission_error.states import StateAxes, StateResults

@@ -7,16 +7,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fe_ste.contact.cells import ContactSettings
-from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.elasticity.sectors import ContactMesh, refined_sectors
+from fe_ste.contact.kinematics import ContactSettings
+from fe_ste.elasticity.hexmesh import ContactMesh, MeshSettings, refined_sectors
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.reference.newton import NewtonSettings, solve_contact
 from fe_ste.reference.position import gear_model
-from fe_ste.root_stress.mesh_cycle import mesh_cycle_stress
-from fe_ste.root_stress.root import root_gauges
+from fe_ste.root_stress import mesh_cycle_stress, root_gauges
 from fe_ste.transmission_error.compliance import pair_compliance
-from fe_ste.transmission_error.face_load import face_load_factor
+from fe_ste.transmission_error.mean_contact import face_load_factor
 from fe_ste.transmission_error.search import hertz_half_width, least_contact_length, normal_load
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 

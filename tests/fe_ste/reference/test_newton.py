@@ -7,12 +7,18 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fe_ste.elasticity.sectors import HEXAHEDRON_FACES
+from fe_ste.elasticity.hexmesh import HEXAHEDRON_FACES
 from fe_ste.geometry.gears import Material
-from fe_ste.reference.contact_model import ContactModel, TurningHub, convergence_table
 from fe_ste.reference.finite_deformation import Bricks
 from fe_ste.reference.mortar import Surface
-from fe_ste.reference.newton import EquilibriumError, NewtonSettings, solve_contact
+from fe_ste.reference.newton import (
+    ContactModel,
+    EquilibriumError,
+    NewtonSettings,
+    TurningHub,
+    convergence_table,
+    solve_contact,
+)
 
 STEEL = Material()
 ALUMINIUM = Material(youngs_modulus=70e9, poissons_ratio=0.33)

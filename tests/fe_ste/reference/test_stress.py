@@ -8,14 +8,12 @@ import importlib.util
 import numpy as np
 import pytest
 
-from fe_ste.contact.cells import ContactSettings
-from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.elasticity.sectors import ContactMesh
+from fe_ste.contact.kinematics import ContactSettings
+from fe_ste.elasticity.hexmesh import ContactMesh, MeshSettings
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.pictures.stress import draw_contact_stress
-from fe_ste.reference.position import NonlinearSettings, nonlinear_position
-from fe_ste.reference.stress import stress_of_position, stress_of_state
-from fe_ste.tools.rendering import RenderingError, require_rendering
+from fe_ste.pictures.teeth import draw_contact_stress
+from fe_ste.reference.position import NonlinearSettings, nonlinear_position, stress_of_position, stress_of_state
+from fe_ste.tools.drawing import RenderingError, require_rendering
 from fe_ste.transmission_error.compliance import pair_compliance
 from fe_ste.transmission_error.search import contact_state, hertz_half_width, normal_load
 

@@ -10,9 +10,7 @@ import xarray as xr
 
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
-from fe_ste.root_stress.gauges import gauge_columns, gauge_places
-from fe_ste.root_stress.mesh_cycle import hertz_stress, mesh_cycle_stress
-from fe_ste.root_stress.root import RootGauges, root_gauges
+from fe_ste.root_stress import RootGauges, gauge_columns, gauge_places, hertz_stress, mesh_cycle_stress, root_gauges
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import form_and_correction
 

@@ -10,22 +10,20 @@ import pytest
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.standards.iso6336 import mesh_stiffness
 from fe_ste.standards.pitting import (
+    CASE_HARDENED_BENDING,
+    CASE_HARDENED_CONTACT,
+    LifeCurve,
     contact_ratio_factor,
     elasticity_factor,
     helix_factor,
     lubricant_factor,
+    miner_sum,
     nominal_contact_stress,
     reduced_radius,
     roughness_factor,
+    safety_factor,
     velocity_factor,
     zone_factor,
-)
-from fe_ste.standards.service_life import (
-    CASE_HARDENED_BENDING,
-    CASE_HARDENED_CONTACT,
-    LifeCurve,
-    miner_sum,
-    safety_factor,
 )
 from fe_ste.standards.tooth_root import form_and_correction, root_stress_factors
 

@@ -14,20 +14,23 @@ from functools import cache
 
 import pytest
 
-from fe_ste.geometry.cutter import PinionCutter
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
-from fe_ste.standards.iso6336 import MethodBStiffness, mesh_stiffness
-from fe_ste.standards.load_factors import (
+from fe_ste.geometry.involute import PinionCutter
+from fe_ste.standards.iso6336 import (
     FlankDeviations,
+    MethodBStiffness,
     dynamic_factor,
     face_load_factor,
     helix_running_in,
+    mesh_stiffness,
     pitch_running_in,
     reduced_mass,
     resonance_ratio,
     transverse_load_factors,
 )
 from fe_ste.standards.pitting import (
+    CASE_HARDENED_BENDING,
+    CASE_HARDENED_CONTACT,
     contact_ratio_factor,
     elasticity_factor,
     helix_factor,
@@ -39,9 +42,13 @@ from fe_ste.standards.pitting import (
     velocity_factor,
     zone_factor,
 )
-from fe_ste.standards.root_strength import notch_factor, size_factor, surface_factor
-from fe_ste.standards.service_life import CASE_HARDENED_BENDING, CASE_HARDENED_CONTACT
-from fe_ste.standards.tooth_root import root_face_load_factor, root_stress_factors
+from fe_ste.standards.tooth_root import (
+    notch_factor,
+    root_face_load_factor,
+    root_stress_factors,
+    size_factor,
+    surface_factor,
+)
 
 STEEL = Material(density=7830.0)
 RPM = math.pi / 30.0

@@ -76,7 +76,7 @@ def test_an_edited_callee_in_another_file_gives_the_new_number(small: Path) -> N
 @pytest.mark.validation
 def test_the_contact_s_near_field_follows_its_half_space(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "fe_ste", tmp_path / "fe_ste", ignore=shutil.ignore_patterns("__pycache__"))
-    expression = "fe_ste.contact.near_field.mean_inverse_distance(0.0, 0.0, 1e-4, 1e-4)"
+    expression = "fe_ste.contact.compliance.mean_inverse_distance(0.0, 0.0, 1e-4, 1e-4)"
     before, _ = printed(expression, tmp_path)
     halfspace = tmp_path / "fe_ste" / "elasticity" / "halfspace.py"
     text = halfspace.read_text(encoding="utf-8")
@@ -197,7 +197,7 @@ def test_compiled_functions_read_only_what_the_digest_covers() -> None:
         for file in (ROOT / package).rglob("*.py")
     }
     with_kernels = {name: text for name, text in sources.items() if "fe_ste.tools.compilation import" in text}
-    assert {"fe_ste.contact.near_field", "exugear.transient.compiled.equations"} <= set(with_kernels)
+    assert {"fe_ste.contact.compliance", "exugear.transient.compiled.equations"} <= set(with_kernels)
     assert not [name for name, text in sources.items() if "njit" in text and name != "fe_ste.tools.compilation"]
     others = {name for name, text in sources.items() if "fe_ste.tools.compilation" not in text}
     frozen = {name: list(foreign_names(text, others)) for name, text in with_kernels.items()}

@@ -15,7 +15,7 @@ import pytest
 import xarray as xr
 
 from fe_ste.tools.files import FileError, append_line, exclusive, read_text, replacement, write_file
-from fe_ste.tools.sealed import load_arrays, write_dataset
+from fe_ste.tools.stores import load_arrays, write_dataset
 
 DATA = xr.Dataset(
     {"a": (("x", "y"), np.random.default_rng(1).random((50, 40)), {"units": "m"})},
@@ -104,7 +104,7 @@ import numpy as np
 import xarray as xr
 from fe_ste.tools.files import append_line, write_file
 from fe_ste.tools.drawing import finish_figure, new_figure
-from fe_ste.tools.sealed import write_dataset
+from fe_ste.tools.stores import write_dataset
 
 folder = Path(sys.argv[1])
 data = xr.Dataset({"a": ("x", np.random.default_rng(1).random(20000))})

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from fe_ste.tools import sealed
+from fe_ste.tools import stores
 from fe_ste.tools.files import FileError, replacement
-from fe_ste.tools.sealed import (
+from fe_ste.tools.stores import (
     ErrorKeeper,
     Layout,
     load_dataset,
@@ -92,7 +92,7 @@ FAILING = """
 import errno, io, sys
 import h5netcdf
 import numpy as np
-from fe_ste.tools.sealed import ErrorKeeper
+from fe_ste.tools.stores import ErrorKeeper
 
 
 class Full(io.BytesIO):
@@ -149,7 +149,7 @@ import sys
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from fe_ste.tools.sealed import write_dataset
+from fe_ste.tools.stores import write_dataset
 
 attributes = {"title": "", "method_version": 3}
 for n in range(12):
@@ -175,10 +175,10 @@ def test_a_file_is_read_once_to_check_it_until_it_changes(tmp_path: Path, monkey
     """One that was checked long after its last change is taken as it is; a change that restores its times is seen."""
     path = tmp_path / "a.bin"
     write_sealed(path, bytes(4000))
-    monkeypatch.setattr("fe_ste.tools.sealed.SETTLED", -1.0)  # as if it had been written long ago
+    monkeypatch.setattr("fe_ste.tools.stores.SETTLED", -1.0)  # as if it had been written long ago
     taken: list[int] = []
-    original = sealed.hashlib.sha256
-    monkeypatch.setattr(sealed.hashlib, "sha256", lambda *content: taken.append(1) or original(*content))
+    original = stores.hashlib.sha256
+    monkeypatch.setattr(stores.hashlib, "sha256", lambda *content: taken.append(1) or original(*content))
     assert checked(path) == checked(path)
     assert len(taken) == 1
     before = path.stat()
@@ -194,8 +194,8 @@ def test_a_file_of_this_moment_is_checked_each_time(tmp_path: Path, monkeypatch:
     path = tmp_path / "a.bin"
     write_sealed(path, bytes(4000))
     taken: list[int] = []
-    original = sealed.hashlib.sha256
-    monkeypatch.setattr(sealed.hashlib, "sha256", lambda *content: taken.append(1) or original(*content))
-    monkeypatch.setattr("fe_ste.tools.sealed.SETTLED", 3600.0)
+    original = stores.hashlib.sha256
+    monkeypatch.setattr(stores.hashlib, "sha256", lambda *content: taken.append(1) or original(*content))
+    monkeypatch.setattr("fe_ste.tools.stores.SETTLED", 3600.0)
     assert checked(path) == checked(path)
     assert len(taken) == 2

@@ -13,10 +13,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from fe_ste.tools import sealed
-from fe_ste.tools.sealed import Layout, write_arrays, write_dataset, write_sealed
-from fe_ste.tools.stores.cache import FOLDER_VARIABLE, Cache
-from fe_ste.tools.stores.store import Arrays, Store
+from fe_ste.tools import stores
+from fe_ste.tools.stores import FOLDER_VARIABLE, Arrays, Cache, Layout, Store, write_arrays, write_dataset, write_sealed
 
 from ..damage import damages
 
@@ -103,7 +101,7 @@ def test_a_full_disk_leaves_what_was_there(written: Store, monkeypatch: pytest.M
         file.write(bytes(10))
         raise OSError(errno.ENOSPC, "No space left on device", file.name)
 
-    monkeypatch.setattr(sealed, "write_all", full)
+    monkeypatch.setattr(stores, "write_all", full)
     with pytest.raises(OSError, match="No space left"):
         written.write({"real": np.zeros(3)})
     arrays = written.read(dict)
@@ -115,7 +113,7 @@ def test_a_full_disk_leaves_what_was_there(written: Store, monkeypatch: pytest.M
 def test_a_kill_in_the_middle_of_writing_leaves_what_was_there(written: Store) -> None:
     program = (
         "import os, signal, sys\nfrom pathlib import Path\nimport numpy as np\n"
-        "from fe_ste.tools.stores.store import Store\n"
+        "from fe_ste.tools.stores import Store\n"
         "os.fsync = lambda handle: os.kill(os.getpid(), signal.SIGKILL)\n"
         "Store(Path(sys.argv[1]), 'this input').write({'real': np.zeros(3)})\n"
     )

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fe_ste.tools.threads
-from fe_ste.elimination.dense import add_product
+from fe_ste.elimination import add_product
 from fe_ste.tools.threads import AtOnce, one_dense_thread, second_thread, side_by_side
 
 

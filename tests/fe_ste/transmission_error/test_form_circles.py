@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from fe_ste.contact.cells import ContactSettings
-from fe_ste.contact.flank_ends import reaches_form_circle, share_beyond
-from fe_ste.contact.kinematics import FlankPair
+from fe_ste.contact.kinematics import ContactSettings, FlankPair, reaches_form_circle, share_beyond
 from fe_ste.elasticity.flank import FlankCompliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.sealed import write_dataset
+from fe_ste.tools.stores import write_dataset
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.search import contact_state, hertz_half_width
 from fe_ste.transmission_error.states import CUT_OFF

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.transmission_error.gaps import GapError, complete_cycle, complete_loads
+from fe_ste.transmission_error.surface import GapError, complete_cycle, complete_loads
 from fe_ste.transmission_error.table import MeshTable, TableInput
 
 GEAR = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)

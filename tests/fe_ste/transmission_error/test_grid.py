@@ -15,12 +15,12 @@ import pytest
 import xarray as xr
 
 import fe_ste.transmission_error.grid
-from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.flank import flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.flanks.modifications import FlankModification
+from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.workers import Workers
+from fe_ste.tools.threads import Workers
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.grid import Checkpoint, GridError, solve_grid
 from fe_ste.transmission_error.search import contact_state, unloaded_states

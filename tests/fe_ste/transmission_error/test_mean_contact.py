@@ -12,18 +12,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import fe_ste.transmission_error.known_contacts
-from fe_ste.contact.cells import ContactSettings
-from fe_ste.contact.kinematics import ContactError
+import fe_ste.transmission_error.mean_contact
+from fe_ste.contact.kinematics import ContactError, ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.flanks.modifications import FlankModification
+from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools import sealed
-from fe_ste.tools.sealed import write_sealed
-from fe_ste.tools.stores.cache import FOLDER_VARIABLE
+from fe_ste.tools import stores
+from fe_ste.tools.stores import FOLDER_VARIABLE, write_sealed
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
-from fe_ste.transmission_error.known_contacts import contacts_told, forget_contacts, known_contacts
-from fe_ste.transmission_error.mean_contact import MeanContact, contact_input, mean_contact
+from fe_ste.transmission_error.mean_contact import (
+    MeanContact,
+    contact_input,
+    contacts_told,
+    forget_contacts,
+    known_contacts,
+    mean_contact,
+)
 from fe_ste.transmission_error.table import TableInput
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 
@@ -195,7 +199,7 @@ def solved(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         hashes.append(wanted.hash)
         return mean_contact(wanted)
 
-    monkeypatch.setattr(fe_ste.transmission_error.known_contacts, "mean_contact", counted)
+    monkeypatch.setattr(fe_ste.transmission_error.mean_contact, "mean_contact", counted)
     return hashes
 
 
@@ -229,7 +233,7 @@ def test_another_input_is_not_misread(kept: Path, solved: list[str]) -> None:
 def test_another_version_does_not_use_the_files(kept: Path, solved: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     known_contacts([WANTED])
     forget_contacts()
-    monkeypatch.setattr(fe_ste.transmission_error.known_contacts, "MEAN_CONTACT", -1)
+    monkeypatch.setattr(fe_ste.transmission_error.mean_contact, "MEAN_CONTACT", -1)
     known_contacts([WANTED])
     assert len(solved) == 2
 
@@ -282,7 +286,7 @@ def test_what_is_stopped_goes_on_from_the_contacts_that_are_solved(kept: Path, s
 
 
 def test_contacts_used_least_lately_are_removed(kept: Path, solved: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fe_ste.transmission_error.known_contacts._contacts, "in_files", 6000)
+    monkeypatch.setattr(fe_ste.transmission_error.mean_contact._contacts, "in_files", 6000)
     known_contacts([WANTED])
     other = dataclasses.replace(WANTED, misalignment=(0.0, 1e-5))
     known_contacts([other])
@@ -322,6 +326,6 @@ def test_a_full_disk_costs_nothing_but_time(
     def full(path: Path, content: memoryview) -> str:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(sealed, "write_sealed", full)
+    monkeypatch.setattr(stores, "write_sealed", full)
     known_contacts([WANTED])
     assert "No space left on device" in caplog.text and not list(kept.glob("contact-*"))

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import fe_ste.elasticity.known_flanks
+import fe_ste.elasticity.flank
 import fe_ste.transmission_error.table
-from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.flanks.modifications import FlankModification
+from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.sealed import write_dataset
+from fe_ste.tools.stores import write_dataset
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 from ..damage import damages
@@ -147,13 +147,13 @@ def test_netcdf_without_a_table_is_refused(tmp_path: Path) -> None:
 def test_a_gear_that_meshes_twice_is_computed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """On either flank, under another name or not."""
     calls = []
-    compute = fe_ste.elasticity.known_flanks.flank_compliance
+    compute = fe_ste.elasticity.flank.flank_compliance
 
     def counted(gear: Gear, *rest: Any, **options: Any) -> Any:
         calls.append(gear.face_width)
         return compute(gear, *rest, **options)
 
-    monkeypatch.setattr(fe_ste.elasticity.known_flanks, "flank_compliance", counted)
+    monkeypatch.setattr(fe_ste.elasticity.flank, "flank_compliance", counted)
     gear = dataclasses.replace(GEAR, face_width=1.01 * GEAR.face_width)
     pair = GearPair(name="pair", pinion=gear, gear=dataclasses.replace(gear, name="other"), centre_distance=90e-3)
     compliance = fe_ste.transmission_error.table.prepared_compliance(dataclasses.replace(WANTED, pair=pair))

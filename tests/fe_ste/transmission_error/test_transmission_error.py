@@ -12,11 +12,10 @@ import pytest
 import xarray as xr
 
 import fe_ste.transmission_error.transmission_error
-from fe_ste.contact.cells import ContactSettings
-from fe_ste.contact.kinematics import ContactError
+from fe_ste.contact.kinematics import ContactError, ContactSettings
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.flanks.modifications import FlankModification, Relief, radius_at_roll_length_from_tip
+from fe_ste.flanks import FlankModification, Relief, radius_at_roll_length_from_tip
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance

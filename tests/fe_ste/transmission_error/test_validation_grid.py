@@ -12,10 +12,10 @@ import pytest
 import xarray as xr
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.tooth_mesh.grid_axes import axes_reaching
-from fe_ste.contact.cells import ContactSettings
+from exugear.system.tooth_mesh.tables import axes_reaching
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.flank import flank_compliance
-from fe_ste.flanks.modifications import FlankModification, Relief, radius_at_roll_length_from_tip
+from fe_ste.flanks import FlankModification, Relief, radius_at_roll_length_from_tip
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.search import unloaded_states

@@ -16,7 +16,7 @@ import pytest
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import PairSpec
-from fe_ste.contact.cells import ContactSettings
+from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.flank import FlankCompliance, flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear, GearPair

@@ -2,31 +2,472 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import xarray as xr
 
 import exugear
-from exugear.exchange.rexs import synonyms
+from exugear.exchange.rexs import tree
 from exugear.exchange.rexs.additions import OWN
 from exugear.exchange.rexs.containers import read_rexs, with_additions
-from exugear.exchange.rexs.export.dynamics import put_bearings, put_modes, put_runs
-from exugear.exchange.rexs.export.names import Results
-from exugear.exchange.rexs.export.origins import origins_of
-from exugear.exchange.rexs.export.shafts import put_displacements, put_speeds
-from exugear.exchange.rexs.export.stored import StoredResults
-from exugear.exchange.rexs.export.teeth import (
-    Target,
-    check_same_gears,
-    put_gears,
-    put_pairs,
-    put_static_forces,
-    put_tables,
-)
+from exugear.exchange.rexs.export.names import Origins, Results, origins_of, stiffness_names
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.to_case.notes import Rules
-from exugear.exchange.rexs.tree import Model
+from exugear.exchange.rexs.tree import Model, RexsError
+from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import RPM, Body, seat_key
+from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import VariantError
+from exugear.results.folder import bodies_folder, read_duties
+from exugear.results.run_file import FINAL_NAME, load_run
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.bodies.of_gearbox import reduced_bodies
+from exugear.system.build import assemble
+from exugear.system.modes import load_modes
+from exugear.system.statics import BalanceError, static_state
+from exugear.system.system import Assembly, input_hash
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.placement import MeshError
+from exugear.system.tooth_mesh.tables import fitting_table, table_path
+from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed
+from fe_ste.tools.files import FileError
+from fe_ste.transmission_error.mean_contact import face_load_factor, load_along_face
+from fe_ste.transmission_error.table import MeshTable, TableError
+
+# Results in a folder that belong to a gearbox: what was computed from another input is left out, and told
+
+Result = TypeVar("Result")
+_UNFIT = (CaseError, MeshError, VariantError, BearingError, BalanceError, FileError, KeyError, ValueError)
+"""What a file, or the case for the choice that it was computed of, may say."""
+
+
+@dataclass
+class StoredResults:
+    """What lies in a results folder."""
+
+    gearbox: Gearbox
+    folder: Path
+    left_out: list[str] = field(default_factory=list)
+    """Files that do not belong to the gearbox, with the reason."""
+    _assemblies: dict[Choice, Assembly] = field(default_factory=dict, repr=False)
+
+    def tables(self) -> dict[str, MeshTable]:
+        """Tables by pair."""
+        found = {}
+        for name in self.gearbox.pairs:
+            if not table_path(self.folder, name).exists():
+                continue
+            try:
+                found[name] = fitting_table(self.gearbox, name, self.folder)
+            except TableError as error:
+                self.left_out.append(f"table of {name}: {error}")
+        return found
+
+    def modes(self) -> dict[Choice, xr.Dataset]:
+        """Modes by what they were computed of."""
+        return dict(self._each("*/*/modes.nc", self._modes))
+
+    def runs(self) -> dict[Choice, xr.Dataset]:
+        """Mesh forces of finished runs by what was run, the load case included."""
+        return dict(self._each(f"*/*/{FINAL_NAME}", self._run))
+
+    def duties(self) -> list[Mapping[str, Any]]:
+        """Return what bearings bear, from the most complete variant that was asked."""
+        found = dict(self._each("*/*/bearings.json", self._duties))
+        best = sorted(found, key=lambda choice: choice.variant.is_elastic)[-1:]
+        return [duty for choice in best for duty in found[choice]]
+
+    @property
+    def loaded(self) -> Assembly | None:
+        """The most complete variant with bearings of which results were read."""
+        assemblies = [assembly for assembly in self._assemblies.values() if assembly.variant.on_bearings]
+        return max(assemblies, key=lambda one: one.variant.is_elastic, default=None)
+
+    def _each(self, pattern: str, read: Callable[[Path], tuple[Choice, Result]]) -> Iterator[tuple[Choice, Result]]:
+        """Read files one by one; what does not belong to the gearbox is noted."""
+        for path in sorted(self.folder.glob(pattern)):
+            try:
+                yield read(path)
+            except _UNFIT as error:
+                self.left_out.append(f"{path.relative_to(self.folder)}: {error}")
+
+    def _modes(self, path: Path) -> tuple[Choice, xr.Dataset]:
+        data = load_modes(path)
+        self._check(_choice(data.attrs), data.attrs)
+        return _choice(data.attrs), data
+
+    def _run(self, path: Path) -> tuple[Choice, xr.Dataset]:
+        data = load_run(path, ("mesh_force",))
+        case = str(data.attrs["load_case"])
+        if case not in self.gearbox.load_cases:
+            raise CaseError(f"the case has no load case {case!r}")
+        self._check(_choice(data.attrs), data.attrs, case)
+        return replace(_choice(data.attrs), load_case=case), data
+
+    def _duties(self, path: Path) -> tuple[Choice, list[Mapping[str, Any]]]:
+        content = read_duties(path)
+        law, _, inertias = path.parent.name.partition("-")
+        choice = Choice(path.parent.parent.name, law, inertias)
+        self._check(choice, content)
+        return choice, content["bearings"]
+
+    def _check(self, choice: Choice, attributes: Mapping[str, Any], load_case: str | None = None) -> None:
+        """Refuse what was computed from another input.
+
+        Raises
+        ------
+        CaseError
+            It was.
+        """
+        if choice not in self._assemblies:
+            bodies: dict[str, ElasticBody] = {}
+            if choice.variant.is_elastic:
+                bodies = reduced_bodies(self.gearbox, choice.inertia_set(self.gearbox), bodies_folder(self.folder))
+            stiffness = mesh_stiffness(self.gearbox, choice.mesh_law, self.folder)
+            self._assemblies[choice] = assemble(self.gearbox, choice, stiffness, bodies)
+        if input_hash(self._assemblies[choice], load_case) != attributes.get("input_hash"):
+            raise CaseError("was computed from another input; compute it again")
+
+
+def _choice(attributes: Mapping[str, Any]) -> Choice:
+    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_law", "inertias")))
+
+
+# Results on gears and stages: what their geometry gives, their static load, and their transmission error tables
+
+EQUAL = 1e-9
+"""Largest relative difference of numbers that are the same in both files."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where results go: the model that was read, its parts, and the load case of the static load (None: the model)."""
+
+    model: Model
+    origins: Origins
+    load_case: int | None
+
+
+def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
+    """Refuse a REXS file of another gearbox; numbers that may have been edited are no matter here.
+
+    Raises
+    ------
+    RexsError
+        Gears or pairs of the case that the file does not have, or that differ in what makes a gear that gear.
+    """
+    faults = []
+    for kind, own, others in (("gears", gearbox.gears, imported.gears), ("pairs", gearbox.pairs, imported.pairs)):
+        missing = [name for name in own if name not in others]
+        if missing:
+            faults.append(
+                f"{gearbox.source}: {kind} {', '.join(missing)} do not come from this file, whose {kind} are imported "
+                f"as {', '.join(others)}; keep the names of the import"
+            )
+    for name in gearbox.gears.keys() & imported.gears.keys():
+        gear = gearbox.gears[name]
+        other = imported.gears[name]
+        for key in ("teeth", "normal_module", "internal"):
+            if not math.isclose(getattr(gear, key), getattr(other, key), rel_tol=EQUAL):
+                faults.append(
+                    f"{gearbox.source}: gears.{name} has {key} = {getattr(gear, key):g}, in this file it is "
+                    f"{getattr(other, key):g}: results of another gear do not belong into it"
+                )
+    if faults:
+        raise RexsError(*faults)
+
+
+def put_gears(results: Results, gearbox: Gearbox, target: Target) -> None:
+    """Put diameters of gears, and inputs of the case that are not those of the file."""
+    for name, gear in gearbox.gears.items():
+        for number in target.origins.gears[name]:
+            results.put(number, "reference_diameter", "mm", 2e3 * gear.reference_radius)
+            results.put(number, "base_diameter", "mm", 2e3 * gear.base_radius)
+            if gear.helix_angle:
+                results.put(
+                    number, "axial_pitch", "mm", 1e3 * math.pi * gear.normal_module / abs(math.sin(gear.helix_angle))
+                )
+            normal = gear.normal_tooth_thickness
+            results.put(number, "normal_tooth_thickness", "mm", 1e3 * normal)
+            results.put(number, "transverse_tooth_thickness", "mm", 1e3 * normal / math.cos(gear.helix_angle))
+            results.put(number, "normal_tooth_thickness_at_tip_diameter", "mm", 1e3 * gear.tip_thickness)
+            part = target.model.components[number]
+            for key, radius in (("root_form_diameter", gear.form_radius), ("tip_diameter", gear.tip_radius)):
+                stated = part.quantity(key, "mm")
+                if stated is None and key == "root_form_diameter":
+                    results.put(number, key, "mm", 2e3 * radius)
+                elif stated is None or not math.isclose(abs(stated), 2e3 * radius, rel_tol=EQUAL):
+                    results.put_own(number, key, "mm", 2e3 * radius)  # the file's own is an input and stays
+            for key, unit, value in _inputs(gear):
+                results.put_own(number, key, unit, value)
+
+
+def _inputs(gear: Gear) -> tuple[tuple[str, str, float], ...]:
+    """Return inputs that a REXS file leaves to assumptions, or that an import may have to replace."""
+    return (
+        ("profile_shift", "none", gear.profile_shift),
+        ("tooth_thinning", "mm", 1e3 * gear.tooth_thinning),
+        ("root_diameter", "mm", 2e3 * gear.root_radius),
+        ("tool_tip_radius", "none", gear.rack.tip_radius),
+    )
+
+
+def put_pairs(results: Results, gearbox: Gearbox, target: Target) -> None:
+    """Put relations of pairs: contact ratios, working circles, clearances."""
+    for name, spec in gearbox.pairs.items():
+        pair = spec.pair
+        for stage in target.origins.pairs[name]:
+            results.put(stage, "gear_ratio", "none", pair.ratio)
+            results.put(stage, "transverse_contact_ratio", "none", pair.transverse_contact_ratio)
+            if pair.overlap_ratio > 0.0:  # REXS has none of zero
+                results.put(stage, "overlap_ratio", "none", pair.overlap_ratio)
+            results.put(stage, "total_contact_ratio", "none", pair.total_contact_ratio)
+            length = pair.path_end - pair.path_start
+            results.put(stage, "length_of_path_of_contact", "mm", 1e3 * length)
+            results.put_own(stage, "transverse_backlash", "mm", 1e3 * pair.circumferential_backlash)
+            for gear, clearance, ends in (
+                (pair.pinion, pair.pinion_tip_clearance, _active(pair, pair.pinion)),
+                (pair.gear, pair.gear_tip_clearance, _active(pair, pair.gear)),
+            ):
+                data = _gear_data(target, stage, gear)
+                if data is None:
+                    continue
+                results.put(data, "pitch_diameter", "mm", 2e3 * pair.working_radius(gear))
+                results.put(data, "working_pressure_angle", "deg", math.degrees(pair.working_pressure_angle))
+                results.put(data, "active_root_diameter", "mm", 2e3 * ends[0])
+                results.put(data, "active_tip_diameter", "mm", 2e3 * ends[1])
+                results.put(data, "tip_clearance", "mm", 1e3 * clearance)
+
+
+def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
+    """Radii at root and tip between which a gear touches its mate, m."""
+    rolls = [pair.path_start, pair.path_end]
+    if gear is pair.gear:
+        tangent = pair.base_tangent_length
+        rolls = [roll + tangent if gear.internal else tangent - roll for roll in rolls]
+    low, high = sorted(math.hypot(gear.base_radius, roll) for roll in rolls)
+    if gear.internal:
+        return (high, low)
+    return (low, high)
+
+
+def _gear_data(target: Target, stage: int, gear: Gear) -> int | None:
+    """Component that holds data of a gear in a stage."""
+    numbers = target.origins.gears[gear.name]
+    for relation in target.model.relations_of("stage_gear_data"):
+        if relation.roles.get("stage") == stage and relation.roles.get("gear") in numbers:
+            return relation.roles.get("stage_gear_data")
+    return None
+
+
+def put_static_forces(results: Results, gearbox: Gearbox, target: Target) -> None:
+    """Put the forces that the static load asks of the meshes; equal planets share it evenly."""
+    for mesh, force in gearbox.train.static_mesh_forces().items():
+        one = next(each for each in gearbox.meshes if each.name == mesh)
+        numbers = target.origins.pairs[one.pair.name]
+        instance = instance_of(mesh, one.family)
+        stage = numbers[instance] if instance < len(numbers) else None
+        if stage is not None:
+            results.put(stage, "tangential_force_at_base_circle", "N", abs(force), target.load_case)
+
+
+def instance_of(name: str, family: str) -> int:
+    """Return the number of a planet, from 0, in the name of what it carries.
+
+    Examples
+    --------
+    >>> instance_of("sun_planet_3", "sun_planet"), instance_of("stage_1", "stage_1")
+    (2, 0)
+    """
+    number = name.removeprefix(family).removeprefix("_")
+    if number.isdigit():
+        return int(number) - 1
+    return 0
+
+
+def put_tables(results: Results, gearbox: Gearbox, tables: Mapping[str, MeshTable], target: Target) -> None:
+    """Put transmission error, mesh stiffness and load along the face of the static state."""
+    for name, table in tables.items():
+        data = table.static_state
+        pair = gearbox.pairs[name].pair
+        case = target.load_case
+        positions = tuple(data["pmc"].to_numpy().tolist())
+        for stage in target.origins.pairs[name]:
+            series = {
+                "transmission_error": ("mum", 1e6 * data["ste"]),
+                "mesh_stiffness": ("N / mm", 1e-3 * data["mesh_stiffness"]),
+            }
+            for key, (unit, values) in series.items():
+                if bool(values.isnull().any()):
+                    continue  # REXS has no sign for a value that is missing
+                results.put(stage, key, unit, tuple(values.to_numpy().tolist()), case)
+            error = data["ste"]
+            results.put_own(stage, "mesh_cycle_positions", "none", positions, case)
+            results.put_own(
+                stage, "transmission_error_peak_to_peak", "mum", float(1e6 * (error.max() - error.min())), case
+            )
+            results.put_own(stage, "mean_mesh_stiffness", "N / mm", float(1e-3 * data["mesh_stiffness"].mean()), case)
+            results.put_own(stage, "contact_pressure_maximum", "MPa", float(1e-6 * data["max_pressure"].max()), case)
+            results.put(stage, "face_load_factor", "none", float(face_load_factor(data)), case)
+            along = load_along_face(data)
+            places = tuple((1e3 * along["axial_position"]).to_numpy().tolist())
+            results.put_own(stage, "load_along_face", "N / mm", tuple((1e-3 * along).to_numpy().tolist()), case)
+            results.put_own(stage, "load_along_face_positions_from_middle", "mm", places, case)
+            for gear in (pair.pinion, pair.gear):
+                place = _gear_data(target, stage, gear)
+                if place is not None:
+                    turned = tuple(360.0 / gear.teeth * position for position in positions)
+                    results.put(place, "mesh_positions", "deg", turned, case)
+
+
+# Results on shafts: speeds under each load case, and how far they move under the static load
+
+SPEED = "rotational_speed"
+
+
+def put_speeds(results: Results, gearbox: Gearbox, target: Target) -> None:
+    """Put the speeds of shafts and gears at which the train rolls, where the file leaves them out.
+
+    Those of planets are left out: REXS does not say whether they count against the carrier.
+    """
+    for case in target.model.load_cases or (None,):
+        name = "nominal" if case is None else f"load_case_{case.number}"
+        known = gearbox.load_cases.get(name)
+        if known is None or not known.start_speed:
+            continue
+        speeds = gearbox.train.rolling({gearbox.case.overall.input: known.start_speed, **known.start_speeds})
+        for body, members in target.origins.bodies.items():
+            for number in members[0] if body in speeds else ():
+                part = target.model.components[number]
+                stated = part.attributes if case is None else {**part.attributes, **case.changes.get(number, {})}
+                if SPEED not in stated:
+                    speed = _sense(target, number) * speeds[body] / RPM
+                    results.put(number, SPEED, "1 / min", speed, None if case is None else case.number)
+
+
+def put_displacements(results: Results, assembly: Assembly, target: Target) -> None:
+    """Put how far shafts move under the static load, in their own axes, where gears and bearings sit on them."""
+    q = static_state(assembly).q
+    for body in assembly.bodies:
+        members = target.origins.bodies.get(body.family, ())
+        instance = instance_of(body.name, body.family)
+        shafts = [n for n in (members[instance] if instance < len(members) else ()) if _is_shaft(target, n)]
+        nodes = sorted(_nodes(assembly, q, body), key=lambda node: node[0])
+        if len(shafts) != 1 or not nodes or body.fixed:
+            continue
+        number = shafts[0]
+        nodes = nodes[:: _sense(target, number)]
+        heights, moved = zip(*nodes, strict=True)
+        along = _sense(target, number) * (np.array(heights) - target.origins.places[number])
+        own = np.array(moved) @ target.origins.axes[number].T
+        results.put(number, "node_positions", "mm", tuple((1e3 * along).tolist()), target.load_case)
+        for axis, column in zip("uvw", own.T, strict=True):
+            results.put(number, f"displacement_{axis}", "mum", tuple((1e6 * column).tolist()), target.load_case)
+
+
+def _is_shaft(target: Target, number: int) -> bool:
+    return target.model.components[number].type == "shaft" and number in target.origins.axes
+
+
+def _sense(target: Target, number: int) -> int:
+    """Sense of a component's u axis: 1 along +z, -1 against it."""
+    axes = target.origins.axes.get(number)
+    if axes is None or axes[0, 2] > 0.0:
+        return 1
+    return -1
+
+
+def _nodes(assembly: Assembly, q: Floats, body: Body) -> Iterator[tuple[float, Floats]]:
+    """Places (m) along a body with a place in space, and displacements (3,) in m of its axis there."""
+    seats = dict(body.wheels)
+    for support in assembly.supports:
+        if body.name in (support.body, support.on):
+            seats[support.name] = support.position[2]
+    coordinates = list(assembly.coordinates[body.name])
+    if coordinates[0] < 0:
+        return
+    for item, height in seats.items():
+        own = assembly.coordinates.get(seat_key(body.name, item))
+        if own is not None:
+            yield height, q[list(own[:3])]
+        elif body.name not in assembly.elastic_bodies:
+            x, y, z, about_x, about_y = q[coordinates[:5]]
+            arm = height - body.centre_of_mass_z
+            yield height, np.array([x + about_y * arm, y - about_x * arm, z])
+
+
+# Results on bearings, modes and runs
+
+
+def put_bearings(results: Results, gearbox: Gearbox, duties: Sequence[Mapping[str, Any]], target: Target) -> None:
+    """Put what catalogue bearings bear: loads, stiffness at the operating point, pressure and life."""
+    families = {bearing.name: bearing.family for bearing in gearbox.bearings}
+    case = target.load_case
+    for duty in duties:
+        name = str(duty["bearing"])
+        family = families.get(name, name)
+        numbers = target.origins.bearings.get(family, ())
+        instance = instance_of(name, family)
+        if instance >= len(numbers):
+            continue
+        number = numbers[instance]
+        results.put_own(number, "radial_load", "kN", float(duty["radial_load_kN"]), case)
+        results.put_own(number, "axial_load", "kN", float(duty["axial_load_kN"]), case)
+        results.put(number, "contact_pressure", "MPa", duty["contact_pressure_MPa"], case)
+        results.put(number, "basic_rating_life", "MRev", duty["L10_Mrev"], case)
+        results.put(number, "reference_rating_life", "MRev", duty["L10r_Mrev"], case)
+        stiffness = in_axes(np.array(duty["stiffness_matrix_N_m_rad"]), target.origins.axes[number])
+        for key, row, column, unit, factor in stiffness_names(results.version):
+            results.put_named(number, key, unit, factor * float(stiffness[row, column]), case)
+
+
+def in_axes(stiffness: Floats, axes: Floats) -> Floats:
+    """Return a stiffness (6, 6) over x, y, z and angles about them in a bearing's axes u, v, w, rows of a (3, 3)."""
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = turn[3:, 3:] = axes
+    return np.asarray(turn @ stiffness @ turn.T)
+
+
+def words_of(choice: Choice) -> str:
+    """Choice as part of an attribute's name."""
+    return "_".join(str(part) for part in (choice.variant, choice.mesh_law, choice.inertias)).replace("-", "_")
+
+
+def put_modes(results: Results, modes: Mapping[Choice, xr.Dataset], unit: int, load_case: int | None) -> None:
+    """Put eigenfrequencies and damping of the variants on the gear unit."""
+    for choice, data in modes.items():
+        moving = data["frequency"].to_numpy() > 0.0
+        for key, name, sign in (("eigenfrequencies", "frequency", "Hz"), ("damping_ratios", "damping_ratio", "none")):
+            values = tuple(data[name].to_numpy()[moving].tolist())
+            results.put_own(unit, f"{key}_{words_of(choice)}", sign, values, load_case)
+
+
+def put_runs(results: Results, gearbox: Gearbox, runs: Mapping[Choice, xr.Dataset], target: Target) -> None:
+    """Put the largest and the mean mesh forces of runs in time on the stages."""
+    families = {mesh.name: mesh for mesh in gearbox.meshes}
+    numbers = {f"load_case_{case.number}": case.number for case in target.model.load_cases}
+    for choice, data in runs.items():
+        case = numbers.get(str(choice.load_case))
+        ending = words_of(choice) if case is not None else f"{words_of(choice)}_{choice.load_case}"
+        for name in data["mesh"].to_numpy().tolist():
+            mesh = families[str(name)]
+            stage = target.origins.pairs[mesh.pair.name][instance_of(mesh.name, mesh.family)]
+            force = data["mesh_force"].sel(mesh=name)
+            for key, value in (("mesh_force_maximum", force.max()), ("mesh_force_mean", force.mean())):
+                if math.isfinite(float(value)):
+                    results.put_named(stage, f"{OWN}{key}_{ending}", "N", float(value), case)
+
+
+# Results of a gearbox put back into the REXS file that it was imported from
 
 
 @dataclass(frozen=True)
@@ -112,6 +553,6 @@ def _replaced(model: Model, results: Results) -> tuple[str, ...]:
         part = model.components[addition.component]
         cases = {case.number: case.changes.get(addition.component, {}) for case in model.load_cases}
         there = part.attributes if addition.load_case is None else cases[addition.load_case]
-        if synonyms.ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
+        if tree.ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
             told.append(f"{part}: {addition.name}")
     return tuple(told)

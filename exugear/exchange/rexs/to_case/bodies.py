@@ -6,10 +6,8 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.faults import RexsError
-from exugear.exchange.rexs.to_case.notes import Notes
-from exugear.exchange.rexs.to_case.places import Places
-from exugear.exchange.rexs.tree import Component, Model
+from exugear.exchange.rexs.to_case.notes import Notes, Places
+from exugear.exchange.rexs.tree import Component, Model, RexsError
 from fe_ste.tools.display import Displayed
 
 GEARS = ("cylindrical_gear", "ring_gear")

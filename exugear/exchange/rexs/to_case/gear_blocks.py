@@ -6,12 +6,12 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.to_case.bodies import Bodies, Body
 from exugear.exchange.rexs.to_case.meshing import (
     PLACE_TOLERANCE,
     Stage,
     centre_distance,
+    modification_of,
     told_if_impossible,
     unchecked,
     with_clear_tips,
@@ -21,9 +21,7 @@ from exugear.exchange.rexs.to_case.meshing import (
     with_possible_cutter,
     with_shifts,
 )
-from exugear.exchange.rexs.to_case.modifications import modification_of
-from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
-from exugear.exchange.rexs.to_case.places import Places
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
 from exugear.exchange.rexs.to_case.shafts import Cylinder, seat_diameter
 from exugear.exchange.rexs.to_case.toothing import (
     Toothing,
@@ -32,7 +30,7 @@ from exugear.exchange.rexs.to_case.toothing import (
     material_table,
     toothing_of,
 )
-from exugear.exchange.rexs.tree import Component, Model
+from exugear.exchange.rexs.tree import Component, Model, RexsError
 
 FACE_TOLERANCE = 1e-3
 """Largest difference of face widths that needs no word, mm."""

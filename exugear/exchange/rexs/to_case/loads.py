@@ -6,12 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.to_case.bodies import Bodies, Body
-from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
-from exugear.exchange.rexs.to_case.places import Places
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
 from exugear.exchange.rexs.to_case.toothing import material_of
-from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model
+from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, RexsError
 
 FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
 UNKNOWN_TORQUE = 100.0

@@ -8,12 +8,10 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.to_case.bodies import Body
-from exugear.exchange.rexs.to_case.notes import Notes, needed, tidy
-from exugear.exchange.rexs.to_case.places import Places
+from exugear.exchange.rexs.to_case.notes import Notes, Places, needed, tidy
 from exugear.exchange.rexs.to_case.toothing import Toothing, is_rigid, material_of
-from exugear.exchange.rexs.tree import Component, Model
+from exugear.exchange.rexs.tree import Component, Model, RexsError
 from fe_ste.geometry.cylinders import Tube, mass_properties
 
 STEEL = 7850.0

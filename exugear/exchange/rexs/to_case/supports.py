@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from exugear.exchange.rexs.faults import RexsError, plain
 from exugear.exchange.rexs.to_case.bodies import (
     JOINING,
     RIGID_ABOVE,
@@ -17,11 +16,10 @@ from exugear.exchange.rexs.to_case.bodies import (
     is_rigid_in_torsion,
     torsional_stiffness,
 )
-from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, assumed, derived, read, tidy
-from exugear.exchange.rexs.to_case.places import Places
-from exugear.exchange.rexs.tree import Component, Model
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
+from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
 from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS
-from exugear.system.bearings.rolling.designations import boundary_of
+from exugear.system.bearings.rolling.dimensions import boundary_of
 
 BEARINGS = ("concept_bearing", "rolling_bearing_with_catalog_geometry", "rolling_bearing_with_detailed_geometry")
 PLAIN_BEARINGS = ("hydrodynamic_radial_plain_bearing", "slide_bearing")

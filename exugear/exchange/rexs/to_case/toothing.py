@@ -6,9 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, needed, read, tidy, within
-from exugear.exchange.rexs.tree import Component, Model
+from exugear.exchange.rexs.tree import Component, Model, RexsError
 
 PLAUSIBLE_TIP = (0.5, 2.0)
 """Tip diameters over the reference diameter beyond which a tip diameter is taken as a placeholder."""

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from itertools import groupby
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -21,7 +22,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from exugear.gearbox.sections.case import CaseFile
-from exugear.gearbox.sections.quantities import Range
+from exugear.gearbox.sections.entries import Range
 
 UNITS = {
     "mm": "mm",
@@ -204,3 +205,74 @@ def written(value: object) -> str:
     if isinstance(value, str):
         return f'"{value}"'
     return str(value)
+
+
+# The JSON schema of the gearbox file, for editors: it tells keys and ranges while one types
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def json_schema() -> dict[str, Any]:
+    """Describe the whole file; keys have their meaning, numbers their range.
+
+    Examples
+    --------
+    >>> json_schema()["$defs"]["GearSection"]["properties"]["teeth"]
+    {'maximum': 2000, 'minimum': 5, 'type': 'integer', 'description': 'Number of teeth, positive for rings, too.'}
+    """
+    schema = CaseFile.model_json_schema()
+    models = {model.__name__: model for model in tables().values()}
+    for name, table in {CaseFile.__name__: schema, **schema["$defs"]}.items():
+        for key, meaning in meanings(models[name]).items():
+            table["properties"][key]["description"] = meaning
+    return {"$schema": DIALECT, **_as_toml_has_it(schema)}
+
+
+def _as_toml_has_it(node: Any) -> Any:
+    """Leave out what a TOML file cannot say: null, and titles that repeat the keys."""
+    if isinstance(node, list):
+        return [_as_toml_has_it(entry) for entry in node]
+    if not isinstance(node, dict):
+        return node
+    if "anyOf" in node:
+        kinds = [kind for kind in node["anyOf"] if kind != {"type": "null"}]
+        node = {key: value for key, value in node.items() if key != "anyOf"}
+        node |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+    titled = isinstance(node.get("title"), str)
+    kept = {key: value for key, value in node.items() if not (key == "title" and titled)}
+    return {key: _as_toml_has_it(value) for key, value in kept.items() if not (key == "default" and value is None)}
+
+
+# The page of the documentation that describes every key of the gearbox file
+
+_HEAD = """# The gearbox file
+
+Every key there is, table by table; written by `exugear schema --page` from the models that read the
+file, so that it is always what the program takes. `NAME` stands for a name of one's own. A key whose
+default is "needed" must be there if its table is; with "none" the key may be left out. Nothing is
+converted: a key's end names its unit, text stands in quotes, and a whole number may stand for a number.
+Editors that know JSON schemas (`exugear schema`) tell all this while one types.
+"""
+_HEADINGS = "| Key | What it holds | From, to | Default | Meaning | Example |"
+
+
+def page() -> str:
+    """Page in Markdown."""
+    parts = [_HEAD]
+    for table, entries in groupby(keys(), lambda key: key.table):
+        parts.append(_section(table, list(entries)))
+    return "\n".join(parts)
+
+
+def _section(table: str, entries: list[Key]) -> str:
+    model = tables()[table]
+    about = " ".join((model.__doc__ or "").split()) if table else "What stands before all tables."
+    lines = [f"## {f'`[{table}]`' if table else 'Top of the file'}", "", about, ""]
+    lines += [_HEADINGS, "| --- | --- | --- | --- | --- | --- |"]
+    return "\n".join([*lines, *map(_row, entries), ""])
+
+
+def _row(key: Key) -> str:
+    kind = f"{key.kind}, {key.unit}" if key.unit else key.kind
+    told = (f"`{key.name}`", kind, key.range, key.default, key.meaning, f"`{written(key.example)}`")
+    return f"| {' | '.join(cell.replace('|', '/') for cell in told)} |"

@@ -1,32 +1,35 @@
 """Rows of rolling elements from a catalogue section, and estimates of what it leaves open.
 
 A catalogue prints the boundary dimensions. What the file leaves open of the inside follows from the usual
-proportions of the type (`exugear.system.bearings.rolling.proportions`), and is told as an estimate with its range.
+proportions of the type (`exugear.system.bearings.rolling.dimensions`), and is told as an estimate with its range.
+
+`makers.csv` has the least of what the catalogues of SKF, NKE and NSK print for open bearings of today's design with
+these boundary dimensions (text of the catalogues in the public repository ArtemFilin1990/Mar, commit 7b871a5):
+cylindrical roller bearings with E of that design, without E the older ones where they are printed; angular contact ball
+bearings of 40 degrees (B). Where two makers agree within a tenth and the third does not within a fifth, it was read
+wrong and is left out.
 """
 
 from __future__ import annotations
 
+import csv
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from exugear.gearbox.sections.connections import (
     CONTACT_ANGLES_DEG,
     ROUNDING_MM,
     TYPES_OF_KEYS,
+    BearingType,
     CatalogueSection,
 )
-from exugear.system.bearings.rolling import proportions
-from exugear.system.bearings.rolling.rows import (
-    BallRow,
-    BearingError,
-    RollerRow,
-    RollingRow,
-    moved,
-    pair_rows,
-    rib_row,
-)
+from exugear.system.bearings.rolling import dimensions
+from exugear.system.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows, rib_row
 
 ALIGNING = ("spherical_roller", "self_aligning_ball")
 """Types whose outer raceway is a sphere about the middle of the bearing."""
@@ -142,14 +145,14 @@ def row_count(section: CatalogueSection) -> int:
     return section.row_count or (2 if section.type in ALIGNING else 1)
 
 
-def _scaled(key: str, proportion: proportions.Proportion, scale: float, unit: str) -> Estimate:
+def _scaled(key: str, proportion: dimensions.Proportion, scale: float, unit: str) -> Estimate:
     return Estimate(key, proportion.value * scale, proportion.low * scale, proportion.high * scale, unit)
 
 
 def _pitch_diameter(section: CatalogueSection) -> Estimate:
     mean = 0.5 * (section.bore_mm + section.outer_diameter_mm)
     height = section.outer_diameter_mm - section.bore_mm
-    beyond = proportions.PITCH_BEYOND_MEAN
+    beyond = dimensions.PITCH_BEYOND_MEAN
     value, low, high = (mean + share * height for share in (beyond.value, beyond.low, beyond.high))
     return Estimate("pitch_diameter_mm", value, low, high, "mm")
 
@@ -157,9 +160,9 @@ def _pitch_diameter(section: CatalogueSection) -> Estimate:
 def _contact_angle(section: CatalogueSection) -> Estimate | None:
     if section.type not in CONTACT_ANGLES_DEG or (section.type in ALIGNING and row_count(section) == 1):
         return None
-    if section.type in proportions.CONTACT_ANGLE_DEG:
-        return _scaled("contact_angle_deg", proportions.CONTACT_ANGLE_DEG[section.type], 1.0, "deg")
-    distance = proportions.ALIGNING_ROW_DISTANCE[section.type]
+    if section.type in dimensions.CONTACT_ANGLE_DEG:
+        return _scaled("contact_angle_deg", dimensions.CONTACT_ANGLE_DEG[section.type], 1.0, "deg")
+    distance = dimensions.ALIGNING_ROW_DISTANCE[section.type]
     pitch = _given(section, "pitch_diameter_mm")
     value, low, high = (
         math.degrees(math.atan(share * section.width_mm / pitch))
@@ -170,7 +173,7 @@ def _contact_angle(section: CatalogueSection) -> Estimate | None:
 
 def _element_diameter(section: CatalogueSection) -> Estimate:
     height = section.outer_diameter_mm - section.bore_mm
-    estimate = _scaled("element_diameter_mm", proportions.PROPORTIONS[section.type].diameter, height, "mm")
+    estimate = _scaled("element_diameter_mm", dimensions.PROPORTIONS[section.type].diameter, height, "mm")
     if section.element_count is None:
         return estimate
     # As many as the file says have to fit.
@@ -182,9 +185,9 @@ def _element_diameter(section: CatalogueSection) -> Estimate:
 def _element_count(section: CatalogueSection) -> Estimate:
     ratio = _given(section, "element_diameter_mm") / _given(section, "pitch_diameter_mm")
     most = int(math.pi / math.asin(min(ratio, 1.0)))
-    spacing = proportions.PROPORTIONS[section.type].spacing
+    spacing = dimensions.PROPORTIONS[section.type].spacing
     value, low, high = (
-        float(min(most, proportions.element_count(section.type, ratio, each, section.full_complement)))
+        float(min(most, dimensions.element_count(section.type, ratio, each, section.full_complement)))
         for each in (spacing.value, spacing.high, spacing.low)
     )
     if section.full_complement:
@@ -194,32 +197,32 @@ def _element_count(section: CatalogueSection) -> Estimate:
 
 
 def _element_length(section: CatalogueSection) -> Estimate | None:
-    if section.type not in proportions.ROLLER_LENGTH:
+    if section.type not in dimensions.ROLLER_LENGTH:
         return None
     return _scaled(
-        "element_length_mm", proportions.ROLLER_LENGTH[section.type], section.width_mm / row_count(section), "mm"
+        "element_length_mm", dimensions.ROLLER_LENGTH[section.type], section.width_mm / row_count(section), "mm"
     )
 
 
 def _groove(key: str) -> Callable[[CatalogueSection], Estimate]:
-    return lambda section: _scaled(key, proportions.GROOVE_RATIO, 1.0, "")
+    return lambda section: _scaled(key, dimensions.GROOVE_RATIO, 1.0, "")
 
 
 def _rib_contact(section: CatalogueSection) -> Estimate | None:
     if section.ribs == "none":
         return None
-    return _scaled("rib_contact_mm", proportions.RIB_CONTACT, _given(section, "element_diameter_mm"), "mm")
+    return _scaled("rib_contact_mm", dimensions.RIB_CONTACT, _given(section, "element_diameter_mm"), "mm")
 
 
 def _osculation(section: CatalogueSection) -> Estimate:
-    return _scaled("osculation", proportions.OSCULATION, 1.0, "")
+    return _scaled("osculation", dimensions.OSCULATION, 1.0, "")
 
 
 def _row_distance(section: CatalogueSection) -> Estimate | None:
     if section.arrangement != "single":
-        distance = proportions.PAIR_DISTANCE
+        distance = dimensions.PAIR_DISTANCE
         if section.type == "tapered_roller":
-            distance = proportions.TAPERED_PAIR_DISTANCE.get(section.arrangement, distance)
+            distance = dimensions.TAPERED_PAIR_DISTANCE.get(section.arrangement, distance)
         return _scaled("row_distance_mm", distance, section.width_mm, "mm")
     rows = row_count(section)
     if rows == 1 or section.type in ALIGNING:
@@ -230,16 +233,16 @@ def _row_distance(section: CatalogueSection) -> Estimate | None:
 
 
 def _radial_clearance(section: CatalogueSection) -> Estimate | None:
-    if section.type not in proportions.CLEARANCE_UM:
+    if section.type not in dimensions.CLEARANCE_UM:
         return None
-    fixed, per_bore = proportions.CLEARANCE_UM[section.type]
+    fixed, per_bore = dimensions.CLEARANCE_UM[section.type]
     return Estimate("radial_clearance_mm", 0.0, 0.0, 1e-3 * (fixed + per_bore * section.bore_mm), "mm")
 
 
 def _axial_preload(section: CatalogueSection) -> Estimate | None:
     if section.arrangement not in ("X", "O") or "radial_clearance_mm" in section.model_fields_set:
         return None
-    setting = proportions.AXIAL_SETTING_UM_PER_MM * section.bore_mm
+    setting = dimensions.AXIAL_SETTING_UM_PER_MM * section.bore_mm
     return Estimate("axial_preload_um", 0.0, -setting, setting, "um")
 
 
@@ -307,7 +310,7 @@ def _roller_row(section: CatalogueSection) -> RollerRow:
         raceway = _outer_raceway_radius(section)
         profile["crown_curvature"] = (1.0 / _given(section, "osculation") - 1.0) / raceway
     elif section.profile == "standard":
-        factor, straight = proportions.standard_profile(section.type, common["element_diameter"], length)
+        factor, straight = dimensions.standard_profile(section.type, common["element_diameter"], length)
         profile.update(profile_factor=factor, straight_share=straight)
     elif section.profile == "none":
         profile["profile_factor"] = 0.0
@@ -361,3 +364,109 @@ def _ribs(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollerRo
     length = 1e-3 * _given(section, "rib_contact_mm")
     senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[section.ribs]
     return tuple(rib_row(row, sense, length) for sense in senses)
+
+
+# Load ratings that makers print for a designation, and how far estimates may lie above printed ones
+
+WITHIN = 0.005
+"""Part by which dimensions may differ from those of the designation."""
+MARGINS: Mapping[BearingType, tuple[float, float]] = {
+    "deep_groove_ball": (1.23, 1.24),
+    "angular_contact_ball": (1.11, 1.12),
+    "self_aligning_ball": (1.51, 1.35),
+    "four_point_ball": (1.00, 1.00),
+    "cylindrical_roller": (1.94, 2.11),
+    "needle_roller": (1.27, 1.27),
+    "tapered_roller": (1.27, 1.22),
+    "spherical_roller": (1.17, 1.22),
+    "thrust_spherical_roller": (1.27, 1.27),
+}
+"""Largest ratio of estimated to printed dynamic and static rating, by which estimates are divided.
+
+Of all bearings in `makers.csv`, cylindrical roller bearings of older design among them; and of four-point ball
+bearings, whose estimates count the balls once and reach 0.73 of what is printed. Needle rollers and thrust bearings
+have the largest static ratio of full complement rollers.
+"""
+FULL_COMPLEMENT_MARGIN = 1.27
+"""The same of cylindrical rollers without a cage (static ratings, see `system.bearings.rolling.proportions`)."""
+_LISTED = re.compile(r"(NUP|NU|NJ|N)?\s?(\d{3,5})(?!\d)[\s-]?([A-Z0-9-]*)")
+_SEALED = re.compile(r"2?RS|LL|DDU|VV|UU")
+
+
+@dataclass(frozen=True)
+class KnownRating:
+    """Dynamic and static rating of one bearing, N, and whose catalogues they are the least of."""
+
+    dynamic: float
+    static: float
+    makers: tuple[str, ...]
+
+
+def known_rating(section: CatalogueSection) -> KnownRating | None:
+    """Ratings of a single bearing by its designation; None where it is not listed, or has other dimensions.
+
+    Examples
+    --------
+    >>> section = CatalogueSection(
+    ...     designation="22320 E", type="spherical_roller", bore_mm=100.0, outer_diameter_mm=215.0, width_mm=73.0
+    ... )
+    >>> known_rating(section)
+    KnownRating(dynamic=682000.0, static=842000.0, makers=('NKE', 'NSK', 'SKF'))
+    """
+    if section.row_count is not None or section.full_complement:
+        return None
+    rows = (_listed().get((section.type, number)) for number in _listed_as(section))
+    row = next((one for one in rows if one is not None), None)
+    if row is None:
+        return None
+    sizes = zip(("bore_mm", "outer_diameter_mm", "width_mm"), row[:3], strict=True)
+    if any(abs(getattr(section, key) / size - 1.0) > WITHIN for key, size in sizes):
+        return None
+    return KnownRating(row[3], row[4], row[5])
+
+
+def margins(section: CatalogueSection) -> tuple[float, float]:
+    """Divisors of estimated dynamic and static ratings, see `MARGINS`."""
+    if section.type == "cylindrical_roller" and section.full_complement:
+        return FULL_COMPLEMENT_MARGIN, FULL_COMPLEMENT_MARGIN
+    return MARGINS[section.type]
+
+
+def _listed_as(section: CatalogueSection) -> tuple[str, ...]:
+    """Designations of the table that may be meant; none for other designs, and for seals that leave less room inside.
+
+    A cylindrical roller bearing without E is of the older design where a maker still prints that one.
+    """
+    match = _LISTED.match((section.designation or "").strip().upper())
+    if match is None:
+        return ()
+    prefix, number, suffix = match.groups()
+    if section.type == "cylindrical_roller":
+        if prefix is None:
+            return ()
+        if suffix.startswith("E"):
+            return (f"NU{number}E",)
+        return (f"NU{number}", f"NU{number}E")
+    if prefix is not None:
+        return ()
+    if section.type == "angular_contact_ball":
+        if suffix.startswith("B"):
+            return (f"{number}B",)
+        return ()
+    if section.type == "self_aligning_ball" and _SEALED.search(suffix):
+        return ()
+    return (number,)
+
+
+@cache
+def _listed() -> dict[tuple[str, str], tuple[float, float, float, float, float, tuple[str, ...]]]:
+    """Bore, outer diameter and width (mm), dynamic and static rating (N) and makers, by type and designation."""
+    found = {}
+    with (Path(__file__).parent / "makers.csv").open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            bore, outer, width = (float(row[key]) for key in ("bore_mm", "outer_diameter_mm", "width_mm"))
+            dynamic = 1e3 * float(row["dynamic_kN"])
+            static = 1e3 * float(row["static_kN"])
+            makers = tuple(row["makers"].split("/"))
+            found[row["type"], row["designation"]] = bore, outer, width, dynamic, static, makers
+    return found

@@ -332,7 +332,7 @@ def equilibrium(
 
     Examples
     --------
-    >>> from exugear.system.bearings.rolling.rollers import CylindricalRollerBearing
+    >>> from exugear.system.bearings.rolling.rows import CylindricalRollerBearing
     >>> bearing = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
     >>> state = equilibrium(bearing, (129.9e3, 0.0, 0.0))
     >>> round(1e6 * state.displacement[0])  # micrometres
@@ -445,7 +445,7 @@ def pitch_averaged_tangent(bearing: RollingBearing, force: ArrayLike, positions:
 
     Examples
     --------
-    >>> from exugear.system.bearings.rolling.rollers import CylindricalRollerBearing
+    >>> from exugear.system.bearings.rolling.rows import CylindricalRollerBearing
     >>> bearing = CylindricalRollerBearing(bore=0.100, outside_diameter=0.180, width=0.046)
     >>> stiffness = pitch_averaged_tangent(bearing, (33.5e3, 0.0, 0.0))
     >>> float(round(stiffness[0, 0] / 1e9, 1))

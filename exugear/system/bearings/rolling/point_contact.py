@@ -7,18 +7,62 @@ a sphere about the middle of the bearing, the line stays on that middle.
 
 Forces on the ball itself (centrifugal, gyroscopic, friction) are left out: both contacts of a ball carry the same.
 The frame is that of `exugear.system.bearings.rolling.rows`.
+
+A roller feels the approach of its middle and its tilt alone, so that one table over both holds what all its slices
+(ISO/TS 16281) give together. It is made once for each kind of roller from more slices than a lamina model affords in a
+run, and shared by all rows of that kind, whatever their number, angle, place and clearance.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from exugear.system.bearings.rolling.rows import STEEL_MODULUS, BallRow
+from exugear.system.bearings.rolling.rows import (
+    LEAST_ELEMENTS,
+    STEEL_MODULUS,
+    BallRow,
+    BearingError,
+    RollerRow,
+    RollingRow,
+)
+from exugear.system.kernels.rolling import (
+    ALIGNED_BALL,
+    AXIAL,
+    BALL,
+    CENTRE_AXIAL,
+    CENTRE_RADIAL,
+    CIRCLE,
+    CONSTANT,
+    COSINE,
+    COUNT,
+    FORM,
+    GAP,
+    GAPS,
+    GEOMETRY_SIZE,
+    HALF_SLICES,
+    LAYOUT_SIZE,
+    LEVER,
+    LINE_POWER,
+    MOST_DEPTH,
+    MOST_TILT,
+    PER_ROOT,
+    PER_TILT,
+    RADIUS,
+    ROLLER,
+    SINE,
+    SLICE_LENGTH,
+    SPAN,
+    STRIPS,
+    TABLE,
+    TILTING,
+    RollingArrays,
+)
 from fe_ste.tools.arrays import Floats, Integers
 
 POINT_CONTACT_EXPONENT = 1.5
@@ -293,3 +337,239 @@ def ball_tangent(balls: BallArrays, displacement: Floats) -> Floats:
     tangent = along.T @ (slope[:, None] * along) + across.T @ ((load / state.length)[:, None] * across)
     symmetric: Floats = 0.5 * (tangent + tangent.T)
     return symmetric
+
+
+# Potentials of rolling bearings for the compiled law: rows to the arrays of `exugear.system.kernels.rolling`
+
+SLICES = 240
+"""Slices of a roller: their sum is within 1e-4 of that of infinitely many where 30 are 1 % soft against tilting."""
+STEPS, MORE_STEPS = (32, 24), (48, 32)
+"""Steps of a table along the root of the depth and along the tilt; more where first contact is no smooth function of
+the tilt, as of straight rollers."""
+MOST_TILT_OF_TABLE = 5e-3
+"""Tilt (rad) up to which a table goes: more than any bearing stands. Beyond it slices are summed."""
+MOST_PRESSURE = 4e9
+"""Contact pressure (Pa) that a table goes to: that of the static rating of roller bearings (ISO 76)."""
+ROUNDING = 2e-4
+"""How far the bound of first contact is rounded off where the roller has no smooth crown, as a share of the depth."""
+
+
+HERMITE = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [-3.0, -2.0, 3.0, -1.0], [2.0, 1.0, -2.0, 1.0]])
+"""Coefficients of a cubic from value and slope at both ends of a step."""
+
+
+class RollerTable(NamedTuple):
+    """Condensed potential of a kind of roller, without clearance."""
+
+    strips: Floats
+    """(n, 6) bound of first contact as a cubic over a strip of tilts (m), first tilt (rad), 1 over its width."""
+    patches: Floats
+    """(m, n, 4, 4) U / depth^2 (N/m) as a bicubic over a step of tilt and one of the depth's root."""
+    gaps: Floats
+    """(h,) gap of both contacts of the slices of half a roller, from its middle, m."""
+    most_tilt: float
+    most_depth: float
+    """Tilt (rad) and depth behind the bound of first contact (m) up to which the table goes."""
+
+
+@lru_cache(maxsize=64)
+def roller_table(row: RollerRow) -> RollerTable:
+    """Table of a row; number of rollers, angle, place and clearance do not matter."""
+    # The load of a line contact, flat against flat raceway, at the limit of pressure; then the approach under it.
+    load = MOST_PRESSURE**2 * math.pi * row.effective_length * row.element_diameter / STEEL_MODULUS
+    depth = float((load / row.contact_constant) ** (1.0 / LINE_POWER))
+    steps, count = STEPS if _is_crowned(row) else MORE_STEPS
+    count = 1 if row.aligning else count
+    tilts = MOST_TILT_OF_TABLE * (np.arange(count + 1) / count) ** 2
+    # An aligning roller is never tilted: both ends of its only strip are the same.
+    at = np.zeros(2) if row.aligning else tilts
+    onset, slope = _first_contact(row, at, ROUNDING * depth)
+    most_depth = 1.2 * depth + 4.0 * row.profile_factor * row.element_diameter + float(onset[0] - onset[-1])
+    roots = math.sqrt(most_depth) * np.arange(steps + 1) / steps
+    nodes = np.stack([_nodes(row, roots, *line) for line in zip(at, onset, slope, strict=True)], axis=1)
+    width = np.diff(tilts)
+    cubics = HERMITE @ np.stack([onset[:-1], slope[:-1] * width, onset[1:], slope[1:] * width])
+    return RollerTable(
+        strips=np.column_stack([cubics.T, tilts[:-1], 1.0 / width]),
+        patches=_patches(nodes, width),
+        gaps=2.0 * row.drop(_along(row)[SLICES // 2 :]),
+        most_tilt=float(tilts[-1]),
+        most_depth=most_depth,
+    )
+
+
+def _patches(nodes: Floats, width: Floats) -> Floats:
+    """Coefficients (m, n, 4, 4), powers of the tilt first, from nodes (m + 1, n + 1, 2, 2) likewise."""
+    scaled = np.zeros((len(nodes) - 1, len(width), 2, 2, 2, 2))
+    for i in range(2):
+        for j in range(2):
+            scaled[:, :, j, :, i, :] = nodes[i : i + len(nodes) - 1, j : j + len(width)]
+    scaled[:, :, :, 1] *= width[:, None, None, None]
+    ends = scaled.reshape(len(nodes) - 1, len(width), 4, 4)
+    patches: Floats = HERMITE @ ends @ HERMITE.T
+    return patches
+
+
+def _is_crowned(row: RollerRow) -> bool:
+    """Tell whether the roller curves away from its middle on, so that first contact moves steadily with the tilt."""
+    return row.profile_table is None and (row.profile_factor > 0.0 or row.crown_curvature > 0.0)
+
+
+def _along(row: RollerRow) -> Floats:
+    """Middles of the slices along a roller, m."""
+    along: Floats = ((np.arange(SLICES) + 0.5) / SLICES - 0.5) * row.effective_length
+    return along
+
+
+def _first_contact(row: RollerRow, tilts: Floats, rounding: float) -> tuple[Floats, Floats]:
+    """Bound (m) below the approach at which a roller first touches, and its derivative, at each tilt.
+
+    The least of gap and tilt times place over the roller's length. A slight crown, and its height taken off again,
+    keeps it smooth where the roller has none of its own, so that forces have no jump at zero tilt.
+    """
+    height = 0.0 if _is_crowned(row) else rounding
+    share = np.linspace(-1.0, 1.0, 8001)[1:-1]
+    place = 0.5 * row.effective_length * share
+    gaps = 2.0 * row.drop(place) + height * share**2 + np.outer(tilts, place)
+    least = gaps.argmin(axis=1)
+    slope: Floats = place[least]
+    slope[0] = 0.0
+    return gaps.min(axis=1) - height, slope
+
+
+def _nodes(row: RollerRow, roots: Floats, tilt: float, onset: float, slope: float) -> Floats:
+    """Nodes (m, 2, 2) at one tilt, from the sum over slices; zero where nothing touches yet.
+
+    U over the depth squared and its derivative by the tilt, of each the value and the slope per step of the root.
+    """
+    along = _along(row)
+    depth = roots**2
+    approach = np.maximum((depth + onset)[:, None] - tilt * along - 2.0 * row.drop(along), 0.0)
+    power = np.cbrt(np.cbrt(approach)) * row.contact_constant / SLICES
+    force = power * approach
+    stiffness = LINE_POWER * power
+    # Derivatives by the tilt at constant approach turn into those at constant depth by that of the bound.
+    by_tilt = slope - along if tilt > 0.0 else np.zeros(SLICES)
+    nodes = np.zeros((len(roots), 2, 2))
+    for n, (value, by_depth) in enumerate(
+        (
+            (np.sum(force * approach, axis=1) / (1.0 + LINE_POWER), force.sum(axis=1)),
+            (force @ by_tilt, stiffness @ by_tilt),
+        )
+    ):
+        nodes[1:, n, 0] = value[1:] / depth[1:] ** 2
+        nodes[1:, n, 1] = 2.0 * roots[1] / roots[1:] * (by_depth[1:] / depth[1:] - 2.0 * nodes[1:, n, 0])
+    return nodes
+
+
+def rolling_arrays(
+    rows_per_connector: Sequence[tuple[RollingRow, ...]],
+    scale: Sequence[float],
+    time: Sequence[float],
+    cage_ratio: Sequence[float],
+    phase: Sequence[float],
+) -> RollingArrays:
+    """Put the rolling laws of connectors into arrays.
+
+    Parameters
+    ----------
+    rows_per_connector : rows of each connector in the frame of its bearing; none where it has no rolling law
+    scale, time, cage_ratio, phase
+        one number a connector each: see `exugear.system.kernels.rolling.RollingArrays`
+
+    Raises
+    ------
+    BearingError
+        A row of neither rollers nor balls.
+
+    Examples
+    --------
+    >>> row = RollerRow(
+    ...     element_diameter=0.03, pitch_diameter=0.225, element_count=20, effective_length=0.06, profile_factor=3.5e-4
+    ... )
+    >>> arrays = rolling_arrays([(row,), ()], scale=[1.0, 1.0], time=[0.0, 0.0], cage_ratio=[0.43, 0.0], phase=[0, 0])
+    >>> arrays.first.tolist(), len(arrays.circle)
+    ([0, 1, 1], 20)
+    """
+    rows = [row for rows in rows_per_connector for row in rows]
+    packing = _Packing()
+    places = [packing.place(row) for row in rows]
+    return RollingArrays(
+        first=np.cumsum([0, *(len(rows) for rows in rows_per_connector)]).astype(np.int64),
+        scale=np.array(scale, dtype=np.float64),
+        time=np.array(time, dtype=np.float64),
+        cage_ratio=np.array(cage_ratio, dtype=np.float64),
+        phase=np.array(phase, dtype=np.float64),
+        layout=np.array([layout for layout, _ in places], dtype=np.int64).reshape(-1, LAYOUT_SIZE),
+        geometry=np.array([geometry for _, geometry in places]).reshape(-1, GEOMETRY_SIZE),
+        circle=np.concatenate([np.zeros((0, 2)), *packing.circles]),
+        tables=np.concatenate([np.zeros(0), *packing.tables]),
+    )
+
+
+class _Packing:
+    """Circles and tables so far; rows that have the same share them."""
+
+    def __init__(self) -> None:
+        self.circles: list[Floats] = []
+        self.tables: list[Floats] = []
+        self._first_on_circle: dict[int, int] = {}
+        self._first_in_table: dict[RollerRow, int] = {}
+
+    def place(self, row: RollingRow) -> tuple[list[int], Floats]:
+        """Layout and geometry of a row."""
+        cosine = math.cos(row.contact_angle)
+        sine = math.sin(row.contact_angle)
+        layout = [0] * LAYOUT_SIZE
+        geometry = np.zeros(GEOMETRY_SIZE)
+        layout[COUNT], layout[CIRCLE] = row.element_count, self._circle(row.element_count)
+        geometry[[COSINE, SINE, GAP]] = cosine, sine, 0.5 * row.radial_clearance * cosine
+        if row.aligning:
+            geometry[LEVER] = -row.sphere_centre * cosine
+        else:
+            lever = 0.5 * row.pitch_diameter * sine - row.axial_position * cosine
+            geometry[LEVER], geometry[TILTING] = lever, 1.0
+        if isinstance(row, RollerRow):
+            self._place_rollers(row, layout, geometry)
+        elif isinstance(row, BallRow):
+            layout[FORM], geometry[CONSTANT] = ALIGNED_BALL if row.aligning else BALL, ball_constant(row)
+            # The law follows the centre of the inner groove, which lies beyond the ball.
+            beyond = (row.inner_conformity - 0.5) * row.element_diameter
+            geometry[RADIUS] = 0.5 * row.pitch_diameter + beyond * cosine
+            geometry[AXIAL] = row.axial_position + beyond * sine
+            span = (row.inner_conformity + row.outer_conformity - 1.0) * row.element_diameter
+            geometry[SPAN] = span
+            geometry[[CENTRE_RADIAL, CENTRE_AXIAL]] = span * cosine - 0.5 * row.radial_clearance, span * sine
+        else:
+            raise BearingError(f"row: {type(row).__name__} has no rolling law; it must be a RollerRow or a BallRow")
+        return layout, geometry
+
+    def _place_rollers(self, row: RollerRow, layout: list[int], geometry: Floats) -> None:
+        kind = replace(
+            row,
+            pitch_diameter=10.0 * row.element_diameter,
+            element_count=LEAST_ELEMENTS,
+            contact_angle=0.0,
+            axial_position=0.0,
+            radial_clearance=0.0,
+            sphere_centre=0.0,
+            laminae=SLICES,
+        )
+        table = roller_table(kind)
+        if kind not in self._first_in_table:
+            self._first_in_table[kind] = sum(part.size for part in self.tables)
+            self.tables += [table.strips.ravel(), table.patches.ravel(), table.gaps]
+        first, (steps, strips) = self._first_in_table[kind], table.patches.shape[:2]
+        layout[FORM], layout[TABLE], layout[STRIPS] = ROLLER, first, strips
+        layout[GAPS], layout[HALF_SLICES] = first + table.strips.size + table.patches.size, table.gaps.size
+        geometry[CONSTANT], geometry[SLICE_LENGTH] = row.contact_constant / SLICES, row.effective_length / SLICES
+        geometry[PER_TILT], geometry[MOST_TILT] = strips**2 / table.most_tilt, table.most_tilt
+        geometry[PER_ROOT], geometry[MOST_DEPTH] = steps / math.sqrt(table.most_depth), table.most_depth
+
+    def _circle(self, count: int) -> int:
+        """First line of the cosines and sines of equally spaced elements."""
+        if count not in self._first_on_circle:
+            self._first_on_circle[count] = sum(len(circle) for circle in self.circles)
+            angles = 2.0 * math.pi * np.arange(count) / count
+            self.circles.append(np.column_stack([np.cos(angles), np.sin(angles)]))
+        return self._first_on_circle[count]

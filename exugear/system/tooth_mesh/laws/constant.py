@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from exugear.gearbox.parts import Mesh
-from exugear.system.tooth_mesh.law import Angles
+from exugear.system.tooth_mesh.element import Angles
 from exugear.system.tooth_mesh.laws.line_of_action import LineOfAction
 from fe_ste.tools.arrays import Floats
 

@@ -20,15 +20,14 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
-from exugear.system.tooth_mesh.kernels.meshes import periodic_cubic, stiffness_at
-from exugear.system.tooth_mesh.kernels.table_law import piece_at
-from exugear.system.tooth_mesh.law import Law, MeshCurve, MeshData
+from exugear.system.kernels.meshes import periodic_cubic, stiffness_at
+from exugear.system.kernels.table_law import piece_at
+from exugear.system.tooth_mesh.element import Law, MeshCurve, MeshData
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import fitting_table, table_path, wanted_table
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
-from fe_ste.transmission_error.gaps import GapError, complete_cycle
-from fe_ste.transmission_error.surface import SteSurface
+from fe_ste.transmission_error.surface import GapError, SteSurface, complete_cycle
 from fe_ste.transmission_error.table import TableError
 
 STIFFNESS_FORM = 0

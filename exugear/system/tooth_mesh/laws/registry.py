@@ -1,7 +1,7 @@
 """All mesh laws in one table: their names, what they are in a line, and what the rest of the program must know.
 
 To add a law: a file of its name in this folder, with a `LAW`, and a row here. Only a law whose force is no stiffness
-over the mesh cycle times the deflection needs more, a branch in `exugear.system.tooth_mesh.laws.along_row`. Nothing
+over the mesh cycle times the deflection needs more, a branch in `exugear.system.tooth_mesh.laws.mesh_forces`. Nothing
 heavy is imported here, because the command line reads its choices from this table.
 """
 
@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 if TYPE_CHECKING:
-    from exugear.system.tooth_mesh.law import Law
+    from exugear.system.tooth_mesh.element import Law
 
 
 @dataclass(frozen=True)

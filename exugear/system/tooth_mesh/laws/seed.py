@@ -12,7 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from exugear.gearbox.parts import Mesh
-from exugear.system.tooth_mesh.law import Angles
+from exugear.system.tooth_mesh.element import Angles
 from exugear.system.tooth_mesh.laws.line_of_action import LineOfAction
 from exugear.system.tooth_mesh.placement import MeshGeometry, pitch_point_of, wrench_row
 from fe_ste.tools.arrays import Floats

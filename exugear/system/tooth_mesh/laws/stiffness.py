@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.gearbox.parts import seat_key
+from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from exugear.system.kernels.meshes import (
+    FRAME,
+    ROW_SIZE,
+    TILT_COLUMNS,
+    TILT_STIFFNESS,
+    WAY_COLUMNS,
+    MeshArrays,
+    periodic_cubic,
+)
+from exugear.system.kernels.table_law import NOMINAL_DEFLECTION
+from exugear.system.tooth_mesh.element import MeshCurve, MeshElement
+from exugear.system.tooth_mesh.laws.line_of_action import CURVE_FORM, STIFFNESS_FORM, curve_coefficients
 from exugear.system.tooth_mesh.laws.registry import LAWS, law_of
+from exugear.system.tooth_mesh.laws.table import pack_tables
 from exugear.system.tooth_mesh.placement import MeshError
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.transmission_error.surface import SteSurface
 
 
@@ -43,3 +60,126 @@ def mesh_stiffness(
         raise MeshError(f"mesh law {law!r} needs STE tables: give the directory they were written to")
     at_work = {mesh.pair.name for mesh in gearbox.meshes}
     return {name: reader.read(gearbox, name, Path(directory or ".")) for name in gearbox.pairs if name in at_work}
+
+
+# Mesh elements as arrays for the kernels
+
+_NO_COORDINATES = (-1,) * BODY_SIZE
+
+
+def pack(
+    elements: tuple[MeshElement, ...],
+    coordinates: Mapping[str, tuple[int, ...]],
+    averaged: bool = False,
+    linear: bool = False,
+    tangent: bool = False,
+) -> MeshArrays:
+    """Arrays for the kernel.
+
+    Parameters
+    ----------
+    coordinates : mapping of body name, or of `seat_key`, to six state indices (-1 where there is none)
+    averaged : replace stiffness and tables by their mean over the cycle, as eigenmodes need it
+    linear
+        Replace laws that are no stiffness, such as tables, by the stiffness they have at the static load: force over
+        deflection.
+    tangent : replace curves by the straight line that touches them at the static load
+    """
+    count = len(elements)
+    forms = [_form(element, averaged, linear, tangent) for element in elements]
+    width = max((len(values) for _, values in forms), default=1)
+    stiffness = np.zeros((count, width, max((values.shape[1] for _, values in forms), default=4)))
+    for block, (_, values) in zip(stiffness, forms, strict=True):
+        block[: len(values), : values.shape[1]] = values
+    index = _indices(elements, coordinates)
+    tilts = _pack_tilts(elements, index, linear)
+    # Its mean is in the lever; of gears that do not tilt it does nothing.
+    resists = tilts[:, TILT_STIFFNESS] > 0.0
+    moves = resists & (not averaged)
+    ways = [e.load_ways if move else np.zeros((2, 0)) for move, e in zip(moves, elements, strict=True)]
+    tables = pack_tables(elements, index, averaged, linear)
+    if tangent:
+        tables.nominal[:, NOMINAL_DEFLECTION] -= [element.rest for element in elements]
+    return MeshArrays(
+        coordinates=index,
+        axis=np.array([e.axis for e in elements]).reshape(count, 2, 2),
+        form=np.array([form for form, _ in forms], dtype=np.int64),
+        deflection=np.array([e.deflection for e in elements]).reshape(count, FRAME),
+        force=np.array([e.force for e in elements]).reshape(count, FRAME),
+        cycles=np.array([e.cycles for e in elements]),
+        phase=np.array([e.phase for e in elements]),
+        pieces=np.array([len(values) for _, values in forms], dtype=np.int64),
+        stiffness=stiffness,
+        damping=np.array([e.damping for e in elements]),
+        tilt=tilts,
+        way_pieces=np.array([way.shape[1] for way in ways], dtype=np.int64),
+        way=_pack_ways(elements, ways),
+        line_of_action=np.array([e.line_of_action for e in elements]),
+        error_pieces=np.array([[len(error) for error in e.errors] for e in elements], dtype=np.int64).reshape(count, 2),
+        error=_pack_errors(elements),
+        table=tables,
+    )
+
+
+def _form(element: MeshElement, averaged: bool, linear: bool, straight: bool) -> tuple[int, Floats]:
+    """Choose the form that an element's law has, by its number, and its coefficients (n, c)."""
+    secant = element.stiffness
+    tangent = element.tangent
+    if averaged:
+        secant = np.array([np.mean(secant)])
+        tangent = np.array([np.mean(tangent)])
+    if linear:
+        return STIFFNESS_FORM, periodic_cubic(secant)
+    if element.is_curved and straight:
+        return STIFFNESS_FORM, periodic_cubic(tangent)
+    if element.is_curved:
+        return CURVE_FORM, curve_coefficients(secant, tangent, element.load)
+    return element.law.form, element.law.coefficients(secant)
+
+
+def _pack_tilts(elements: tuple[MeshElement, ...], index: Integers, linear: bool) -> Floats:
+    """Fill `MeshArrays.tilt`: not of gears that do not tilt, nor of tables, which have a potential of their own."""
+    tilts = np.zeros((len(elements), TILT_COLUMNS))
+    for row, element, own in zip(tilts, elements, index, strict=True):
+        contact = element.contact
+        still = bool((own[[TILT, BODY_SIZE + TILT]] < 0).all())
+        if contact is None or still or (element.table is not None and not linear):
+            continue
+        stiffness = contact.tilt_stiffness
+        lever = contact.tangent_load_centre
+        moment = contact.force * (contact.load_centre - lever)
+        row[:] = stiffness, element.damping_time * stiffness, lever, moment, contact.misalignment
+    return tilts
+
+
+def _indices(elements: tuple[MeshElement, ...], coordinates: Mapping[str, tuple[int, ...]]) -> Integers:
+    """Position of each local coordinate of each mesh in the state, (m, 13)."""
+    index = np.full((len(elements), ROW_SIZE), -1, dtype=np.int64)
+    for row, element in zip(index, elements, strict=True):
+        mesh = element.mesh
+        for start, body, gear in ((0, mesh.pinion, mesh.pair.pinion), (BODY_SIZE, mesh.gear, mesh.pair.gear)):
+            keys = (seat_key(body, mesh.name), seat_key(body, gear.name), body)  # a travelling seat, a seat, the body
+            carrying = (coordinates[key] for key in keys if key in coordinates)
+            row[start : start + BODY_SIZE] = next(carrying, _NO_COORDINATES)
+        row[FRAME] = coordinates.get(mesh.frame, _NO_COORDINATES)[SPIN]
+    return index
+
+
+def _pack_ways(elements: tuple[MeshElement, ...], ways: list[Floats]) -> Floats:
+    """Fill `MeshArrays.way` from ways (2, n) of each mesh; zeros behind shorter ones."""
+    coefficients = np.zeros((len(ways), max((way.shape[1] for way in ways), default=0), WAY_COLUMNS))
+    for block, element, (of_load, added) in zip(coefficients, elements, ways, strict=True):
+        if added.size:
+            moment = element.load * (of_load - added)
+            block[: added.size] = np.hstack([periodic_cubic(added), periodic_cubic(moment)])
+    return coefficients
+
+
+def _pack_errors(elements: tuple[MeshElement, ...]) -> Floats:
+    longest = max((len(error) for element in elements for error in element.errors), default=0)
+    coefficients = np.zeros((len(elements), 2, longest, 4))
+    for block, element in zip(coefficients, elements, strict=True):
+        for end, error in enumerate(element.errors):
+            if len(error):
+                block[end, : len(error)] = periodic_cubic(error)
+    return coefficients

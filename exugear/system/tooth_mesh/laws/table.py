@@ -1,12 +1,12 @@
 """Mesh law `table`: the potential of a pair's table over deflection, centre distance and misalignment.
 
-The potential (`exugear.system.tooth_mesh.kernels.table_law`) depends on the deflection delta, on the centre distance a
+The potential (`exugear.system.kernels.table_law`) depends on the deflection delta, on the centre distance a
 and on the misalignment gamma, each a row of the same coordinates. The generalized force is
 
     f = -(F d delta/dq + U_a da/dq + U_gamma d gamma/dq).
 
 Damping is a time times the tangent of the potential at a frozen position, along the same rows: where the tangent has a
-negative part, that does not damp (`exugear.system.tooth_mesh.kernels.table_law.surface_damping`). It fades as the teeth
+negative part, that does not damp (`exugear.system.kernels.table_law.surface_damping`). It fades as the teeth
 part. Teeth are apart in the backlash; beyond it the other flank touches. A table is that of the flank s = +1; the flank
 s = -1 is it turned by pi about the line of centres: the same table with misalignment reversed. Two forms of the force
 stand here, `table_force` with its tangent, and `fast_table_force` for the compiled solver, which tests hold together.
@@ -22,10 +22,15 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
 from exugear.system.kernels.coordinates import BODY_SIZE, COSINE, SINE, SPIN
-from exugear.system.tooth_mesh.element import MeshElement
-from exugear.system.tooth_mesh.kernels.fast_meshes import (
+from exugear.system.kernels.meshes import (
     ALONG_DEFLECTION,
     ALONG_FORCE,
+    CYCLE_POWER,
+    DAMPED_POWER,
+    DEFLECTION,
+    ENERGY,
+    FORCE,
+    FRAME,
     LAST_CENTRE,
     LAST_CENTRE_RATE,
     LAST_CYCLE,
@@ -36,20 +41,6 @@ from exugear.system.tooth_mesh.kernels.fast_meshes import (
     LAST_MISALIGNMENT,
     LAST_OUTSIDE,
     LAST_RATE,
-    TABLE_FORCE,
-    Meshes,
-    MeshMemory,
-    MeshWork,
-    mesh_row,
-    subtract_errors,
-)
-from exugear.system.tooth_mesh.kernels.meshes import (
-    CYCLE_POWER,
-    DAMPED_POWER,
-    DEFLECTION,
-    ENERGY,
-    FORCE,
-    FRAME,
     OUTSIDE,
     PMC,
     RATE,
@@ -57,16 +48,22 @@ from exugear.system.tooth_mesh.kernels.meshes import (
     SPIN_1,
     SPIN_2,
     STIFFNESS,
+    TABLE_FORCE,
     MeshArrays,
+    Meshes,
+    MeshMemory,
+    MeshWork,
     frame_row,
     mesh_pmc,
+    mesh_row,
     net_deflection,
     rate_gradient,
     relative_spin,
     row_dot,
+    subtract_errors,
     turn_rows,
 )
-from exugear.system.tooth_mesh.kernels.table_law import (
+from exugear.system.kernels.table_law import (
     BY_DISTANCE,
     BY_MISALIGNMENT,
     CUBIC_SIZE,
@@ -93,7 +90,7 @@ from exugear.system.tooth_mesh.kernels.table_law import (
     surface_law,
     surface_tangent,
 )
-from exugear.system.tooth_mesh.law import Law, MeshData, TableFlanks
+from exugear.system.tooth_mesh.element import Law, MeshData, MeshElement, TableFlanks
 from exugear.system.tooth_mesh.placement import (
     MeshError,
     ToothContact,

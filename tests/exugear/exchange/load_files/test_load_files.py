@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exugear.exchange.load_files.channels import LoadFileError
-from exugear.exchange.load_files.reading import read_channels
+from exugear.exchange.channels import LoadFileError
+from exugear.exchange.series_files import read_channels
 
 DATA = Path(__file__).parent / "data"
 EXAMPLE = Path(__file__).parents[4] / "cases/grc750/loads"

@@ -13,8 +13,8 @@ import pytest
 
 from exugear.exchange.rexs.additions import Addition
 from exugear.exchange.rexs.containers import parsed, read_rexs, with_additions
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.parsing import parse_model
+from exugear.exchange.rexs.tree import RexsError
 
 from .own_files import spur_pair
 

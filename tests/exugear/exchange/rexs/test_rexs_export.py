@@ -13,13 +13,10 @@ from typer.testing import CliRunner
 
 from exugear.cli.app import app
 from exugear.exchange.rexs.containers import parsed, read_rexs
-from exugear.exchange.rexs.export.dynamics import in_axes
-from exugear.exchange.rexs.export.export import with_results
-from exugear.exchange.rexs.export.names import NAMES, name_in, stiffness_names
-from exugear.exchange.rexs.export.origins import origins_of
-from exugear.exchange.rexs.faults import RexsError
+from exugear.exchange.rexs.export.export import in_axes, with_results
+from exugear.exchange.rexs.export.names import NAMES, name_in, origins_of, stiffness_names
 from exugear.exchange.rexs.to_case.conversion import to_case
-from exugear.exchange.rexs.tree import Model
+from exugear.exchange.rexs.tree import Model, RexsError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
@@ -79,7 +76,7 @@ def test_every_attribute_that_is_not_our_own_is_one_of_the_version(name, exporte
 
 
 def _present(names):
-    from exugear.exchange.rexs.synonyms import ATTRIBUTES
+    from exugear.exchange.rexs.tree import ATTRIBUTES
 
     return {ATTRIBUTES.get(name, name) for name in names}
 

@@ -15,13 +15,12 @@ from typer.testing import CliRunner
 
 from exugear.cli.app import app
 from exugear.exchange.rexs.containers import read_rexs
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.parsing import parse_model
 from exugear.exchange.rexs.to_case.conversion import to_case
-from exugear.exchange.rexs.tree import Attribute
+from exugear.exchange.rexs.tree import Attribute, RexsError
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.bearings.rolling.designations import boundary_of
-from exugear.system.readiness.readiness import lacking
+from exugear.system.bearings.rolling.dimensions import boundary_of
+from exugear.system.readiness import lacking
 
 DATA = Path(__file__).parent / "data"
 SEW = "SEW_3-stage_cylindrical_gearbox_1.0.rexs"

@@ -10,16 +10,16 @@ import math
 import numpy as np
 import pytest
 
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.to_case.notes import Rules
+from exugear.exchange.rexs.tree import RexsError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.sections.connections import CatalogueSection
-from exugear.system.assemble import assemble
-from exugear.system.bearing_duties import bearing_duties, reaction_loads
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import equilibrium
 from exugear.system.bearings.rolling.rows import BearingOfRows
+from exugear.system.build import assemble
+from exugear.system.operating_points import bearing_duties, reaction_loads
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
 from .own_files import OwnFile, spur_pair

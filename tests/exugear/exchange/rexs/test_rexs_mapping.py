@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from exugear.exchange.rexs.containers import read_rexs
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.to_case.conversion import to_case
-from exugear.exchange.rexs.tree import Attribute, Component, Model, Relation
-from exugear.system.readiness.readiness import lacking
+from exugear.exchange.rexs.tree import Attribute, Component, Model, Relation, RexsError
+from exugear.system.readiness import lacking
 from fe_ste.geometry.involute import inverse_involute, involute
 
 DATA = Path(__file__).parent / "data"

@@ -12,9 +12,8 @@ from pathlib import Path
 import pytest
 
 from exugear.exchange.rexs.containers import LARGEST, read_rexs
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.parsing import DEEPEST, parse_model
-from exugear.exchange.rexs.synonyms import unit_factor
+from exugear.exchange.rexs.tree import RexsError, unit_factor
 
 DATA = Path(__file__).parent / "data"
 FILES = sorted(path.name for path in DATA.iterdir() if path.suffix not in (".txt", ".md"))

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from exugear.cli import app as cli
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases.summary import (
+from exugear.gearbox.load_cases import (
     BURSTING_RIM_SPEED,
     LoadSummary,
     doubt_about_bearings,
@@ -23,7 +23,7 @@ from exugear.gearbox.load_cases.summary import (
 )
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import CaseError
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 from exugear.system.statics import accelerating_start
 from exugear.transient.runup import simulate
 

@@ -12,9 +12,7 @@ from pydantic import ConfigDict, TypeAdapter
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.gearbox.sections.schema.json_schema import json_schema
-from exugear.gearbox.sections.schema.keys import keys, meanings, tables
-from exugear.gearbox.sections.schema.page import page
+from exugear.gearbox.sections.schema.keys import json_schema, keys, meanings, page, tables
 from exugear.gearbox.templates.kinds import KINDS, template
 
 ROOT = Path(__file__).parents[4]

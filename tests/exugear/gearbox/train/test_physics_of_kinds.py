@@ -9,11 +9,11 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases.summary import summarise_loads
+from exugear.gearbox.load_cases import summarise_loads
 from exugear.gearbox.reading import CaseError
 from exugear.results.run_file import load_run
-from exugear.system.assemble import assemble
-from exugear.system.eigenmodes.modes import modes_of
+from exugear.system.build import assemble
+from exugear.system.modes import modes_of
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.transient.runup import simulate
@@ -324,7 +324,7 @@ def test_a_pair_has_a_table_or_a_stated_stiffness() -> None:
 
 
 def test_planets_that_mesh_are_told_when_they_do_not_fit() -> None:
-    from exugear.system.readiness.readiness import check_parts
+    from exugear.system.readiness import check_parts
 
     content = meshing_planets()
     content["bodies"]["short"]["planet_angles_deg"] = [angle + 2.0 for angle in (0.0, 120.0, 240.0)]

@@ -10,11 +10,11 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases.summary import doubts_about, summarise_loads
+from exugear.gearbox.load_cases import doubts_about, summarise_loads
 from exugear.gearbox.variant import VariantError
-from exugear.system.assemble import assemble
-from exugear.system.bearings.supports import unsupported
-from exugear.system.eigenmodes.modes import modes_of
+from exugear.system.bearings.stiffness import unsupported
+from exugear.system.build import assemble
+from exugear.system.modes import modes_of
 from exugear.system.statics import accelerating_start, static_state
 from exugear.transient.runup import simulate
 

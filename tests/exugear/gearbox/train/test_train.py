@@ -12,9 +12,16 @@ import pytest
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
-from exugear.gearbox.train.kinematics import coupling_row, kinematic_modes, mesh_row, turn_together
-from exugear.gearbox.train.statics import UNLOADED, holding_forces, without_round_off
-from exugear.gearbox.train.train import Train
+from exugear.gearbox.train import (
+    UNLOADED,
+    Train,
+    coupling_row,
+    holding_forces,
+    kinematic_modes,
+    mesh_row,
+    turn_together,
+    without_round_off,
+)
 from fe_ste.geometry.gears import GearPair
 
 

@@ -7,9 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exugear.exchange.load_files.reading import read_channels
-from exugear.life.counting.duration import equivalent_load, load_duration
-from exugear.life.counting.rainflow import Rainflow, damage_equivalent_range, rainflow, reversals
+from exugear.exchange.series_files import read_channels
+from exugear.life.load_spectrum.counting import (
+    Rainflow,
+    damage_equivalent_range,
+    equivalent_load,
+    load_duration,
+    rainflow,
+    reversals,
+)
 
 EXAMPLE = Path(__file__).parents[4] / "cases/grc750/loads"
 

@@ -14,14 +14,14 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli import app as cli
-from exugear.exchange.load_files.channels import LoadFileError
-from exugear.exchange.load_files.reading import read_channels
+from exugear.exchange.channels import LoadFileError
+from exugear.exchange.series_files import read_channels
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
-from exugear.life.counting.rainflow import damage_equivalent_range
-from exugear.life.load_spectrum import pools
+from exugear.life.load_spectrum import series as pools
 from exugear.life.load_spectrum.counted import CountedLoads, count_loads
-from exugear.life.load_spectrum.pools import Samples, condensed
+from exugear.life.load_spectrum.counting import damage_equivalent_range
+from exugear.life.load_spectrum.series import Samples, condensed
 from exugear.life.load_spectrum.sources import load_sources
 
 from ...exchange.load_files.test_load_files import packed
@@ -345,9 +345,9 @@ def test_a_unit_of_time_that_is_none_is_refused(tmp_path):
 
 
 def test_line_ends_of_all_systems_are_read_across_blocks(tmp_path, monkeypatch):
-    from exugear.exchange.load_files import lines
+    from exugear.exchange import series_files
 
-    monkeypatch.setattr(lines, "BLOCK", 7)
+    monkeypatch.setattr(series_files, "BLOCK", 7)
     rows = ["0,1,2", "1,2,3", "", "2,4,5", "3,6,7"]
     for end in ("\n", "\r\n", "\r"):
         path = tmp_path / "series.csv"

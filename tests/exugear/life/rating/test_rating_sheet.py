@@ -18,12 +18,12 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.loads import StrengthSection
+from exugear.life.life import LEFT_OUT
 from exugear.life.rating.standard import FlankRules, MeshLoads, rate
-from exugear.life.verdict import LEFT_OUT
 from exugear.project import Project
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards.iso6336 import mesh_stiffness
-from fe_ste.standards.service_life import CASE_HARDENED_BENDING, CASE_HARDENED_CONTACT
+from fe_ste.standards.pitting import CASE_HARDENED_BENDING, CASE_HARDENED_CONTACT
 
 from ...case_mutations import toml_text
 from ...spur_case import COARSE_INPUT, SPUR_CASE

@@ -11,11 +11,11 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.report.findings.constant_speed import constant_speed_of, truest_of
 from exugear.report.findings.facts import facts_of_response
 from exugear.report.findings.groups import RankedResonance
+from exugear.report.findings.loudness import constant_speed_of, truest_of
 from exugear.report.findings.words import Words
-from exugear.results.spectra.orders import OrderLine
+from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.settings import SpeedRange, SteadySettings
 
 from ...results.spectra.run_ups import STORED_LINE

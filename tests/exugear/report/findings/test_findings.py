@@ -7,12 +7,12 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.report.findings.levers import levers_of
-from exugear.report.findings.variations import best_change, guarded
+from exugear.report.findings.facts import levers_of
+from exugear.report.findings.verdicts import best_change, guarded
 from exugear.report.findings.words import Words
-from exugear.results.spectra.windows import is_among, other_windows, survives
-from exugear.system.eigenmodes.modes import modes_of
-from exugear.system.eigenmodes.sensitivity import Parameter, ParameterVariation
+from exugear.results.spectra.run_spectra import is_among, other_windows, survives
+from exugear.system.modes import modes_of
+from exugear.system.sensitivity import Parameter, ParameterVariation
 
 from ...assembled import assembled
 from ...results.spectra.run_ups import STORED_LINE

@@ -9,15 +9,15 @@ import pytest
 import xarray as xr
 
 from exugear.gearbox.choice import Choice
-from exugear.gearbox.load_cases.operating_range import operating_range
+from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import CaseError
 from exugear.report.findings.loudness import HOUSING, SHAFTS, ranking_of
-from exugear.steady.mean_system.quantities import quantities_of
+from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 
 SPEED = np.linspace(1.0, 5.0, 401)
 SIGNALS = ("overall_dte", *(f"{kind} brg {axis}" for kind in ("support_force", "seat_acceleration") for axis in "xyz"))

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from exugear.report.pictures.mode_diagrams import plot_campbell
-from exugear.results.spectra.orders import OrderLine
+from exugear.report.pictures.diagrams import plot_campbell
+from exugear.results.spectra.waterfall import OrderLine
 
 RATE = 2048.0
 MESH, SECOND = OrderLine("mesh", 60.0), OrderLine("2 × mesh", 120.0)

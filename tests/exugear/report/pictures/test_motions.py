@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.parts import Body
-from exugear.report.pictures.motions import (
+from exugear.report.pictures.shapes import (
+    BodyShape,
     displacement_of,
     mode_scene,
     motion_matrix,
     motions_of,
     placed,
+    tube_surface,
 )
-from exugear.report.pictures.shapes import BodyShape
-from exugear.report.pictures.surfaces import tube_surface
 
 CASE = FilePath(__file__).parents[4] / "cases" / "grc750" / "gearbox.toml"
 

@@ -5,10 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from exugear.report.pictures.run_diagrams import plot_waterfalls, pooled_levels
-from exugear.results.spectra.orders import OrderLine
+from exugear.report.pictures.diagrams import plot_waterfalls, pooled_levels
 from exugear.results.spectra.resonances import Pick
-from exugear.results.spectra.waterfall import Waterfall, waterfall
+from exugear.results.spectra.waterfall import OrderLine, Waterfall, waterfall
 
 RATE = 2048.0
 MESH, SECOND = OrderLine("mesh", 60.0), OrderLine("2 × mesh", 120.0)

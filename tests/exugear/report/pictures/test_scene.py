@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from exugear.report.pictures.motions import mode_scene
 from exugear.report.pictures.scene import (
     DISPLACEMENT_COLOURS,
     animate_mode,
@@ -13,10 +12,9 @@ from exugear.report.pictures.scene import (
     draw_gearbox,
     draw_mode,
 )
-from exugear.report.pictures.shapes import BodyShape
-from exugear.report.pictures.surfaces import Surface, gear_surface, tube_surface
+from exugear.report.pictures.shapes import BodyShape, Surface, gear_surface, mode_scene, tube_surface
 from fe_ste.geometry.gears import Gear
-from fe_ste.tools.rendering import RenderingError, require_rendering
+from fe_ste.tools.drawing import RenderingError, require_rendering
 
 
 def renders():

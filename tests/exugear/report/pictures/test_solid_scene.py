@@ -5,11 +5,11 @@ import pytest
 import skfem
 from matplotlib.figure import Figure
 
-from exugear.report.pictures.solid_scene import draw_free_vibration
-from exugear.system.bodies.finite_elements.solid_seats import SolidSeat
+from exugear.report.pictures.scene import draw_free_vibration
+from exugear.system.bodies.solid_elements import SolidSeat
 from exugear.system.bodies.solids import SolidModel, reduce_solid
 from fe_ste.geometry.gear_relations import Material
-from fe_ste.tools.rendering import RenderingError, require_rendering
+from fe_ste.tools.drawing import RenderingError, require_rendering
 
 
 def renders():

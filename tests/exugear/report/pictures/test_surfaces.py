@@ -6,7 +6,7 @@ from pathlib import Path as FilePath
 import numpy as np
 import pytest
 
-from exugear.report.pictures.surfaces import Surface, gear_surface, tube_surface
+from exugear.report.pictures.shapes import Surface, gear_surface, tube_surface
 from fe_ste.geometry.gears import Gear
 from fe_ste.geometry.profile import tooth_profile
 

@@ -12,13 +12,10 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.report.pictures.motions import displacement_of
-from exugear.report.pictures.shapes import bodies_of
-from exugear.report.web.arrays import ArrayStore
-from exugear.report.web.drawn_bodies import drawn_bodies, drawn_mode, turn_between
-from exugear.report.web.mode_page import write_mode_page
-from exugear.report.web.stage import stage_data
-from exugear.system.eigenmodes.modes import modes_of
+from exugear.report.pictures.shapes import bodies_of, displacement_of
+from exugear.report.web.document import ArrayStore
+from exugear.report.web.stage import drawn_bodies, drawn_mode, stage_data, turn_between, write_mode_page
+from exugear.system.modes import modes_of
 
 from ... import gear_trains
 from ...assembled import assembled

@@ -13,10 +13,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exugear.report.web.arrays import ArrayStore
-from exugear.report.web.document import whole_page
-from exugear.report.web.libraries import libraries, licences, vendored
-from exugear.report.web.scripts import bundle, module_order, script_source
+from exugear.report.web.document import (
+    ArrayStore,
+    bundle,
+    libraries,
+    licences,
+    module_order,
+    script_source,
+    vendored,
+    whole_page,
+)
 
 ROOT = Path(__file__).parents[4]
 SCRIPTS = sorted(path.stem for path in (ROOT / "exugear" / "report" / "web" / "scripts").glob("*.js"))

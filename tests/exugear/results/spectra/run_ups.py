@@ -10,9 +10,8 @@ import scipy.signal
 import xarray as xr
 
 from exugear.gearbox.versions import RUN
-from exugear.results.spectra.orders import OrderLine
-from exugear.results.spectra.waterfall import waterfall
-from fe_ste.tools.sealed import write_dataset
+from exugear.results.spectra.waterfall import OrderLine, waterfall
+from fe_ste.tools.stores import write_dataset
 
 RATE = 8192.0
 MESH = OrderLine("mesh", 60.0)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.results.spectra.comparison import AbsenceRule, compare, only_in_first
 from exugear.results.spectra.resonances import pick_resonances
-from exugear.results.spectra.run_spectra import read_run
+from exugear.results.spectra.run_spectra import AbsenceRule, compare, only_in_first, read_run
 from exugear.results.spectra.waterfall import waterfall
 
 from .run_ups import MESH, RATE, STORED_LINE, run_up, swept_pair, write_run

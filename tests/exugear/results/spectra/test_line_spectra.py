@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from exugear.results.spectra.line_spectra import LineSpectra, line_peaks, line_spectra
-from exugear.results.spectra.orders import OrderLine
 from exugear.results.spectra.resonances import pick_resonances
+from exugear.results.spectra.waterfall import OrderLine
 
 MESH, OTHER = OrderLine("mesh", 20.0), OrderLine("other", 50.0)
 RESONANCE, DAMPING = 300.0, 0.01

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from exugear.results.spectra.mode_report import mobility_shares, nearest_mode, report_mode
+from exugear.results.spectra.run_spectra import mobility_shares, nearest_mode, report_mode
 
 from .run_ups import modes_dataset
 

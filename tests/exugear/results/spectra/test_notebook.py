@@ -4,11 +4,9 @@ import re
 
 import pytest
 
-from exugear.results.spectra.comparison import compare
-from exugear.results.spectra.mode_report import report_mode
-from exugear.results.spectra.order_cut import order_cut
-from exugear.results.spectra.orders import OrderLine
-from exugear.results.spectra.resonances import group_by_frequency, pick_resonances
+from exugear.results.spectra.resonances import group_by_frequency, order_cut, pick_resonances
+from exugear.results.spectra.run_spectra import compare, report_mode
+from exugear.results.spectra.waterfall import OrderLine
 
 from .run_ups import MESH, RATE, modes_dataset, run_up, swept_pair
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from exugear.results.spectra.order_cut import order_cut
+from exugear.results.spectra.resonances import order_cut
 
 from .run_ups import MESH, RATE, oscillator, run_up
 

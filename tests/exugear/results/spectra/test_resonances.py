@@ -5,15 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from exugear.results.spectra.orders import OrderLine, harmonics
 from exugear.results.spectra.resonances import (
     Pick,
     group_by_frequency,
     match_eigenfrequencies,
     pick_resonances,
 )
-from exugear.results.spectra.spectrum import sweep_matched_window
-from exugear.results.spectra.waterfall import waterfall
+from exugear.results.spectra.waterfall import OrderLine, harmonics, sweep_matched_window, waterfall
 
 from .run_ups import MESH, RATE, oscillator, run_up
 

@@ -7,7 +7,7 @@ import pytest
 
 from exugear.results.run_file import load_run
 from exugear.results.spectra.run_spectra import read_run
-from fe_ste.tools.sealed import write_dataset
+from fe_ste.tools.stores import write_dataset
 
 from .run_ups import STORED_LINE, write_run
 

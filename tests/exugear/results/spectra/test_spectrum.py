@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from exugear.results.spectra.spectrum import (
+from exugear.results.spectra.waterfall import (
     amplitude_spectrum,
     sweep_limited_resolution,
     sweep_matched_window,
+    waterfall,
 )
-from exugear.results.spectra.waterfall import waterfall
 
 from .run_ups import RATE, run_up
 

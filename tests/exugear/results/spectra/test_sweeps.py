@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from exugear.results.spectra.orders import OrderLine
-from exugear.results.spectra.sweeps import TOO_FAST, run_up_cut, sweep_rate
+from exugear.results.spectra.resonances import TOO_FAST, run_up_cut, sweep_rate
+from exugear.results.spectra.waterfall import OrderLine
 
 FREQUENCY, DAMPING = 50.0, 0.01
 

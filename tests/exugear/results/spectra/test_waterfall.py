@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from exugear.results.spectra.orders import OrderLine
 from exugear.results.spectra.resonances import pick_resonances
-from exugear.results.spectra.waterfall import line_level, waterfall
+from exugear.results.spectra.waterfall import OrderLine, line_level, waterfall
 
 from .run_ups import MESH, RATE, run_up
 

@@ -11,11 +11,11 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
-from exugear.steady.campbell.campbell import LAYOUT, campbell_from, campbell_of, modes_over_speed
+from exugear.steady.campbell import LAYOUT, campbell_from, campbell_of, modes_over_speed
 from exugear.steady.mean_system.mean_system import mean_system
-from exugear.system.assemble import assemble
-from exugear.system.eigenmodes.modes import eigenmodes
-from fe_ste.tools.sealed import Layout, load_dataset, write_dataset
+from exugear.system.build import assemble
+from exugear.system.modes import eigenmodes
+from fe_ste.tools.stores import Layout, load_dataset, write_dataset
 
 PLANETS = 4
 FAST = 200.0

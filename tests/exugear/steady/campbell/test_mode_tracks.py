@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.steady.campbell.mode_kinds import circle
-from exugear.steady.campbell.mode_tracks import MOST, assurance, mode_tracks
-from exugear.steady.mean_system.mean_modes import vibrations
+from exugear.steady.campbell import MOST, assurance, circle, mode_tracks
+from exugear.steady.mean_system.mean_system import vibrations
 
 AXIAL, TRANSVERSE, STIFFNESS = 0.02, 0.012, 3e4
 """A disc on isotropic tilting springs, kg m2 and N m/rad."""

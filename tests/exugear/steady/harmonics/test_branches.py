@@ -7,11 +7,9 @@ import pytest
 import scipy.integrate
 import scipy.optimize
 
-from exugear.steady.harmonics.branches import Scales, trace
-from exugear.steady.harmonics.floquet import exponents, kicks_needed
-from exugear.steady.harmonics.krylov import HarmonicBalanceError
-from exugear.steady.harmonics.lattice import lattice
-from exugear.steady.harmonics.lines import line_set
+from exugear.steady.harmonics.branches import Scales, exponents, kicks_needed, trace
+from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
+from exugear.steady.harmonics.lines import lattice, line_set
 
 DAMPING, SHARES, BACKLASH, LOAD = 0.03, (0.1, 0.05), 1.0, 2.0
 """Gear pair with backlash: x'' + 2 z x' + k(t) f(x) = F, f = x in contact, zero in the backlash behind it."""

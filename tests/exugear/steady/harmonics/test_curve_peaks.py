@@ -7,7 +7,7 @@ import pytest
 import scipy.optimize
 import scipy.signal
 
-from exugear.steady.harmonics.curve_peaks import predicted_top, standing_peaks
+from exugear.steady.harmonics.branches import predicted_top, standing_peaks
 
 
 def two_modes(x, second):

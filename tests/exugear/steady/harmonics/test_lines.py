@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from exugear.steady.harmonics.krylov import HarmonicBalanceError, solve_lines
-from exugear.steady.harmonics.lattice import lattice
-from exugear.steady.harmonics.lines import Modulator, beside, joined, line_set
-from exugear.steady.harmonics.products import Coupling, Group
+from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
+from exugear.steady.harmonics.lines import Coupling, Group, Modulator, beside, joined, lattice, line_set
 
 BASES = (1.0, 0.5 * (1.0 + 5.0**0.5))
 

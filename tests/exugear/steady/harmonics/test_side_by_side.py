@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from exugear.steady.harmonics.floquet import TOGETHER, exponents
-from exugear.steady.harmonics.side_by_side import elimination, solve_side_by_side
+from exugear.steady.harmonics.branches import TOGETHER, exponents
+from exugear.steady.harmonics.linear_solvers import elimination, solve_side_by_side
 
 
 def chain_of_bodies(random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

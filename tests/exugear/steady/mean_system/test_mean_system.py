@@ -11,10 +11,10 @@ from exugear.steady.mean_system.mesh_waves import mesh_waves
 from exugear.steady.mean_system.rotating_frame import RotatingFrame, SteadyError, planet_sets
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
-from exugear.system.assemble import assemble
-from exugear.system.bearings.equal_planets import planet_supports, with_equal_planets
-from exugear.system.eigenmodes.modes import eigenmodes
-from exugear.system.linearised import linearise
+from exugear.system.bearings.stiffness import planet_supports, with_equal_planets
+from exugear.system.build import assemble
+from exugear.system.modes import eigenmodes
+from exugear.system.statics import linearise
 
 BUSHING = Choice("bushing")
 

@@ -7,8 +7,8 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.steady.mean_system.rotating_frame import RotatingFrame, planet_sets
-from exugear.steady.settling.frame_motion import frame_coordinates
-from exugear.system.assemble import assemble
+from exugear.steady.settling import frame_coordinates
+from exugear.system.build import assemble
 
 FOUR = {"bodies.planet.planet_angles_deg": [0.0, 90.0, 180.0, 270.0]}
 

@@ -11,19 +11,17 @@ import scipy.linalg
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.matrices import axially_symmetric
 from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
-from exugear.system.bearings.rolling.rollers import BearingPair, TaperedRollerBearing
-from exugear.system.bodies.finite_elements.shaft_sections import ShaftSection
-from exugear.system.bodies.of_gearbox.shafts import shaft_model
-from exugear.system.bodies.reduced_body import ReducedBody
+from exugear.system.bearings.rolling.rows import BearingPair, TaperedRollerBearing
+from exugear.system.bearings.stiffness import axially_symmetric
+from exugear.system.bodies.of_gearbox import shaft_model
+from exugear.system.bodies.reduction import ReducedBody
+from exugear.system.bodies.shaft_sections import ShaftSection
 from exugear.system.bodies.turned_shaft import ShaftModel, reduce_shaft
-from exugear.system.eigenmodes.energy_shares import BODY_MOTIONS
-from exugear.system.eigenmodes.modes import modes_of
-from exugear.system.linearised import linearise
 from exugear.system.loads import Loading, LoadTable
-from exugear.system.statics import accelerating_start
+from exugear.system.modes import BODY_MOTIONS, modes_of
+from exugear.system.statics import accelerating_start, linearise
+from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.exudyn_model.system import ExudynSystem
 

@@ -7,20 +7,20 @@ import math
 import numpy as np
 import pytest
 
-from exugear.system.bearings.matrices import (
+from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
+from exugear.system.bearings.rolling.rows import (
+    BearingError,
+    BearingPair,
+    CylindricalRollerBearing,
+    TaperedRollerBearing,
+)
+from exugear.system.bearings.stiffness import (
     axially_symmetric,
     in_series,
     proportional_damping,
     regularised,
     rotate_stiffness,
 )
-from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
-from exugear.system.bearings.rolling.rollers import (
-    BearingPair,
-    CylindricalRollerBearing,
-    TaperedRollerBearing,
-)
-from exugear.system.bearings.rolling.rows import BearingError
 
 NJ2232 = CylindricalRollerBearing(bore=0.160, outside_diameter=0.290, width=0.080)
 PAIR = BearingPair(

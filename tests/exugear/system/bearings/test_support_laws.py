@@ -9,10 +9,10 @@ import pytest
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.connections import CatalogueSection
-from exugear.system.bearings.matrices import axially_symmetric
 from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
-from exugear.system.bearings.rolling.rollers import BearingPair, CylindricalRollerBearing
-from exugear.system.bearings.support_laws import (
+from exugear.system.bearings.rolling.rows import BearingPair, CylindricalRollerBearing
+from exugear.system.bearings.stiffness import (
+    axially_symmetric,
     cage_ratio,
     catalogue_stiffness,
     linear_law,

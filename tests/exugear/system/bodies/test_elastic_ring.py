@@ -12,12 +12,11 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assembly import Assembly
 from exugear.system.loads import Loading, LoadTable
 from exugear.system.signals import energy_residual
 from exugear.system.statics import accelerating_start, locked_equilibrium
-from exugear.transient.compiled.observers import Observer
-from exugear.transient.compiled.solver import CompiledSystem
+from exugear.system.system import Assembly
+from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...assembled import assembled, simulated

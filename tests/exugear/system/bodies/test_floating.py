@@ -14,19 +14,24 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
-from exugear.system.assembly import Assembly
-from exugear.system.bodies.finite_elements.shaft_sections import MeshSize
-from exugear.system.bodies.finite_elements.solid_seats import SolidSeat
-from exugear.system.bodies.floating import floating_body, load_or_reduce_floating
-from exugear.system.bodies.floating_coordinates import FloatingCoordinates
-from exugear.system.bodies.of_gearbox.shafts import shaft_model, solid_of_shaft
-from exugear.system.bodies.reduced_body import Blank, ReductionError
-from exugear.system.bodies.solids import SolidModel, reduce_matrices, reduce_solid
+from exugear.system.bodies.elastic_body import FloatingCoordinates
+from exugear.system.bodies.of_gearbox import shaft_model, solid_of_shaft
+from exugear.system.bodies.reduction import Blank, ReductionError
+from exugear.system.bodies.shaft_sections import MeshSize
+from exugear.system.bodies.solid_elements import SolidSeat
+from exugear.system.bodies.solids import (
+    SolidModel,
+    floating_body,
+    load_or_reduce_floating,
+    reduce_matrices,
+    reduce_solid,
+)
 from exugear.system.loads import Drive, Loading
 from exugear.system.signals import energy_residual
 from exugear.system.statics import accelerating_start
+from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import unsupported_reason
-from exugear.transient.exudyn_model.floating_object import frame_integrals
+from exugear.transient.exudyn_model.bodies import frame_integrals
 from exugear.transient.exudyn_model.library import elements, exudyn
 from exugear.transient.exudyn_model.system import ExudynSystem
 from exugear.transient.outcome import RunError

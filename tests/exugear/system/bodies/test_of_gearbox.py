@@ -11,23 +11,19 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.variant import VariantError
-from exugear.report.pictures.elastic_scene import (
+from exugear.report.pictures.scene import (
     animate_elastic_bodies,
     draw_elastic_bodies,
     elastic_scene,
 )
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
-from exugear.system.bodies.of_gearbox.shafts import shaft_model
-from exugear.system.bodies.of_gearbox.solids import solid_body
-from exugear.system.eigenmodes.modes import counterparts, eigenmodes, modes_of
-from exugear.system.linearised import linearise
+from exugear.system.bodies.of_gearbox import reduced_bodies, shaft_model, solid_body
+from exugear.system.build import assemble
 from exugear.system.loads import Loading, LoadTable
+from exugear.system.modes import counterparts, eigenmodes, modes_of
 from exugear.system.signals import signal_layout
-from exugear.system.statics import accelerating_start, locked_equilibrium
-from exugear.transient.compiled.observers import Observer
-from exugear.transient.compiled.solver import CompiledSystem
+from exugear.system.statics import accelerating_start, linearise, locked_equilibrium
+from exugear.system.system import Assembly
+from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...assembled import assembled, modes_with_bodies

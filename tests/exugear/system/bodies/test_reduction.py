@@ -10,13 +10,19 @@ import pytest
 import scipy.linalg
 import scipy.sparse.linalg
 
-from exugear.system.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
-from exugear.system.bodies.finite_elements.turned_section import Shaft
-from exugear.system.bodies.reduced_body import Blank, ReducedBody, ReductionError, RigidInertia
-from exugear.system.bodies.reduction import with_rigid_inertia, with_stiffness_factor
+from exugear.system.bodies.reduction import (
+    Blank,
+    ReducedBody,
+    ReductionError,
+    RigidInertia,
+    with_rigid_inertia,
+    with_stiffness_factor,
+)
+from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.system.bodies.turned_section import Shaft
 from exugear.system.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
 from fe_ste.geometry.gears import Material
-from fe_ste.tools.stores.store import Store
+from fe_ste.tools.stores import Store
 
 from ....fe_ste.damage import damages
 

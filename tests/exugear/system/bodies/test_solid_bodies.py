@@ -16,23 +16,19 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.variant import VariantError
-from exugear.report.pictures.elastic_scene import elastic_scene
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bodies.finite_elements.solid_matrices import assemble as assemble_solid
-from exugear.system.bodies.finite_elements.solid_seats import seat_rows
-from exugear.system.bodies.of_gearbox.elastic_bodies import reduced_bodies
-from exugear.system.bodies.of_gearbox.solids import solid_body
-from exugear.system.eigenmodes.energy_shares import BODY_MOTIONS
-from exugear.system.eigenmodes.modes import counterparts, eigenmodes, modes_of
-from exugear.system.fingerprint import input_hash
-from exugear.system.linearised import linearise
+from exugear.report.pictures.scene import elastic_scene
+from exugear.system.bodies.of_gearbox import reduced_bodies, solid_body
+from exugear.system.bodies.solid_elements import assemble as assemble_solid
+from exugear.system.bodies.solid_elements import seat_rows
+from exugear.system.build import assemble
 from exugear.system.loads import Loading, LoadTable
+from exugear.system.modes import BODY_MOTIONS, counterparts, eigenmodes, modes_of
 from exugear.system.signals import energy_residual
-from exugear.system.statics import accelerating_start, locked_equilibrium
+from exugear.system.statics import accelerating_start, linearise, locked_equilibrium
+from exugear.system.system import Assembly, input_hash
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.exudyn_model.system import ExudynSystem
-from fe_ste.elimination.sparse import factorise
+from fe_ste.elimination import factorise
 
 from ...assembled import assembled, bodies_of, modes_with_bodies, simulated
 from ...box_case import box_content
@@ -364,5 +360,5 @@ def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatc
     def missing(name: str) -> Any:
         raise ModuleNotFoundError(name)
 
-    monkeypatch.setattr("exugear.system.bodies.finite_elements.solid_files.importlib.import_module", missing)
+    monkeypatch.setattr("exugear.system.bodies.solid_files.importlib.import_module", missing)
     refused({f"{solid}.length_unit_mm": 1.001}, r"meshio is not installed: pip install 'exugear\[mesh\]'")

@@ -18,15 +18,11 @@ import scipy.sparse
 import scipy.sparse.linalg
 import skfem
 
-from exugear.system.bodies.finite_elements import second_order, solid_files
-from exugear.system.bodies.finite_elements.second_order import SolidError
-from exugear.system.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
-from exugear.system.bodies.finite_elements.solid_files import read_solid, tetrahedra
-from exugear.system.bodies.finite_elements.solid_matrices import assemble
-from exugear.system.bodies.finite_elements.solid_seats import SolidSeat, seat_rows
-from exugear.system.bodies.finite_elements.turned_hexahedra import turned_hexahedra
-from exugear.system.bodies.finite_elements.turned_section import Shaft
-from exugear.system.bodies.reduced_body import Blank, ReducedBody, ReductionError
+from exugear.system.bodies import solid_elements, solid_files
+from exugear.system.bodies.reduction import Blank, ReducedBody, ReductionError
+from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.system.bodies.solid_elements import SolidError, SolidSeat, assemble, seat_rows
+from exugear.system.bodies.solid_files import read_solid, tetrahedra
 from exugear.system.bodies.solids import (
     SolidModel,
     gyroscopic_matrix,
@@ -34,8 +30,9 @@ from exugear.system.bodies.solids import (
     reduce_matrices,
     reduce_solid,
 )
+from exugear.system.bodies.turned_section import Shaft, turned_hexahedra
 from exugear.system.bodies.turned_shaft import ShaftModel, reduce_shaft
-from fe_ste.elimination.sparse import factorise
+from fe_ste.elimination import factorise
 from fe_ste.geometry.gears import Material
 
 STEEL = Material(210e9, 0.3, 7850.0)
@@ -206,7 +203,7 @@ TUBE_SEATS = (
 def test_a_broken_pipe_stays_an_error_after_meshing():
     """Else a process that meshed a solid would end without a word when a worker of its grid is lost."""
     code = (
-        "import os\nfrom exugear.system.bodies.finite_elements.solid_files import tetrahedra\n"
+        "import os\nfrom exugear.system.bodies.solid_files import tetrahedra\n"
         "tetrahedra(lambda occ: occ.addBox(0.0, 0.0, 0.0, 1.0, 0.5, 0.25), 0.5)\n"
         "reader, writer = os.pipe()\nos.close(reader)\n"
         "try:\n    os.write(writer, b'x')\nexcept BrokenPipeError:\n    print('an error')\n"
@@ -222,7 +219,7 @@ def test_a_request_to_stop_is_heard_after_meshing():
     program = """
 import signal
 signal.signal(signal.SIGTERM, lambda number, frame: print("heard"))
-from exugear.system.bodies.finite_elements.solid_files import tetrahedra
+from exugear.system.bodies.solid_files import tetrahedra
 tetrahedra(lambda occ: occ.addBox(0, 0, 0, 1, 1, 1), size=1.0)
 signal.raise_signal(signal.SIGTERM)
 """
@@ -255,7 +252,7 @@ def test_meshes_are_read_from_files(tmp_path, suffix, options, kind):
     if kind.startswith("hexa"):
         straight = skfem.MeshHex.init_tensor(*[np.linspace(0, s, 2) for s in (2, 1, 1)])
         cells, points = straight.t.T[:, np.argsort([6, 2, 5, 7, 1, 3, 4, 0])], straight.p.T
-    edges = second_order.TET_EDGES if kind == "tetra10" else second_order.HEX_EDGES
+    edges = solid_elements.TET_EDGES if kind == "tetra10" else solid_elements.HEX_EDGES
     if kind in ("tetra10", "hexahedron20"):
         middles = points[cells[:, edges]].mean(axis=2).reshape(-1, 3)
         extra = len(points) + np.arange(len(middles)).reshape(len(cells), -1)

@@ -9,15 +9,8 @@ import pytest
 import scipy.sparse
 import skfem
 
-from exugear.system.bodies.finite_elements.shaft_sections import (
-    MeshSize,
-    SeatBand,
-    ShaftError,
-    ShaftSection,
-)
-from exugear.system.bodies.finite_elements.tapers import Tapers
-from exugear.system.bodies.finite_elements.turned_hexahedra import turned_hexahedra
-from exugear.system.bodies.finite_elements.turned_section import HarmonicName, Shaft
+from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftError, ShaftSection
+from exugear.system.bodies.turned_section import HarmonicName, Shaft, Tapers, turned_hexahedra
 from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties
 from fe_ste.geometry.gears import Material
 

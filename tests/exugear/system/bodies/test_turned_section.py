@@ -12,13 +12,8 @@ import scipy.sparse
 import scipy.sparse.linalg
 import skfem
 
-from exugear.system.bodies.finite_elements.shaft_sections import (
-    MeshSize,
-    SeatBand,
-    ShaftError,
-    ShaftSection,
-)
-from exugear.system.bodies.finite_elements.turned_section import Shaft
+from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftError, ShaftSection
+from exugear.system.bodies.turned_section import Shaft
 from fe_ste.geometry.gears import Material
 
 STEEL = Material(210e9, 0.3, 7850.0)

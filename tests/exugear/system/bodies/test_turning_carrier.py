@@ -14,14 +14,12 @@ import skfem
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
-from exugear.system.assembly import Assembly
-from exugear.system.eigenmodes.modes import modes_of
-from exugear.system.linearised import linearise
 from exugear.system.loads import Loading, LoadTable
+from exugear.system.modes import modes_of
 from exugear.system.signals import signal_layout
-from exugear.system.statics import accelerating_start, locked_equilibrium
-from exugear.transient.compiled.observers import Observer
-from exugear.transient.compiled.solver import CompiledSystem
+from exugear.system.statics import accelerating_start, linearise, locked_equilibrium
+from exugear.system.system import Assembly
+from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...assembled import assembled

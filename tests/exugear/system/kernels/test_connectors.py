@@ -10,15 +10,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from exugear.system.bearings.kernels.connectors import (
+from exugear.system.bearings.rolling.point_contact import rolling_arrays
+from exugear.system.kernels.connectors import (
     ConnectorArrays,
     add_connector_forces,
     add_connector_tangents,
     connector_loads,
     connector_strains,
 )
-from exugear.system.bearings.kernels.rolling import no_rolling
-from exugear.system.bearings.rolling.potential import rolling_arrays
+from exugear.system.kernels.rolling import no_rolling
 
 from ...plain_connectors import DISPLACEMENT, add_forces, connector_load, connector_motion
 from ...rolling_case import BALLS, CYLINDRICAL

@@ -8,7 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from exugear.system.bearings.kernels.rolling import (
+from exugear.system.bearings.rolling.contact import (
+    bearing_load,
+    equilibrium,
+    row_contacts,
+    tangent_stiffness,
+)
+from exugear.system.bearings.rolling.point_contact import rolling_arrays
+from exugear.system.bearings.rolling.rows import BearingError, BearingPair, RollerRow, RollingRow, TaperedRollerBearing
+from exugear.system.kernels.rolling import (
     CAGE_DAMPING,
     CAGE_TORQUE,
     DAMPED_PART,
@@ -23,15 +31,6 @@ from exugear.system.bearings.kernels.rolling import (
     rolling_tangent,
     selected_rolling,
 )
-from exugear.system.bearings.rolling.contact import (
-    bearing_load,
-    equilibrium,
-    row_contacts,
-    tangent_stiffness,
-)
-from exugear.system.bearings.rolling.potential import rolling_arrays
-from exugear.system.bearings.rolling.rollers import BearingPair, TaperedRollerBearing
-from exugear.system.bearings.rolling.rows import BearingError, RollerRow, RollingRow
 
 from ...rolling_case import BALLS, CYLINDRICAL, TAPERED, plain_energy_and_load
 

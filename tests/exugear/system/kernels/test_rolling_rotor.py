@@ -10,16 +10,11 @@ import pytest
 import scipy.linalg
 import scipy.optimize
 
-from exugear.system.bearings.kernels.connectors import ConnectorArrays, add_connector_forces
-from exugear.system.bearings.kernels.rolling import (
-    STORED,
-    rolling_forces,
-    rolling_memory,
-    rolling_tangent,
-)
-from exugear.system.bearings.rolling.potential import rolling_arrays
+from exugear.system.bearings.rolling.point_contact import rolling_arrays
 from exugear.system.bearings.rolling.rows import RollingRow
-from exugear.system.kernels.inertia import InertiaArrays, accelerations, kinetic_energies
+from exugear.system.kernels.connectors import ConnectorArrays, add_connector_forces
+from exugear.system.kernels.coordinates import InertiaArrays, accelerations, kinetic_energies
+from exugear.system.kernels.rolling import STORED, rolling_forces, rolling_memory, rolling_tangent
 
 from ...plain_connectors import add_forces
 from ...rolling_case import BALLS, CYLINDRICAL

@@ -16,12 +16,9 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.loads import LoadTable
-from exugear.system.statics import locked_equilibrium
-from exugear.system.tooth_mesh.kernels.meshes import DAMPED_POWER
-from exugear.system.tooth_mesh.kernels.table_law import (
+from exugear.system.build import assemble
+from exugear.system.kernels.meshes import DAMPED_POWER
+from exugear.system.kernels.table_law import (
     ENERGY_DERIVATIVES,
     GUESSED,
     LAW_FORCE,
@@ -30,10 +27,12 @@ from exugear.system.tooth_mesh.kernels.table_law import (
     scratch_memory,
     surface_law,
 )
-from exugear.system.tooth_mesh.laws.forms import add_mesh_forces
-from exugear.system.tooth_mesh.laws.packing import pack
-from exugear.transient.compiled.observers import Observer
-from exugear.transient.compiled.solver import CompiledSystem
+from exugear.system.loads import LoadTable
+from exugear.system.statics import locked_equilibrium
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces
+from exugear.system.tooth_mesh.laws.stiffness import pack
+from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.runup import simulate
 from fe_ste.transmission_error.surface import SteSurface
 

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from exugear.system.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
-from exugear.system.bodies.finite_elements.solid_matrices import assemble
-from exugear.system.bodies.finite_elements.solid_seats import SolidSeat, seat_rows
-from exugear.system.bodies.finite_elements.turned_hexahedra import turned_hexahedra
-from exugear.system.bodies.finite_elements.turned_section import Shaft
-from exugear.system.bodies.kernels.travelling import (
+from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.system.bodies.solid_elements import SolidSeat, assemble, seat_rows
+from exugear.system.bodies.turned_section import Shaft, turned_hexahedra
+from exugear.system.kernels.turning import (
     TravellingArrays,
     follow,
     place_travelling,
@@ -21,7 +19,7 @@ from exugear.system.bodies.kernels.travelling import (
     travelling_memory,
     travelling_tangent,
 )
-from fe_ste.elimination.sparse import factorise
+from fe_ste.elimination import factorise
 from fe_ste.geometry.gears import Material
 
 NUMBER = 9

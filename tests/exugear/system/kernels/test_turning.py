@@ -10,25 +10,23 @@ import pytest
 import scipy.linalg
 import skfem
 
-from exugear.system.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
-from exugear.system.bodies.finite_elements.solid_seats import SolidSeat
-from exugear.system.bodies.finite_elements.turned_hexahedra import turned_hexahedra
-from exugear.system.bodies.finite_elements.turned_section import Shaft
-from exugear.system.bodies.kernels.turning import (
-    set_turning_motion,
-    turning_energies,
-    turning_memory,
-    turning_weight_power,
-)
-from exugear.system.bodies.reduced_body import ReducedBody, RigidInertia
-from exugear.system.bodies.reduction import with_rigid_inertia
+from exugear.system.bodies.reduction import ReducedBody, RigidInertia, with_rigid_inertia
+from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.system.bodies.solid_elements import SolidSeat
 from exugear.system.bodies.solids import (
     SolidModel,
     gyroscopic_matrix,
     reduce_matrices,
     reduce_solid,
 )
+from exugear.system.bodies.turned_section import Shaft, turned_hexahedra
 from exugear.system.bodies.turning_frame import TurningBody, turning_arrays
+from exugear.system.kernels.turning import (
+    set_turning_motion,
+    turning_energies,
+    turning_memory,
+    turning_weight_power,
+)
 from fe_ste.geometry.gears import Material
 
 STEEL = Material(210e9, 0.3, 7850.0)

@@ -8,11 +8,10 @@ from typing import Any
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.readiness.margins import PROPOSED_MARGIN, doubts_about_pairs, pair_margins
-from exugear.system.readiness.readiness import remarks
-from fe_ste.contact.flank_ends import reaches_form_circle
-from fe_ste.transmission_error.hertz import pitch_point_pressure
-from fe_ste.transmission_error.search import contact_state
+from exugear.system.plausibility import PROPOSED_MARGIN, doubts_about_pairs, pair_margins
+from exugear.system.readiness import remarks
+from fe_ste.contact.kinematics import reaches_form_circle
+from fe_ste.transmission_error.search import contact_state, pitch_point_pressure
 from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 
 from ...gear_trains import pair

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from exugear.exchange.rexs.containers import read_rexs
-from exugear.exchange.rexs.faults import RexsError
 from exugear.exchange.rexs.to_case.conversion import to_case
+from exugear.exchange.rexs.tree import RexsError
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.readiness.plausibility import doubts_about_parts, usual_backlash
-from exugear.system.readiness.readiness import check_parts, remarks
+from exugear.system.plausibility import doubts_about_parts, usual_backlash
+from exugear.system.readiness import check_parts, remarks
 
 from ...gear_trains import KINDS
 

@@ -10,11 +10,9 @@ import scipy.optimize
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.system.build import assemble
 from exugear.system.kernels.coordinates import TILT
-from exugear.system.tooth_mesh.contact_state import ContactState
-from exugear.system.tooth_mesh.kernels.meshes import (
+from exugear.system.kernels.meshes import (
     CYCLE_POWER,
     DAMPED_POWER,
     ENERGY,
@@ -24,7 +22,7 @@ from exugear.system.tooth_mesh.kernels.meshes import (
     TILT_REST,
     TILT_STIFFNESS,
 )
-from exugear.system.tooth_mesh.kernels.table_law import (
+from exugear.system.kernels.table_law import (
     ENERGY_DERIVATIVES,
     LAW_BY_MISALIGNMENT,
     LAW_FORCE,
@@ -34,9 +32,11 @@ from exugear.system.tooth_mesh.kernels.table_law import (
     scratch_memory,
     surface_law,
 )
-from exugear.system.tooth_mesh.law import MeshCurve
-from exugear.system.tooth_mesh.laws.packing import pack
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.contact_state import ContactState
+from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.laws.registry import LAWS, law_of
+from exugear.system.tooth_mesh.laws.stiffness import pack
 from exugear.system.tooth_mesh.placement import loaded_flanks
 from exugear.system.tooth_mesh.tables import wanted_table
 

@@ -9,16 +9,11 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.system.build import assemble
+from exugear.system.kernels.meshes import ENERGY, STATE_SIZE, periodic_cubic, stiffness_at
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import mesh_elements
-from exugear.system.tooth_mesh.kernels.meshes import (
-    ENERGY,
-    STATE_SIZE,
-    periodic_cubic,
-    stiffness_at,
-)
-from exugear.system.tooth_mesh.laws.forms import add_mesh_forces, mesh_state
+from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces, mesh_state
 from exugear.system.tooth_mesh.laws.registry import LAWS as ALL_LAWS
 from exugear.system.tooth_mesh.laws.registry import law_of
 from exugear.system.tooth_mesh.placement import MeshError, MeshGeometry, loaded_flanks, mesh_phases

@@ -12,11 +12,18 @@ import exugear.system.tooth_mesh.tables
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 from exugear.system.statics import static_state
-from exugear.system.tooth_mesh.grid_axes import LEAST, REACH, axes_reaching, rounded_up
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.system.tooth_mesh.tables import fitting_table, requested_tables, wanted_table
+from exugear.system.tooth_mesh.tables import (
+    LEAST,
+    REACH,
+    axes_reaching,
+    fitting_table,
+    requested_tables,
+    rounded_up,
+    wanted_table,
+)
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.transmission_error.table import MeshTable, TableError
 

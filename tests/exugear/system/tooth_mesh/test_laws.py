@@ -9,15 +9,15 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.tooth_mesh.kernels.meshes import periodic_cubic
-from exugear.system.tooth_mesh.law import MeshCurve
-from exugear.system.tooth_mesh.laws.along_row import row_law
+from exugear.system.build import assemble
+from exugear.system.kernels.meshes import periodic_cubic
+from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.laws.line_of_action import (
     CURVE_FORM,
     STIFFNESS_FORM,
     curve_coefficients,
 )
+from exugear.system.tooth_mesh.laws.mesh_forces import row_law
 from exugear.system.tooth_mesh.laws.registry import LAWS, law_of
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.laws.table import TABLE_FORM

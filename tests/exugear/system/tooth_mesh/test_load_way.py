@@ -9,11 +9,11 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
 from exugear.system.kernels.coordinates import TILT
+from exugear.system.kernels.meshes import FORCE, PMC
 from exugear.system.tooth_mesh.contact_state import ContactCycle
-from exugear.system.tooth_mesh.kernels.meshes import FORCE, PMC
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.placement import loaded_flanks
 
 from ...contact_case import contacts

@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.placement import MeshError
-from exugear.system.tooth_mesh.table_remarks import doubts_about_table, remarks_about_table
-from exugear.system.tooth_mesh.tables import requested_tables, table_path, wanted_table
+from exugear.system.tooth_mesh.tables import (
+    doubts_about_table,
+    remarks_about_table,
+    requested_tables,
+    table_path,
+    wanted_table,
+)
 from fe_ste.transmission_error.states import CUT_OFF
 from fe_ste.transmission_error.table import MeshTable
 

@@ -15,7 +15,7 @@ from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.report.writer import write_report
-from exugear.system.tooth_mesh.law import MeshCurve
+from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import missing_tables, requested_tables, wanted_table

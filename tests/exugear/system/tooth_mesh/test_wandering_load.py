@@ -12,8 +12,7 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
-from exugear.system.tooth_mesh.tables import fitting_table, requested_tables
-from exugear.system.tooth_mesh.wandering_load import wandering_loads
+from exugear.system.tooth_mesh.tables import fitting_table, requested_tables, wandering_loads
 
 from ...spur_case import COARSE_INPUT, SPUR_CASE
 

@@ -12,13 +12,12 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.statics import accelerating_start, locked_equilibrium
-from exugear.system.tooth_mesh.laws.packing import pack
-from exugear.system.tooth_mesh.placement import MeshGeometry, loaded_flanks, tooth_places
-from exugear.system.tooth_mesh.wheel_errors import contact_line_shares
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.laws.stiffness import pack
+from exugear.system.tooth_mesh.placement import MeshGeometry, contact_line_shares, loaded_flanks, tooth_places
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.runup import simulate
 

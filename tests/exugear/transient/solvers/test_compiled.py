@@ -14,18 +14,16 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.run_file import load_run
-from exugear.results.spectra.order_cut import order_cut
-from exugear.results.spectra.orders import harmonics
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.results.spectra.resonances import order_cut
+from exugear.results.spectra.waterfall import harmonics
+from exugear.system.build import assemble
 from exugear.system.loads import DriveLaw, Loading, LoadTable
 from exugear.system.signals import signal_layout
 from exugear.system.statics import accelerating_start
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
-from exugear.transient.compiled.methods import RUNGE_KUTTA, Method
-from exugear.transient.compiled.observers import Observer
-from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
-from exugear.transient.compiled.step import choose_integration, highest_rate
+from exugear.transient.compiled.integrator import RUNGE_KUTTA, Method, choose_integration, highest_rate
+from exugear.transient.compiled.solver import CompiledSystem, Observer, unsupported_reason
 from exugear.transient.exudyn_model.library import exudyn
 from exugear.transient.exudyn_model.system import ExudynSystem
 from exugear.transient.outcome import RunError

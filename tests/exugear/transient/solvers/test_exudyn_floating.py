@@ -10,20 +10,18 @@ import pytest
 import scipy.linalg
 import skfem
 
-from exugear.system.bodies.finite_elements.shaft_sections import MeshSize, SeatBand, ShaftSection
-from exugear.system.bodies.finite_elements.solid_seats import SolidSeat
-from exugear.system.bodies.finite_elements.turned_hexahedra import turned_hexahedra
-from exugear.system.bodies.finite_elements.turned_section import Shaft
-from exugear.system.bodies.floating import floating_body
-from exugear.system.bodies.floating_body import FloatingBody
-from exugear.system.bodies.reduced_body import Blank
-from exugear.system.bodies.reduction import selective_mass_scaling
+from exugear.system.bodies.elastic_body import FloatingBody
+from exugear.system.bodies.reduction import Blank, selective_mass_scaling
+from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftSection
+from exugear.system.bodies.solid_elements import SolidSeat
 from exugear.system.bodies.solids import (
     ReducedSolid,
     SolidModel,
+    floating_body,
     gyroscopic_matrix,
     reduce_matrices,
 )
+from exugear.system.bodies.turned_section import Shaft, turned_hexahedra
 from exugear.transient.exudyn_model.floating import FloatingSystem, SeatLaw, linear_supports
 from fe_ste.geometry.gears import Material
 

@@ -8,14 +8,13 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import VariantError
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.bearings.kernels.connectors import add_connector_forces
-from exugear.system.eigenmodes.modes import modes_of
-from exugear.system.kernels.springs import add_spring_forces
-from exugear.system.linearised import linearise
+from exugear.system.build import assemble
+from exugear.system.kernels.connectors import add_connector_forces
+from exugear.system.kernels.coordinates import add_spring_forces
 from exugear.system.loads import Loading
-from exugear.system.statics import StartState, accelerating_start
+from exugear.system.modes import modes_of
+from exugear.system.statics import StartState, accelerating_start, linearise
+from exugear.system.system import Assembly
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...assembled import assembled

@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
-from exugear.system.linearised import linearise
+from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
-from exugear.system.statics import accelerating_start
-from exugear.transient.compiled.methods import (
+from exugear.system.statics import accelerating_start, linearise
+from exugear.system.system import Assembly
+from exugear.transient.compiled.integrator import (
     CORRECT_POSITION,
     CORRECT_VELOCITY,
     EXTRAPOLATE,
+    MARGIN,
     ORDERS,
     PREDICT_POSITION,
     PREDICT_VELOCITY,
@@ -26,13 +26,14 @@ from exugear.transient.compiled.methods import (
     Method,
     adams,
     ahead_of_correction,
+    choose_integration,
+    eigenvalues,
     forced_error,
     growth,
     resonance_error,
     stabilised,
 )
 from exugear.transient.compiled.solver import CompiledSystem
-from exugear.transient.compiled.step import MARGIN, choose_integration, eigenvalues
 
 LOAD = {"carrier": 240e3, "hss": -2.9e3}
 """N m."""

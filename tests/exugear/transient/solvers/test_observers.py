@@ -7,7 +7,8 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
+from exugear.system.build import assemble
+from exugear.system.kernels.table_law import GUESSED, LEFT_TABLE
 from exugear.system.signals import (
     BALANCE_TERMS,
     ENERGIES,
@@ -17,15 +18,14 @@ from exugear.system.signals import (
     signal_layout,
     signals_of,
 )
-from exugear.system.tooth_mesh.kernels.table_law import GUESSED, LEFT_TABLE
-from exugear.transient.compiled import observers, sampling
+from exugear.transient.compiled import sampling, solver
 
 from ...table_case import surfaces
 
 
 def function_named(name: str) -> object:
-    """Function of `exugear.transient.compiled.sampling`, or method of `exugear.transient.compiled.observers`."""
-    function: object = observers if "." in name else sampling
+    """Function of `exugear.transient.compiled.sampling`, or method of `exugear.transient.compiled.solver`."""
+    function: object = solver if "." in name else sampling
     for part in name.split("."):
         function = getattr(function, part)
     return function

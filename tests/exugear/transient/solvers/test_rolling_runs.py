@@ -9,13 +9,12 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.system.build import assemble
 from exugear.system.loads import Loading, LoadTable
 from exugear.system.signals import signal_layout
 from exugear.system.statics import accelerating_start
-from exugear.transient.compiled.observers import Observer
-from exugear.transient.compiled.solver import CompiledSystem
+from exugear.system.system import Assembly
+from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...assembled import assembled

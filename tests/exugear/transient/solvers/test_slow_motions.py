@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
-from exugear.system.assemble import assemble
-from exugear.transient.compiled.methods import RUNGE_KUTTA, adams, growth, stabilised
-from exugear.transient.compiled.step import MARGIN, SLOWEST, choose_integration
+from exugear.system.build import assemble
+from exugear.transient.compiled.integrator import (
+    MARGIN,
+    RUNGE_KUTTA,
+    SLOWEST,
+    adams,
+    choose_integration,
+    growth,
+    stabilised,
+)
 
 SWAYING = 1e-9
 """Growth in a step that round-off makes of slow motions; see `GROWTH_ALLOWED` of the step."""

@@ -22,9 +22,9 @@ from scipy.integrate import solve_ivp
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.assemble import assemble
-from exugear.system.assembly import Assembly
+from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
+from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem
 from fe_ste.transmission_error.surface import SteSurface
 

@@ -8,7 +8,6 @@ import pytest
 import scipy.integrate
 import scipy.special
 
-from exugear.system.bearings.matrices import rotate_stiffness
 from exugear.system.bearings.rolling.contact import (
     bearing_load,
     elastic_energy,
@@ -34,6 +33,7 @@ from exugear.system.bearings.rolling.rows import (
     moved,
     pair_rows,
 )
+from exugear.system.bearings.stiffness import rotate_stiffness
 
 DEEP_GROOVE = BallRow(element_diameter=0.0127, pitch_diameter=0.065, element_count=9)  # 209, Harris
 ANGULAR = BallRow(  # 218, Harris

@@ -81,7 +81,7 @@ def static_rating(rows, kind):
 def test_estimated_bearings_have_the_static_rating_of_the_catalogue(name):
     kind, bore, outer, width, printed, keys = PRINTED[name]
     rows = catalogue_rows(section(kind, float(bore), float(outer), float(width), **keys))
-    # Nine tenths of 680 bearings lie within the ranges of `exugear.system.bearings.rolling.proportions`, 0.71 to 1.27
+    # Nine tenths of 680 bearings lie within the ranges of `exugear.system.bearings.rolling.dimensions`, 0.71 to 1.27
     # in all.
     assert static_rating(rows, kind) == pytest.approx(printed, rel=0.3)
 

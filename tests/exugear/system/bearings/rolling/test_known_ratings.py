@@ -11,8 +11,8 @@ import pytest
 
 from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.system.bearings.duty import ratings_of
-from exugear.system.bearings.rolling import known_ratings
-from exugear.system.bearings.rolling.known_ratings import known_rating
+from exugear.system.bearings.rolling import catalogue
+from exugear.system.bearings.rolling.catalogue import known_rating
 
 from .test_catalogue import PRINTED as STATIC_RATINGS
 
@@ -38,7 +38,7 @@ def section(kind: str, bore: float, outer: float, width: float, **keys: object) 
 
 
 def listed() -> list[dict[str, str]]:
-    path = Path(known_ratings.__file__).parent / "makers.csv"
+    path = Path(catalogue.__file__).parent / "makers.csv"
     return list(csv.DictReader(path.read_text("utf-8").splitlines()))
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from exugear.system.bearings.rolling.lubrication import (
+from exugear.system.bearings.rolling.life import (
     CONTAMINATION,
     LARGEST_FACTOR,
     contamination_factor,

@@ -13,8 +13,13 @@ from exugear.system.bearings.rolling.ratings import (
     row_count,
     static_factor,
 )
-from exugear.system.bearings.rolling.rollers import CylindricalRollerBearing, TaperedRollerBearing
-from exugear.system.bearings.rolling.rows import BallRow, BearingError, RollerRow
+from exugear.system.bearings.rolling.rows import (
+    BallRow,
+    BearingError,
+    CylindricalRollerBearing,
+    RollerRow,
+    TaperedRollerBearing,
+)
 
 
 def balls(diameter, pitch, count, degrees=0.0, **options):

@@ -7,7 +7,6 @@ import pytest
 
 from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.system.bearings.duty import ratings_of
-from exugear.system.bearings.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
 from exugear.system.bearings.rolling.catalogue import catalogue_rows, estimates
 from exugear.system.bearings.rolling.contact import (
     bearing_load,
@@ -17,13 +16,14 @@ from exugear.system.bearings.rolling.contact import (
     tangent_stiffness,
 )
 from exugear.system.bearings.rolling.life import reference_life
-from exugear.system.bearings.rolling.potential import rolling_arrays
+from exugear.system.bearings.rolling.point_contact import rolling_arrays
 from exugear.system.bearings.rolling.rows import (
     RIB_APPROACH,
     BearingError,
     BearingOfRows,
     on_raceways,
 )
+from exugear.system.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
 
 PLAIN = {"type": "cylindrical_roller", "bore_mm": 60.0, "outer_diameter_mm": 130.0, "width_mm": 31.0}
 

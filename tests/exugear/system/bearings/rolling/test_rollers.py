@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from exugear.system.bearings.matrices import axially_symmetric, rotate_stiffness
 from exugear.system.bearings.rolling.contact import (
     bearing_load,
     elastic_energy,
@@ -16,12 +15,14 @@ from exugear.system.bearings.rolling.contact import (
     row_contacts,
     tangent_stiffness,
 )
-from exugear.system.bearings.rolling.rollers import (
+from exugear.system.bearings.rolling.rows import (
+    BearingError,
     BearingPair,
     CylindricalRollerBearing,
+    RollerRow,
     TaperedRollerBearing,
 )
-from exugear.system.bearings.rolling.rows import BearingError, RollerRow
+from exugear.system.bearings.stiffness import axially_symmetric, rotate_stiffness
 
 
 # Closed forms hold for straight rollers, and the hand estimate has rollers of 0.75 of the width: so have all bearings

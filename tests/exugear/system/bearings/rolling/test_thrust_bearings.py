@@ -9,8 +9,7 @@ import pytest
 
 from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.system.bearings.duty import loads_of_rows, ratings_of
-from exugear.system.bearings.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
-from exugear.system.bearings.rolling.catalogue import catalogue_rows
+from exugear.system.bearings.rolling.catalogue import MARGINS, catalogue_rows
 from exugear.system.bearings.rolling.contact import (
     bearing_load,
     bearing_state,
@@ -18,9 +17,8 @@ from exugear.system.bearings.rolling.contact import (
     row_contacts,
     tangent_stiffness,
 )
-from exugear.system.bearings.rolling.known_ratings import MARGINS
 from exugear.system.bearings.rolling.life import basic_rating_life, reference_life
-from exugear.system.bearings.rolling.potential import rolling_arrays
+from exugear.system.bearings.rolling.point_contact import rolling_arrays
 from exugear.system.bearings.rolling.ratings import (
     basic_dynamic_rating,
     equivalent_load,
@@ -28,6 +26,7 @@ from exugear.system.bearings.rolling.ratings import (
     thrust_contact_factor,
 )
 from exugear.system.bearings.rolling.rows import BearingError, BearingOfRows
+from exugear.system.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
 
 KIND = "thrust_spherical_roller"
 SIZES = {"type": KIND, "bore_mm": 200.0, "outer_diameter_mm": 340.0, "width_mm": 85.0}

@@ -1,0 +1,257 @@
+"""Channels over time as a file holds them: names and units at once, values in blocks when they are asked for."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
+
+# Units as load files write them, and what they are worth in SI
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit of a load file."""
+
+    quantity: str
+    """What it measures: torque, force, speed, time, angle, velocity, or another."""
+    factor: float
+    """Its worth in SI."""
+
+
+_RPM = math.pi / 30.0
+_TURN = 2.0 * math.pi
+UNITS: dict[str, Unit] = {
+    "s": Unit("time", 1.0),
+    "sec": Unit("time", 1.0),
+    "ms": Unit("time", 1e-3),
+    "min": Unit("time", 60.0),
+    "h": Unit("time", 3600.0),
+    "hr": Unit("time", 3600.0),
+    "m/s": Unit("velocity", 1.0),
+    "m/sec": Unit("velocity", 1.0),
+    "km/h": Unit("velocity", 1.0 / 3.6),
+    "n": Unit("force", 1.0),
+    "kn": Unit("force", 1e3),
+    "mn": Unit("force", 1e6),
+    "nm": Unit("torque", 1.0),
+    "n-m": Unit("torque", 1.0),
+    "knm": Unit("torque", 1e3),
+    "kn-m": Unit("torque", 1e3),
+    "mnm": Unit("torque", 1e6),
+    "mn-m": Unit("torque", 1e6),
+    "rpm": Unit("speed", _RPM),
+    "1/min": Unit("speed", _RPM),
+    "rad/s": Unit("speed", 1.0),
+    "rad/sec": Unit("speed", 1.0),
+    "deg/s": Unit("speed", _TURN / 360.0),
+    "deg/sec": Unit("speed", _TURN / 360.0),
+    "hz": Unit("speed", _TURN),
+    "deg": Unit("angle", _TURN / 360.0),
+    "rad": Unit("angle", 1.0),
+}
+"""Units that are understood, as `plain_unit` writes them, without capitals."""
+SI_NAMES = {"torque": "N m", "force": "N", "speed": "rad/s", "time": "s", "angle": "rad", "velocity": "m/s"}
+USUAL_NAMES = {"torque": "kN-m", "force": "kN", "speed": "rpm", "time": "s", "angle": "deg", "velocity": "m/s"}
+"""Units that a message names as examples."""
+
+
+def plain_unit(text: str) -> str:
+    """Write a unit without brackets and blanks, multiplication as a hyphen or nothing.
+
+    Examples
+    --------
+    >>> plain_unit("(kN·m)"), plain_unit(" [kN m] "), plain_unit("(kN-m)"), plain_unit("INVALID")
+    ('kn-m', 'knm', 'kn-m', 'invalid')
+    """
+    bare = text.strip().strip("()[]").strip().lower()
+    return bare.replace("·", "-").replace("*", "-").replace(" ", "")
+
+
+def unit_of(text: str) -> Unit | None:
+    """Look up a unit; None for one that is not understood, millinewtons among them: they are not meganewtons.
+
+    Examples
+    --------
+    >>> unit_of("(kN·m)"), unit_of("furlong"), unit_of("mNm")
+    (Unit(quantity='torque', factor=1000.0), None, None)
+    """
+    if text.strip(" ()[]").startswith("mN"):
+        return None
+    return UNITS.get(plain_unit(text))
+
+
+# Channels over time as a file holds them: names and units at once, values in blocks when they are asked for
+
+ALIASES: tuple[tuple[str, ...], ...] = (
+    ("rottorq", "lsshfttq", "lsshftmxa", "lsshftmxs", "lssgagmxa", "lssgagmxs"),
+    ("rotspeed", "lssspeed", "lssgagvxa"),
+    ("hsshfttq",),
+    ("genspeed", "hssspeed"),
+)
+"""Channels of OpenFAST that are the same quantity under several names (its list of outputs, ElastoDyn)."""
+SHOWN_NAMES = 12
+"""Most names that a message lists."""
+LEAST_LINES = 3
+"""Fewer lines than these are no series."""
+GAP = 50.0
+"""Usual steps of time within which a longer series must go on: what is missing between would count as its ends do."""
+LONG_SERIES = 200
+"""Steps from which a series is one of a program or a recorder, whose steps are even."""
+
+Read = Callable[[tuple[int, ...]], Iterator[tuple[Floats, Floats]]]
+"""Blocks of a file for some of its columns: time (n,) and values (n, columns), in the units of the file."""
+
+
+class LoadFileError(ValueError):
+    """A file of loads that cannot be used: one sentence says file, place and what would be right."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channels(Displayed):
+    """Channels over time."""
+
+    path: Path
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    """As the file writes them, time left out."""
+    time_unit: str
+    """As the file writes it; seconds where it writes none."""
+    read: Read
+    """Callable. Reads blocks of the file for some of its columns."""
+
+    def _line(self) -> str:
+        return f" of {self.path.name}: {', '.join(self.names[:SHOWN_NAMES])}"
+
+    @cached_property
+    def time(self) -> Floats:
+        """Times of all steps, s."""
+        return np.concatenate([time for time, _ in self.blocks(())])
+
+    @cached_property
+    def values(self) -> Floats:
+        """All channels of all steps (steps, channels), in the units of the file."""
+        return np.concatenate([values for _, values in self.read(tuple(range(len(self.names))))])
+
+    def channel(self, name: str, quantity: str) -> Floats:
+        """Values of a channel in SI, (steps,).
+
+        Parameters
+        ----------
+        name : capitals do not matter; other names of OpenFAST for the same are found, too
+        quantity : what it must measure: one of `exugear.exchange.channels.SI_NAMES`
+
+        Raises
+        ------
+        LoadFileError
+            As `blocks`.
+        """
+        return np.concatenate([values[:, 0] for _, values in self.blocks([(name, quantity)])])
+
+    def blocks(self, wanted: Sequence[tuple[str, str]]) -> Iterator[tuple[Floats, Floats]]:
+        """Give time (s) and some channels (SI) block by block, (n,) and (n, channels): no file is in memory as a whole.
+
+        Parameters
+        ----------
+        wanted : name and quantity of each channel, as of `channel`
+
+        Raises
+        ------
+        LoadFileError
+            No such channel, a unit that is not understood or measures something else, values that are no numbers,
+            times that do not grow, or a gap in them.
+        """
+        places = tuple(self._place(name) for name, _ in wanted)
+        units = [self._unit(place, quantity) for place, (_, quantity) in zip(places, wanted, strict=True)]
+        factors = np.array([unit.factor for unit in units])
+        second = self._second()
+        steps = _Steps(self.path)
+        for time, values in self.read(places):
+            steps.check(second * time)
+            found = values * factors
+            self._check_numbers(found, places, second * time, steps.count - len(time))
+            yield second * time, found
+        steps.check_length()
+
+    def _check_numbers(self, values: Floats, places: Sequence[int], time: Floats, before: int) -> None:
+        bad = np.argwhere(~np.isfinite(values))
+        if bad.size:
+            row, column = bad[0].tolist()
+            raise LoadFileError(
+                f"{self.path}: channel {self.names[places[column]]} holds no number at {time[row]:g} s "
+                f"(step {before + row + 1}); every step needs one"
+            )
+
+    def _second(self) -> float:
+        unit = unit_of(self.time_unit) if self.time_unit.strip("() []") else Unit("time", 1.0)
+        if unit is None or unit.quantity != "time":
+            raise LoadFileError(f"{self.path}: time has the unit {self.time_unit!r}; s, ms, min or h would be one")
+        return unit.factor
+
+    def _unit(self, place: int, quantity: str) -> Unit:
+        unit = unit_of(self.units[place])
+        if unit is None or unit.quantity != quantity:
+            written = self.units[place] or "none"
+            raise LoadFileError(
+                f"{self.path}: channel {self.names[place]} has the unit {written!r}, which is no unit of {quantity} "
+                f"known here; one such as {USUAL_NAMES[quantity]} ({SI_NAMES[quantity]} in SI) would be"
+            )
+        return unit
+
+    def _place(self, name: str) -> int:
+        lower = [known.lower() for known in self.names]
+        wanted = name.lower()
+        same = next((group for group in ALIASES if wanted in group), (wanted,))
+        for candidate in (wanted, *same):
+            if candidate in lower:
+                return lower.index(candidate)
+        near = difflib.get_close_matches(wanted, lower, n=3, cutoff=0.5)
+        likely = [self.names[lower.index(one)] for one in near] or list(self.names[:SHOWN_NAMES])
+        raise LoadFileError(
+            f"{self.path}: no channel {name!r}; "
+            f"{'names like it are' if near else 'its channels are'} {', '.join(likely)}"
+        )
+
+
+@dataclass
+class _Steps:
+    """Steps of time, looked at block by block."""
+
+    path: Path
+    count: int = 0
+    last: float | None = None
+    usual: float = 0.0
+
+    def check(self, time: Floats) -> None:
+        before = time if self.last is None else np.concatenate([[self.last], time])
+        first = self.count if self.last is not None else 1
+        steps = np.diff(before)
+        bad = np.flatnonzero(~(steps > 0.0))
+        if bad.size:
+            raise LoadFileError(
+                f"{self.path}: time does not grow behind step {first + int(bad[0])}; each must be later"
+            )
+        if not self.usual and len(steps) >= LONG_SERIES:
+            self.usual = float(np.median(steps))
+        if self.usual:
+            gap = np.flatnonzero(steps > GAP * self.usual)
+            if gap.size:
+                place = int(gap[0])
+                raise LoadFileError(
+                    f"{self.path}: nothing between {before[place]:g} and {before[place + 1]:g} s (behind step "
+                    f"{first + place}), where steps are {self.usual:g} s: a dropout; fill it, or make two files of it"
+                )
+        self.count += len(time)
+        self.last = float(time[-1]) if len(time) else self.last
+
+    def check_length(self) -> None:
+        if self.count < LEAST_LINES:
+            raise LoadFileError(f"{self.path}: {self.count} steps of time; at least {LEAST_LINES} make a series")

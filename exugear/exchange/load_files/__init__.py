@@ -1,1 +1,0 @@
-"""Files of loads over time: turbine simulations, test benches, tables."""

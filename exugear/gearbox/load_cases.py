@@ -1,0 +1,396 @@
+"""What a load case does to the train as it rolls: net torque, speeds, and the flanks that its meshes load.
+
+Gears and couplings count as rigid and all axes as fixed, so that the speed of the overall input tells all others, and
+in a train of several degrees of freedom a few more speeds. To it torques are referred by their power and inertias by
+their kinetic energy, planets' orbits included. This costs nothing beside a run, and shows the wrong sign of a torque
+before one is begun.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import RPM, LoadCase
+from exugear.gearbox.reading import CaseError, fault_line, shortened
+from exugear.gearbox.train import UNLOADED
+from exugear.gearbox.variant import Variant
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed, TitledRows, value_range
+
+# Torques over time of a load case, from a CSV file beside the gearbox file
+
+
+def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, Floats]]:
+    """Read times (s) and torques (N m) by body from the case's CSV file.
+
+    The header is ``time_s`` and one ``<body>_N_m`` per loaded body; between lines torques are linear.
+
+    Returns
+    -------
+    mapping of body name to (times, torques), each (lines,); empty without a file.
+
+    Raises
+    ------
+    CaseError
+        A file that cannot be read, unknown columns, text where numbers belong, times that do not grow.
+    """
+    if case.torque_series is None:
+        return {}
+
+    def fault(text: str) -> CaseError:
+        return CaseError(fault_line(str(case.torque_series), text))
+
+    try:
+        with case.torque_series.open(newline="", encoding="utf-8-sig") as file:
+            lines = [line for line in csv.reader(file) if line]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise fault(f"cannot be read as CSV ({error})") from None
+    if len(lines) < 3 or lines[0][0].strip() != "time_s":
+        raise fault("expected a header time_s,BODY_N_m,... and at least two lines of numbers")
+    try:
+        table = np.array([[float(cell) for cell in line] for line in lines[1:]])
+    except ValueError as error:
+        raise fault(f"{error}; every line needs {len(lines[0])} numbers") from None
+    if table.ndim != 2 or table.shape[1] != len(lines[0]) or not np.all(np.isfinite(table)):
+        raise fault(f"every line needs {len(lines[0])} finite numbers")
+    if not np.all(np.diff(table[:, 0]) > 0.0):
+        raise fault("time_s must grow from line to line")
+    series = {}
+    for column, name in enumerate(lines[0][1:], start=1):
+        body = name.strip().removesuffix("_N_m")
+        if body not in gearbox.spinning or not name.strip().endswith("_N_m"):
+            known = ", ".join(f"{known}_N_m" for known in gearbox.spinning)
+            raise fault(f"column {shortened(name.strip())} is no torque of a body; columns are {known}")
+        series[body] = (table[:, 0], table[:, column])
+    return series
+
+
+# What a load case does to the train as it rolls: net torque, speeds, and the flanks that its meshes load
+
+Series = Mapping[str, tuple[Floats, Floats]]
+BURSTING_RIM_SPEED = 300.0
+"""Rim speed that no wheel of steel survives, m/s: density times its square is 0.7 GPa, the yield strength
+of gear steels. The fastest turbo gears run at two thirds of it.
+"""
+LEAST_SHARE = 0.25
+"""Share of the static load below which the straight line of a linear bearing leads a quarter off its rows."""
+INSTANTS = 2001
+"""Instants at which a torque that changes is looked at, beside those of its own lines."""
+
+
+@dataclass(frozen=True)
+class LoadSummary(Displayed, line=" {name!r}: net torque {net_torque:g} N m, {start_speed:g} to {end_speed:g} rad/s"):
+    """A load case in figures, of the rolling train."""
+
+    name: str
+    """Of the load case."""
+    inertia: float
+    """Of the whole train at the overall input, kg m2."""
+    net_torque: float
+    """Of all torques at the overall input, at the start and without a drive's, N m."""
+    driven: bool
+    """Whether a machine prescribes the speed, and holds what the torques do not."""
+    start_speed: float
+    end_speed: float
+    fastest_speed: float
+    """Of the overall input, rad/s; the last without sign."""
+    rim_speeds: Mapping[str, float]
+    """By body name, speed of the fastest gear's rim on each body with gears at `fastest_speed`, m/s."""
+    mesh_frequencies: Mapping[str, float]
+    """By mesh name, highest mesh frequency of each, Hz."""
+    mesh_forces: Mapping[str, float]
+    """By mesh name, F_bt at the start, N; its sign says which flank of gear 1 carries, as in
+    `Train.static_mesh_forces`."""
+    flanks: Mapping[str, str]
+    """By mesh family, loaded flanks in the course of the load case: ``+``, ``-``, ``+-`` for both, ``0`` for none."""
+    reversed_flanks: tuple[str, ...]
+    """Mesh families with a loaded flank that is not the one of the static load, which their tables are of."""
+    least_shares: Mapping[str, float]
+    """By mesh family, smallest mesh force in the course of the load case over that of the static load; negative
+    where it reverses."""
+
+    def _table(self) -> TitledRows:
+        speeds = (self.start_speed, self.end_speed, self.fastest_speed)
+        return f"load case {self.name} of the rolling train", {
+            "inertia at the input": value_range(self.inertia, "kg m2"),
+            "net torque at the input": value_range(self.net_torque, "N m"),
+            "driven": "yes" if self.driven else "no",
+            "start, end and fastest speed of the input": ", ".join(value_range(speed, "rad/s") for speed in speeds),
+            "flanks": ", ".join(f"{family} {flank}" for family, flank in self.flanks.items()),
+            "on another flank than by the static load": ", ".join(self.reversed_flanks) or "none",
+        }
+
+    @property
+    def fastest_rim(self) -> tuple[str, float]:
+        """Body with the fastest rim and its speed, m/s; no body and standstill of a rotor without gears."""
+        return max(self.rim_speeds.items(), key=lambda item: item[1], default=("", 0.0))
+
+
+def summarise_loads(
+    gearbox: Gearbox,
+    case: LoadCase,
+    inertias: str | None = None,
+    duration: float | None = None,
+    series: Series | None = None,
+) -> LoadSummary:
+    """Sum up what a load case does to the rolling train.
+
+    Parameters
+    ----------
+    inertias : inertia set; the file's default otherwise
+    duration : simulated time, s; the load case's by default
+    series : mapping, optional
+        As `exugear.gearbox.load_cases.torque_series` reads it, where it has been read.
+
+    Raises
+    ------
+    CaseError
+        The torque series cannot be used, or the train is not fixed by the speed of its input.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> loads = summarise_loads(gearbox, gearbox.load_cases["reference"])
+    >>> round(loads.net_torque), round(loads.end_speed, 1)
+    (-4472, -22.5)
+    >>> loads.flanks["high_speed"], loads.reversed_flanks
+    ('-', ())
+    """
+    series = torque_series(gearbox, case) if series is None else series
+    total = case.duration if duration is None else duration
+    names = gearbox.spinning
+    reference = gearbox.case.overall.input
+    rolling = gearbox.train.rolling_speeds(reference, 1.0)
+    unit = np.array([rolling[name] for name in names])
+    axial = _axial_inertias(gearbox, inertias)
+    times = _instants(series, total)
+    torques = _torques(names, case, series, times)
+    rates, added = _rates(gearbox, case, axial, torques)
+    spins = _speeds(gearbox, case, times, rates)
+    speeds = spins[:, names.index(reference)]
+    forces = _mesh_forces(gearbox, torques + added - rates * axial)
+    fastest = dict(zip(names, np.abs(spins).max(axis=0).tolist(), strict=True))
+    flanks, reversed_flanks = _flanks(gearbox, forces)
+    return LoadSummary(
+        name=case.name,
+        inertia=float(axial @ unit**2),
+        net_torque=_without_round_off(float(torques[0] @ unit), torques[0] * unit),
+        driven=case.driven_body is not None,
+        start_speed=case.start_speed,
+        end_speed=float(speeds[-1]),
+        fastest_speed=fastest[reference],
+        rim_speeds={name: fastest[name] * radius for name, radius in rim_radii(gearbox).items()},
+        mesh_frequencies=_highest_mesh_frequencies(gearbox, spins),
+        mesh_forces={mesh.name: float(force) for mesh, force in zip(gearbox.meshes, forces[0], strict=True)},
+        flanks=flanks,
+        reversed_flanks=reversed_flanks,
+        least_shares=_least_shares(gearbox, forces),
+    )
+
+
+def _without_round_off(total: float, parts: Floats) -> float:
+    """Return a sum, or zero where it is the round-off of its parts."""
+    if abs(total) > UNLOADED * float(np.abs(parts).max(initial=0.0)):
+        return total
+    return 0.0
+
+
+def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
+    """Say in words what looks like the wrong sign of a torque, nothing if all is well."""
+    doubts = []
+    if loads.reversed_flanks:
+        doubts.append(
+            f"torque sign? {', '.join(loads.reversed_flanks)} loaded on another flank than by the static load, which "
+            "tables, stiffness and phases are of"
+        )
+    body, rim = loads.fastest_rim
+    if rim > BURSTING_RIM_SPEED:
+        doubts.append(
+            f"torque sign, or too long? the torques bring a rim on {body} to {rim:.4g} m/s, and wheels of steel burst "
+            f"at some {BURSTING_RIM_SPEED:g} m/s; a run stops there"
+        )
+    return tuple(doubts)
+
+
+def doubt_about_bearings(gearbox: Gearbox, loads: LoadSummary, variant: str) -> str:
+    """Say where linear bearings are led far from the static load that their law is of, and the remedy; empty if not.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> loads = summarise_loads(gearbox, gearbox.load_cases["reference"])
+    >>> doubt_about_bearings(gearbox, loads, "bushing")
+    ''
+    """
+    led = [
+        bearing
+        for bearing in gearbox.bearings
+        if bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None and bearing.law == "stiffness"
+    ]
+    light = {family: share for family, share in loads.least_shares.items() if share < LEAST_SHARE}
+    if not led or not light or not Variant.of(variant).on_bearings:
+        return ""
+    turned = [family for family, share in light.items() if share < 0.0]
+    least = min(light.values())
+    how = f"reverses the load of {', '.join(turned)}" if turned else f"takes {', '.join(light)} to {least:.2g} of it"
+    return (
+        f"linear bearings are of the static load, and the load case {loads.name} {how}: "
+        'displacements and loads there want law = "iso16281" on the bearings'
+    )
+
+
+def rim_radii(gearbox: Gearbox) -> dict[str, float]:
+    """Radius (m) of the largest gear on each turning body that has gears; of an internal gear that of its teeth."""
+    return {
+        body.name: max(gearbox.gears[gear].tip_radius for gear in body.wheels)
+        for body in gearbox.bodies()
+        if body.wheels and not body.fixed
+    }
+
+
+def _axial_inertias(gearbox: Gearbox, inertias: str | None) -> Floats:
+    """Inertia of each spin, kg m2, with planets' orbits in their carrier's."""
+    bodies = {body.name: body for body in gearbox.bodies(inertias)}
+    axial = {name: bodies[name].axial for name in gearbox.spinning}
+    for body in bodies.values():
+        if body.carrier is not None and body.carrier in axial:
+            axial[body.carrier] += body.mass * math.dist(body.axis, bodies[body.carrier].axis) ** 2
+    return np.array([axial[name] for name in gearbox.spinning])
+
+
+def _instants(series: Series, total: float) -> Floats:
+    """Instants (s) from 0 to the end that tell all of a load case: with torques that change, their lines too."""
+    if not series:
+        return np.array([0.0, total])
+    lines = np.concatenate([times for times, _ in series.values()])
+    inside = lines[(lines > 0.0) & (lines < total)]
+    return np.unique(np.concatenate([np.linspace(0.0, total, INSTANTS), inside]))
+
+
+def _torques(names: tuple[str, ...], case: LoadCase, series: Series, times: Floats) -> Floats:
+    """Torques (times, bodies) on the spins, N m."""
+    torques = np.zeros((len(times), len(names)))
+    for name, torque in case.torques.items():
+        torques[:, names.index(name)] += torque
+    for name, (lines, values) in series.items():
+        torques[:, names.index(name)] += np.interp(times, lines, values)
+    return torques
+
+
+def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> tuple[Floats, Floats]:
+    """Spin rates (rad/s2) and what a machine adds to the torques (N m), both (times, bodies), of the rolling train.
+
+    Equations of motion in the ways to roll; a machine prescribes the rate of its body, and its torque is one unknown
+    more.
+    """
+    modes = gearbox.train.kinematic_modes
+    matrix = modes.T @ (axial[:, None] * modes)
+    loads = modes.T @ torques.T
+    added = np.zeros_like(torques)
+    if case.driven_body is None:
+        return (modes @ np.linalg.solve(matrix, loads)).T, added
+    driven = gearbox.spinning.index(case.driven_body)
+    row = modes[driven]
+    # The machine's torque in units that make the row as large as the inertias.
+    scale = float(np.abs(matrix).max())
+    bordered = np.block([[matrix, -scale * row[:, None]], [scale * row[None, :], np.zeros((1, 1))]])
+    rate = np.full((1, loads.shape[1]), scale * drive_rate(gearbox, case))
+    solved = np.linalg.solve(bordered, np.concatenate([loads, rate]))
+    added[:, driven] = scale * solved[-1]
+    return (modes @ solved[:-1]).T, added
+
+
+def _speeds(gearbox: Gearbox, case: LoadCase, times: Floats, rates: Floats) -> Floats:
+    """Spins (times, bodies), rad/s, from the start of a load case on."""
+    start = gearbox.start_speeds(case)
+    # Between the instants torques are linear: the trapezoidal rule is exact at them.
+    gained = np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)[:, None], axis=0)
+    gained = np.concatenate([np.zeros((1, rates.shape[1])), gained])
+    return np.asarray(np.array([start[name] for name in gearbox.spinning]) + gained)
+
+
+def _highest_mesh_frequencies(gearbox: Gearbox, spins: Floats) -> dict[str, float]:
+    """Highest mesh frequency of each mesh (Hz), of spins (times, bodies); a body that is no spin stands."""
+    of_body = dict(zip(gearbox.spinning, spins.T, strict=True))
+    standing = np.zeros(len(spins))
+    return {
+        mesh.name: float(np.abs(of_body.get(mesh.pinion, standing) - of_body.get(mesh.frame, standing)).max())
+        * mesh.pair.pinion.teeth
+        / (2.0 * math.pi)
+        for mesh in gearbox.meshes
+    }
+
+
+def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:
+    """Spin rate (rad/s2) of the driven body: from its speed at the start to its end speed."""
+    end = case.end_speed if case.end_speed is not None else 0.0
+    return (end - driven_start_speed(gearbox, case)) / case.duration
+
+
+def driven_start_speed(gearbox: Gearbox, case: LoadCase) -> float:
+    """Speed of the driven body at the start, rad/s; the case states it at the overall input."""
+    return gearbox.start_speeds(case)[str(case.driven_body)]
+
+
+def _mesh_forces(gearbox: Gearbox, applied: Floats) -> Floats:
+    """F_bt (times, meshes) that torques in balance (times, bodies) load meshes with; least-norm where they share."""
+    forces = np.linalg.lstsq(gearbox.train.spin_rows.T, applied.T, rcond=1e-12)[0]
+    return np.asarray(forces[: len(gearbox.meshes)].T)
+
+
+def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Find loaded flanks by mesh family, and the families that load another than the static load does."""
+    static = gearbox.train.static_mesh_forces()
+    least = UNLOADED * float(np.abs(forces).max(initial=0.0))
+    flanks: dict[str, str] = {}
+    turned = []
+    for m, mesh in enumerate(gearbox.meshes):
+        mesh_forces = forces[:, m]
+        loaded = ("+" if np.any(mesh_forces > least) else "") + ("-" if np.any(mesh_forces < -least) else "")
+        flanks[mesh.family] = "".join(sign for sign in "+-" if sign in flanks.get(mesh.family, "") + loaded)
+        if np.any(mesh_forces * np.sign(static[mesh.name]) < -least):
+            turned.append(mesh.family)
+    return {family: signs or "0" for family, signs in flanks.items()}, tuple(dict.fromkeys(turned))
+
+
+def _least_shares(gearbox: Gearbox, forces: Floats) -> dict[str, float]:
+    """Find the smallest force (times, meshes) of each family over that of the static load; unloaded ones have none."""
+    static = gearbox.train.static_mesh_forces()
+    largest = max(map(abs, static.values()), default=0.0)
+    shares: dict[str, float] = {}
+    for m, mesh in enumerate(gearbox.meshes):
+        if abs(static[mesh.name]) > UNLOADED * largest:
+            share = float((forces[:, m] / static[mesh.name]).min())
+            shares[mesh.family] = min(share, shares.get(mesh.family, math.inf))
+    return shares
+
+
+# The speeds that a gearbox works at: which resonances count
+
+OF_RATED = (0.5, 1.25)
+"""Speeds of a gearbox whose file names none, over the rated one."""
+
+
+def operating_range(gearbox: Gearbox) -> tuple[float, float] | None:
+    """Lowest and highest speed of the overall input in service, rad/s, without sign.
+
+    None where the file names neither a range nor a rated speed: all speeds count then.
+
+    Examples
+    --------
+    >>> [round(speed / RPM, 3) for speed in operating_range(Gearbox.from_toml("cases/grc750/gearbox.toml"))]
+    [11.05, 27.625]
+    """
+    operation = gearbox.case.operation
+    if operation.speed_range_rpm is not None:
+        low, high = operation.speed_range_rpm
+        return low * RPM, high * RPM
+    if operation.rated_speed_rpm is None:
+        return None
+    return OF_RATED[0] * operation.rated_speed_rpm * RPM, OF_RATED[1] * operation.rated_speed_rpm * RPM

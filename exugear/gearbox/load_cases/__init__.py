@@ -1,1 +1,0 @@
-"""Load cases: torque series, and what they do to the rolling train."""

@@ -1,0 +1,393 @@
+"""A gear train: its spins, what ties them, how it rolls from input to output, and what it carries at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from fe_ste.geometry.gears import GearPair
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed, TitledRows
+
+# How a gear train rolls: rows that say how meshes close and couplings twist, and the motions that do neither
+
+RANK_TOLERANCE = 1e-9
+"""Singular values below this part of the largest count as zero: rows are scaled to 1, and round-off is 1e-16."""
+
+
+class MeshedBodies(Protocol):
+    """What a mesh joins: bodies with gear 1 and gear 2, and the body whose spin carries the line of centres."""
+
+    @property
+    def name(self) -> str:
+        """Name of the mesh."""
+
+    @property
+    def pair(self) -> GearPair:
+        """Gear 1 and gear 2."""
+
+    @property
+    def pinion(self) -> str:
+        """Body with gear 1."""
+
+    @property
+    def gear(self) -> str:
+        """Body with gear 2."""
+
+    @property
+    def frame(self) -> str:
+        """Body whose spin carries the line of centres; a name that is no spin stands still."""
+
+
+class CoupledBodies(Protocol):
+    """What a coupling joins: two bodies that roll at one speed."""
+
+    @property
+    def first(self) -> str:
+        """One body."""
+
+    @property
+    def second(self) -> str:
+        """The other body."""
+
+
+@dataclass(frozen=True)
+class Tie:
+    """Two bodies that roll at one speed; a name that is no spin stands still."""
+
+    first: str
+    second: str
+
+
+def mesh_row(spins: Sequence[str], mesh: MeshedBodies) -> Floats:
+    """Return how a mesh closes per unit spins: r_b1 (t1 - tf) +- r_b2 (t2 - tf), flank s = +1.
+
+    Plus for an external pair, minus for an internal one; tf is the spin of the frame.
+
+    Parameters
+    ----------
+    spins : bodies that can turn; all others stand still
+
+    Returns
+    -------
+    array (spins,), m/rad
+    """
+    row = np.zeros(len(spins))
+    pinion_radius = mesh.pair.pinion.base_radius
+    gear_radius = mesh.pair.gear.base_radius * (-1.0 if mesh.pair.gear.internal else 1.0)
+    levers = ((mesh.pinion, pinion_radius), (mesh.gear, gear_radius), (mesh.frame, -(pinion_radius + gear_radius)))
+    for name, lever in levers:
+        if name in spins:
+            row[spins.index(name)] += lever
+    return row
+
+
+def coupling_row(spins: Sequence[str], coupling: CoupledBodies) -> Floats:
+    """Return how a coupling twists per unit spins, (spins,): 1 at its first body, -1 at its second."""
+    return np.array([float(name == coupling.first) - float(name == coupling.second) for name in spins])
+
+
+def kinematic_modes(rows: Floats) -> Floats:
+    """Orthonormal basis of the spins that no row sees.
+
+    Parameters
+    ----------
+    rows : (constraints, spins) of any units; each row is scaled by its largest entry
+
+    Returns
+    -------
+    (spins, degrees of freedom)
+
+    Examples
+    --------
+    Two wheels of 1 m and 2 m in mesh: the larger one turns half as fast, the other way round.
+
+    >>> kinematic_modes(np.array([[1.0, 2.0]])).T * np.sqrt(5.0)
+    array([[-2.,  1.]])
+    """
+    rows = np.vstack([rows, np.zeros((1, rows.shape[1]))])
+    scale = np.abs(rows).max(axis=1, keepdims=True)
+    _, singular, basis = np.linalg.svd(rows / np.where(scale > 0, scale, 1.0))
+    rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
+    return np.asarray(basis[rank:].T)
+
+
+def turn_together(motions: Floats, other_motions: Floats) -> bool:
+    """Tell whether two bodies' rows of the rolling motions are one up to a factor: each fixes the other."""
+    lengths = np.linalg.norm(motions) * np.linalg.norm(other_motions)
+    return bool(abs(motions @ other_motions) > (1.0 - RANK_TOLERANCE) * lengths)
+
+
+# What a gear train carries at rest: forces of meshes and torques of couplings that balance outer torques
+
+UNLOADED = 1e-9
+"""Part of the largest load below which a mesh counts as unloaded: round-off of the balance."""
+BALANCE_TOLERANCE = 1e-9
+"""Part of the largest torque that may be left over where torques count as held."""
+
+
+def holding_forces(rows: Floats, torques: Floats) -> Floats | None:
+    """Return the forces of rows that hold torques on the spins; of all that do, those of least norm.
+
+    Parameters
+    ----------
+    rows : (constraints, spins) torques on the spins per unit force of each constraint
+    torques : (spins,) N m
+
+    Returns
+    -------
+    array (constraints,), or None where no forces hold the torques.
+
+    Examples
+    --------
+    Wheels of 1 m and 2 m in mesh, in balance and out of it:
+
+    >>> holding_forces(np.array([[1.0, 2.0]]), np.array([10.0, 20.0]))
+    array([10.])
+    >>> holding_forces(np.array([[1.0, 2.0]]), np.array([10.0, -20.0])) is None
+    True
+    """
+    balance = rows.T
+    forces = np.linalg.lstsq(balance, torques, rcond=1e-12)[0]
+    if np.abs(balance @ forces - torques).max() > BALANCE_TOLERANCE * np.abs(torques).max():
+        return None
+    return np.asarray(forces)
+
+
+def without_round_off(forces: Floats, largest_torque: float, smallest_radius: float) -> Floats:
+    """Mesh forces with those set to zero that are round-off of the balance.
+
+    Parameters
+    ----------
+    forces : (meshes,) N
+    largest_torque : of the torques that they balance, N m
+    smallest_radius : of the base circles on which they act, m
+    """
+    return np.where(np.abs(forces) > UNLOADED * largest_torque / smallest_radius, forces, 0.0)
+
+
+# A gear train: its spins, what ties them, how it rolls from input to output, and what it carries at rest
+
+
+@dataclass(frozen=True, eq=False)
+class Train(
+    Displayed, line=" from {input!r} to {output!r}: {spins!n} spins, {meshes!n} meshes, {couplings!n} couplings"
+):
+    """Bodies that turn about fixed or orbiting axes, tied by rigid meshes and couplings.
+
+    It knows no gearbox: what it cannot do it tells through `fault`, which names the file.
+
+    Examples
+    --------
+    >>> from exugear.gearbox.gearbox import Gearbox
+    >>> train = Gearbox.from_toml("cases/grc750/gearbox.toml").train
+    >>> round(train.ratio, 6)
+    81.490683
+    >>> round(train.mesh_frequencies(1.0)["high_speed"], 3)
+    285.332
+    >>> round(train.static_mesh_forces()["high_speed"])
+    -55492
+    """
+
+    spins: tuple[str, ...]
+    """Bodies that can turn, in the order of the spin vector."""
+    meshes: tuple[MeshedBodies, ...]
+    couplings: tuple[CoupledBodies, ...]
+    input: str
+    output: str
+    """Bodies at the ends of the train."""
+    torques: Mapping[str, float]
+    """By body name, static torques, N m."""
+    locked: tuple[str, ...]
+    """Bodies that hold them."""
+    fault: Callable[[str], Exception]
+    """Makes the error to raise from what is wrong."""
+
+    def _table(self) -> TitledRows:
+        return f"train from {self.input} to {self.output}", {
+            "ratio": f"{self.ratio:.6g}",
+            "degrees of freedom": str(self.degrees_of_freedom),
+            "spins": ", ".join(self.spins),
+            "static load": ", ".join(f"{torque:g} N m on {body}" for body, torque in self.torques.items()),
+            "held by": ", ".join(self.locked) or "nothing",
+        }
+
+    @cached_property
+    def spin_rows(self) -> Floats:
+        """How meshes close and couplings twist per unit spins, (meshes and couplings, spins); m/rad, and 1."""
+        rows = [mesh_row(self.spins, mesh) for mesh in self.meshes]
+        rows += [coupling_row(self.spins, coupling) for coupling in self.couplings]
+        return np.array(rows).reshape(-1, len(self.spins))
+
+    @cached_property
+    def kinematic_modes(self) -> Floats:
+        """Basis of rolling motions, (spins, degrees of freedom): no mesh closes, no coupling twists."""
+        return kinematic_modes(self.spin_rows)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Degrees of freedom in which the train rolls."""
+        return int(self.kinematic_modes.shape[1])
+
+    @cached_property
+    def ratio(self) -> float:
+        """Spin of the output per spin of the input."""
+        return self.rolling_speeds(self.input, 1.0)[self.output]
+
+    @cached_property
+    def independent(self) -> tuple[str, ...]:
+        """Bodies whose speeds tell all others: the input, and those that stand while it alone turns."""
+        return self._prescribed({self.input: 1.0})
+
+    @cached_property
+    def shares(self) -> dict[str, float]:
+        """Spin of the output per spin of each of the `independent` bodies; of the input it is the ratio."""
+        return {body: self.rolling({self.input: 0.0, body: 1.0})[self.output] for body in self.independent}
+
+    def rolling_speeds(self, body: str, speed: float) -> dict[str, float]:
+        """Spins of all bodies (rad/s) in rolling motion when `body` turns at `speed`: see `rolling`."""
+        return self.rolling({body: speed})
+
+    def rolling(self, speeds: Mapping[str, float]) -> dict[str, float]:
+        """Spins of all bodies (rad/s) in rolling motion when some turn at given speeds.
+
+        In a train of several degrees of freedom, locked bodies stand: not those that turn with the first one given,
+        with input or output, nor such as cannot stand beside those given.
+
+        Parameters
+        ----------
+        speeds : by body name, rad/s
+
+        Raises
+        ------
+        Exception
+            As `fault` makes it: the train is not fixed by that, the bodies do not turn so, or one does not turn.
+
+        Examples
+        --------
+        >>> from exugear.gearbox.gearbox import Gearbox
+        >>> train = Gearbox.from_toml("cases/grc750/gearbox.toml").train
+        >>> round(train.rolling({"carrier": 1.0})["hss"], 6)
+        81.490683
+        """
+        for body in speeds:
+            if body not in self.spins:
+                raise self.fault(f"body {body!r} does not turn; bodies are {', '.join(self.spins)}")
+        if not self.degrees_of_freedom:
+            raise self.fault("meshes: the gear train cannot turn, its meshes and couplings lock each other")
+        prescribed = self._prescribed(speeds)
+        rows = self._modes_of(prescribed)
+        given = np.array([speeds.get(name, 0.0) for name in prescribed])
+        weights, _, rank, _ = np.linalg.lstsq(rows, given, rcond=1e-9)
+        if rank < self.degrees_of_freedom:
+            raise self.fault(
+                f"the gear train has {self.degrees_of_freedom} degrees of freedom; turning {', '.join(prescribed)} "
+                "does not fix it: name the bodies that are held in static_load.locked"
+            )
+        if np.abs(rows @ weights - given).max() > 1e-9 * np.abs(given).max():
+            raise self.fault(
+                f"the speeds of {', '.join(speeds)} contradict each other: the gear train has "
+                f"{self.degrees_of_freedom} degree{'s' if self.degrees_of_freedom > 1 else ''} of freedom"
+            )
+        return dict(zip(self.spins, (self.kinematic_modes @ weights).tolist(), strict=True))
+
+    def _prescribed(self, speeds: Mapping[str, float]) -> tuple[str, ...]:
+        """Bodies with given speeds, and of those that stand the ones that these leave free."""
+        chosen = list(speeds)
+        for name in self._standing(chosen[0]):
+            rank = np.linalg.matrix_rank(self._modes_of(tuple(chosen)))
+            if np.linalg.matrix_rank(self._modes_of((*chosen, name))) > rank:
+                chosen.append(name)
+        return tuple(chosen)
+
+    def mesh_frequencies(self, speed: float) -> dict[str, float]:
+        """Mesh frequency (Hz) of each mesh when the input turns at `speed` rad/s; a frame that is no spin stands."""
+        spins = self.rolling_speeds(self.input, speed)
+        return {
+            mesh.name: abs(spins.get(mesh.pinion, 0.0) - spins.get(mesh.frame, 0.0))
+            * mesh.pair.pinion.teeth
+            / (2.0 * math.pi)
+            for mesh in self.meshes
+        }
+
+    def static_mesh_forces(self, torques: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Line-of-action force F_bt of each mesh (N) in the static state, least-norm where planets share.
+
+        The sign says which flank of gear 1 carries: positive = the one that faces the sense of +z rotation.
+
+        Parameters
+        ----------
+        torques : by body name, N m, those of the static load by default; the same bodies are locked
+
+        Raises
+        ------
+        Exception
+            As `fault` makes it: a body is no spin, too many bodies are locked, or they do not hold the torques.
+        """
+        torques = self.torques if torques is None else torques
+        self._check_load(torques)
+        applied = np.array([torques.get(name, 0.0) for name in self.spins])
+        locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
+        forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), applied)
+        if forces is None:
+            raise self.fault(
+                f"static_load: the torques {dict(torques)} are not held by locking "
+                f"{', '.join(self.locked) or 'nothing'}"
+            )
+        smallest_radius = min((mesh.pair.pinion.base_radius for mesh in self.meshes), default=1.0)
+        loaded = without_round_off(forces[: len(self.meshes)], np.abs(applied).max(), smallest_radius)
+        return {mesh.name: float(force) for mesh, force in zip(self.meshes, loaded, strict=True)}
+
+    def dragging_forces(self) -> dict[str, float]:
+        """Line-of-action force of each mesh (N) where a drag of 1 N m holds each body back, at the static locks.
+
+        It says by its sign which flank touches where the static load leaves none pressed. The train rolls as the static
+        torques drive it, or against them where the input is locked and they are the load; nothing where that leaves
+        open how it rolls.
+        """
+        speeds = self.rolling_speeds(self.input, 1.0)
+        power = sum(torque * speeds[name] for name, torque in self.torques.items())
+        sense = math.copysign(1.0, power) * (-1.0 if self.input in self.locked else 1.0)
+        drag = -sense * np.sign(without_round_off(np.array([speeds[name] for name in self.spins]), 1.0, 1.0))
+        locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
+        forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), drag)
+        if forces is None:
+            return {}
+        return dict(zip((mesh.name for mesh in self.meshes), forces.tolist(), strict=False))
+
+    def _check_load(self, torques: Mapping[str, float]) -> None:
+        """Refuse loads and locks on bodies that do not turn, and more locks than degrees of freedom."""
+        for key, names in (("torques_N_m", tuple(torques)), ("locked", self.locked)):
+            for name in names:
+                if name not in self.spins:
+                    raise self.fault(
+                        f"static_load.{key} = {name!r}: no such turning body; bodies are {', '.join(self.spins)}"
+                    )
+        if np.linalg.matrix_rank(self._modes_of(self.locked)) < len(self.locked):
+            raise self.fault(
+                f"static_load.locked = {list(self.locked)}: more bodies than the train has freedoms, "
+                f"{self.degrees_of_freedom}; leave one out, for nothing says how they share the load"
+            )
+
+    def _standing(self, body: str) -> tuple[str, ...]:
+        """Bodies that stand while `body` turns in a train of several degrees of freedom: the locked ones.
+
+        Not those that turn with it, with the input or with the output, such as a brake behind the output.
+        """
+        if self.degrees_of_freedom == 1:
+            return ()
+        turning = self._modes_of((body, self.input, self.output))
+        return tuple(
+            name
+            for name, motions in zip(self.locked, self._modes_of(self.locked), strict=True)
+            if not any(turn_together(motions, row) for row in turning)
+        )
+
+    def _modes_of(self, bodies: tuple[str, ...]) -> Floats:
+        """Rows of the rolling motions that belong to bodies, (bodies, degrees of freedom)."""
+        return self.kinematic_modes[[self.spins.index(name) for name in bodies]]

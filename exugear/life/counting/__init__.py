@@ -1,1 +1,0 @@
-"""What loads over time amount to: time and revolutions at each load, cycles, equivalent loads."""

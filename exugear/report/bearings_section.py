@@ -1,0 +1,275 @@
+"""Section "At the bearings": forces by source, accelerations of seats, and what bearings bear at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.variant import Variant
+from exugear.report.findings.context import choice_of, words_of
+from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.words import figure_text
+from exugear.report.material import Material, Part, only_for
+from exugear.report.web import html as pieces
+from exugear.report.web.html import Cell
+from exugear.steady.peaks import line_name
+from exugear.system.bearings.duty import BearingDuty
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.operating_points import bearing_duties, mesh_duties
+from exugear.system.statics import BalanceError
+from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.contact_state import MeshDuty
+
+LIFTS = 1.0
+"""Swing over the mean force from which a linear bearing is said to have to lift off."""
+NOISE = 1e-3
+"""Share of the mean transverse force below which an axial force is told as none."""
+NOISE_OF_ALL = 1e-5
+"""Share of the largest force of all bearings below which a force is told as none."""
+MEANS = (
+    "Mean force over the middle third of the run-up, and the largest amplitude along an order (root of the summed "
+    "squares of both transverse directions). Of the copies of a planet set the one that swings most stands for all."
+)
+"""What is told of forces in run-ups."""
+WAVES = (
+    "Largest amplitude along an order at constant speed (root of the summed squares of both transverse directions). "
+    "Forces of the bearings of planets are waves around the carrier: mean, cosine and sine. What the bearings bear at "
+    "rest stands below."
+)
+"""What is told of forces at constant speed."""
+SEATS = 12
+"""Seats whose accelerations are listed."""
+QUIET = 1e-3
+"""Share of the largest acceleration below which none is listed."""
+
+
+def bearings_section(material: Material) -> Part:
+    """List forces at bearings by source, accelerations by steady response, and duties by model."""
+    forces = [
+        only_for(_forces(material, data, group, variant), group.name, variant)
+        for data, group in zip(material.run_data["groups"], material.groups, strict=True)
+        for variant in group.runs
+    ]
+    accelerations = [_accelerations(material, data) for data in material.results.steady]
+    duties = [_duties(material, assembly) for assembly in material.context.assemblies.values()]
+    if not any((*forces, *accelerations, *duties)):
+        return Part("")
+    note = ""
+    if not any(accelerations):
+        note = pieces.paragraph("Accelerations of the seats come with a steady response: `exugear steady`.", "note")
+    html = pieces.section("At the bearings", *forces, *accelerations, note, *duties, name="bearings")
+    return Part(html, {}, "At the bearings", "bearings")
+
+
+def _forces(material: Material, data: Mapping[str, Any], group: RunGroup, variant: str) -> str:
+    own = data["variants"][variant]
+    loudest = {name: figures for name, figures in own["loudest"].items() if figures["amplitude"] is not None}
+    if not loudest:
+        return ""
+    largest = max(figures["amplitude"] for figures in loudest.values())
+    felt = NOISE_OF_ALL * max(max(figures["amplitude"], figures["mean"] or 0.0) for figures in loudest.values())
+    loudest = {
+        name: {**figures, **{kind: _above(figures[kind], felt) for kind in ("mean", "amplitude")}}
+        for name, figures in loudest.items()
+    }
+    rows = [_force_row(group, variant, name, figures, largest) for name, figures in loudest.items()]
+    caption = f"Transverse forces {Variant.of(variant).label}, {group.source}"
+    lifting = [
+        f"{figures['words']}: the force swings by {100.0 * figures['amplitude'] / figures['mean']:.0f} % of its mean; "
+        "a linear bearing cannot lift off, a real one would."
+        for figures in loudest.values()
+        if figures["mean"] and figures["amplitude"] > LIFTS * figures["mean"]
+    ]
+    words = WAVES if group.responses else MEANS
+    table = pieces.table(
+        rows,
+        ("loudest order",),
+        caption=caption,
+        name=f"forces-{group.name}-{variant}",
+        hidden=("axial / kN",),
+        sortable=True,
+    )
+    warned = pieces.element("div", pieces.bullets(lifting), class_="warning") if lifting else ""
+    return pieces.element("h3", pieces.text(caption)) + pieces.paragraph(words, "note") + table + warned
+
+
+def _force_row(
+    group: RunGroup, variant: str, name: str, figures: Mapping[str, Any], largest: float
+) -> dict[str, object]:
+    amplitude = figures["amplitude"]
+    mean = figures["mean"] or 0.0
+    copies = f" (1 of {figures['copies']})" if figures["copies"] > 1 else ""
+    share = amplitude / mean if mean else math.inf
+    named = Cell(f"{figures['words']}{copies}", choice=f"channel:{group.name}:{variant}:{name}")
+    swings = Cell(figure_text(1e-3 * amplitude), amplitude, bar=amplitude / largest)
+    measures = {"swings by ± / kN": swings}
+    if not group.responses:
+        measures = {
+            "mean / kN": Cell(figure_text(1e-3 * mean), mean),
+            "axial / kN": Cell(figure_text(_without_noise(1e-3 * figures["axial"], mean)), figures["axial"]),
+            **measures,
+            "of the mean / %": Cell(figure_text(100.0 * share, 2) if math.isfinite(share) else "–", min(share, 1e9)),
+        }
+    return {
+        "bearing or joint": named,
+        **measures,
+        "loudest order": figures["line"],
+        "at / rpm": Cell(figure_text(figures["speed"], 4), figures["speed"]),
+        "at / Hz": Cell(f"{figures['frequency']:.0f}", figures["frequency"]),
+    }
+
+
+def _above(force: float | None, felt: float) -> float:
+    """Force, or none where it is no more than rounding beside the other bearings' forces."""
+    if force and force > felt:
+        return force
+    return 0.0
+
+
+def _without_noise(value: float, mean: float) -> float:
+    """Force (kN) beside a mean one (N): zero where only rounding and start-up are left."""
+    if abs(value) > NOISE * 1e-3 * mean:
+        return value
+    return 0.0
+
+
+def _accelerations(material: Material, data: xr.Dataset) -> str:
+    """Largest accelerations of seats in a steady response, over all its lines and speeds."""
+    signals = [str(name) for name in data["signal"].to_numpy()]
+    places = [place for place, name in enumerate(signals) if name.startswith("seat_acceleration ")]
+    if not places:
+        return ""
+    amplitude = data["amplitude"].to_numpy()[:, 1:, places].astype(np.float64)
+    order = np.argsort(-amplitude.max(axis=(0, 1)))[:SEATS]
+    rows = []
+    for seat in order:
+        if not amplitude[..., seat].max() > QUIET * amplitude.max():
+            break
+        point, line = np.unravel_index(int(np.argmax(amplitude[..., seat])), amplitude.shape[:2])
+        speed = abs(float(data["speed"][point]))
+        rows.append(
+            {
+                "seat": _seat_words(material, signals[places[seat]]),
+                "acceleration / (m/s²)": Cell(
+                    figure_text(float(amplitude[point, line, seat])), float(amplitude[point, line, seat])
+                ),
+                "order": _line_words(material, data, int(line) + 1),
+                "at / rpm": Cell(figure_text(speed / RPM, 4), speed),
+                "at / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
+            }
+        )
+    title = (
+        f"Accelerations of the seats: steady response of {words_of(choice_of(data.attrs))}, level {data.attrs['level']}"
+    )
+    words = (
+        f"Largest amplitude of a single order over all speeds, the {SEATS} largest; x, y and z are the axes of the "
+        "gearbox. Seats of a planet set move as waves around the carrier: mean, cosine and sine."
+    )
+    table = pieces.table(rows, ("order",), caption=title, name=f"seats-{'-'.join(title.split()[7:])}", sortable=True)
+    return pieces.element("h3", pieces.text(title)) + pieces.paragraph(words, "note") + table
+
+
+def _line_words(material: Material, data: xr.Dataset, line: int) -> str:
+    bases = tuple(str(name) for name in data["base"].to_numpy())
+    return material.words.told(line_name(tuple(int(n) for n in data["index"][line].to_numpy()), bases))
+
+
+def _seat_words(material: Material, signal: str) -> str:
+    """Words for a signal such as ``seat_acceleration hss_a x``."""
+    _, name, *rest = signal.split(" ")
+    return " ".join([material.words.of(name), *rest])
+
+
+def _duties(material: Material, assembly: Assembly) -> str:
+    if not assembly.variant.on_bearings or not any(support.catalogue for support in assembly.supports):
+        return ""
+    name = words_of(assembly.choice)
+    try:
+        duties = bearing_duties(assembly)
+    except (BalanceError, BearingError) as error:
+        material.context.notes.left_out.append(f"bearings of {name}: {error}")
+        return ""
+    remarks = [f"{material.words.of(duty.name)}: {remark}." for duty in duties for remark in duty.remarks]
+    rows = [_duty_row(material, duty) for duty in duties]
+    table = pieces.table(
+        rows, ("law",), caption=f"Bearings at the static load, {name}", name=f"duties-{'-'.join(name.split())}"
+    )
+    words = (
+        "Rows of rolling elements by ISO/TS 16281 between rigid rings, under the static load of the case. L10 by "
+        "ISO 281 and L10r by ISO/TS 16281 in million revolutions, basic: lubricant and cleanliness are left out, and "
+        "so are ribs. A rating with a star is estimated on the safe side, one with + is the least that makers print. "
+        "Linear bearings have the tangent at this load."
+    )
+    content = pieces.paragraph(words, "note") + table + (pieces.bullets(remarks) if remarks else "")
+    content += _meshes(material, assembly)
+    return pieces.folded(f"Bearings at the static load: {name}", content)
+
+
+def _meshes(material: Material, assembly: Assembly) -> str:
+    """How gears stand under the static load, and how evenly their teeth bear; nothing where no contact was solved."""
+    if not assembly.contacts.contacts:
+        return ""
+    name = words_of(assembly.choice)
+    duties = mesh_duties(assembly)
+    rows = [_mesh_row(material, duty) for duty in duties]
+    words = (
+        "Where the gears stand under the static load, and how teeth bear there by the contact of finite elements: the "
+        "opening is that of the gap at the +z end over the common face, K_Hbeta the highest over the mean line load "
+        "along the face."
+    )
+    table = pieces.table(
+        rows, (), caption=f"Meshes at the static load, {name}", name=f"meshes-{'-'.join(name.split())}"
+    )
+    return pieces.paragraph(words, "note") + table
+
+
+def _mesh_row(material: Material, duty: MeshDuty) -> dict[str, object]:
+    def shown(value: float, form: str) -> str:
+        if math.isnan(value):
+            return "–"
+        return format(value, form)
+
+    return {
+        "mesh": material.words.of(duty.name),
+        "force / kN": f"{1e-3 * duty.force:.4g}",
+        "misaligned / mrad": f"{1e3 * duty.misalignment:.3f}",
+        "opens / µm": f"{1e6 * duty.opening:.1f}",
+        "load centre / mm": shown(1e3 * duty.load_centre, ".1f"),
+        "K_Hbeta": shown(duty.face_load_factor, ".2f"),
+        "pressure / MPa": shown(1e-6 * duty.pressure, ".0f"),
+    }
+
+
+def _duty_row(material: Material, duty: BearingDuty) -> dict[str, object]:
+    if duty.ratings.estimated:
+        sign = "*"
+    elif duty.ratings.makers:
+        sign = "+"
+    else:
+        sign = ""
+    tilt = 0.5e-6 * float(duty.stiffness[3, 3] + duty.stiffness[4, 4])
+    return {
+        "bearing": material.words.of(duty.name),
+        "law": duty.law,
+        "radial load / kN": f"{1e-3 * duty.radial_load:.4g}",
+        "axial load / kN": f"{round(1e-3 * duty.axial_load, 3) + 0.0:.4g}",
+        "radial / (GN/m)": f"{1e-9 * duty.radial_stiffness:.3g}",
+        "axial / (GN/m)": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
+        "tilt / (MN m/rad)": f"{tilt:.3g}",
+        "misaligned / mrad": f"{1e3 * duty.misalignment:.3f}",
+        "pressure / MPa": f"{1e-6 * duty.pressure:.0f}",
+        "C_r / kN": f"{1e-3 * duty.ratings.dynamic:.4g}{sign}",
+        "L10 / Mrev": _life(duty.basic_life),
+        "L10r / Mrev": _life(duty.reference_life),
+    }
+
+
+def _life(value: float) -> str:
+    if math.isfinite(value):
+        return f"{value:.3g}"
+    return "no load"

@@ -1,0 +1,87 @@
+"""Section "Gears and excitation": transmission errors over the mesh cycle with their harmonics, and the gears."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from exugear.report.findings.context import HARMONICS, PairExcitation, excitations
+from exugear.report.findings.words import figure_text
+from exugear.report.material import Axis, Curve, Material, Part, chart
+from exugear.report.web import html as pieces
+from exugear.report.web.html import Cell
+
+
+def gears_section(material: Material) -> Part:
+    """Show what excites: each pair's transmission error, its harmonics and stiffness; and the gears' geometry."""
+    found = excitations(material.context, material.results)
+    charts: dict[str, Any] = {}
+    content = []
+    if found:
+        html, charts = chart(
+            "ste",
+            "Static transmission error over one mesh cycle",
+            "Change about the mean.",
+            "; ".join(f"{material.words.of(own.pair)} {_swing(own):.2f} µm peak to peak" for own in found),
+            [Curve(material.words.of(own.pair), own.position, 1e6 * (own.error - own.error.mean())) for own in found],
+            [Axis("position in the mesh cycle"), Axis("transmission error / µm")],
+            material.arrays,
+        )
+        content = [
+            html,
+            pieces.table([_row(material, own) for own in found], caption="Static transmission error", name="errors"),
+            pieces.element("h3", "Harmonics of the transmission error, ± µm"),
+            pieces.table([_harmonics_row(material, own) for own in found], caption="Harmonics", name="harmonics"),
+        ]
+    content.append(pieces.folded("Gears", pieces.table(_gear_rows(material), caption="Gears", name="gears")))
+    html = pieces.section("Static transmission error and gears", *content, name="gears-section")
+    return Part(html, {"charts": charts}, "Excitation", "gears-section")
+
+
+def _swing(excitation: PairExcitation) -> float:
+    return 1e6 * float(np.ptp(excitation.error))
+
+
+def _row(material: Material, excitation: PairExcitation) -> dict[str, object]:
+    return {
+        "pair": material.words.of(excitation.pair),
+        "torque on gear 1 / N m": f"{excitation.torque:.1f}",
+        "positions": excitation.position.size,
+        "mean / µm": f"{1e6 * float(excitation.error.mean()):.2f}",
+        "peak to peak / µm": Cell(f"{_swing(excitation):.3f}", _swing(excitation)),
+        "mean stiffness / (N/µm)": f"{1e-6 * float(excitation.stiffness.mean()):.0f}",
+        "ISO 6336-1 B / (N/µm)": f"{1e-6 * excitation.iso_stiffness:.0f}",
+        "pressure / MPa": f"{1e-6 * excitation.pressure:.0f}" if math.isfinite(excitation.pressure) else "–",
+    }
+
+
+def _harmonics_row(material: Material, excitation: PairExcitation) -> dict[str, object]:
+    largest = max(float(excitation.harmonics.max()), 1e-300)
+    cells = {
+        f"{n + 1}.": Cell(figure_text(1e6 * float(value), 2), float(value), bar=float(value) / largest)
+        for n, value in enumerate(excitation.harmonics[:HARMONICS])
+    }
+    return {"pair": material.words.of(excitation.pair), **cells}
+
+
+def _gear_rows(material: Material) -> list[dict[str, object]]:
+    gearbox = material.context.gearbox
+    rows = []
+    for name, gear in gearbox.gears.items():
+        rows.append(
+            {
+                "gear": material.words.of(name),
+                "teeth": gear.teeth,
+                "kind": "internal" if gear.internal else "external",
+                "module / mm": f"{1e3 * gear.normal_module:g}",
+                "pressure angle / °": f"{math.degrees(gear.normal_pressure_angle):g}",
+                "helix angle / °": f"{math.degrees(gear.helix_angle):g}",
+                "profile shift": f"{gear.profile_shift:g}",
+                "face width / mm": f"{1e3 * gear.face_width:g}",
+                "tip diameter / mm": f"{2e3 * gear.tip_radius:.2f}",
+                "root diameter / mm": f"{2e3 * gear.root_radius:.2f}",
+            }
+        )
+    return rows

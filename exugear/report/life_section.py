@@ -1,0 +1,199 @@
+"""Section "How long it lasts": damages of gears and bearings under the loads of a life, and what limits it."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from exugear.gearbox.reading import CaseError
+from exugear.gearbox.variant import VariantError
+from exugear.life.life_file import draw_life, limits, stored_lives
+from exugear.life.rating.sheet import RATED_AS, FlankKey, balanced, of_life, rated, rated_loads
+from exugear.report.findings.context import choice_of, words_of
+from exugear.report.findings.words import figure_text
+from exugear.report.material import Material, Part
+from exugear.report.web import html as pieces
+from exugear.report.web.html import Cell
+from exugear.results.folder import StoredStudy, stored_studies
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.statics import BalanceError
+from exugear.system.tooth_mesh.placement import MeshError
+
+WORDS = (
+    "Loads of the gearbox file over its life, through the balance at rest of the variant and the contact of its teeth "
+    "by finite elements. Damage is Miner's sum: one is worn out. Lives of bearings are basic but for L10m, which "
+    "has oil and cleanliness; L10 and L10m are by ISO 281, L10r is by ISO/TS 16281.",
+    "σ_H is the largest contact stress, σ_F the largest stress at the tooth root, σ_H0 and σ_F0 the nominal ones of "
+    "ISO 6336-2 and -3. S_H and S_F are the factors on stress at which the damage is one; the static ones stand for "
+    "extreme loads. Outside the path: share of the load that edges of tips carry. + is the flank that faces the sense "
+    "of +z rotation. S_0: static rating over the largest load.",
+)
+
+LEAST_DAMAGE = 1e-6
+"""Damages below this are told as such."""
+WIDTH = 850
+"""Of the picture, pixels."""
+
+
+def life_section(material: Material) -> Part:
+    """List what parts bear over the life, for each variant that was rated; with the rating sheet as data."""
+    context = material.context
+    found: dict[FlankKey, dict[str, float]] = {}
+    if context.gearbox.case.loads is None:
+        return Part("", _rating(material, found))
+    content = []
+    for stored in stored_lives(context.gearbox, context.folder, context.assembled):
+        if stored.data is None:
+            context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
+        else:
+            content.append(_of_variant(material, stored.data))
+            found = found or of_life(stored.data)
+            worst = limits(stored.data)
+            if worst:
+                part, kind, damage = worst[0]
+                size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
+                context.notes.statements.append(
+                    f"{words_of(choice_of(stored.data.attrs))}: in {float(stored.data.attrs['life_years']):g} years "
+                    f"{material.words.told(part)} wears most, damage {size} ({kind})."
+                )
+    data = _rating(material, found)
+    if not content:
+        return Part("", data)
+    html = pieces.section("How long it lasts", *(pieces.paragraph(own, "note") for own in WORDS), *content, name="life")
+    return Part(html, data, "How long it lasts", "life")
+
+
+def _rating(material: Material, beside: Mapping[FlankKey, Mapping[str, float]]) -> dict[str, Any]:
+    """Rating sheet by ISO 6336 under the key ``rating``, as `check --rating --json` has it, if it can be had."""
+    context = material.context
+    if context.gearbox.case.rating is None:
+        return {}
+    try:
+        counted = rated_loads(context.gearbox)
+        balance = balanced(context.assembled(RATED_AS.of(context.gearbox)), counted)
+    except (CaseError, BalanceError, VariantError, MeshError, BearingError) as error:
+        context.notes.left_out.append(f"rating by ISO 6336: {error}")
+        return {}
+    return {"rating": rated(context.gearbox, counted, balance, beside).summary()}
+
+
+def _of_variant(material: Material, data: xr.Dataset) -> str:
+    told = material.words.told
+    data = data.assign_coords({key: [told(str(own)) for own in data[key].to_numpy()] for key in ("flank", "bearing")})
+    name = words_of(choice_of(data.attrs))
+    label = f"life-{data.attrs['variant']}-{data.attrs['mesh_law']}"
+    rested = [line for key in ("assumptions", "unrated") for line in json.loads(data.attrs[key])]
+    return (
+        pieces.element("h3", pieces.text(f"{name[0].upper()}{name[1:]}, gears by {data.attrs['edition']}"))
+        + "".join(pieces.paragraph(f"Fails: {told(line)}.") for line in json.loads(data.attrs["failures"]))
+        + "".join(pieces.paragraph(f"Falls short: {told(line)}.") for line in json.loads(data.attrs["shortfalls"]))
+        + "".join(pieces.paragraph(f"{told(line)}.") for line in json.loads(data.attrs["reliefs"]))
+        + _picture(data, f"What limits the life, {name}")
+        + pieces.table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True)
+        + pieces.table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True)
+        + pieces.folded("What that rests on, and what has no life", pieces.bullets(map(told, rested)))
+    )
+
+
+def _picture(data: xr.Dataset, words: str) -> str:
+    content = io.BytesIO()
+    draw_life(data).savefig(content, format="png", dpi=130)
+    source = f"data:image/png;base64,{base64.b64encode(content.getvalue()).decode()}"
+    return pieces.picture(source, words, WIDTH)
+
+
+def _flank_rows(data: xr.Dataset) -> list[dict[str, object]]:
+    columns = {
+        "σ_H / MPa": ("contact_stress", 1e-6, ".0f"),
+        "σ_H0, ISO / MPa": ("nominal_contact", 1e-6, ".0f"),
+        "outside the path / %": ("outside", 100.0, ".1f"),
+        "K_Hbeta": ("face_load", 1.0, ".3f"),
+        "pitting damage": ("contact_damage", 1.0, ".3g"),
+        "S_H": ("contact_safety", 1.0, ".2f"),
+        "S_H, ISO": ("standard_contact_safety", 1.0, ".2f"),
+        "σ_F / MPa": ("root_stress", 1e-6, ".0f"),
+        "σ_F0, ISO / MPa": ("nominal_root", 1e-6, ".0f"),
+        "root damage": ("root_damage", 1.0, ".3g"),
+        "S_F": ("root_safety", 1.0, ".2f"),
+        "S_F, ISO": ("standard_root_safety", 1.0, ".2f"),
+        "static S_H": ("contact_static", 1.0, ".2f"),
+        "static S_F": ("root_static", 1.0, ".2f"),
+    }
+    return _rows(data, "flank", "gear, flank, mesh", columns)
+
+
+def _bearing_rows(data: xr.Dataset) -> list[dict[str, object]]:
+    columns = {
+        "largest load / kN": ("largest_load", 1e-3, ".4g"),
+        "equivalent load / kN": ("equivalent", 1e-3, ".4g"),
+        "L10 / h": ("basic_hours", 1.0, ".3g"),
+        "L10r / h": ("reference_hours", 1.0, ".3g"),
+        "L10m / h": ("modified_hours", 1.0, ".3g"),
+        "κ": ("viscosity_ratio", 1.0, ".2g"),
+        "least load / kN": ("minimum_load", 1e-3, ".3g"),
+        "damage by L10": ("damage", 1.0, ".3g"),
+        "damage by L10r": ("reference_damage", 1.0, ".3g"),
+        "pressure / MPa": ("pressure", 1e-6, ".0f"),
+        "S_0": ("static_safety", 1.0, ".2f"),
+    }
+    return _rows(data, "bearing", "bearing", columns)
+
+
+def _rows(
+    data: xr.Dataset, name: str, first: str, columns: dict[str, tuple[str, float, str]]
+) -> list[dict[str, object]]:
+    return [
+        {first: label, **{title: _told(data, name, place, *column) for title, column in columns.items()}}
+        for place, label in enumerate(data[name].to_numpy().tolist())
+    ]
+
+
+def _told(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> Cell | str:
+    value = factor * float(data[f"{name}_{key}"][place])
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return "infinite"
+    if key.endswith("damage") and value < LEAST_DAMAGE:
+        return Cell(f"below {LEAST_DAMAGE:g}", value)
+    return Cell(figure_text(float(format(value, form))) if key.endswith("hours") else format(value, form), value)
+
+
+# Section "Studies": what variations of the gearbox showed, by the pictures of each
+
+LARGEST_PICTURE = 2_000_000
+"""Bytes of a picture that a page takes in."""
+STUDY_WIDTH = 640
+"""Of a picture, pixels."""
+
+
+def studies_section(material: Material) -> Part:
+    """Show the pictures of the studies that the results folder holds."""
+    found = list(stored_studies(material.context.folder, material.context.gearbox))
+    if not found:
+        return Part("")
+    html = pieces.section("Studies", *map(_study, found), name="studies")
+    return Part(html, title="Studies", name="studies")
+
+
+def _study(study: StoredStudy) -> str:
+    lost = "".join(
+        f", {count} {word}" for count, word in ((study.failed, "failed"), (study.missing, "missing")) if count
+    )
+    old = "" if study.fits else pieces.paragraph("The case was changed since: sweep it again.", "warning")
+    told = f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}"
+    shown = [_picture_of_studies(path) for path in study.pictures if path.stat().st_size <= LARGEST_PICTURE]
+    return pieces.section(study.title, pieces.paragraph(told), old, *shown, level=3)
+
+
+def _picture_of_studies(path: Path) -> str:
+    content = base64.b64encode(path.read_bytes()).decode("ascii")
+    words = path.stem.replace("_", " ")
+    return pieces.picture(f"data:image/png;base64,{content}", words, STUDY_WIDTH)

@@ -1,0 +1,383 @@
+"""Section "Modes and orders": Campbell diagram and list of modes of each model, and the bodies that move in them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.variant import Variant
+from exugear.report.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, words_of
+from exugear.report.findings.facts import best_words, levers_of, shift_text
+from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.verdicts import ModelVariations, best_change, guarded
+from exugear.report.findings.words import figure_text, percentages
+from exugear.report.material import Axis, Curve, Material, Part, chart, model_name, only_for
+from exugear.report.web import html as pieces
+from exugear.report.web.document import rounded
+from exugear.report.web.html import Cell
+from exugear.report.web.stage import stage_data, stage_figure
+from exugear.results.spectra.run_spectra import LEAST_SHARE, NEAR, ModeReport, nearest_mode, report_mode
+from exugear.system.modes import modes_of
+from exugear.system.sensitivity import FrequencyMatch, assumed_parameters, frequency_matches
+
+DEFORMED = 32
+"""Modes in which elastic bodies deform in the page: those of resonances, and those that are seen most."""
+
+
+def modes_section(material: Material) -> Part:
+    """Show the modes of all models."""
+    modes = material.results.modes
+    if not modes:
+        return Part("")
+    for model, data in modes.items():
+        growth = float(data.attrs["growth_rate"])
+        if growth > 0.0:
+            unstable = f"{words_of(model)}: unstable, disturbances grow by up to {growth:.3g} 1/s."
+            material.context.notes.statements.append(unstable)
+    models = {model_name(model): _model(material, model, data) for model, data in modes.items()}
+    campbell = pieces.figure(
+        "campbell",
+        "Campbell diagram",
+        "Lines across: modes that the transmission error sees. Dots: an order meets a mode; the larger, the more it is "
+        "amplified. Click a dot to see the mode move.",
+        "The list of modes below names each with its frequency, damping and amplification.",
+    )
+    chooser = pieces.element(
+        "div",
+        pieces.element("label", "Model " + pieces.element("select", "", id="model")),
+        class_="controls scripts-only",
+    )
+    # Without run-ups nothing else shows the modes in motion.
+    stage = "" if material.groups else _stage_alone()
+    lists = [_all_modes(material, model, data) for model, data in modes.items()]
+    framed = pieces.element("div", campbell, class_="scripts-only")
+    html = pieces.section("Modes and orders", chooser, framed, stage, *lists, name="modes")
+    return Part(html, {"models": models}, "Modes and orders", "modes")
+
+
+def _stage_alone() -> str:
+    return pieces.element("div", stage_figure(), class_="scripts-only")
+
+
+def _model(material: Material, model: Choice, data: xr.Dataset) -> dict[str, Any]:
+    material.context.tell(f"bodies and modes of {words_of(model)}")
+    assembly = material.context.assembled(model)
+    reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
+    labels = material.words.labels
+    return {
+        "words": words_of(model),
+        "variant": model.variant,
+        "stage": stage_data(
+            assembly, data["shape"].to_numpy(), labels, material.arrays, _deformed(material, model, data)
+        ),
+        "modes": [
+            {
+                "frequency": rounded(report.frequency, 6),
+                "damping": rounded(report.damping_ratio, 4),
+                "words": material.words.moves(data, report.index),
+                "seen": report.share >= LEAST_SHARE,
+                "amplification": rounded(report.amplification, 4),
+                "mesh": material.words.of(report.mesh),
+            }
+            for report in reports
+        ],
+        "fastest": rounded(_fastest(material, model), 5),
+    }
+
+
+def _fastest(material: Material, model: Choice) -> float:
+    """Highest speed (rpm) of the run-ups of a model, or of the load cases."""
+    speeds = [
+        float(group.runs[model.variant].spectra.speed.max())
+        for group in material.groups
+        if model.variant in group.runs and group.choice(model.variant) == model
+    ]
+    if speeds:
+        return max(speeds) / RPM
+    cases = material.context.gearbox.load_cases.values()
+    ends = [abs(speed) for case in cases for speed in (case.start_speed, case.end_speed or 0.0)]
+    return max([*ends, RPM]) / RPM
+
+
+def _deformed(material: Material, model: Choice, data: xr.Dataset) -> set[int]:
+    if not model.variant.is_elastic:
+        return set()
+    matched = {
+        own.finding.mode
+        for group in material.groups
+        if model.variant in group.runs and group.choice(model.variant) == model
+        for own in group.ranked[model.variant]
+        if own.finding.mode is not None
+    }
+    reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
+    seen = sorted((report for report in reports if report.share >= VISIBLE_SHARE), key=lambda one: -one.amplification)
+    most = [*sorted(matched), *(one.index for one in seen if one.index not in matched)]
+    return set(most[: max(DEFORMED, len(matched))])
+
+
+def _all_modes(material: Material, model: Choice, data: xr.Dataset) -> str:
+    reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
+    rows = [
+        {
+            "No.": Cell(str(mode.index + 1), mode.index),
+            "Frequency / Hz": Cell(f"{mode.frequency:.1f}", mode.frequency, f"mode:{model_name(model)}:{mode.index}"),
+            "Damping / %": Cell(f"{100 * mode.damping_ratio:.2f}", mode.damping_ratio),
+            "Share / %": Cell(f"{100 * mode.share:.2f}", mode.share),
+            "Amplification": Cell(f"{mode.amplification:.2f}", mode.amplification),
+            "by mesh": material.words.of(mode.mesh) if mode.amplification >= 0.01 else "–",
+            "What moves": material.words.moves(data, mode.index),
+            "What gives": percentages(material.words.gives(data, mode.index)),
+        }
+        for mode in reports
+    ]
+    title = f"All {len(rows)} modes of {words_of(model)}"
+    table = pieces.table(
+        rows,
+        ("by mesh", "What moves", "What gives"),
+        caption=title,
+        name=f"modes-{model_name(model)}",
+        hidden=("Share / %", "by mesh"),
+        sortable=True,
+    )
+    note = (
+        "Share: of the mode in the mobility of the overall transmission error; amplification: overall transmission "
+        "error at resonance per transmission error of the mesh named."
+    )
+    return pieces.folded(title, pieces.paragraph(note, "note") + table)
+
+
+# Section on modes near a frequency that the case or the user names, such as one that was measured
+
+
+@dataclass(frozen=True)
+class ModelMatch:
+    """An assumption that brings a mode of a model to the target frequency."""
+
+    model: Choice
+    match: FrequencyMatch
+
+    @property
+    def assumption(self) -> str:
+        """Parameter with its value."""
+        return f"{self.match.parameter.label} = {self.match.value:.3g}"
+
+
+def near_section(material: Material) -> Part:
+    """Tell which modes lie near the target frequency, and which assumptions would bring one there."""
+    target = material.context.target
+    modes = material.results.modes
+    if target is None or not modes:
+        return Part("")
+    rows = []
+    for model, data in modes.items():
+        nearest = nearest_mode(data, target)
+        visible = nearest_mode(data, target, VISIBLE_SHARE)
+        if nearest is None or visible is None:
+            continue
+        rows += [_row(material, model, data, mode, target) for mode in dict.fromkeys([nearest.index, visible.index])]
+        material.context.notes.statements.append(_statement(model, data, nearest, visible, target))
+    words = (
+        "Share: of the mode in the mobility of the overall transmission error. Where the nearest mode has a share "
+        f"under {100 * VISIBLE_SHARE:g} %, the nearest that has more stands below it. Near: within {100 * NEAR:g} %."
+    )
+    title = f"Modes near {target:.0f} Hz"
+    table = pieces.table(rows, ("inertias", "what moves"), caption=title, name="near")
+    html = pieces.section(title, pieces.paragraph(words, "note"), table, *_matches(material, target), name="target")
+    return Part(html, {}, title, "target")
+
+
+def _row(material: Material, model: Choice, data: xr.Dataset, index: int, target: float) -> dict[str, object]:
+    mode = report_mode(data, index)
+    return {
+        "variant": model.variant,
+        "inertias": f"{model.inertias} ({model.mesh_law})",
+        "frequency / Hz": f"{mode.frequency:.1f}",
+        "near": "yes" if mode.is_near(target) else "no",
+        "damping / %": f"{100 * mode.damping_ratio:.2f}",
+        "share / %": f"{100 * mode.share:.1f}",
+        "amplification": f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})",
+        "what moves": material.words.moves(data, index),
+    }
+
+
+def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: ModeReport, target: float) -> str:
+    factor = float(data.attrs["housing_factor"])
+    subject = f"Variant {words_of(model)}, housing factor {factor:g}"
+    if visible.is_near(target):
+        return (
+            f"{subject}: a mode at {visible.frequency:.0f} Hz, near {target:.0f} Hz, which the overall transmission "
+            f"error sees with a share of {100 * visible.share:.0f} % ({visible.name})."
+        )
+    if nearest.is_near(target):
+        return (
+            f"{subject}: a mode at {nearest.frequency:.0f} Hz, near {target:.0f} Hz, but the overall transmission "
+            f"error hardly sees it (share {100 * nearest.share:.2g} %; {nearest.name})."
+        )
+    return (
+        f"{subject}: no mode within {100 * NEAR:g} % of {target:.0f} Hz; the nearest that the overall transmission "
+        f"error sees is at {visible.frequency:.0f} Hz ({visible.name})."
+    )
+
+
+def _matches(material: Material, target: float) -> Iterator[str]:
+    """Table of the assumptions that bring a mode to the target, or that none does."""
+    modelmatchs = [
+        ModelMatch(variation.choice, match)
+        for variation in material.variations
+        for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
+    ]
+    yield pieces.element("h3", f"Assumptions that bring a mode to {target:.0f} Hz")
+    if not modelmatchs:
+        yield pieces.paragraph(f"No value in the ranges varied brings a mode that is seen to {target:.0f} Hz.")
+        return
+    told = "; ".join(
+        f"{modelmatch.assumption} instead of {modelmatch.match.parameter.default:g} ({words_of(modelmatch.model)}: "
+        f"{modelmatch.match.frequency:.0f} Hz)"
+        for modelmatch in modelmatchs
+    )
+    material.context.notes.statements.append(
+        f"Assumptions that bring a mode seen by the overall transmission error to {target:.0f} Hz: {told}."
+    )
+    rows = [_match_row(material, modelmatch, target) for modelmatch in modelmatchs]
+    yield pieces.table(rows, ("inertias", "assumption", "what moves"), caption="Assumptions", name="matches")
+
+
+def _match_row(material: Material, found: ModelMatch, target: float) -> dict[str, object]:
+    match = found.match
+    data = match.modes.to_dataset()
+    mode = report_mode(data, match.index)
+    return {
+        "variant": found.model.variant,
+        "inertias": f"{found.model.inertias} ({found.model.mesh_law})",
+        "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
+        "frequency / Hz": f"{mode.frequency:.0f}",
+        "share / %": f"{100 * mode.share:.1f}",
+        "amplification": f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})",
+        f"nearest seen in {REFERENCE_VARIANT} / Hz": f"{_reference_frequency(material, found, target):.0f}",
+        "what moves": material.words.moves(data, match.index),
+    }
+
+
+def _reference_frequency(material: Material, found: ModelMatch, target: float) -> float:
+    """Frequency (Hz) of the nearest visible mode of the reference variant under the same assumption."""
+    context = material.context
+    match = found.match
+    reference = replace(found.model, variant=REFERENCE_VARIANT)
+    parameters = assumed_parameters(context.gearbox, reference, context.stiffness(found.model.mesh_law))
+    same = next((parameter for parameter in parameters if parameter.label == match.parameter.label), None)
+    assembly = same.build(match.value) if same else context.assembled(reference)
+    nearest = nearest_mode(modes_of(assembly).to_dataset(), target, VISIBLE_SHARE)
+    if nearest:
+        return nearest.frequency
+    return math.nan
+
+
+# Section "What to change": first-order shifts of the loudest mode, and full variations with their guard
+
+LEVERS = 8
+"""Levers of each kind in the table."""
+
+
+def change_section(material: Material) -> Part:
+    """Show what moves the loudest mode of each group of run-ups."""
+    charts: dict[str, Any] = {}
+    content = [only_for(_group(material, group, charts), group.name) for group in material.groups]
+    if not any(content):
+        return Part("")
+    return Part(
+        pieces.section("What to change", *content, name="change"), {"charts": charts}, "What to change", "change"
+    )
+
+
+def _group(material: Material, group: RunGroup, charts: dict[str, Any]) -> str:
+    top = group.loudest
+    modes = group.runs[group.main].modes
+    if top is None or modes is None or top.finding.mode is None:
+        return ""
+    mode = top.finding.mode
+    frequency = float(modes["frequency"][mode])
+    scope = (
+        f"For the mode at {frequency:.1f} Hz {Variant.of(group.main).label}, inertias {group.inertias}: "
+        f"{material.words.moves(modes, mode)}."
+    )
+    own = next((variation for variation in material.variations if variation.choice == group.choice(group.main)), None)
+    full = _variations(material, group, own, frequency, charts) if own and own.variations else ""
+    return pieces.paragraph(scope, "note") + _levers(material, group, mode) + full
+
+
+def _levers(material: Material, group: RunGroup, mode: int) -> str:
+    modes = group.runs[group.main].modes
+    assert modes is not None
+    levers = levers_of(material.words, modes, mode)
+    largest = max((abs(lever.shift) for lever in levers), default=1.0)
+    kinds = [[lever for lever in levers if lever.kind == kind][:LEVERS] for kind in ("stiffness", "inertia")]
+    rows = [
+        {
+            "10 % more": lever.kind,
+            "of": lever.what,
+            "holds / %": Cell(f"{100.0 * lever.share:.1f}", lever.share),
+            "shift": Cell(shift_text(lever), lever.shift, bar=abs(lever.shift) / largest),
+        }
+        for own in kinds
+        for lever in own
+    ]
+    caption = "First-order shifts of the loudest mode"
+    table = pieces.table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True)
+    words = (
+        "From the shares of its energies, the shape held. A share of strain energy s raises the frequency by "
+        "f (√(1 + 0.1 s) − 1), one of kinetic energy lowers it."
+    )
+    return pieces.element("h3", "10 % more of what") + pieces.paragraph(words, "note") + table
+
+
+def _variations(
+    material: Material, group: RunGroup, variations: ModelVariations, frequency: float, charts: dict[str, Any]
+) -> str:
+    figures = []
+    told = []
+    for number, variation in enumerate(variations.variations):
+        parameter = variation.parameter
+        seen = guarded(variation, frequency)
+        best = best_change(variation, frequency)
+        label = material.words.parameter(parameter.label)
+        told.append(f"{label.partition(' / ')[0]}: {best_words(material.words, best)}")
+        values = np.array(parameter.values)
+        html, data = chart(
+            f"variation-{group.name}-{number}",
+            label,
+            f"{_range(seen.frequency)} Hz; amplification {_range(seen.amplification)}",
+            best_words(material.words, best),
+            [
+                Curve("this mode / Hz", values, seen.frequency),
+                Curve("its amplification", values, seen.amplification, "dashed", True),
+                Curve("loudest within an octave", values, seen.loudest, "thin", True),
+            ],
+            [Axis(label, parameter.logarithmic), Axis("Hz"), Axis("amplification")],
+            material.arrays,
+            [(parameter.default, "used")],
+        )
+        figures.append(html)
+        charts.update(data)
+    words = (
+        "Full eigenvalue analysis at each value; dotted: value used. Thick, left axis: frequency of this mode. Dashed, "
+        "right axis: its amplification of the transmission error. Thin, right axis: amplification of the loudest mode "
+        "of any shape within an octave. Where the dashed line falls and the thin one does not, another mode has taken "
+        "over and nothing became quieter."
+    )
+    return (
+        pieces.element("h3", "If an assumption were different")
+        + pieces.paragraph(words, "note")
+        + pieces.element("div", "".join(figures), class_="grid")
+        + pieces.bullets(told)
+    )
+
+
+def _range(values: np.ndarray[Any, Any]) -> str:
+    return f"{figure_text(float(values.min()), 4)} to {figure_text(float(values.max()), 4)}"

@@ -1,1 +1,0 @@
-"""Sections of the report page: each makes its HTML, and the data that its figures are drawn from."""

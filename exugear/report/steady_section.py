@@ -1,0 +1,465 @@
+"""Section "Steady response": levels along orders, peaks, run-ups that are too fast, modes over speed, sidebands."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from exugear.gearbox.load_cases import summarise_loads
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.reading import CaseError
+from exugear.gearbox.sections.entries import GROUND
+from exugear.report.findings.context import Context, choice_of, words_of
+from exugear.report.findings.words import figure_text
+from exugear.report.material import Axis, Curve, Material, Part, chart, model_name
+from exugear.report.web import html as pieces
+from exugear.results.run_file import read_run
+from exugear.results.spectra.resonances import TOO_FAST, run_up_cut, sweep_rate, sweep_severity
+from exugear.results.spectra.run_spectra import VariantRun
+from exugear.results.spectra.waterfall import OrderLine, order_lines
+from exugear.steady.campbell import Campbell, campbell_from
+from exugear.steady.peaks import Peak, line_name, peaks, planet_sidebands, sidebands
+from exugear.steady.steady_file import settings_of
+from fe_ste.tools.arrays import Floats
+
+SHOWN = 20
+"""Peaks in a table."""
+LEAST_SHARE, MOST_TOLD = 0.05, 3
+"""Least share that is told of what makes a resonance, and how many."""
+STRONG = 0.1
+"""Share of the largest peak from which a crossing counts as strong."""
+TELL_FAST = "too fast"
+EXPLAINED, BESIDE = 5, 6
+"""Peaks whose sidebands are told, the loudest of each line, and how many of each kind at most."""
+OTHER_KIND = "other"
+"""Kind of modes that no planet set carries, in the legend."""
+WHIRLING = 0.3
+"""Whirl from which its sense is told."""
+BELOW = 6.0
+"""Levels (dB) below the lowest steady one at which a cut out of a run-up shows noise."""
+SAME_SPEED = 0.02
+"""Share of the speed within which a peak belongs to the crossing of its line with a mode."""
+
+
+def steady_section(material: Material) -> Part:
+    """Show the steady responses, each with the run-ups of the same variant, law and inertia set over it."""
+    if not material.results.steady:
+        return Part("")
+    charts: dict[str, Any] = {}
+    content = [_response(material, data, charts) for data in material.results.steady]
+    html = pieces.section("Steady response", *content, name="steady")
+    return Part(html, {"charts": charts}, "Steady response", "steady")
+
+
+def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> str:
+    context = material.context
+    choice = choice_of(data.attrs)
+    level = str(data.attrs["level"])
+    runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
+    label = f"{words_of(choice)}, level {level}"
+    context.tell(f"steady response, {label}")
+    found = peaks(data)[:SHOWN]
+    rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
+    rows = [_row(material, peak, data, rates) for peak in found]
+    lost = [row for row in rows if any(value == TELL_FAST for value in row.values())]
+    note = ""
+    if lost:
+        told = f"run-ups are too fast for {len(lost)} of its {len(rows)} loudest peaks, which they show too low."
+        context.notes.statements.append(f"Steady response, {label}: {told}")
+        note = pieces.paragraph(f"Mind: {told}", "warning")
+    growth = float(data.attrs["growth_rate"])
+    content = [
+        pieces.alert("Unstable", [f"disturbances grow by up to {growth:.3g} 1/s"]) if growth > 0.0 else "",
+        note,
+        _shared_lines(material, data),
+        _remarks(data, f"remarks-{level}-{model_name(choice)}"),
+        _order_charts(material, data, runs, f"steady-{level}-{model_name(choice)}", charts),
+        pieces.element("h4", f"Loudest peaks: the first {len(rows)}"),
+        pieces.table(
+            rows,
+            ("line",),
+            caption=f"Peaks of the steady response, {label}",
+            name=f"peaks-{level}-{model_name(choice)}",
+            sortable=True,
+        ),
+        _contributions_table(material, data, f"made-by-{level}-{model_name(choice)}"),
+        _campbell(material, data, f"campbell-{level}-{model_name(choice)}", label, charts),
+        _sidebands_table(material, data, peaks(data)),
+        pieces.paragraph(
+            f"Slowest decay of a disturbance {-growth:.3g} 1/s. A run-up is called too fast for a resonance where "
+            f"f′ / (2π ζ² f²) is above {TOO_FAST:g}: the peak does not build up. f is the frequency of the peak, "
+            "f′ its rate in the run-up, ζ the damping of the mode that is met there; – where no mode is known.",
+            "note",
+        ),
+    ]
+    return pieces.section(label[0].upper() + label[1:], *content, level=3)
+
+
+def _shared_lines(material: Material, data: xr.Dataset) -> str:
+    """Say which mesh frequencies share lines: what excites such a line cannot be told from its frequency."""
+    shared = str(data.attrs["shared_lines"])
+    if not shared:
+        return ""
+    told = material.words.told(shared)
+    return pieces.paragraph(
+        f"Mind: mesh frequencies share lines: {told}. Each such line is one, named after the simplest of those that "
+        "make it; its level is that of all of them together.",
+        "warning",
+    )
+
+
+def _remarks(data: xr.Dataset, name: str) -> str:
+    """Table of the speeds that something is to be said of, and of those at which no state was found."""
+    speeds = data["speed"].to_numpy()
+    said = [(abs(float(speed)), str(words)) for speed, words in zip(speeds, data["remark"].to_numpy(), strict=True)]
+    lost = [
+        (abs(float(load["speed"])), f"left out: {load['reason']}") for load in json.loads(str(data.attrs["unsolved"]))
+    ]
+    told = sorted([own for own in said if own[1]] + lost)
+    if not told:
+        return ""
+    rows: list[dict[str, object]] = [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in told]
+    table = pieces.table(rows, ("remark",), caption="Remarks on speeds", name=name)
+    return pieces.folded(f"Remarks on {len(rows)} of {len(speeds) + len(lost)} speeds", table)
+
+
+def _order_charts(
+    material: Material, data: xr.Dataset, runs: Sequence[VariantRun], name: str, charts: dict[str, Any]
+) -> str:
+    """Levels along the orders at steady speed, the same cut out of run-ups beside them; a figure for each order."""
+    figures = []
+    for number, line in enumerate(order_lines(material.context.gearbox, 2)):
+        if _place(data, line) is None:
+            continue
+        html, spec = chart(
+            f"{name}-{number}",
+            material.words.line(line),
+            "",
+            f"Overall transmission error along {material.words.line_sentence(line)}.",
+            _curves(data, runs, line),
+            [Axis(f"{material.input_words} speed / rpm"), Axis("level / dB re 1 µm")],
+            material.arrays,
+        )
+        figures.append(html)
+        charts.update(spec)
+    words = "Level of the overall transmission error along the orders: at steady speed"
+    words += ", and as run-ups show it, cut with the window that suits their sweep." if runs else "."
+    if settings_of(data.attrs).branches:
+        words += " Branches go back at their folds; states on dashed parts do not last."
+    return pieces.paragraph(words, "note") + pieces.element("div", "".join(figures), class_="grid")
+
+
+def _contributions_table(material: Material, data: xr.Dataset, name: str) -> str:
+    """Table of what makes the strongest resonances at the level `linear`."""
+    told = material.words.told
+    bases = tuple(str(name) for name in data["base"].to_numpy())
+    index = data["index"].to_numpy()
+    rows = []
+    for load in json.loads(data.attrs["contributions"]):
+        line = load["line"]
+        speed = abs(float(load["speed"]))
+        rows.append(
+            {
+                "line": told(line_name(tuple(int(n) for n in index[line]), bases)),
+                "speed / rpm": f"{speed / RPM:.2f}",
+                "excited by": told(_shares(load["meshes"].items())),
+                "carried by": _shares((f"{frequency:.1f} Hz", share) for frequency, share in load["modes"]),
+                "per stiffness of": told(_slopes_of(load["supports"])),
+                "per inertia of": told(_slopes_of(load["bodies"])),
+            }
+        )
+    if not rows:
+        return ""
+    said = "What makes resonances: shares of the amplitude, and its relative change per relative change of a parameter"
+    return pieces.folded(
+        said,
+        pieces.table(
+            rows,
+            ("line", "excited by", "carried by", "per stiffness of", "per inertia of"),
+            caption="What makes resonances",
+            name=name,
+        ),
+    )
+
+
+def _campbell(material: Material, data: xr.Dataset, name: str, label: str, charts: dict[str, Any]) -> str:
+    """Figure and table of the modes over speed, with the crossings that excite them."""
+    diagram = campbell_from(data)
+    if not diagram.names or len(diagram.speeds) < 2:
+        return ""
+    crossings = json.loads(data.attrs["crossings"])
+    speeds = np.abs(diagram.speeds) / RPM
+    curves = [
+        Curve(f"{kind or OTHER_KIND}: mode {number}", speeds, frequency, "thin")
+        for number, (kind, frequency) in enumerate(zip(diagram.kinds, diagram.frequency.T, strict=True), start=1)
+    ]
+    highest = float(np.nanmax(diagram.frequency, initial=1.0))
+    for line in order_lines(material.context.gearbox, 1):
+        ends = np.array([0.0, float(speeds.max())])
+        frequency = line.frequency(ends * RPM)
+        reach = min(1.0, highest / max(float(frequency[1]), 1e-300))
+        curves.append(Curve(material.words.line(line), reach * ends, reach * frequency, "dashed"))
+    for strength, crossed in (("strong", True), ("weak", False)):
+        own = [c for c in crossings if (c["share"] >= STRONG) == crossed]
+        if own:
+            x = np.array([abs(c["speed"]) / RPM for c in own])
+            curves.append(Curve(f"{strength} crossings", x, [c["frequency"] for c in own], "points"))
+    caption = (
+        f"Modes over speed as seen from the housing, {label}; dots where mesh orders and their harmonics meet modes "
+        "that they excite."
+    )
+    html, spec = chart(
+        name,
+        "Modes over speed",
+        "Lines across: modes, by type. Dashed: mesh orders. Dots: crossings that excite.",
+        caption,
+        curves,
+        [Axis(f"{material.input_words} speed / rpm"), Axis("frequency / Hz")],
+        material.arrays,
+    )
+    charts.update(spec)
+    rows = _mode_rows(material, diagram, data, crossings)
+    return (
+        html
+        + _speed_ranges(material.context)
+        + pieces.folded(
+            "Modes over speed and the crossing that excites each most: share of the largest peak of a signal",
+            pieces.table(
+                rows, ("type", "strongest crossing", "what moves"), caption=caption, name=f"{name}-modes", sortable=True
+            ),
+        )
+    )
+
+
+def _speed_ranges(context: Context) -> str:
+    """Speeds that the load cases pass, in words."""
+    told = [f"{name}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm" for name, (slow, fast) in _ranges(context).items()]
+    if told:
+        return pieces.paragraph(f"Speeds of the load cases. {'; '.join(told)}.", "note")
+    return ""
+
+
+def _ranges(context: Context) -> dict[str, tuple[float, float]]:
+    """Speeds of the input that each load case passes, without sign, rad/s."""
+    ranges = {}
+    for name, case in context.gearbox.load_cases.items():
+        try:
+            loads = summarise_loads(context.gearbox, case)
+        except CaseError as error:
+            context.notes.left_out.append(f"speeds of load case {name}: {error}")
+            continue
+        slowest = min(abs(loads.start_speed), abs(loads.end_speed))
+        ranges[name] = (0.0 if loads.start_speed * loads.end_speed < 0.0 else slowest, loads.fastest_speed)
+    return ranges
+
+
+def _mode_rows(
+    material: Material, diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
+) -> list[dict[str, object]]:
+    """Rows of the modes, those that are excited most first."""
+    bases = tuple(str(name) for name in data["base"].to_numpy())
+    index = data["index"].to_numpy()
+    strongest: dict[int, Mapping[str, float]] = {}
+    for crossing in crossings:
+        mode = diagram.mode_at(crossing["speed"], crossing["frequency"])
+        if mode is not None and crossing["share"] > strongest.get(mode, {"share": 0.0})["share"]:
+            strongest[mode] = crossing
+    rows: list[dict[str, object]] = []
+    for mode in sorted(range(len(diagram.names)), key=lambda m: -strongest.get(m, {"share": 0.0})["share"]):
+        met = strongest.get(mode)
+        known = np.flatnonzero(~np.isnan(diagram.frequency[:, mode]))
+        known = known[np.argsort(np.abs(diagram.speeds[known]))]
+        slow, fast = diagram.frequency[known[[0, -1]], mode]
+        whirl = float(diagram.whirl[known[-1], mode])
+        row: dict[str, object] = {
+            "mode": mode + 1,
+            "slow / Hz": f"{slow:.1f}",
+            "fast / Hz": f"{fast:.1f}",
+            "damping / %": f"{100.0 * diagram.damping[known[-1], mode]:.3f}",
+            "type": diagram.kinds[mode],
+            "whirl": _whirl_text(whirl),
+            "strongest crossing": "",
+            "share / %": "",
+            "what moves": material.words.told(diagram.names[mode]),
+        }
+        if met is not None:
+            line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
+            row["strongest crossing"] = f"{material.words.told(line)} at {abs(met['speed']) / RPM:.1f} rpm"
+            row["share / %"] = f"{100.0 * met['share']:.1f}"
+        rows.append(row)
+    return rows
+
+
+def _sidebands_table(material: Material, data: xr.Dataset, found: Sequence[Peak]) -> str:
+    """Table of the lines beside the loudest peaks, each with its cause."""
+    context = material.context
+    told = material.words.told
+    carriers = _carriers(context)
+    loudest: dict[str, Peak] = {}
+    for peak in found:
+        loudest.setdefault(peak.line, peak)
+    rows = []
+    for peak in list(loudest.values())[:EXPLAINED]:
+        bands = (*sidebands(data, peak)[:BESIDE], *planet_sidebands(data, peak, carriers)[:BESIDE])
+        for band in bands:
+            rows.append(
+                {
+                    "peak": f"{told(peak.line)} at {abs(peak.speed) / RPM:.1f} rpm",
+                    "peak / Hz": f"{peak.frequency:.1f}",
+                    "beside it": told(band.line.replace("mesh_force ", "force of mesh ")),
+                    "at / Hz": f"{band.frequency:.1f}",
+                    "apart / Hz": f"{band.frequency - peak.frequency:+.2f}",
+                    "amplitude": _amplitude(band.line, band.amplitude),
+                    "share / %": f"{100.0 * band.share:.1f}",
+                    "cause": told(band.cause),
+                }
+            )
+    if not rows:
+        return ""
+    said = "Sidebands of the loudest peaks and their causes: lines at the speed of the peak that other meshes or the "
+    table = pieces.table(rows, ("beside it", "cause"))
+    return pieces.folded(f"{said}turning planets make", pieces.paragraph(told(_passages(context, carriers))) + table)
+
+
+def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> str:
+    """Tell how often planets pass a place of the housing, and how that goes into the order of their meshes."""
+    gearbox = context.gearbox
+    orders = {mesh.family: gearbox.train.mesh_frequencies(2.0 * np.pi)[mesh.name] for mesh in gearbox.meshes}
+    told = []
+    for family, (carrier, ratio) in carriers.items():
+        count = sum(mesh.family == family for mesh in gearbox.meshes)
+        passage = count * abs(ratio)
+        told.append(
+            f"{family}: {count} planets of {carrier} pass a place of the housing at order {passage:g}, which goes "
+            f"{orders[family] / passage:g} times into the order of the meshes, {orders[family]:g}."
+        )
+    return " ".join(told)
+
+
+def _amplitude(line: str, amplitude: float) -> str:
+    if line.startswith("mesh_force "):
+        return f"{amplitude:.3g} N"
+    return f"{1e6 * amplitude:.3g} µm"
+
+
+def _carriers(context: Context) -> dict[str, tuple[str, float]]:
+    """Carrier of the planets of each family of meshes, and its turns per turn of the input."""
+    gearbox = context.gearbox
+    speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    own = {mesh.family: mesh.frame for mesh in gearbox.meshes if mesh.frame != GROUND}
+    return {family: (frame, speeds[frame]) for family, frame in own.items() if speeds.get(frame)}
+
+
+def _shares(parts: Iterable[tuple[str, float]]) -> str:
+    told = [f"{name} {100.0 * share:.0f} %" for name, share in parts if abs(share) >= LEAST_SHARE]
+    return ", ".join(told[:MOST_TOLD])
+
+
+def _slopes_of(slopes: Mapping[str, float]) -> str:
+    strongest = sorted(slopes.items(), key=lambda item: -abs(item[1]))[:MOST_TOLD]
+    return ", ".join(f"{name} {slope:+.2f}" for name, slope in strongest)
+
+
+def _place(data: xr.Dataset, line: OrderLine) -> int | None:
+    """Place of an order among the lines of a response."""
+    order = data["order"].to_numpy()
+    index = int(np.argmin(np.abs(order - line.order)))
+    if abs(order[index] - line.order) < 1e-6 * line.order:
+        return index
+    return None
+
+
+def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> list[Curve]:
+    place = _place(data, line)
+    amplitude = data["amplitude"].to_numpy()[:, place, 0].astype(np.float64)
+    speed = np.abs(data["speed"].to_numpy()) / RPM
+    level = _level(amplitude)
+    quiet = float(level.min()) - BELOW
+    curves = []
+    for run in runs:
+        stored, _ = read_run(run.path, ("time", "overall_dte", "input_speed"))
+        cut = run_up_cut(stored["time"], stored["overall_dte"], stored["input_speed"], line)
+        label = f"run-up {run.attributes['load_case']}"
+        cut_level = _level(np.abs(cut.amplitude))
+        heard = np.where(cut_level > quiet, cut_level, np.nan)
+        curves.append(Curve(label, np.abs(cut.speed) / RPM, heard, "dashed"))
+    # Above the others: what shows of a run-up is where it departs.
+    if settings_of(data.attrs).branches:
+        return [*curves, *branch_curves(speed, level, data["growth"].to_numpy())]
+    return [*curves, Curve("steady", speed, level)]
+
+
+def branch_curves(speed: Floats, level: Floats, growth: Floats) -> list[Curve]:
+    """Parts of a branch that goes back at its folds: no part has two values at a speed, or changes its stability.
+
+    Parameters
+    ----------
+    speed, level, growth : (n,) along the branch; what grows (1/s) is unstable
+    """
+    stable = ~(growth > 0.0)
+    rising = np.diff(speed) >= 0.0
+    # A part ends where the next step turns back, and where the next point is of the other stability.
+    turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
+    ends = np.unique(np.concatenate([turns, np.flatnonzero(stable[1:] != stable[:-1]) + 1, [len(speed) - 1]]))
+    curves = []
+    first = 0
+    for number, last in enumerate(ends, start=1):
+        part = slice(first, last + 1)
+        kind, style = ("stable", "line") if stable[part].mean() > 0.5 else ("unstable", "dashed")
+        curves.append(Curve(f"{kind}: part {number}", speed[part], level[part], style))
+        first = int(last)
+    return curves
+
+
+def _level(amplitude: Floats) -> Floats:
+    """Level of an amplitude (m), dB re 1 µm."""
+    return np.asarray(20.0 * np.log10(np.maximum(amplitude / 1e-6, 1e-6)))
+
+
+def _unit_rate(run: VariantRun) -> float:
+    """Rate at which order one sweeps in a run, Hz/s."""
+    stored, _ = read_run(run.path, ("time", "input_speed"))
+    return sweep_rate(stored["time"], stored["input_speed"], 1.0)
+
+
+def _whirl_text(whirl: float) -> str:
+    if abs(whirl) <= WHIRLING:
+        return ""
+    return "forward" if whirl > 0.0 else "backward"
+
+
+def _row(material: Material, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
+    damping = _damping(peak, data)
+    row: dict[str, object] = {
+        "line": material.words.told(peak.line),
+        "speed / rpm": f"{abs(peak.speed) / RPM:.2f}",
+        "frequency / Hz": f"{peak.frequency:.1f}",
+        "amplitude / µm": figure_text(1e6 * peak.amplitude),
+        "damping / %": "–" if damping is None else f"{100.0 * damping:.3f}",
+    }
+    for load_case, rate in rates.items():
+        too_fast = damping is not None and sweep_severity(peak.frequency, damping, rate * peak.order) > TOO_FAST
+        if damping is None:
+            row[f"run-up {load_case}"] = "–"
+        elif too_fast:
+            row[f"run-up {load_case}"] = TELL_FAST
+        else:
+            row[f"run-up {load_case}"] = "slow enough"
+    return row
+
+
+def _damping(peak: Peak, data: xr.Dataset) -> float | None:
+    """Damping of the mode that the line of a peak crosses there, where one is known."""
+    orders = data["order"].to_numpy()
+    near = []
+    for crossing in json.loads(data.attrs["crossings"]):
+        same = abs(orders[crossing["line"]] - peak.order) < 1e-9 * peak.order
+        if same and abs(crossing["speed"] - peak.speed) < SAME_SPEED * abs(peak.speed):
+            near.append((abs(crossing["speed"] - peak.speed), float(crossing["damping"])))
+    if near:
+        return min(near)[1]
+    return None

@@ -1,0 +1,357 @@
+"""Section "In short": three facts in plain words, checks that were passed, and things to mind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from exugear.gearbox.parts import RPM
+from exugear.gearbox.variant import Variant
+from exugear.report.findings.facts import Fact, facts_of, facts_of_response
+from exugear.report.findings.groups import RankedResonance, RunGroup
+from exugear.report.findings.loudness import Resonance
+from exugear.report.findings.verdicts import Verdict, verdicts_of
+from exugear.report.findings.words import figure_text, percentages
+from exugear.report.material import Material, Part, group_words, only_for, told_groups
+from exugear.report.web import html as pieces
+from exugear.report.web.html import Cell
+from exugear.report.web.stage import stage_figure
+from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun
+
+
+def short_section(material: Material) -> Part:
+    """Tell the facts of each group of results as cards; the command line prints the same sentences.
+
+    Those of steady responses are printed where there is no run-up, which else tells of both.
+    """
+    context = material.context
+    groups = told_groups(material.groups)
+    content = []
+    for group in material.groups:
+        facts = facts_of(context, material.words, group, material.variations)
+        verdicts = verdicts_of(context, group)
+        if group in groups:
+            several = f"{group_words(groups, group)}: " if len(groups) > 1 else ""
+            context.notes.statements.extend(f"{several}{fact.line}" for fact in facts)
+            context.notes.statements.extend(f"{several}{verdict.line}." for verdict in verdicts)
+        content.append(only_for(_group(material, group, facts, verdicts), group.name))
+    if not content:
+        content = [_without_groups(material)]
+    elif not any(not group.responses for group in material.groups):
+        content.append(pieces.paragraph("No run-up of this case is here: `exugear run` makes one.", "note"))
+    return Part(pieces.section("In short", *content, name="short"), {}, "In short", "short")
+
+
+def _group(material: Material, group: RunGroup, facts: Sequence[Fact], verdicts: Sequence[Verdict]) -> str:
+    scope = (
+        f"{group.title[0].upper()}{group.title[1:]}. Speeds are those of the {material.input_words}, levels those of "
+        "the overall transmission error, 0 dB = 1 µm."
+    )
+    return (
+        pieces.paragraph(scope, "note")
+        + pieces.element("div", "".join(map(_card, facts)), class_="cards")
+        + verdict_list(verdicts)
+    )
+
+
+def _without_groups(material: Material) -> str:
+    """Tell what branches and responses at few speeds know, and what tells more."""
+    facts = [fact for data in material.results.steady for fact in facts_of_response(material.words, data)]
+    material.context.notes.statements.extend(fact.line for fact in facts)
+    cards = pieces.element("div", "".join(map(_card, facts)), class_="cards") if facts else ""
+    return cards + pieces.paragraph(
+        "No run-up of this case is here: `exugear run` makes one, and the page tells more.", "note" if facts else ""
+    )
+
+
+def _card(fact: Fact) -> str:
+    large = pieces.element(
+        "p", pieces.text(fact.figure) + pieces.element("small", pieces.text(f" {fact.beside}")), class_="large"
+    )
+    more = pieces.element("a", "See more", href=f"#{fact.link}", aria_label=f"See more: {fact.kind}")
+    return pieces.element(
+        "article", f"<h3>{pieces.text(fact.kind)}</h3>{large}{pieces.paragraph(fact.sentence)}{more}", class_="card"
+    )
+
+
+def verdict_list(verdicts: Sequence[Verdict]) -> str:
+    """List what was passed and what to mind; words say which is which beside colours."""
+    entries = []
+    for verdict in verdicts:
+        sign = pieces.element("b", "✓" if verdict.passed else "!", aria_hidden="true")
+        element = pieces.element("span", "Passed: " if verdict.passed else "Mind: ", class_="unseen")
+        entries.append(
+            pieces.element(
+                "li", sign + element + pieces.text(verdict.words), class_="good" if verdict.passed else "mind"
+            )
+        )
+    return pieces.element("ul", "".join(entries), class_="verdicts", aria_label="Can this be trusted?")
+
+
+# Section "Where it rings": waterfall, order cuts, the chosen resonance in words, and its mode in motion
+
+NO_MODES = "No modes are here: `exugear modes` computes them, and the page shows them move."
+
+
+def rings_section(material: Material) -> Part:
+    """Draw the waterfalls of all run-ups and steady responses; the sentences stand in the ranking, too."""
+    if not material.groups:
+        return Part("")
+    return Part(_html(material), material.run_data, "Where it rings", "rings")
+
+
+def _html(material: Material) -> str:
+    words = _in_words(material.groups)
+    channel = pieces.element("label", "Signal " + pieces.element("select", "", id="channel"))
+    views = pieces.element("div", "", class_="choices", id="view", role="group", aria_label="Model shown")
+    waterfall = pieces.figure("waterfall", "Waterfall", f"Read from: {material.groups[0].source}.", words)
+    scale = pieces.element("div", "", class_="scale", id="waterfall-scale") + pieces.element(
+        "p", "", class_="readout", id="readout"
+    )
+    cuts = pieces.figure("cuts", "Level along the orders", "Same speeds as above. Choose the orders below.", words)
+    orders = pieces.element("div", "", class_="chips", id="orders", role="group", aria_label="Orders shown")
+    detail = pieces.element("article", "", class_="panel", id="detail", aria_live="polite")
+    left = pieces.element(
+        "div", waterfall.replace("</figure>", f"{scale}</figure>") + cuts.replace("</figure>", f"{orders}</figure>")
+    )
+    # Without modes nothing moves.
+    stage = stage_figure() if material.results.modes else pieces.paragraph(NO_MODES, "note")
+    right = pieces.element("div", detail + stage)
+    controls = pieces.element("div", channel + views, class_="controls scripts-only")
+    split = pieces.element("div", left + right, class_="split scripts-only")
+    return pieces.section("Where it rings", controls, split, _without_scripts(words), name="rings")
+
+
+def _without_scripts(words: str) -> str:
+    said = f"Diagrams need scripts, which are switched off here; nothing is loaded from any network. {words}"
+    return f"<noscript>{pieces.paragraph(said, 'warning')}</noscript>"
+
+
+def _in_words(groups: Sequence[RunGroup]) -> str:
+    group = groups[0]
+    loudest = [own for own in group.ranked[group.main] if own.steady][:3]
+    told = [f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.loudness)} dB" for own in loudest]
+    return f"Loudest, {Variant.of(group.main).label}, {group.source}: {'; '.join(told) or 'nothing stands out'}."
+
+
+# Section "Resonances, loudest first": what rings, by which mesh, whether other variants have it, and what moves
+
+SHOWN_SPAN = 60.0
+"""dB below the loudest at which the bar of a level ends."""
+BUILT_UP = 3.0
+"""dB below the level at constant speed from which a run-up counts as too fast for a resonance."""
+NOT_NEAR = "no mode near"
+SHOWN = 10
+"""Resonances in the table by three quantities."""
+QUANTITIES = {
+    "error": ("Transmission error / µm", 1e6),
+    "force": ("Bearing force / kN", 1e-3),
+    "acceleration": ("Acceleration / m/s²", 1.0),
+}
+"""Titles of the three quantities, and their units over those of SI."""
+AT_CONSTANT = "Constant speed / dB, Hz"
+
+
+def ranking_section(material: Material) -> Part:
+    """Rank the resonances of each run-up, and of each steady response, in a table."""
+    in_operation = [only_for(_in_operation(material, group), group.name) for group in material.groups]
+    tables = [
+        only_for(_table(material, group, variant), group.name, variant)
+        for group in material.groups
+        for variant in reversed(list(group.runs))
+    ]
+    for group in told_groups(material.groups):
+        _note_comparisons(material, group)
+    if not tables:
+        return Part("")
+    controls = pieces.element("div", _variant_choice() + _filters(), class_="controls scripts-only")
+    html = pieces.section(
+        "Resonances, loudest first",
+        *in_operation,
+        controls,
+        *tables,
+        pieces.paragraph(_rules(), "note"),
+        name="ranking",
+    )
+    return Part(html, {}, "Ranking", "ranking")
+
+
+def _in_operation(material: Material, group: RunGroup) -> str:
+    """Table of the resonances of the main variant at constant speed, where the gearbox works, by three quantities."""
+    ranking = group.in_operation
+    if ranking is None or not ranking.resonances:
+        return ""
+    low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
+    which = "all speeds" if ranking.whole else "speeds of operation"
+    rows = [_loud_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
+    title = f"At constant speed, {Variant.of(group.main).label}, {which}, {low} to {high} rpm: the first {len(rows)}"
+    table = pieces.table(rows, ("Excited by", "At"), caption=title, name=f"in-operation-{group.name}", sortable=True)
+    note = (
+        f"In the order of the best place in any of the three; the place stands in brackets. Accelerations are those of "
+        f"the {ranking.accelerates} at bearings. Of planets it is the root of the mean square over them."
+    )
+    return pieces.element("h3", pieces.text(title)) + table + pieces.paragraph(note, "note")
+
+
+def _loud_row(material: Material, resonance: Resonance) -> dict[str, object]:
+    row: dict[str, object] = {
+        "Excited by": material.words.told(resonance.line),
+        "Speed / rpm": Cell(figure_text(abs(resonance.speed) / RPM, 4), abs(resonance.speed) / RPM),
+        "Frequency / Hz": Cell(f"{resonance.frequency:.1f}", resonance.frequency),
+    }
+    for name, loudness in resonance.loudness.items():
+        title, factor = QUANTITIES[name]
+        place = "" if loudness.place is None else f" ({loudness.place})"
+        row[title] = Cell(f"{figure_text(factor * loudness.amplitude)}{place}", loudness.amplitude)
+        if name == "force":
+            row["At"] = material.words.of(loudness.at)
+    return row
+
+
+def _variant_choice() -> str:
+    return pieces.element("div", "", class_="choices", id="variant", role="group", aria_label="Resonances of")
+
+
+def _filters() -> str:
+    only = pieces.element(
+        "label", pieces.element("input", type="checkbox", id="only-lacking") + " only what another model lacks"
+    )
+    text = pieces.element(
+        "input", type="search", id="filter", placeholder="Filter: shaft, bearing, Hz", aria_label="Filter the table"
+    )
+    limit = pieces.element(
+        "label",
+        "Speeds up to "
+        + pieces.element("input", type="range", id="limit")
+        + pieces.element("output", "", id="limit-shown"),
+    )
+    rated = pieces.element("button", "Around rated", type="button", id="rated", hidden=True)
+    return only + text + limit + rated
+
+
+def _rules() -> str:
+    factors = ", ".join(f"{factor:g}" for factor in WINDOW_FACTORS)
+    return (
+        "A resonance is a peak that stands at least 6 dB above its surroundings along an order; peaks of several "
+        f"orders at one frequency are one. Absent, judged at its loudest peak: {AbsenceRule().description}, with every "
+        f"window. Unsteady, of run-ups: not shown with every length of the window, {factors} times that of the "
+        "diagrams. Where a steady response is there, levels at constant speed rank: a run-up that is too fast for a "
+        f"resonance shows it too low, and is marked where it lacks {BUILT_UP:g} dB or more. At constant speed ± is "
+        "half of the width of a peak 3 dB below its top."
+    )
+
+
+def _table(material: Material, group: RunGroup, variant: str) -> str:
+    run = group.runs[variant]
+    ranked = group.ranked[variant]
+    title = f"{Variant.of(variant).label.capitalize()}, inertias {group.inertias}, {group.source}"
+    heading = pieces.element("h3", pieces.text(f"{title}: {len(ranked)}"))
+    rows = [_row(material, group, run, number, own) for number, own in enumerate(ranked, start=1)]
+    if not rows:
+        return heading + pieces.paragraph("No resonance stands out.")
+    table = pieces.table(
+        rows,
+        ("Excited by", "What moves; what gives", *_others(group, variant)),
+        caption=f"Resonances {title}",
+        name=f"ranking-{group.name}-{variant}",
+        hidden=("± µm", "Prominence / dB", "Mode / Hz"),
+        sortable=True,
+        choices=[f"resonance:{group.name}:{variant}:{number}" for number in range(len(rows))],
+    )
+    return heading + table
+
+
+def _others(group: RunGroup, variant: str) -> list[str]:
+    return [f"{Variant.of(name).label.capitalize()} / dB" for name in group.runs if name != variant]
+
+
+def _row(
+    material: Material, group: RunGroup, run: VariantRun, number: int, resonance: RankedResonance
+) -> dict[str, object]:
+    finding = resonance.finding
+    peak = resonance.peak
+    loudest = group.ranked[run.variant][0].loudness
+    frequency = f"{finding.resonance.frequency:.0f} ± {figure_text(finding.resonance.resolution, 1)}"
+    choice = f"resonance:{group.name}:{run.variant}:{number - 1}"
+    matched = math.isfinite(finding.mode_frequency)
+    row: dict[str, object] = {
+        "No.": Cell(str(number), number),
+        "Frequency / Hz": Cell(frequency, finding.resonance.frequency, choice),
+        "Speed / rpm": Cell(figure_text(finding.speed, 4), finding.speed),
+        "Excited by": material.words.line(peak.line),
+        "Level / dB": _level(resonance, loudest),
+    }
+    if run.variant in group.constant:
+        row[AT_CONSTANT] = _at_constant(resonance, loudest)
+    row["± µm"] = Cell(figure_text(10.0 ** (resonance.loudness / 20.0), 2), resonance.loudness)
+    row["Prominence / dB"] = Cell(figure_text(peak.prominence, 2), peak.prominence)
+    for name, key in zip((n for n in group.runs if n != run.variant), _others(group, run.variant), strict=True):
+        level = resonance.elsewhere[name]
+        if name in resonance.lacking:
+            row[key] = Cell("absent", -1e3, tag="plain")
+        else:
+            row[key] = Cell(f"{level:.1f}" if math.isfinite(level) else "–", level if math.isfinite(level) else -1e4)
+    row["Mode / Hz"] = Cell(
+        f"{finding.mode_frequency:.1f}" if matched else "–", finding.mode_frequency if matched else -1.0
+    )
+    row["What moves; what gives"] = _story(material, group, run, resonance)
+    if group.responses:
+        return row
+    row["Windows"] = Cell(
+        "all" if resonance.steady else "unsteady", float(resonance.steady), tag="good" if resonance.steady else "mind"
+    )
+    return row
+
+
+def _level(resonance: RankedResonance, loudest: float) -> Cell:
+    """Level of the run-up; marked where it is too fast."""
+    level = resonance.peak.level
+    if resonance.constant is None:
+        return Cell(f"{level:.1f}", level, bar=1.0 - (loudest - level) / SHOWN_SPAN)
+    if resonance.missed >= BUILT_UP:
+        return Cell(f"{level:.1f} too fast", level, tag="mind")
+    return Cell(f"{level:.1f}", level)
+
+
+def _at_constant(resonance: RankedResonance, loudest: float) -> Cell:
+    """Level at constant speed, and the frequency where it is highest."""
+    at = resonance.constant
+    if at is None:
+        return Cell("–", -1e4)
+    return Cell(f"{at.level:.1f}, {at.frequency:.0f} Hz", at.level, bar=1.0 - (loudest - at.level) / SHOWN_SPAN)
+
+
+def _story(material: Material, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> str:
+    mode = resonance.finding.mode
+    modes = run.modes
+    if resonance.finding.mode_name and modes is None:
+        return material.words.told(resonance.finding.mode_name)
+    if modes is None:
+        if group.responses:
+            return NOT_NEAR
+        return "no modes were computed"
+    if mode is None:
+        return NOT_NEAR
+    gives = percentages(material.words.gives(modes, mode))
+    return f"{material.words.moves(modes, mode)}; {gives}"
+
+
+def _note_comparisons(material: Material, group: RunGroup) -> None:
+    """Tell which resonances only one of two variants has; unsteady ones are not counted."""
+    for variant, comparison in group.comparisons.items():
+        reference = comparison.second.variant
+        here = _only(group, variant, reference)
+        there = _only(group, reference, variant)
+        material.context.notes.statements.append(
+            f"Resonances in {variant} and not in {reference} ({group.title}): {here}. In {reference} and not in "
+            f"{variant}: {there}."
+        )
+
+
+def _only(group: RunGroup, variant: str, other: str) -> str:
+    frequencies = sorted(
+        own.finding.resonance.frequency for own in group.ranked[variant] if own.steady and other in own.lacking
+    )
+    if frequencies:
+        return ", ".join(f"{frequency:.0f}" for frequency in frequencies) + " Hz"
+    return "none"

@@ -1,0 +1,404 @@
+"""Campbell diagram of a mean system: eigenfrequencies and damping over speed, each mode named, and read from a file.
+
+Two modes at neighbouring speeds are compared by left and right shapes::
+
+    MAC_ij = |(left_i . right_j) (left_j . right_i)|,   left_i . right_i = 1 at each speed
+
+This is 1 for the same mode, and 0 for different ones of one system, however it is damped and however gyroscopic:
+shapes of such systems are not orthogonal by mass alone. Where modes veer, steps are halved until shapes change
+gradually. Two modes that changed places within a step crossed if MAC_ij is zero; else they are coupled by half a gap
+
+    c = root(MAC_ij) / (1 / D_1 + 1 / D_2),   D their distance in frequency at both ends of the step,
+
+as two modes are that veer, and stay close over 2 c / (D_1 + D_2) of the step: if that is wide enough to be seen, the
+step is halved, too.
+
+Equal planets, equally spaced, have three types of modes (Lin and Parker 1999, J. Vib. Acoust. 121, 316): rotational,
+in which all planets move alike and central bodies turn (and move along the axis); translational, in which planets move
+as a cosine and a sine around the carrier and central bodies move across; planet modes, of higher waves, in which no
+central body moves. Coordinates are waves already, so that the kinetic energy tells.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
+from exugear.steady.mean_system.rotating_frame import PlanetSet
+from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY
+from exugear.system.modes import BODY_MOTIONS, kinetic_shares, mode_name
+from exugear.system.statics import linearise
+from fe_ste.tools.arrays import Complexes, Floats, Integers
+from fe_ste.tools.display import Displayed
+from fe_ste.tools.threads import side_by_side
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Modes followed over speed: which mode at one speed is which at the next
+
+Found: TypeAlias = tuple[Complexes, Complexes, Complexes]
+"""Eigenvalues (n,), right and left shapes (n, 2 size), as `exugear.steady.mean_system.mean_system` gives them."""
+CLEAR = 0.8
+"""MAC from which two modes are taken for one without a look in between."""
+LEAST = 0.05
+"""MAC below which two modes are none."""
+COUNT, MOST = 9, 33
+"""Even speeds to begin with, and speeds at most."""
+NARROWEST = 1.0 / 512.0
+"""Share of the range below which a step is not halved, and a veering is a crossing."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModeTracks:
+    """Modes over speed; n speeds, m modes in the order of their frequency."""
+
+    speeds: Floats
+    """(n,) ascending, rad/s."""
+    eigenvalues: Complexes
+    """(n, m) 1/s; NaN where a mode is none: beyond the highest frequency, or overdamped."""
+    shapes: Complexes
+    left: Complexes
+    """(n, m, size) displacements, and the parts of left shapes that loads meet; zero where a mode is none."""
+
+    @property
+    def frequency(self) -> Floats:
+        """Damped eigenfrequencies (n, m), Hz."""
+        return self.eigenvalues.imag / (2.0 * np.pi)
+
+    @property
+    def damping(self) -> Floats:
+        """Shares (n, m) of critical damping."""
+        return np.asarray(-self.eigenvalues.real / np.abs(self.eigenvalues))
+
+
+def assurance(one: Found, other: Found) -> Floats:
+    """MAC (n, m) of modes of one system with those of another that differs little."""
+    return np.asarray(np.abs((one[2] @ other[1].T) * (other[2] @ one[1].T).T))
+
+
+def mode_tracks(modes_at: Callable[[float], Found], low: float, high: float) -> ModeTracks:
+    """Follow modes from one speed to another.
+
+    Parameters
+    ----------
+    modes_at : from a speed (rad/s) to the modes there
+    low, high : ends of the range, rad/s
+
+    Examples
+    --------
+    A mode that hardens with speed passes one that does not:
+
+    >>> from exugear.steady.mean_system.mean_system import vibrations
+    >>> tracks = mode_tracks(
+    ...     lambda w: vibrations(np.eye(2), np.zeros((2, 2)), np.diag([100.0, 50.0 + w**2])), 0.0, 20.0
+    ... )
+    >>> (2.0 * np.pi * tracks.frequency[[0, -1]]).round(3)
+    array([[10.   ,  7.071],
+           [10.   , 21.213]])
+    """
+    even = np.linspace(low, high, COUNT).tolist()
+    found = dict(zip(even, side_by_side(modes_at, even), strict=True))
+    narrowest = NARROWEST * abs(high - low)
+    while len(found) < MOST:
+        speeds = sorted(found)
+        steps = [
+            (_clarity(found[a], found[b], narrowest / (b - a)), 0.5 * (a + b))
+            for a, b in itertools.pairwise(speeds)
+            if b - a > narrowest
+        ]
+        unclear = min(steps, default=(1.0, 0.0))
+        if unclear[0] >= CLEAR:
+            break
+        found[unclear[1]] = modes_at(unclear[1])
+    speeds = sorted(found)
+    return _joined(np.array(speeds), [found[speed] for speed in speeds])
+
+
+def _matches(one: Found, other: Found) -> tuple[Integers, Integers, Floats]:
+    """Pairs of modes that are one, each used once so that the sum of the MAC is largest, and their MAC."""
+    import scipy.optimize  # a quarter of a second that others need not wait
+
+    values = assurance(one, other)
+    rows, columns = scipy.optimize.linear_sum_assignment(values, maximize=True)
+    kept = values[rows, columns] >= LEAST
+    rows = rows[kept]
+    columns = columns[kept]
+    return rows, columns, values[rows, columns]
+
+
+def _clarity(one: Found, other: Found, narrowest: float) -> float:
+    """Least MAC of modes that are one across a step, or less than `CLEAR` where a veering may hide in it."""
+    rows, columns, values = _matches(one, other)
+    before, after = (own[0][places].imag for own, places in ((one, rows), (other, columns)))
+    far = np.triu(np.subtract.outer(before, before), 1)
+    near = np.triu(np.subtract.outer(after, after), 1)
+    first, second = np.nonzero(far * near < 0.0)
+    apart = np.abs(far[first, second]), np.abs(near[first, second])
+    cross = assurance(one, other)[rows[first], columns[second]]
+    share = 2.0 * np.sqrt(cross) / (1.0 / apart[0] + 1.0 / apart[1]) / (apart[0] + apart[1])
+    hidden = share[share > narrowest].max(initial=0.0)
+    clear = float(values.min(initial=1.0))
+    if hidden:
+        return min(clear, CLEAR * (1.0 - min(1.0, float(hidden))))
+    return clear
+
+
+def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
+    """Tracks from modes at each speed, in the order of their mean frequency."""
+    places = [list(range(len(found[0][0])))]
+    count = len(found[0][0])
+    for one, other in itertools.pairwise(found):
+        rows, columns, _ = _matches(one, other)
+        own = dict(zip(columns.tolist(), (places[-1][row] for row in rows), strict=True))
+        new = [n for n in range(len(other[0])) if n not in own]
+        own |= {n: count + number for number, n in enumerate(new)}
+        count += len(new)
+        places.append([own[n] for n in range(len(other[0]))])
+    size = found[0][1].shape[1] // 2
+    eigenvalues = np.full((len(speeds), count), complex(np.nan, np.nan))
+    shapes, partners = np.zeros((2, len(speeds), count, size), dtype=np.complex128)
+    for n, (place, (values, right, left)) in enumerate(zip(places, found, strict=True)):
+        eigenvalues[n, place], shapes[n, place], partners[n, place] = values, right[:, :size], left[:, size:]
+    order = np.argsort(np.nanmean(eigenvalues.imag, axis=0)) if count else np.zeros(0, dtype=np.int64)
+    return ModeTracks(speeds, eigenvalues[:, order], shapes[:, order], partners[:, order])
+
+
+# What modes of the mean system are: types of planetary sets, who moves how in words, the sense of a whirl
+
+KINDS = ("rotational", "translational", "planet")
+"""Types of modes of a planetary set."""
+MIXED = "mixed"
+"""Neither: bearings that are not isotropic, or gears beside the set, couple its waves."""
+OF_SET, OF_PLANETS, OF_KIND = 0.5, 0.1, 0.8
+"""Least shares of the kinetic energy: of a set for a mode to be one of its own, of the planets for it to be named by
+type, and of one type within the set."""
+LATERAL = 0.01
+"""Least share of the kinetic energy that turning bodies' lateral and tilting motions have for a whirl to be told."""
+TURNING = tuple(BODY_MOTIONS.index(name) for name in ("spin", "axial", "twist", "stretch"))
+"""Motions of a central body in rotational modes; all others are those of translational ones."""
+
+
+@dataclass(frozen=True)
+class NamedMode:
+    """A mode in words."""
+
+    kind: str
+    """Of `KINDS`, `MIXED`, or empty where no planet set carries the mode; with the carrier where there are several."""
+    name: str
+    """What moves and what is strained."""
+    whirl: float
+    """1 for a circle in the sense in which the body turns, -1 against it, 0 for a line and where hardly any turning
+    body moves across."""
+
+
+class ModeNamer:
+    """Names modes of a mean system; its elements are linearised once, about the static state at one speed.
+
+    Parameters
+    ----------
+    speed : of the input, rad/s
+    """
+
+    def __init__(self, system: MeanSystem, speed: float) -> None:
+        self.system, frame = system, system.frame
+        self.assembly, self._turn = frame.assembly, frame.matrices(0.0)[0]
+        self._q = frame.state(0.0, speed, system.static_at(speed))[0]
+        self._elements = linearise(self.assembly, self._q, frame.mean_meshes).stiffness
+        self._senses = {name: float(np.sign(own * speed)) for name, own in frame.speeds.items()}
+
+    def named(self, shape: Complexes) -> NamedMode:
+        """Name a shape (size,) of the mean system."""
+        kinetic = self._kinetic(shape)
+        return NamedMode(self._kind(shape, kinetic), self._words(shape, kinetic), self.whirl(shape))
+
+    def whirl(self, shape: Complexes) -> float:
+        """Sense of the whirl of a shape (size,), bodies by their lateral and tilting energy; see `NamedMode`."""
+        circling = total = 0.0
+        energy = np.diag(self.system.mass)
+        for body in self.assembly.bodies:
+            index = self.assembly.coordinates[body.name]
+            if body.carrier is not None:
+                continue
+            for x, y in ((index[UX], index[UY]), (index[TILT_X], index[TILT_Y])):
+                if min(x, y) >= 0:
+                    circling += self._senses.get(body.name, 0.0) * energy[x] * circle(shape[x], shape[y])
+                    total += energy[x] * (abs(shape[x]) ** 2 + abs(shape[y]) ** 2)
+        whole = float((shape.conj() @ self.system.mass @ shape).real)
+        if total > LATERAL * whole:
+            return float(circling / total)
+        return 0.0
+
+    def _parts(self, shape: Complexes) -> tuple[tuple[Floats, float], ...]:
+        """Real and imaginary part of a shape with the share of its energy that each has."""
+        parts = (shape.real, shape.imag)
+        energies = [float(part @ self.system.mass @ part) for part in parts]
+        return tuple(
+            (part, energy / sum(energies)) for part, energy in zip(parts, energies, strict=True) if energy > 0.0
+        )
+
+    def _kinetic(self, shape: Complexes) -> Floats:
+        """Share of kinetic energy (bodies, motions)."""
+        shares = np.zeros((len(self.assembly.bodies), len(BODY_MOTIONS)))
+        for part, weight in self._parts(shape):
+            shares += weight * kinetic_shares(self.assembly, (self._turn @ part)[:, None], self._q)[0]
+        return shares
+
+    def _words(self, shape: Complexes, kinetic: Floats) -> str:
+        moved = self._turn @ shape
+        strain = np.array([float((moved.conj() @ k @ moved).real) for k in self._elements.values()])
+        return mode_name(self.assembly, tuple(self._elements), kinetic, strain / max(float(strain.sum()), 1e-300))
+
+    def _kind(self, shape: Complexes, kinetic: Floats) -> str:
+        sets = self.system.frame.sets
+        shares = [(planets, self._of_kinds(planets, shape, kinetic)) for planets in sets]
+        if not shares:
+            return ""
+        planets, (of_planets, own) = max(shares, key=lambda item: float(item[1][1].sum()))
+        if own.sum() < OF_SET or of_planets < OF_PLANETS:
+            return ""
+        most = int(np.argmax(own))
+        kind = KINDS[most] if own[most] >= OF_KIND * own.sum() else MIXED
+        if len(sets) == 1:
+            return kind
+        return f"{kind} of {planets.carrier}"
+
+    def _of_kinds(self, planets: PlanetSet, shape: Complexes, kinetic: Floats) -> tuple[float, Floats]:
+        """Share of the planets of a set, and shares (3,) of the set by type of motion."""
+        places = {body.name: n for n, body in enumerate(self.assembly.bodies)}
+        waves = np.array([self._wave_energy(name, shape) for name in planets.names])
+        by_kind = np.array([waves[0], waves[1:3].sum(), waves[3:].sum()])
+        of_planets = float(sum(kinetic[places[name]].sum() for name in planets.names))
+        shares = of_planets * by_kind / max(float(by_kind.sum()), 1e-300)
+        for name in self._central(planets):
+            if name in places:
+                turning = float(kinetic[places[name], TURNING].sum())
+                shares[:2] += turning, float(kinetic[places[name]].sum()) - turning
+        return of_planets, shares
+
+    def _wave_energy(self, slot: str, shape: Complexes) -> float:
+        """Kinetic energy of the wave that stands in the coordinates of a planet."""
+        index = [i for i in self.assembly.coordinates[slot] if i >= 0]
+        own = shape[index]
+        return float((own.conj() @ self.system.mass[np.ix_(index, index)] @ own).real)
+
+    def _central(self, planets: PlanetSet) -> set[str]:
+        """Bodies that carry the planets or mesh with them."""
+        meshes = (element.mesh for element in self.assembly.elements)
+        ends = [{mesh.pinion, mesh.gear} for mesh in meshes]
+        own = set(planets.names)
+        return {planets.carrier}.union(*(pair for pair in ends if pair & own)) - own
+
+
+def circle(x: complex, y: complex) -> float:
+    """Product of the axes of an ellipse x, y, twice: ``|x|^2 + |y|^2`` for a circle from x to y, negative against it.
+
+    Examples
+    --------
+    >>> circle(1.0, -1j), circle(1.0, 1j), circle(1.0, 2.0)
+    (2.0, -2.0, 0.0)
+    """
+    return float(0.0 - 2.0 * (np.conj(x) * y).imag)
+
+
+# Campbell diagram of a mean system: eigenfrequencies and damping over speed, each mode named, and read from a file
+
+LAYOUT: dict[str, tuple[str, ...]] = {
+    "campbell_speed": ("campbell_point",),
+    "mode_frequency": ("campbell_point", "mode"),
+    "mode_damping": ("campbell_point", "mode"),
+    "mode_whirl": ("campbell_point", "mode"),
+    "mode_kind": ("mode",),
+    "mode_name": ("mode",),
+}
+"""Variables of a file that holds a diagram."""
+SAME_FREQUENCY = 0.02
+"""Share of a frequency within which a mode is the one that a crossing was found at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Campbell(Displayed, line=": {names!n} modes at {speeds!n} speeds"):
+    """Modes over speed; n speeds, m modes."""
+
+    speeds: Floats
+    """(n,) of the overall input, ascending, rad/s."""
+    frequency: Floats
+    damping: Floats
+    whirl: Floats
+    """(n, m) Hz as seen from the housing, share of critical damping, and sense of the whirl as `NamedMode` has it;
+    NaN where a mode is none."""
+    kinds: tuple[str, ...]
+    names: tuple[str, ...]
+    """As `NamedMode` has them, at the fastest speed."""
+
+    def mode_at(self, speed: float, frequency: float) -> int | None:
+        """Find the mode that has a frequency (Hz) at a speed (rad/s), None where none is near."""
+        if not len(self.names):
+            return None
+        own = np.array([np.interp(speed, self.speeds, column) for column in self.frequency.T])
+        apart = np.where(np.isnan(own), np.inf, np.abs(own - frequency))
+        nearest = int(np.argmin(apart))
+        if apart[nearest] <= SAME_FREQUENCY * frequency:
+            return nearest
+        return None
+
+    def variables(self) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
+        """Arrays with dimensions and units, as files hold them."""
+        values = {
+            "campbell_speed": (self.speeds, {"units": "rad/s", "long_name": "speed of the overall input"}),
+            "mode_frequency": (self.frequency, {"units": "Hz", "long_name": "as seen from the housing"}),
+            "mode_damping": (self.damping, {"units": "1", "long_name": "share of critical damping"}),
+            "mode_whirl": (self.whirl, {"units": "1", "long_name": "1 with the turn of the body, -1 against it"}),
+            "mode_kind": (np.array(self.kinds, dtype=object), {}),
+            "mode_name": (np.array(self.names, dtype=object), {}),
+        }
+        return {name: (LAYOUT[name], own, attributes) for name, (own, attributes) in values.items()}
+
+
+def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float) -> ModeTracks:
+    """Follow the modes of a mean system between two speeds of the input (rad/s), up to a frequency (Hz)."""
+
+    def modes_at(speed: float) -> Found:
+        values, right, left = mean_modes(system, speed)
+        kept = values.imag <= 2.0 * np.pi * highest
+        return values[kept], right[kept], left[kept]
+
+    return mode_tracks(modes_at, low, high)
+
+
+def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
+    """Campbell diagram of the modes of a mean system, followed over speed."""
+    low = tracks.speeds[0]
+    high = tracks.speeds[-1]
+    namer = ModeNamer(system, high if abs(high) > abs(low) else low)
+    whirl = np.full(tracks.frequency.shape, np.nan)
+    for n, m in zip(*np.nonzero(~np.isnan(tracks.frequency)), strict=True):
+        whirl[n, m] = namer.whirl(tracks.shapes[n, m])
+    named = [namer.named(tracks.shapes[_fastest(tracks, m), m]) for m in range(tracks.frequency.shape[1])]
+    return Campbell(
+        tracks.speeds,
+        tracks.frequency,
+        tracks.damping,
+        whirl,
+        tuple(own.kind for own in named),
+        tuple(own.name for own in named),
+    )
+
+
+def campbell_from(data: xr.Dataset) -> Campbell:
+    """Read a diagram from the dataset of a file that holds one."""
+    values = {name: data[name].to_numpy() for name in LAYOUT}
+    kinds, names = (tuple(str(value) for value in values[name]) for name in ("mode_kind", "mode_name"))
+    speeds, frequency, damping, whirl = (values[name] for name in list(LAYOUT)[:4])
+    return Campbell(speeds, frequency, damping, whirl, kinds, names)
+
+
+def _fastest(tracks: ModeTracks, mode: int) -> int:
+    """Place of the fastest speed at which a mode is one."""
+    known = np.flatnonzero(~np.isnan(tracks.frequency[:, mode]))
+    return int(known[np.argmax(np.abs(tracks.speeds[known]))])

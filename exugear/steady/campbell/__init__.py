@@ -1,1 +1,0 @@
-"""Campbell diagram of a gearbox: modes of the mean system followed over speed, named by type."""

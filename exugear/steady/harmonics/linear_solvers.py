@@ -1,0 +1,391 @@
+"""Linear equations of harmonic balance: without their matrix, and many of one pattern eight at a time.
+
+Bodies touch each other at few coordinates, so that most entries of a dynamic stiffness are zero, the same ones at all
+frequencies. Which entries an elimination fills, and in what order it fills the fewest, is found once; then eight lines
+at a time pass through it in the registers of the processor. Entries on the diagonal are not exchanged for larger ones:
+what is left over tells whether that was harmless, and a line that it was not harmless for is solved with exchanges.
+Machine code is kept by `fe_ste.tools.compilation`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
+from fe_ste.tools.compilation import kernel
+from fe_ste.tools.inner_kernels import kept_bundle
+from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, put
+
+# Linear equations of harmonic balance, solved without their matrix
+
+MOST_PRODUCTS = 400
+"""Products with the operator after which the search is given up."""
+
+
+ROOM = 40
+"""Products for which there is room from the beginning; more of it is made where they are not enough."""
+
+
+class HarmonicBalanceError(RuntimeError):
+    """No balance of all lines was found."""
+
+
+def solve_lines(
+    apply: Callable[[Complexes], Complexes], right: Complexes, tolerance: float, start: Complexes | None = None
+) -> tuple[Complexes, int]:
+    """Solve A y = b for coefficients of lines by GMRES (Saad and Schultz 1986) over real and imaginary parts.
+
+    A is linear over the reals alone, since products of signals mix lines with their conjugates.
+
+    Parameters
+    ----------
+    apply : a times an array of the shape of `right`
+    tolerance : residual over the size of the right-hand side
+
+    Returns
+    -------
+    solution
+    products : products with A that it took
+
+    Raises
+    ------
+    HarmonicBalanceError
+        Not within `MOST_PRODUCTS`.
+
+    Examples
+    --------
+    >>> solve_lines(lambda y: y + 0.1j * y.conj(), np.array([1.1 + 0.1j]), 1e-12)[0].round(12)
+    array([1.1010101-0.01010101j])
+    """
+
+    def real(values: Complexes) -> Floats:
+        return np.ascontiguousarray(values).view(np.float64).ravel()
+
+    def lines(values: Floats) -> Complexes:
+        return values.view(np.complex128).reshape(right.shape)
+
+    wanted = tolerance * float(np.linalg.norm(right))
+    x = np.zeros(2 * right.size) if start is None else real(start).copy()
+    remainder = real(right) - (real(apply(lines(x))) if start is not None else 0.0)
+    size = float(np.linalg.norm(remainder))
+    if size <= wanted:
+        return lines(x), 0
+    most = min(MOST_PRODUCTS, 2 * right.size)
+    basis = np.empty((min(most, ROOM) + 1, x.size))
+    # Givens rotations keep the least-squares problem triangular; its residual is then known without solving it.
+    columns: list[list[float]] = []
+    turns: list[tuple[float, float]] = []
+    rest = [size]
+    basis[0] = remainder / size
+    for n in range(most):
+        w = real(apply(lines(basis[n])))
+        column, w = _orthogonal(w, basis[: n + 1])
+        length = math.sqrt(w @ w)
+        for i, (c, s) in enumerate(turns):
+            column[i], column[i + 1] = c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]
+        radius = math.hypot(column[n], length)
+        turns.append((column[n] / radius, length / radius))
+        column[n] = radius
+        columns.append(column)
+        rest[n:] = turns[n][0] * rest[n], -turns[n][1] * rest[n]
+        if abs(rest[n + 1]) <= wanted or length == 0.0:
+            return lines(x + _steps(columns, rest) @ basis[: n + 1]), n + 1
+        if n + 1 == len(basis):
+            basis = np.concatenate([basis, np.empty_like(basis)])
+        basis[n + 1] = w / length
+    raise HarmonicBalanceError(
+        f"harmonic balance: the residual stays at {abs(rest[most]) / max(size, 1e-300):.1e} of its start after "
+        f"{most} products"
+    )
+
+
+def _orthogonal(w: Floats, basis: Floats) -> tuple[list[float], Floats]:
+    """Shares of a vector along an orthonormal basis, and what is left of it, orthogonal to round-off."""
+    first = basis @ w
+    w = w - first @ basis
+    second = basis @ w
+    return (first + second).tolist(), w - second @ basis
+
+
+def _steps(columns: list[list[float]], rest: list[float]) -> Floats:
+    """Solve the triangular equations of all columns."""
+    triangle = np.zeros((len(columns), len(columns)))
+    for n, column in enumerate(columns):
+        triangle[: n + 1, n] = column
+    return np.asarray(np.linalg.solve(triangle, rest[: len(columns)]))
+
+
+# Many systems of equations of one pattern, solved eight at a time: lines of a response at one speed
+
+LEFT_OVER = 1e-10
+"""Residual over the load up to which a solution counts as such, both by the sum of all loads."""
+
+
+class Elimination(NamedTuple):
+    """Order and places of an elimination of systems of one pattern with n rows and e entries, filled ones too."""
+
+    order: Integers
+    """(n,) row that is eliminated in each step."""
+    row: Integers
+    column: Integers
+    """(e,) place of each entry in the matrix."""
+    diagonal: Integers
+    """(n,) entry on the diagonal, by step."""
+    first: Integers
+    """(n + 1,) first of the later rows that each step touches, in the three arrays that follow."""
+    later: Integers
+    """(r,) steps in which these rows are eliminated."""
+    below: Integers
+    right: Integers
+    """(r,) entries in the column and in the row of the step."""
+    change: Integers
+    """(n,) first of the entries in `changed` that each step changes, row by row of its later rows."""
+    changed: Integers
+    """(c,) entries."""
+
+
+def elimination(pattern: Booleans) -> Elimination:
+    """Find an elimination of matrices with entries where a pattern (n, n) is true: rows with few neighbours first.
+
+    Examples
+    --------
+    A chain needs no more entries than it has:
+
+    >>> found = elimination(np.abs(np.subtract.outer(np.arange(5), np.arange(5))) < 2)
+    >>> len(found.row), len(found.changed)
+    (13, 4)
+    """
+    n = len(pattern)
+    linked = pattern | pattern.T
+    np.fill_diagonal(linked, True)
+    filled = linked.copy()
+    left = np.ones(n, dtype=bool)
+    order = []
+    touched: list[Integers] = []
+    for _ in range(n):
+        counts = np.where(left, (filled & left).sum(axis=1), n + 1)
+        k = int(np.argmin(counts))
+        left[k] = False
+        others = np.flatnonzero(filled[k] & left)
+        filled[np.ix_(others, others)] = True
+        order.append(k)
+        touched.append(others)
+    step = np.empty(n, dtype=np.int64)
+    step[order] = np.arange(n)
+    row, column = np.nonzero(filled)
+    entry = np.full((n, n), -1, dtype=np.int64)
+    entry[row, column] = np.arange(len(row))
+    none = np.zeros(0, dtype=np.int64)
+    return Elimination(
+        order=np.array(order, dtype=np.int64),
+        row=row.astype(np.int64),
+        column=column.astype(np.int64),
+        diagonal=entry[order, order],
+        first=np.cumsum([0, *map(len, touched)]).astype(np.int64),
+        later=np.concatenate([none, *(step[others] for others in touched)]),
+        below=np.concatenate([none, *(entry[others, k] for k, others in zip(order, touched, strict=True))]),
+        right=np.concatenate([none, *(entry[k, others] for k, others in zip(order, touched, strict=True))]),
+        change=np.cumsum([0, *(len(others) ** 2 for others in touched[:-1])]).astype(np.int64),
+        changed=np.concatenate([none, *(entry[np.ix_(others, others)].ravel() for others in touched)]),
+    )
+
+
+def solve_side_by_side(
+    plan: Elimination,
+    stiffness: Floats,
+    damping: Floats,
+    mass: Floats,
+    frequencies: Floats,
+    loads: Floats,
+    amplitudes: Complexes,
+) -> None:
+    """Fill amplitudes x (lines, n, loads) of (K + i w C - w^2 M) x = f, an array in C order.
+
+    Parameters
+    ----------
+    plan : of a pattern that holds all entries of the three matrices
+    stiffness, damping, mass : (n, n)
+    frequencies : (lines,) angular frequencies w, rad/s
+    loads : (n, loads)
+    """
+    places = (plan.row, plan.column)
+    given = np.ascontiguousarray(loads[plan.order])
+    memory = aligned_zeros(2 * SIZE * max(len(plan.row), 2 * len(plan.order))).reshape(2, -1)
+    x = aligned_zeros(2 * SIZE * loads.size)
+    numbers = amplitudes.view(np.float64)
+    pencil = (stiffness[places], damping[places], mass[places])
+    missing = np.empty(len(frequencies))
+    solve_octets(kept_bundle(plan), *pencil, frequencies, given, memory[0], memory[1], x, numbers, missing)
+    scale = np.abs(loads.sum(axis=1)).max() + 1e-3 * np.abs(loads).max()
+    # A residual that is no number is none that is small.
+    for line in np.flatnonzero(~(missing <= LEFT_OVER * scale)):
+        w = frequencies[line]
+        amplitudes[line] = np.linalg.solve(stiffness - w**2 * mass + 1j * w * damping, loads)
+
+
+@kernel
+def solve_octets(
+    plan: Elimination,
+    stiffness: Floats,
+    damping: Floats,
+    mass: Floats,
+    frequencies: Floats,
+    loads: Floats,
+    real: Floats,
+    imaginary: Floats,
+    x: Floats,
+    out: Floats,
+    missing: Floats,
+) -> None:
+    """Fill amplitudes (lines, n, 2 cases), real and imaginary parts in turns, and residuals (lines,), eight at a time.
+
+    Matrices are given by their entries (e,), loads (n, cases) by row in the order of the elimination. `real` and
+    `imaginary` (8 e, or 16 n if that is more) and `x` (16 n cases,) are memory.
+    """
+    size, cases = loads.shape
+    lines = frequencies.size
+    for line in range(0, lines, SIZE):
+        count = min(SIZE, lines - line)
+        for lane in range(SIZE):
+            x[lane] = frequencies[line + min(lane, count - 1)]  # the last line fills what is left
+        w = eight(x, 0)
+        for entry in range(stiffness.size):
+            put(real, SIZE * entry, stiffness[entry] - w * w * mass[entry])
+            put(imaginary, SIZE * entry, w * damping[entry])
+        eliminate(plan, loads, real, imaginary, x)
+        for k in range(size):
+            for case in range(cases):
+                at = 2 * SIZE * (k * cases + case)
+                for lane in range(count):
+                    out[line + lane, plan.order[k], 2 * case] = x[at + lane]
+                    out[line + lane, plan.order[k], 2 * case + 1] = x[at + SIZE + lane]
+        add_cases(plan.order, loads, real, imaginary, x)
+        for lane in range(SIZE):
+            x[lane] = frequencies[line + min(lane, count - 1)]
+        leave_over(plan, stiffness, damping, mass, real, imaginary, x)
+        for lane in range(count):
+            missing[line + lane] = math.sqrt(x[lane])
+
+
+@kernel
+def add_cases(order: Integers, loads: Floats, real: Floats, imaginary: Floats, x: Floats) -> None:
+    """Put the sum of the solutions of all cases into the first 8 n numbers of the memory, by row, its loads behind."""
+    size, cases = loads.shape
+    for k in range(size):
+        a = all_eight(0.0)
+        b = all_eight(0.0)
+        given = 0.0
+        for case in range(cases):
+            at = 2 * SIZE * (k * cases + case)
+            a = a + eight(x, at)
+            b = b + eight(x, at + SIZE)
+            given += loads[k, case]
+        put(real, SIZE * order[k], a)
+        put(imaginary, SIZE * order[k], b)
+        put(real, SIZE * (size + order[k]), all_eight(-given))
+        put(imaginary, SIZE * (size + order[k]), all_eight(0.0))
+
+
+@kernel
+def leave_over(
+    plan: Elimination, stiffness: Floats, damping: Floats, mass: Floats, real: Floats, imaginary: Floats, x: Floats
+) -> None:
+    """Turn eight frequencies, the first numbers of `x`, into the squares of what solutions in the memory leave over."""
+    size = plan.order.size
+    w = eight(x, 0)
+    for entry in range(stiffness.size):
+        p = stiffness[entry] - w * w * mass[entry]
+        q = w * damping[entry]
+        at = SIZE * plan.column[entry]
+        to = SIZE * (size + plan.row[entry])
+        a = eight(real, at)
+        b = eight(imaginary, at)
+        put(real, to, eight(real, to) + p * a - q * b)
+        put(imaginary, to, eight(imaginary, to) + p * b + q * a)
+    total = all_eight(0.0)
+    for row in range(size, 2 * size):
+        a = eight(real, SIZE * row)
+        b = eight(imaginary, SIZE * row)
+        total = total + a * a + b * b
+    put(x, 0, total)
+
+
+@kernel
+def eliminate(plan: Elimination, loads: Floats, real: Floats, imaginary: Floats, x: Floats) -> None:
+    """Solve eight systems, whose entries (8 e,) are overwritten, for loads (n, cases) that they share."""
+    size, cases = loads.shape
+    for k in range(size):
+        for case in range(cases):
+            at = 2 * SIZE * (k * cases + case)
+            put(x, at, all_eight(loads[k, case]))
+            put(x, at + SIZE, all_eight(0.0))
+    for k in range(size):
+        invert(SIZE * plan.diagonal[k], real, imaginary)
+        eliminate_row(k, cases, plan, real, imaginary, x)
+    for k in range(size - 1, -1, -1):
+        substitute_back(k, cases, plan, real, imaginary, x)
+
+
+@kernel
+def invert(at: int, real: Floats, imaginary: Floats) -> None:
+    """Take the inverse of the eight entries at a place."""
+    for i in range(at, at + SIZE):
+        square = real[i] * real[i] + imaginary[i] * imaginary[i]
+        real[i], imaginary[i] = real[i] / square, -imaginary[i] / square
+
+
+@kernel
+def eliminate_row(k: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
+    """Take the row of step k, its diagonal inverted, out of all later rows."""
+    x = eight(real, SIZE * plan.diagonal[k])
+    y = eight(imaginary, SIZE * plan.diagonal[k])
+    begin = plan.first[k]
+    end = plan.first[k + 1]
+    change = plan.change[k]
+    for i in range(begin, end):
+        at = SIZE * plan.below[i]
+        a = eight(real, at)
+        b = eight(imaginary, at)
+        factor = a * x - b * y
+        turned = a * y + b * x
+        for j in range(begin, end):
+            at = SIZE * plan.right[j]
+            to = SIZE * plan.changed[change]
+            change += 1
+            a = eight(real, at)
+            b = eight(imaginary, at)
+            put(real, to, eight(real, to) - factor * a + turned * b)
+            put(imaginary, to, eight(imaginary, to) - factor * b - turned * a)
+        for case in range(cases):
+            at = 2 * SIZE * (k * cases + case)
+            to = 2 * SIZE * (plan.later[i] * cases + case)
+            a = eight(out, at)
+            b = eight(out, at + SIZE)
+            put(out, to, eight(out, to) - factor * a + turned * b)
+            put(out, to + SIZE, eight(out, to + SIZE) - factor * b - turned * a)
+
+
+@kernel
+def substitute_back(k: int, cases: int, plan: Elimination, real: Floats, imaginary: Floats, out: Floats) -> None:
+    """Find the solution of step k from those of later ones."""
+    x = eight(real, SIZE * plan.diagonal[k])
+    y = eight(imaginary, SIZE * plan.diagonal[k])
+    for case in range(cases):
+        to = 2 * SIZE * (k * cases + case)
+        p = eight(out, to)
+        q = eight(out, to + SIZE)
+        for j in range(plan.first[k], plan.first[k + 1]):
+            at = SIZE * plan.right[j]
+            known = 2 * SIZE * (plan.later[j] * cases + case)
+            a = eight(real, at)
+            b = eight(imaginary, at)
+            c = eight(out, known)
+            d = eight(out, known + SIZE)
+            p = p - a * c + b * d
+            q = q - a * d - b * c
+        put(out, to, p * x - q * y)
+        put(out, to + SIZE, p * y + q * x)

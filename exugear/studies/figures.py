@@ -1,0 +1,641 @@
+"""Figures that studies keep of a point, of modes, statics, tables, steady responses, runs, lives; their table.
+
+Of several planets the one that is worn most is rated. A damage without end is infinite, and so is a life that nothing
+ends.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import json
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from exugear.gearbox.parts import RPM
+from exugear.steady.peaks import line_name, peaks
+from exugear.studies.point_results import PointError, PointResults
+from exugear.system.modes import FREE_ROTATION, Modes
+from exugear.system.signals import SIGNALS
+from fe_ste.tools.arrays import Floats
+
+# A figure: a number of a point, or some by name, with unit, and the options that say which
+
+Values = float | Mapping[str, float]
+"""One number, or several by name along the figure's dimension."""
+Needs = Literal["", "run", "steady", "life", "bearings"]
+"""What a figure is read from, where it is more than modes, tables and the static state: a run, a steady response, a
+life, or bearings in that life."""
+
+
+class FigureError(ValueError):
+    """A figure that is not known, or options that it has not got."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What is kept of a point."""
+
+    function: Callable[..., Values]
+    """Takes `PointResults` and options by keyword; a function of a module, since workers look it up there. Each
+    option is a keyword-only parameter; its annotation names its type, its default makes it optional."""
+    units: str
+    dimension: str = ""
+    """Name of the dimension of several numbers; empty for one."""
+    needs: Needs = ""
+    """{"", "run", "steady", "life", "bearings"}: what it is read from, where that is more than modes, tables and the
+    static state."""
+
+    @property
+    def description(self) -> str:
+        """What it is, in a line."""
+        return (inspect.getdoc(self.function) or "").split("\n")[0]
+
+    def of(self, results: PointResults, options: Mapping[str, Any]) -> Values:
+        """Compute it for a point."""
+        return self.function(results, **options)
+
+    def check(self, name: str, options: Mapping[str, Any]) -> None:
+        """Refuse options that it has not got, are of another type, or are missing."""
+        known = {
+            key: parameter
+            for key, parameter in inspect.signature(self.function).parameters.items()
+            if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+        }
+        for key, value in options.items():
+            if key not in known:
+                near = difflib.get_close_matches(key[:100], known, n=1)
+                hint = f"did you mean {near[0]!r}?" if near else f"its options are {', '.join(known) or 'none'}"
+                raise FigureError(f"figures.{name}.{key}: no such option; {hint}")
+            if not _fits(value, str(known[key].annotation)):
+                raise FigureError(f"figures.{name}.{key} = {value!r}: must be {_WORDS[str(known[key].annotation)]}")
+        for key, parameter in known.items():
+            if parameter.default is inspect.Parameter.empty and key not in options:
+                raise FigureError(f"figures.{name}.{key}: this option is missing")
+
+
+_WORDS = {
+    "float": "a number",
+    "int": "a whole number",
+    "str": "text in quotes",
+    "bool": "true or false",
+    "Sequence[float]": "an array of numbers",
+}
+_TYPES: dict[str, tuple[type, ...]] = {"float": (int, float), "int": (int,), "str": (str,), "bool": (bool,)}
+
+
+def _fits(value: object, kind: str) -> bool:
+    """Whether a value is of the type that an annotation names."""
+    if kind == "Sequence[float]":
+        return isinstance(value, list) and bool(value) and all(_fits(entry, "float") for entry in value)
+    return isinstance(value, _TYPES[kind]) and (kind == "bool" or not isinstance(value, bool))
+
+
+# Figures of eigenmodes
+
+
+def frequencies(results: PointResults, *, count: int = 12) -> dict[str, float]:
+    """Eigenfrequencies, the lowest first, without free rotation."""
+    modes = results.modes
+    elastic = [n for n, name in enumerate(modes.names) if name != FREE_ROTATION][:count]
+    return {str(number): float(modes.frequency[n]) for number, n in enumerate(elastic, start=1)}
+
+
+def nearest_frequency(results: PointResults, *, near_Hz: float, element: str = "") -> float:
+    """Eigenfrequency nearest to a frequency, or of the modes that strain an element most."""
+    return float(results.modes.frequency[_mode(results.modes, near_Hz, element)])
+
+
+def nearest_damping(results: PointResults, *, near_Hz: float, element: str = "") -> float:
+    """Share of critical damping of that mode."""
+    return float(results.modes.damping_ratio[_mode(results.modes, near_Hz, element)])
+
+
+def nearest_amplification(results: PointResults, *, near_Hz: float, element: str = "") -> float:
+    """Overall transmission error at resonance of that mode per transmission error of the mesh that excites it most."""
+    return float(results.modes.amplification[_mode(results.modes, near_Hz, element)].max())
+
+
+def nearest_strain(results: PointResults, *, near_Hz: float, element: str) -> float:
+    """Share of strain energy of an element in the mode nearest to a frequency."""
+    modes = results.modes
+    return float(modes.strain[_mode(modes, near_Hz, ""), _element(modes, element)])
+
+
+def loudest_frequency(results: PointResults, *, from_Hz: float = 0.0, to_Hz: float = 1e6) -> float:
+    """Eigenfrequency of the mode between two frequencies that amplifies a mesh's transmission error most."""
+    modes = results.modes
+    inside = (modes.frequency >= from_Hz) & (modes.frequency <= to_Hz)
+    if not inside.any():
+        raise PointError(f"no mode between {from_Hz:g} and {to_Hz:g} Hz")
+    return float(modes.frequency[np.argmax(np.where(inside, modes.amplification.max(axis=1), -1.0))])
+
+
+def _mode(modes: Modes, near: float, element: str) -> int:
+    """Mode nearest to a frequency (Hz), of those in which an element has the largest share if one is named."""
+    elastic = np.array([name != FREE_ROTATION for name in modes.names])
+    if element:
+        shares = modes.strain[:, _element(modes, element)]
+        elastic &= shares >= 0.5 * shares.max(initial=0.0)
+    distance = np.where(elastic, np.abs(modes.frequency - near), np.inf)
+    return int(np.argmin(distance))
+
+
+def _element(modes: Modes, name: str) -> int:
+    if name not in modes.element_names:
+        raise PointError(f"no element {name!r}; elements are {', '.join(modes.element_names)}")
+    return modes.element_names.index(name)
+
+
+# Figures of the static state: what meshes carry, and how evenly planets share it
+
+
+def mesh_forces(results: PointResults) -> dict[str, float]:
+    """Force of each mesh on its line of action under the static load."""
+    return dict(zip(results.assembly.mesh_names, map(float, results.static.mesh_force), strict=True))
+
+
+def misalignments(results: PointResults) -> dict[str, float]:
+    """Misalignment of each mesh under the static load, positive where the gap opens at the +z end."""
+    return dict(zip(results.assembly.mesh_names, map(float, results.static.misalignment), strict=True))
+
+
+def load_sharing(results: PointResults, *, meshes: str) -> float:
+    """Mesh load factor: the largest force among the planets' meshes over their mean, under the static load."""
+    forces = of_planets(results, meshes, results.static.mesh_force)
+    return float(forces.max() / forces.mean())
+
+
+def of_planets(results: PointResults, family: str, values: Floats) -> Floats:
+    """Pick the values of the meshes of a family, one for each planet.
+
+    Raises
+    ------
+    PointError
+        There is no such family.
+    """
+    families = [mesh.family for mesh in results.gearbox.meshes]
+    chosen = [n for n, own in enumerate(families) if own == family]
+    if not chosen:
+        raise PointError(f"no meshes {family!r}; meshes are {', '.join(dict.fromkeys(families))}")
+    return np.asarray(values[..., chosen], dtype=np.float64)
+
+
+# Figures of runs in time
+
+SETTLING = 0.25
+"""Share of a run that is left out at its beginning."""
+OVERALL = "overall_dte"
+
+
+def _settled(results: PointResults, signal: str) -> Floats:
+    """Values of a signal over time, the beginning left out."""
+    if signal not in results.run.variables or results.run[signal].dims[:1] != ("time",):
+        known = ", ".join(
+            str(name) for name, variable in results.run.variables.items() if variable.dims[:1] == ("time",)
+        )
+        raise PointError(f"no signal {signal!r} over time; signals are {known}")
+    values = results.run[signal].to_numpy()
+    return np.asarray(values[int(SETTLING * len(values)) :], dtype=np.float64)
+
+
+def rms(results: PointResults, *, signal: str = OVERALL) -> float:
+    """Root mean square of a signal about its mean; of several the largest."""
+    return float(np.max(np.std(_settled(results, signal), axis=0)))
+
+
+def peak_to_peak(results: PointResults, *, signal: str = OVERALL) -> float:
+    """Peak to peak of a signal; of several the largest."""
+    return float(np.max(np.ptp(_settled(results, signal), axis=0)))
+
+
+def final_speed(results: PointResults) -> float:
+    """Speed of the overall input at the end."""
+    return float(results.run["input_speed"].to_numpy()[-1])
+
+
+def dynamic_load_sharing(results: PointResults, *, meshes: str) -> float:
+    """Largest mean force among the planets' meshes over the mean of all, in a run."""
+    forces = of_planets(results, meshes, _settled(results, "mesh_force")).mean(axis=0)
+    return float(forces.max() / forces.mean())
+
+
+def order_amplitudes(
+    results: PointResults, *, centre: float, spacing: float, count: int = 3, signal: str = OVERALL
+) -> dict[str, float]:
+    """Amplitudes of a signal at orders of the input: a centre and `count` sidebands to either side.
+
+    The run is at constant speed and at least two periods of the spacing long.
+    """
+    orders = {f"{n:+d}" if n else "0": centre + n * spacing for n in range(-count, count + 1)}
+    return dict(zip(orders, _at_orders(results, signal, list(orders.values()), spacing), strict=True))
+
+
+def run_harmonics(results: PointResults, *, mesh: str, count: int = 6, signal: str = OVERALL) -> dict[str, float]:
+    """Amplitudes of a signal at the order of a mesh and its multiples, in a run of two turns of the input or more."""
+    meshes = {own.family: own.name for own in results.gearbox.meshes}
+    if mesh not in meshes:
+        raise PointError(f"no meshes {mesh!r}; meshes are {', '.join(meshes)}")
+    order = results.gearbox.train.mesh_frequencies(2.0 * math.pi)[meshes[mesh]]
+    orders = [n * order for n in range(1, count + 1)]
+    return {str(n): value for n, value in enumerate(_at_orders(results, signal, orders, 1.0), start=1)}
+
+
+def _at_orders(results: PointResults, signal: str, orders: list[float], spacing: float) -> list[float]:
+    """Peak amplitudes of a signal at orders of the input, those `spacing` apart told from each other.
+
+    Hann's window over a whole number of periods of the spacing, at least two: its zeros then fall on all neighbours.
+    """
+    values = _settled(results, signal)
+    time = results.run["time"].to_numpy()
+    if values.ndim > 1:
+        raise PointError(f"signal {signal!r} is one of each mesh or support; orders are read of single signals")
+    speed = np.abs(_settled(results, "input_speed"))
+    rate = 1.0 / float(time[1] - time[0])
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / rate
+    periods = int(angle[-1] * spacing / (2.0 * math.pi))
+    if periods < 2:
+        raise PointError(f"the run has {periods} whole periods of the order {spacing:g}, and needs 2; make it longer")
+    whole = int(np.searchsorted(angle, 2.0 * math.pi * periods / spacing))
+    weights = 1.0 - np.cos(2.0 * math.pi * angle[:whole] / angle[whole])
+    weighed = weights * values[:whole] * (2.0 / weights.sum())
+    return [float(abs(np.exp(-1j * order * angle[:whole]) @ weighed)) for order in orders]
+
+
+# Figures of steady responses over speed
+
+
+def _amplitudes(results: PointResults, signal: str) -> Floats:
+    """Amplitudes (points, lines) of a signal."""
+    names = [str(name) for name in results.steady["signal"].to_numpy()]
+    if signal not in names:
+        raise PointError(f"no signal {signal!r}; signals are {', '.join(names)}")
+    return np.asarray(results.steady["amplitude"].to_numpy()[:, :, names.index(signal)], dtype=np.float64)
+
+
+def _line(results: PointResults, name: str) -> int:
+    """Place of a line by its name, such as ``2 x sun_planet``."""
+    bases = tuple(str(base) for base in results.steady["base"].to_numpy())
+    names = [line_name(tuple(int(n) for n in row), bases) for row in results.steady["index"].to_numpy()]
+    if name not in names:
+        raise PointError(f"no line {name!r}; lines are {', '.join(names[1:8])} and so on")
+    return names.index(name)
+
+
+def largest_line(results: PointResults, *, line: str, signal: str = OVERALL) -> float:
+    """Largest amplitude over speed of a line of a signal, such as the line ``2 x sun_planet``."""
+    return float(_amplitudes(results, signal)[:, _line(results, line)].max())
+
+
+def loudest_peak(results: PointResults, *, signal: str = OVERALL) -> float:
+    """Amplitude of the loudest line of a signal over all speeds."""
+    return float(_amplitudes(results, signal)[:, 1:].max())
+
+
+def loudest_speed(results: PointResults, *, signal: str = OVERALL) -> float:
+    """Speed of the input at which a line of a signal is loudest."""
+    found = peaks(results.steady, signal)
+    if found:
+        return float(abs(found[0].speed))
+    return float("nan")
+
+
+def harmonics(
+    results: PointResults, *, mesh: str, speed_rpm: float, count: int = 6, signal: str = OVERALL
+) -> dict[str, float]:
+    """Amplitudes of the harmonics of a mesh in a signal, at the speed nearest to one."""
+    speeds = np.abs(results.steady["speed"].to_numpy())
+    at = int(np.argmin(np.abs(speeds - abs(speed_rpm) * RPM)))
+    values = _amplitudes(results, signal)[at]
+    lines = {n: _line(results, mesh if n == 1 else f"{n} x {mesh}") for n in range(1, count + 1)}
+    return {str(n): float(values[line]) for n, line in lines.items()}
+
+
+# Figures of transmission error tables and of contact over loads and misalignments
+
+LOADS = (0.25, 0.5, 1.0, 1.5)
+"""Loads over the static one that a ripple is looked at."""
+MISALIGNMENTS_UM = (-20.0, 0.0, 20.0)
+"""Openings at the +z end over the common face width."""
+POSITIONS = 16
+
+
+def ste_peak_to_peak(results: PointResults, *, pair: str) -> float:
+    """Peak to peak of the static transmission error of a pair at its static load."""
+    return float(np.ptp(results.table(pair).static_state["ste"].to_numpy()))
+
+
+def ste_harmonic(results: PointResults, *, pair: str, harmonic: int = 1) -> float:
+    """Amplitude of a harmonic of the static transmission error of a pair at its static load."""
+    ste = results.table(pair).static_state["ste"].to_numpy()
+    return float(2.0 * np.abs(np.fft.rfft(ste)[harmonic]) / ste.size)
+
+
+def mesh_stiffness(results: PointResults, *, pair: str) -> float:
+    """Mean of the mesh stiffness of a pair over the cycle at its static load."""
+    return float(results.table(pair).static_state["mesh_stiffness"].mean())
+
+
+def contact_pressure(results: PointResults, *, pair: str) -> float:
+    """Highest contact pressure of a pair over the cycle at its static load."""
+    return float(results.table(pair).static_state["max_pressure"].max())
+
+
+def ripples(ste: Floats) -> Floats:
+    """Peak to peak over positions (the first axis) of a transmission error."""
+    return np.asarray(np.ptp(ste, axis=0), dtype=np.float64)
+
+
+def worst_ripple(
+    results: PointResults,
+    *,
+    pair: str,
+    torque_factors: Sequence[float] = LOADS,
+    misalignment_um: Sequence[float] = MISALIGNMENTS_UM,
+    positions: int = POSITIONS,
+) -> float:
+    """Largest peak to peak of the static transmission error over loads and misalignments."""
+    data = results.states(pair, positions, torque_factors, misalignment_um)
+    return float(ripples(data["ste"].to_numpy()).max())
+
+
+def mean_ripple(
+    results: PointResults,
+    *,
+    pair: str,
+    torque_factors: Sequence[float] = LOADS,
+    misalignment_um: Sequence[float] = MISALIGNMENTS_UM,
+    positions: int = POSITIONS,
+) -> float:
+    """Mean peak to peak of the static transmission error over loads and misalignments."""
+    data = results.states(pair, positions, torque_factors, misalignment_um)
+    return float(ripples(data["ste"].to_numpy()).mean())
+
+
+def worst_pressure(
+    results: PointResults,
+    *,
+    pair: str,
+    torque_factors: Sequence[float] = LOADS,
+    misalignment_um: Sequence[float] = MISALIGNMENTS_UM,
+    positions: int = POSITIONS,
+) -> float:
+    """Highest contact pressure inside the flank over loads and misalignments."""
+    data = results.states(pair, positions, torque_factors, misalignment_um)
+    return float(data["max_pressure"].max())
+
+
+# Figures of lives: safeties, damages and hours of gears and bearings, as the verb `life` tells them
+
+SAFETIES: Mapping[str, str] = {"life": "{}_safety", "static": "{}_static", "iso6336": "standard_{}_safety"}
+"""Words of the option `of`: over the life, under the largest load, over the life by stresses of the standard."""
+LIVES: Mapping[str, str] = {"L10": "basic", "L10r": "reference", "L10m": "modified"}
+"""Words of the option `by`."""
+LEAST = "least"
+"""Word of the option `by`: whichever is worst for a bearing."""
+Worst = Callable[[Iterable[float]], float]
+
+
+def contact_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
+    """Safety S_H against pitting by gear, flank and meshes, the worst of planets."""
+    return _of_flanks(results, SAFETIES[of].format("contact"))
+
+
+def root_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
+    """Safety S_F against breakage of teeth by gear, flank and meshes, the worst of planets."""
+    return _of_flanks(results, SAFETIES[of].format("root"))
+
+
+def contact_damages(results: PointResults) -> dict[str, float]:
+    """Miner's sum of pitting by gear, flank and meshes, the worst of planets."""
+    return _of_flanks(results, "contact_damage")
+
+
+def root_damages(results: PointResults) -> dict[str, float]:
+    """Miner's sum of breakage of teeth by gear, flank and meshes, the worst of planets."""
+    return _of_flanks(results, "root_damage")
+
+
+def worst_planets(results: PointResults) -> dict[str, float]:
+    """Which planet's flanks are worn most, by gear, flank and meshes: its number; none where there is but one body."""
+    data = results.life
+    holders = zip(data["flank"].to_numpy().tolist(), data["flank_contact_holder"].to_numpy().tolist(), strict=True)
+    return {str(label): _number_of(str(holder)) for label, holder in holders}
+
+
+def contact_safety(results: PointResults, *, gear: str = "", of: str = "life") -> float:
+    """Least safety S_H against pitting, of all gears or of one."""
+    return _worst(contact_safeties(results, of=of), gear, min)
+
+
+def root_safety(results: PointResults, *, gear: str = "", of: str = "life") -> float:
+    """Least safety S_F against breakage of teeth, of all gears or of one."""
+    return _worst(root_safeties(results, of=of), gear, min)
+
+
+def contact_damage(results: PointResults, *, gear: str = "") -> float:
+    """Largest Miner's sum of pitting, of all gears or of one."""
+    return _worst(contact_damages(results), gear, max)
+
+
+def root_damage(results: PointResults, *, gear: str = "") -> float:
+    """Largest Miner's sum of breakage of teeth, of all gears or of one."""
+    return _worst(root_damages(results), gear, max)
+
+
+def bearing_lives(results: PointResults, *, by: str = LEAST) -> dict[str, float]:
+    """Hours until bearings fail by L10, L10r or L10m, or by whichever is least."""
+    return _of_bearings(results, "hours", by, min)
+
+
+def bearing_damages(results: PointResults, *, by: str = LEAST) -> dict[str, float]:
+    """Miner's sum of bearings by L10, L10r or L10m, or by whichever is worst."""
+    return _of_bearings(results, "damage", by, max)
+
+
+def static_safeties(results: PointResults) -> dict[str, float]:
+    """Safety S_0 of bearings under the largest load."""
+    data = results.life
+    return dict(
+        zip(map(str, data["bearing"].to_numpy()), map(float, data["bearing_static_safety"].to_numpy()), strict=True)
+    )
+
+
+def bearing_life(results: PointResults, *, bearing: str = "", by: str = LEAST) -> float:
+    """Least hours until a bearing fails, of all or of one."""
+    return _worst(bearing_lives(results, by=by), bearing, min)
+
+
+def bearing_damage(results: PointResults, *, bearing: str = "", by: str = LEAST) -> float:
+    """Largest Miner's sum of bearings, of all or of one."""
+    return _worst(bearing_damages(results, by=by), bearing, max)
+
+
+def static_safety(results: PointResults, *, bearing: str = "") -> float:
+    """Least static safety S_0 of bearings, of all or of one."""
+    return _worst(static_safeties(results), bearing, min)
+
+
+def life_hours(results: PointResults) -> float:
+    """Hours of operation until the first Miner's sum of a gear or a bearing is one."""
+    from exugear.life.life_file import limits
+
+    largest = max((damage for _, _, damage in limits(results.life)), default=math.nan)
+    hours = float(results.life["hours"].sum())
+    if largest > 0.0:
+        return hours / largest
+    if math.isnan(largest):
+        return math.nan
+    return math.inf
+
+
+def shortfalls(results: PointResults) -> float:
+    """How many sentences the verb `life` ends with: parts that fail, or fall short of what is asked for."""
+    return float(sum(len(json.loads(results.life.attrs[key])) for key in ("failures", "shortfalls")))
+
+
+def _of_flanks(results: PointResults, key: str) -> dict[str, float]:
+    data = results.life
+    return dict(zip(map(str, data["flank"].to_numpy()), map(float, data[f"flank_{key}"].to_numpy()), strict=True))
+
+
+def _of_bearings(results: PointResults, key: str, by: str, worst: Worst) -> dict[str, float]:
+    """Figures by bearing, of one kind of life or the worst of all that are known."""
+    data = results.life
+    names = [_name_of(kind, key) for kind in (LIVES.values() if by == LEAST else [LIVES[by]])]
+    columns = zip(*(data[name].to_numpy().tolist() for name in names), strict=True)
+    known = [[value for value in column if not math.isnan(value)] for column in columns]
+    found = [worst(values) if values else math.nan for values in known]
+    return dict(zip(map(str, data["bearing"].to_numpy()), found, strict=True))
+
+
+def _name_of(kind: str, key: str) -> str:
+    if (kind, key) == ("basic", "damage"):
+        return "bearing_damage"
+    return f"bearing_{kind}_{key}"
+
+
+def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
+    """Least or largest of those that are known, of all parts or of one."""
+    own = {name: value for name, value in values.items() if part in ("", name, name.split(" ")[0])}
+    known = [value for value in own.values() if not math.isnan(value)]
+    if not known:
+        raise PointError(f"{part or 'no part'}: the life of this gearbox has no such figure; `exugear life` says why")
+    return worst(known)
+
+
+def _number_of(holder: str) -> float:
+    number = holder.rpartition("_")[2]
+    if number.isdecimal():
+        return float(number)
+    return math.nan
+
+
+# All figures that a study file can name; a study in Python may bring its own
+
+AS_SIGNAL = "as the signal"
+"""Unit of figures that an option `signal` names."""
+FIGURES: dict[str, Figure] = {
+    "ste_peak_to_peak": Figure(ste_peak_to_peak, "m"),
+    "ste_harmonic": Figure(ste_harmonic, "m"),
+    "mesh_stiffness": Figure(mesh_stiffness, "N/m"),
+    "contact_pressure": Figure(contact_pressure, "Pa"),
+    "worst_ripple": Figure(worst_ripple, "m"),
+    "mean_ripple": Figure(mean_ripple, "m"),
+    "worst_pressure": Figure(worst_pressure, "Pa"),
+    "mesh_forces": Figure(mesh_forces, "N", "mesh"),
+    "misalignments": Figure(misalignments, "rad", "mesh"),
+    "load_sharing": Figure(load_sharing, "1"),
+    "frequencies": Figure(frequencies, "Hz", "mode"),
+    "nearest_frequency": Figure(nearest_frequency, "Hz"),
+    "nearest_damping": Figure(nearest_damping, "1"),
+    "nearest_amplification": Figure(nearest_amplification, "m/m"),
+    "nearest_strain": Figure(nearest_strain, "1"),
+    "loudest_frequency": Figure(loudest_frequency, "Hz"),
+    "largest_line": Figure(largest_line, AS_SIGNAL, needs="steady"),
+    "loudest_peak": Figure(loudest_peak, AS_SIGNAL, needs="steady"),
+    "loudest_speed": Figure(loudest_speed, "rad/s", needs="steady"),
+    "harmonics": Figure(harmonics, AS_SIGNAL, "harmonic", "steady"),
+    "rms": Figure(rms, AS_SIGNAL, needs="run"),
+    "peak_to_peak": Figure(peak_to_peak, AS_SIGNAL, needs="run"),
+    "final_speed": Figure(final_speed, "rad/s", needs="run"),
+    "dynamic_load_sharing": Figure(dynamic_load_sharing, "1", needs="run"),
+    "run_harmonics": Figure(run_harmonics, AS_SIGNAL, "harmonic", "run"),
+    "order_amplitudes": Figure(order_amplitudes, AS_SIGNAL, "sideband", "run"),
+    "contact_safeties": Figure(contact_safeties, "1", "flank", "life"),
+    "root_safeties": Figure(root_safeties, "1", "flank", "life"),
+    "contact_damages": Figure(contact_damages, "1", "flank", "life"),
+    "root_damages": Figure(root_damages, "1", "flank", "life"),
+    "worst_planets": Figure(worst_planets, "1", "flank", "life"),
+    "contact_safety": Figure(contact_safety, "1", needs="life"),
+    "root_safety": Figure(root_safety, "1", needs="life"),
+    "contact_damage": Figure(contact_damage, "1", needs="life"),
+    "root_damage": Figure(root_damage, "1", needs="life"),
+    "bearing_lives": Figure(bearing_lives, "h", "bearing", "bearings"),
+    "bearing_damages": Figure(bearing_damages, "1", "bearing", "bearings"),
+    "static_safeties": Figure(static_safeties, "1", "bearing", "bearings"),
+    "bearing_life": Figure(bearing_life, "h", needs="bearings"),
+    "bearing_damage": Figure(bearing_damage, "1", needs="bearings"),
+    "static_safety": Figure(static_safety, "1", needs="bearings"),
+    "life_hours": Figure(life_hours, "h", needs="life"),
+    "shortfalls": Figure(shortfalls, "1", needs="life"),
+}
+"""By the name in a study file."""
+
+
+@dataclass(frozen=True)
+class KeptFigure:
+    """A figure with its options, as a study keeps it."""
+
+    figure: Figure
+    options: Mapping[str, Any]
+
+    @property
+    def units(self) -> str:
+        """Unit of its numbers; of a signal that one's."""
+        if self.figure.units != AS_SIGNAL:
+            return self.figure.units
+        named = str(self.options.get("signal", OVERALL)).split(" ")[0]
+        return next((signal.units for signal in SIGNALS if signal.name == named), "")
+
+    def of(self, results: PointResults) -> Values:
+        """Compute it for a point."""
+        return self.figure.of(results, self.options)
+
+
+def kept_figures(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Figure]) -> dict[str, KeptFigure]:
+    """Figures of the sections of a study file, checked.
+
+    Parameters
+    ----------
+    sections : by the name in the dataset: ``figure`` and its options
+    known : figures that may be named
+
+    Raises
+    ------
+    FigureError
+        An unknown figure or wrong options.
+
+    Examples
+    --------
+    >>> kept_figures({"ringing": {"figure": "nearest_frequncy", "near_Hz": 800.0}}, FIGURES)
+    Traceback (most recent call last):
+    ...
+    exugear.studies.figures.FigureError: figures.ringing.figure = 'nearest_frequncy': no such figure; did you
+    mean 'nearest_frequency'?
+    """
+    kept = {}
+    for name, section in sections.items():
+        options = dict(section)
+        wanted = str(options.pop("figure", ""))
+        if wanted not in known:
+            near = difflib.get_close_matches(wanted[:100], known, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"figures are {', '.join(known)}"
+            raise FigureError(f"figures.{name}.figure = {wanted!r}: no such figure; {hint}")
+        known[wanted].check(name, options)
+        kept[name] = KeptFigure(known[wanted], options)
+    return kept

@@ -1,0 +1,614 @@
+"""The points of a study: every combination of listed values with every draw, as values at paths of the case."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+from scipy.stats import qmc
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.sections.schema.keys import tables, unit_of
+from exugear.studies.sections import ParameterSection, StudyFile
+from fe_ste.standards.iso1328 import tolerance
+from fe_ste.tools.arrays import Floats
+
+# Distributions of parameters, by the inverse of their distribution functions, and draws that are correlated
+
+Sampling = Literal["sobol", "latin_hypercube", "random"]
+_OPEN = 1e-15
+"""Distance from 0 and 1 at which a share is kept: a normal distribution has no end."""
+
+
+class Distribution(Protocol):
+    """What draws are taken from."""
+
+    def at(self, share: Floats) -> Floats:
+        """Values that a share (0 to 1) of all draws lies below."""
+        ...
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Normal distribution, cut off where limits are given.
+
+    Examples
+    --------
+    >>> Normal(0.0, 1.0).at(np.array([0.5, 0.975])).round(3).tolist()
+    [0.0, 1.96]
+    """
+
+    mean: float
+    deviation: float
+    """Of the distribution before it is cut off."""
+    least: float = -math.inf
+    most: float = math.inf
+    """Draws lie between."""
+
+    def at(self, share: Floats) -> Floats:
+        """Values that a share (0 to 1) of all draws lies below."""
+        low, high = ndtr((np.array([self.least, self.most]) - self.mean) / self.deviation)
+        inside = np.clip(low + share * (high - low), _OPEN, 1.0 - _OPEN)
+        values = self.mean + self.deviation * ndtri(inside)
+        return np.asarray(np.clip(values, self.least, self.most), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Uniform:
+    """Every value between two is as likely.
+
+    Examples
+    --------
+    >>> Uniform(2.0, 4.0).at(np.array([0.25])).tolist()
+    [2.5]
+    """
+
+    least: float
+    most: float
+
+    def at(self, share: Floats) -> Floats:
+        """Values that a share (0 to 1) of all draws lies below."""
+        return np.asarray(self.least + share * (self.most - self.least), dtype=np.float64)
+
+
+def shares(sampling: Sampling, count: int, dimensions: int, seed: int) -> Floats:
+    """Points of the unit cube (count, dimensions), evenly spread; the same for the same seed.
+
+    A Sobol sequence that is made longer begins with the points it had.
+
+    Parameters
+    ----------
+    sampling : {"sobol", "latin_hypercube", "random"}
+    count : of Sobol points a power of two
+
+    Examples
+    --------
+    >>> shares("latin_hypercube", 4, 2, seed=1).shape
+    (4, 2)
+    """
+    generator = np.random.default_rng(seed)
+    if sampling == "random":
+        return generator.random((count, dimensions))
+    if sampling == "sobol":
+        points = qmc.Sobol(dimensions, rng=generator).random_base2(round(math.log2(count)))
+    else:
+        points = qmc.LatinHypercube(dimensions, rng=generator).random(count)
+    return np.asarray(points, dtype=np.float64)
+
+
+def correlated(independent: Floats, correlation: float) -> Floats:
+    """Shares (count, members) of a group whose members are correlated pair by pair (Gaussian copula).
+
+    Parameters
+    ----------
+    independent : (count, members) shares that are not correlated
+    correlation : of the normal variables behind any two members, 0 to 1
+
+    Examples
+    --------
+    >>> same = correlated(np.array([[0.2, 0.9]]), 1.0)
+    >>> bool(np.allclose(same, 0.2))
+    True
+    """
+    members = independent.shape[1]
+    if correlation in (0.0, 1.0) or members == 1:
+        if correlation == 1.0:
+            return np.repeat(independent[:, :1], members, axis=1)
+        return independent
+    matrix = np.full((members, members), correlation) + (1.0 - correlation) * np.eye(members)
+    normal = ndtri(np.clip(independent, _OPEN, 1.0 - _OPEN)) @ np.linalg.cholesky(matrix).T
+    return np.asarray(ndtr(normal), dtype=np.float64)
+
+
+# Dotted paths into a gearbox file: what stands there, what may stand there, and a content with other values
+
+SHOWN_MATCHES = 3
+"""Most near matches that a message names."""
+
+
+class PathError(ValueError):
+    """A path that leads nowhere in a gearbox file; the message names near matches."""
+
+
+def value_at(content: Mapping[str, Any], path: str) -> Any:
+    """Return what stands at a path; None where nothing does.
+
+    Parameters
+    ----------
+    content : of a gearbox file
+    path : keys joined by dots; an entry of a list by its number from 0
+
+    Examples
+    --------
+    >>> value_at({"gears": {"sun": {"teeth": 21}}, "angles": [0.0, 120.0]}, "gears.sun.teeth")
+    21
+    >>> value_at({"angles": [0.0, 120.0]}, "angles.1")
+    120.0
+    """
+    found: Any = content
+    for key in path.split("."):
+        if isinstance(found, Mapping) and key in found:
+            found = found[key]
+        elif isinstance(found, list) and key.isdigit() and int(key) < len(found):
+            found = found[int(key)]
+        else:
+            return None
+    return found
+
+
+def changed(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a content with other values at some paths; tables on the way are made, what is not changed is shared.
+
+    Raises
+    ------
+    PathError
+        A path leads through what is neither table nor list, or beyond the end of a list.
+
+    Examples
+    --------
+    >>> changed({"housing": {"factor": 1.0}, "angles": [0.0, 120.0]}, {"housing.factor": 0.3, "angles.1": 125.0})
+    {'housing': {'factor': 0.3}, 'angles': [0.0, 125.0]}
+    """
+    result = dict(content)
+    copied = {id(result)}
+    for path, value in changes.items():
+        *parents, last = path.split(".")
+        section: Any = result
+        for key in parents:
+            inner = _inner(section, key, path)
+            if id(inner) not in copied:
+                inner = list(inner) if isinstance(inner, list) else dict(inner)
+                copied.add(id(inner))
+                section[_place(section, key, path)] = inner
+            section = inner
+        section[_place(section, last, path)] = value
+    return result
+
+
+def _inner(section: Any, key: str, path: str) -> Any:
+    inner = section[_place(section, key, path)] if isinstance(section, list) else section.get(key, {})
+    if not isinstance(inner, Mapping | list):
+        raise PathError(f"{path}: {key!r} is neither a table nor a list")
+    return inner
+
+
+def _place(section: Any, key: str, path: str) -> Any:
+    """Key of a table, or number of an entry of a list."""
+    if not isinstance(section, list):
+        return key
+    if not (key.isdigit() and int(key) < len(section)):
+        raise PathError(f"{path}: {key!r} is no entry of a list of {len(section)}; entries count from 0")
+    return int(key)
+
+
+def check_path(content: Mapping[str, Any], path: str) -> None:
+    """Refuse a path that leads nowhere.
+
+    A key that the file leaves out, and that may stand there, is fine.
+
+    Raises
+    ------
+    PathError
+        It names near matches.
+
+    Examples
+    --------
+    >>> check_path({"housing": {"factor": 0.3}}, "housing.facter")
+    Traceback (most recent call last):
+    ...
+    exugear.studies.sampling.PathError: no key 'housing.facter' in the case; did you mean housing.factor?
+    """
+    if value_at(content, path) is not None or path in set(_possible(content)):
+        return
+    single = {key for key in _possible(content) if not isinstance(value_at(content, key), Mapping)}
+    near = difflib.get_close_matches(path[:200], sorted(single.union(_present(content, ""))), SHOWN_MATCHES)
+    hint = f"did you mean {' or '.join(near)}?" if near else "paths are as bearings.NAME.z_mm, with the case's names"
+    raise PathError(f"no key {path[:200]!r} in the case; {hint}")
+
+
+def _present(content: Any, before: str) -> Iterator[str]:
+    """Paths of all single values of a content."""
+    if isinstance(content, Mapping):
+        for key, value in content.items():
+            yield from _present(value, f"{before}.{key}" if before else key)
+    else:
+        yield before
+
+
+def _possible(content: Mapping[str, Any]) -> Iterator[str]:
+    """Paths of all keys that may stand in the file, for the names that it has."""
+    for table, model in tables().items():
+        for place in _named(content, table.split(".") if table else []):
+            yield from (f"{place}.{key}" if place else key for key in model.model_fields)
+
+
+def _named(content: Any, pattern: list[str], before: str = "") -> Iterator[str]:
+    """Places of a table: the word NAME of its pattern stands for each entry that is there."""
+    if not pattern:
+        yield before
+        return
+    first, *rest = pattern
+    every = list(content) if isinstance(content, Mapping) else []
+    names = every if first == "NAME" else [first]
+    for name in names:
+        inner = content.get(name) if isinstance(content, Mapping) else None
+        yield from _named(inner, rest, f"{before}.{name}" if before else name)
+
+
+# The points of a study: every combination of listed values with every draw, as values at paths of the case
+
+MOST_POINTS = 10_000_000
+SAMPLE = "sample"
+"""Dimension of draws."""
+PARAMETER, SIDE = "parameter", "side"
+"""Dimensions of local derivatives."""
+SIDES = ("below", "above")
+_DEVIATIONS_WITHIN = 3.0
+"""Standard deviations of a production within its tolerance."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One variation."""
+
+    index: tuple[int, ...]
+    """Its place along the dimensions of the study."""
+    changes: Mapping[str, Any]
+    """Values at paths of the case."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A coordinate of the study's dataset."""
+
+    dimensions: tuple[str, ...]
+    values: Any
+    """Array."""
+    units: str = ""
+    path: str = ""
+    """What it sets, in words."""
+
+
+@dataclass(frozen=True)
+class Design:
+    """All points of a study over labelled dimensions."""
+
+    shape: Mapping[str, int]
+    """Mapping of dimension to size."""
+    axes: Mapping[str, Axis]
+    """By name."""
+    points: tuple[Point, ...]
+    levels: Mapping[str, tuple[Mapping[str, Any], ...]] = field(default_factory=dict)
+    """By dimension, values at paths of the case along each dimension; points are all their combinations."""
+
+
+@dataclass(frozen=True)
+class _Levels:
+    """Values that a listed parameter takes one after the other."""
+
+    axes: Mapping[str, Axis]
+    changes: tuple[Mapping[str, Any], ...]
+
+
+def design_of(study: StudyFile, gearbox: Gearbox) -> Design:
+    """Make the points of a study of a gearbox whose `changes` are made.
+
+    Raises
+    ------
+    PathError
+        Values are scaled or shifted that are no numbers, or there are too many points.
+    ValueError
+        A tolerance class that the gear has not got.
+    """
+    if any(parameter.kind == "step" for parameter in study.parameters.values()):
+        return _derivatives(study, gearbox)
+    listed = {name: parameter for name, parameter in study.parameters.items() if not parameter.is_drawn}
+    levels = {name: _levels(name, parameter, gearbox) for name, parameter in listed.items()}
+    drawn = {name: parameter for name, parameter in study.parameters.items() if parameter.is_drawn}
+    if drawn:
+        levels[SAMPLE] = _draws(study, drawn, gearbox)
+    shape = {name: len(level.changes) for name, level in levels.items()}
+    total = int(np.prod([float(size) for size in shape.values()]))
+    if total > MOST_POINTS:
+        raise PathError(f"parameters: {total:.3g} combinations; a study has at most {MOST_POINTS}")
+    axes = {name: axis for level in levels.values() for name, axis in level.axes.items()}
+    points = tuple(
+        Point(
+            index,
+            {
+                key: value
+                for n, level in zip(index, levels.values(), strict=True)
+                for key, value in level.changes[n].items()
+            },
+        )
+        for index in itertools.product(*(range(size) for size in shape.values()))
+    )
+    return Design(shape, axes, points, {name: level.changes for name, level in levels.items()})
+
+
+def _levels(name: str, parameter: ParameterSection, gearbox: Gearbox) -> _Levels:
+    """Values of a parameter that lists them."""
+    if parameter.settings is not None:
+        labels = np.array(list(parameter.settings), dtype=object)
+        axis = Axis((name,), labels, "", ", ".join(parameter.targets))
+        return _Levels({name: axis}, tuple(dict(setting) for setting in parameter.settings.values()))
+    values = listed_values(parameter)
+    changes = tuple({path: acting(parameter, gearbox, path, value) for path in parameter.targets} for value in values)
+    labels = _labels(values)
+    return _Levels({name: Axis((name,), labels, units_of(parameter), ", ".join(parameter.targets))}, changes)
+
+
+def listed_values(parameter: ParameterSection) -> list[Any]:
+    """Values of a list or a range."""
+    if parameter.range is None:
+        return list(parameter.values or [])
+    spread = np.geomspace if parameter.range.scale == "logarithmic" else np.linspace
+    return [_rounded(value) for value in spread(parameter.range.first, parameter.range.last, parameter.range.count)]
+
+
+def _labels(values: list[Any]) -> Any:
+    """Numbers as they are; anything else in words."""
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
+        return np.array(values, dtype=np.float64)
+    return np.array([value if isinstance(value, str) else str(value) for value in values], dtype=object)
+
+
+def acting(parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any) -> Any:
+    """Value at a path: as it is, or by that of the case.
+
+    Raises
+    ------
+    PathError
+        The case has no number there.
+    """
+    return acted(parameter, own_value(gearbox, path), path, value)
+
+
+def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
+    """Value at a path: as it is, or by one that stands there.
+
+    Raises
+    ------
+    PathError
+        No number stands there.
+    """
+    if parameter.acts == "replaces":
+        return value
+    if isinstance(own, bool) or not isinstance(own, int | float):
+        raise PathError(
+            f"{path}: the case has no number there that a value {parameter.acts.rstrip('s')}s; give one in "
+            "[changes], or acts = 'replaces'"
+        )
+    return _rounded(own * value if parameter.acts == "scales" else own + value)
+
+
+def own_value(gearbox: Gearbox, path: str) -> Any:
+    """Value that a case has at a path, also where the file leaves it to the default."""
+    given = value_at(gearbox.content, path)
+    if given is not None:
+        return given
+    found: Any = gearbox.case
+    for key in path.split("."):
+        found = found.get(key) if isinstance(found, Mapping) else getattr(found, key, None)
+    return found
+
+
+def _rounded(value: float) -> float:
+    """Twelve digits: what another machine computes is the same point."""
+    return float(f"{value:.12g}")
+
+
+def units_of(parameter: ParameterSection) -> str:
+    """Return the unit of the values, from the ends of the keys that they set."""
+    if parameter.acts == "scales":
+        return "1"
+    units = {unit_of(path.rpartition(".")[2]) for path in parameter.targets}
+    if len(units) == 1:
+        return units.pop()
+    return ""
+
+
+def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox) -> _Levels:
+    """Values of all parameters with distributions, drawn together."""
+    axes, draws = drawn_values(study, drawn, gearbox)
+    axes = {SAMPLE: Axis((SAMPLE,), np.arange(1, len(draws) + 1)), **axes}
+    owners = {path: parameter for parameter in drawn.values() for path in parameter.targets}
+    changes = [{path: acting(owners[path], gearbox, path, value) for path, value in draw.items()} for draw in draws]
+    return _Levels(axes, tuple(changes))
+
+
+def drawn_values(
+    study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox
+) -> tuple[dict[str, Axis], list[dict[str, float]]]:
+    """Coordinates of parameters with distributions over their draws, and values by path before they act.
+
+    Raises
+    ------
+    ValueError
+        See `distribution_of`.
+    """
+    count = study.samples or 1
+    members = {name: len(parameter.targets) if parameter.correlation < 1.0 else 1 for name, parameter in drawn.items()}
+    cube = shares(study.sampling, count, sum(members.values()), study.seed)
+    axes: dict[str, Axis] = {}
+    draws: list[dict[str, float]] = [{} for _ in range(count)]
+    first = 0
+    for name, parameter in drawn.items():
+        own = cube[:, first : first + members[name]]
+        first += members[name]
+        values = distribution_of(parameter, gearbox).at(correlated(own, parameter.correlation))
+        axes |= _drawn_axes(name, parameter, values)
+        for n, row in enumerate(values):
+            for m, path in enumerate(parameter.targets):
+                draws[n][path] = _rounded(float(row[min(m, len(row) - 1)]))
+    return axes, draws
+
+
+def _drawn_axes(name: str, parameter: ParameterSection, values: Floats) -> dict[str, Axis]:
+    """Coordinates of a drawn parameter: over the draws, and over its paths where these are drawn by themselves."""
+    units = units_of(parameter)
+    paths = ", ".join(parameter.targets)
+    if values.shape[1] == 1:
+        return {name: Axis((SAMPLE,), values[:, 0], units, paths)}
+    member = f"{name}_path"
+    return {
+        member: Axis((member,), np.array(parameter.targets, dtype=object)),
+        name: Axis((SAMPLE, member), values, units, paths),
+    }
+
+
+def distribution_of(parameter: ParameterSection, gearbox: Gearbox) -> Distribution:
+    """Distribution of a parameter.
+
+    Raises
+    ------
+    ValueError
+        The case has no such gear, or it lies outside ISO 1328.
+    """
+    if parameter.uniform is not None:
+        return Uniform(parameter.uniform.least, parameter.uniform.most)
+    if parameter.normal is not None:
+        normal = parameter.normal
+        limits = (-np.inf if normal.least is None else normal.least, np.inf if normal.most is None else normal.most)
+        return Normal(normal.mean, normal.deviation, *limits)
+    assert parameter.iso1328 is not None
+    wanted = parameter.iso1328
+    if wanted.gear not in gearbox.gears:
+        raise ValueError(f"iso1328: no gear {wanted.gear!r} in the case; gears are {', '.join(gearbox.gears)}")
+    gear = gearbox.gears[wanted.gear]
+    most = 1e6 * tolerance(
+        wanted.deviation,
+        wanted.tolerance_class,
+        reference_diameter=2.0 * gear.reference_radius,
+        normal_module=gear.normal_module,
+        face_width=gear.face_width,
+    )
+    least = 0.0 if wanted.deviation == "runout" else -most  # half of the normal distribution: it has no sign
+    return Normal(0.0, most / _DEVIATIONS_WITHIN, least, most)
+
+
+def _derivatives(study: StudyFile, gearbox: Gearbox) -> Design:
+    """Two points for each parameter, a step below and a step above the case."""
+    points = []
+    steps = []
+    for number, parameter in enumerate(study.parameters.values()):
+        step = parameter.step or 0.0
+        steps.append(step)
+        for side, sign in enumerate((-1.0, 1.0)):
+            value = 1.0 + sign * step if parameter.acts == "scales" else sign * step
+            moved = parameter if parameter.acts == "scales" else parameter.model_copy(update={"acts": "shifts"})
+            points.append(
+                Point((number, side), {path: acting(moved, gearbox, path, value) for path in parameter.targets})
+            )
+    axes = {
+        PARAMETER: Axis((PARAMETER,), np.array(list(study.parameters), dtype=object)),
+        SIDE: Axis((SIDE,), np.array(SIDES, dtype=object)),
+        "step": Axis((PARAMETER,), np.array(steps)),
+    }
+    levels = {
+        name: tuple(point.changes for point in points if point.index[0] == number)
+        for number, name in enumerate(study.parameters)
+    }
+    return Design({PARAMETER: len(study.parameters), SIDE: len(SIDES)}, axes, tuple(points), levels)
+
+
+# Tolerances of a search: what production does not hold, the same draws at every point that is looked at
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Draws of all tolerances together."""
+
+    axes: Mapping[str, Axis]
+    """By name, coordinates over the draws."""
+    draws: tuple[Mapping[str, float], ...]
+    """Tuple of mapping of path to float. Values before they act."""
+    acting: Mapping[str, ParameterSection]
+    """Mapping of path to ParameterSection. What a value at a path does."""
+
+    def produced(self, gearbox: Gearbox, changes: Mapping[str, Any]) -> list[dict[str, Any]]:
+        """Values at paths of the case, of each draw: a tolerance shifts or scales what a point has set.
+
+        Raises
+        ------
+        PathError
+            There is no number that a value scales or shifts.
+        """
+        return [
+            {
+                **changes,
+                **{
+                    path: acted(self.acting[path], changes.get(path, own_value(gearbox, path)), path, value)
+                    for path, value in draw.items()
+                },
+            }
+            for draw in self.draws
+        ]
+
+
+def tolerances_of(study: StudyFile, gearbox: Gearbox) -> Tolerances | None:
+    """Draw the tolerances of a study; None where it has none.
+
+    Raises
+    ------
+    PathError, ValueError
+        As `exugear.studies.sampling.design_of`.
+    """
+    if not study.tolerances:
+        return None
+    axes, draws = drawn_values(study, study.tolerances, gearbox)
+    acting = {path: tolerance for tolerance in study.tolerances.values() for path in tolerance.targets}
+    tolerances = Tolerances(axes, tuple(draws), acting)
+    tolerances.produced(gearbox, {})
+    return tolerances
+
+
+def percentile_of(values: Floats, percent: float) -> Floats:
+    """Percentile along the last axis, of a sample of draws; one beside a value without end is that of the worse draw.
+
+    Parameters
+    ----------
+    values : (..., draws)
+    percent : 50 and above; below it the mirrored one, which errs to the side of small values
+
+    Notes
+    -----
+    Between draws by Hyndman and Fan's eighth rule, whose median error is least whatever the distribution.
+
+    Examples
+    --------
+    >>> print(percentile_of(np.arange(1.0, 101.0), 95.0).round(2), percentile_of(np.array([1.0, np.inf]), 95.0))
+    95.65 inf
+    """
+    if percent < 50.0:
+        return np.asarray(-percentile_of(-values, 100.0 - percent))
+    finite = np.isfinite(values).all(axis=-1)
+    with np.errstate(invalid="ignore"):  # beside what has no end
+        between = np.percentile(values, percent, axis=-1, method="median_unbiased")
+    return np.where(finite, between, np.percentile(values, percent, axis=-1, method="higher"))

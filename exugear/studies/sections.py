@@ -1,0 +1,407 @@
+"""Sections of a study file as it is written: parameters, what is computed, and which figures are kept."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from exugear.gearbox.reading import fault_line, parsed, shortened
+from exugear.gearbox.sections.entries import Name, Text
+from exugear.gearbox.variant import Variant
+from fe_ste.tools.files import FileError, read_text
+
+Value = int | Annotated[float, AllowInfNan(True)] | str | bool | list[Any]
+"""What may stand at a key of a case; what may not becomes a failed point with its name."""
+MOST_VALUES = 100_000
+DottedPath = Annotated[str, Field(min_length=1, max_length=400)]
+
+
+class StudyPart(BaseModel):
+    """A table of the study file; no key or type is guessed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class RangeSection(StudyPart):
+    """Values from one to another."""
+
+    first: float
+    """First value."""
+    last: float
+    """Last value."""
+    count: Annotated[int, Field(ge=2, le=MOST_VALUES)]
+    """How many, both ends included."""
+    scale: Literal["linear", "logarithmic"] = "linear"
+    """Equal differences, or equal ratios."""
+
+    @model_validator(mode="after")
+    def _signs(self) -> RangeSection:
+        if self.scale == "logarithmic" and not (self.first > 0.0 and self.last > 0.0):
+            raise ValueError("a logarithmic range goes from one positive value to another")
+        return self
+
+
+class NormalSection(StudyPart):
+    """Normal distribution, cut off at limits where they are given."""
+
+    mean: float = 0.0
+    """Mean."""
+    deviation: Annotated[float, Field(gt=0.0)]
+    """Standard deviation before it is cut off."""
+    least: float | None = None
+    """No draw lies below."""
+    most: float | None = None
+    """No draw lies above."""
+
+    @model_validator(mode="after")
+    def _order(self) -> NormalSection:
+        if self.least is not None and self.most is not None and self.least >= self.most:
+            raise ValueError("least must be below most")
+        return self
+
+
+class UniformSection(StudyPart):
+    """Every value between two is as likely."""
+
+    least: float
+    """Lower end."""
+    most: float
+    """Upper end."""
+
+    @model_validator(mode="after")
+    def _order(self) -> UniformSection:
+        if self.least >= self.most:
+            raise ValueError("least must be below most")
+        return self
+
+
+class ToleranceSection(StudyPart):
+    """Flank deviation of a tolerance class of ISO 1328-1: normal, cut off at the tolerance, three deviations away."""
+
+    gear: Name
+    """Gear of the case."""
+    deviation: Literal["profile_slope", "helix_slope", "single_pitch", "cumulative_pitch", "runout"]
+    """Kind of deviation."""
+    tolerance_class: Annotated[int, Field(ge=1, le=11)]
+    """1 to 11."""
+
+
+KINDS = ("values", "range", "normal", "uniform", "iso1328", "settings", "step")
+"""Keys that say which values a parameter takes."""
+
+
+class ParameterSection(StudyPart):
+    """What is varied: one key of the case or several together, and the values they take."""
+
+    path: DottedPath | None = None
+    """Key of the case, such as ``housing.factor``."""
+    paths: Annotated[list[DottedPath], Field(min_length=2, max_length=500)] | None = None
+    """Several keys: with one value for all, or with `correlation` draws of their own."""
+    acts: Literal["replaces", "scales", "shifts"] = "replaces"
+    """Whether a value stands for that of the case, multiplies it or is added to it."""
+    values: Annotated[list[Value], Field(min_length=1, max_length=MOST_VALUES)] | None = None
+    """A list."""
+    range: RangeSection | None = None
+    """From one value to another."""
+    normal: NormalSection | None = None
+    """A normal distribution."""
+    uniform: UniformSection | None = None
+    """A uniform distribution."""
+    iso1328: ToleranceSection | None = None
+    """A tolerance class of flank deviations."""
+    settings: Annotated[dict[str, dict[DottedPath, Value]], Field(min_length=1, max_length=1000)] | None = None
+    """Several keys by the names of what they are together."""
+    step: Annotated[float, Field(gt=0.0)] | None = None
+    """Half the difference that a local derivative is taken over, in the unit of the values."""
+    correlation: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
+    """Of the draws of several paths: 1 is one draw for all, 0 are independent draws."""
+
+    @property
+    def kind(self) -> str:
+        """Which of `KINDS` it has."""
+        return next(kind for kind in KINDS if getattr(self, kind) is not None)
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """Keys of the case that it sets."""
+        if self.settings is not None:
+            return tuple(dict.fromkeys(path for setting in self.settings.values() for path in setting))
+        if self.path is not None:
+            return (self.path,)
+        return tuple(self.paths or ())
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether its values are drawn from a distribution."""
+        return self.kind in ("normal", "uniform", "iso1328")
+
+    @model_validator(mode="after")
+    def _one_of_each(self) -> ParameterSection:
+        given = [kind for kind in KINDS if getattr(self, kind) is not None]
+        if len(given) != 1:
+            raise ValueError(f"give one of {', '.join(KINDS)}; {' and '.join(given) or 'none'} is given")
+        if (self.path is not None) + (self.paths is not None) != (0 if self.settings is not None else 1):
+            raise ValueError("give path or paths; settings name their own paths and need neither")
+        if self.correlation != 1.0 and not (self.is_drawn and self.paths):
+            raise ValueError("correlation is between the draws of several paths; give paths and a distribution")
+        if self.settings is not None and len({frozenset(setting) for setting in self.settings.values()}) > 1:
+            raise ValueError("all settings must set the same keys")
+        return self
+
+
+class ChoiceSection(StudyPart):
+    """What is computed of the gearbox, as on the command line."""
+
+    variant: Annotated[str, AfterValidator(Variant.offered)] = Variant.bushing
+    """How bodies are held."""
+    mesh_law: str = "line_of_action"
+    """How teeth push each other."""
+    inertias: str | None = None
+    """Inertia set; that of the case by default."""
+    load_case: str | None = None
+    """Load case of runs; the first by default."""
+
+
+class SteadySection(StudyPart):
+    """Steady responses, for figures that are read from them."""
+
+    speeds: str
+    """FIRST:LAST:COUNT in rpm of the input."""
+    level: Literal["linear", "parametric", "nonlinear"] = "parametric"
+    """What varies."""
+    harmonics: Annotated[int, Field(ge=1, le=100)] | None = None
+    """Harmonics of each mesh frequency; by default as many as the mesh stiffness asks for."""
+    combinations: Annotated[int, Field(ge=1, le=20)] = 3
+    """Largest sum of multiples of several mesh frequencies."""
+    at_resonances: bool = True
+    """Whether speeds are added where lines cross modes."""
+
+
+class RunSection(StudyPart):
+    """Runs in time, for figures that are read from them."""
+
+    duration_s: Annotated[float, Field(gt=0.0)] | None = None
+    """Simulated time; that of the load case by default."""
+    solver: Literal["compiled", "exudyn"] | None = None
+    """The compiled one where it applies by default."""
+
+
+class LimitSection(StudyPart):
+    """Bounds that a figure is kept within by a search."""
+
+    least: float | None = None
+    """The figure is this or more."""
+    most: float | None = None
+    """The figure is this or less."""
+
+    @model_validator(mode="after")
+    def _order(self) -> LimitSection:
+        if self.least is None and self.most is None:
+            raise ValueError("give least, most or both")
+        if self.least is not None and self.most is not None and self.least > self.most:
+            raise ValueError("least must not be above most")
+        return self
+
+
+class OptimisationSection(StudyPart):
+    """Search for parameters, each within its `uniform` limits, that make figures small."""
+
+    minimise: Annotated[list[Name], Field(min_length=1, max_length=2)]
+    """One figure, or two that are weighed against each other."""
+    limits: dict[Name, LimitSection] = {}
+    """Figures that are kept within bounds meanwhile."""
+    percentile: Annotated[float, Field(ge=50.0, le=100.0)] | None = None
+    """Of each figure over the tolerances, on its bad side; 95 by default. Of 100 it is the worst draw."""
+    weightings: Annotated[int, Field(ge=1, le=50)] = 5
+    """Of two figures: how many weightings, one search each, from the first alone to the second alone."""
+    population: Annotated[int, Field(ge=4, le=1000)] = 16
+    """Points of a generation."""
+    generations: Annotated[int, Field(ge=1, le=10000)] = 20
+    """Most generations of a search."""
+
+
+class StudyFile(StudyPart):
+    """The whole study file."""
+
+    name: Annotated[Text, Field(max_length=200)]
+    """Title of the study."""
+    case: Annotated[str, Field(min_length=1, max_length=1000)]
+    """Gearbox file, beside the study file."""
+    description: Text = ""
+    """Words for people."""
+    choice: ChoiceSection = ChoiceSection()
+    """What is computed."""
+    changes: dict[DottedPath, Value] = {}
+    """Keys of the case with other values in all points."""
+    parameters: Annotated[dict[Name, ParameterSection], Field(min_length=1, max_length=200)]
+    """What is varied, by name."""
+    figures: Annotated[dict[Name, dict[str, Any]], Field(min_length=1, max_length=200)]
+    """What is kept, by name: `figure` says which, other keys are its options."""
+    sampling: Literal["sobol", "latin_hypercube", "random"] = "latin_hypercube"
+    """How distributions are drawn from."""
+    samples: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
+    """Draws, where parameters have distributions; of a search with tolerances at each point."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """The same seed gives the same draws."""
+    steady: SteadySection | None = None
+    """Settings of steady responses."""
+    run: RunSection = RunSection()
+    """Settings of runs."""
+    optimise: OptimisationSection | None = None
+    """A search instead of all combinations."""
+    tolerances: Annotated[dict[Name, ParameterSection], Field(max_length=200)] = {}
+    """What production does not hold, by name: drawn at every point of a search."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> StudyFile:
+        drawn = [name for name, parameter in self.parameters.items() if parameter.is_drawn]
+        if self.optimise is not None:
+            wrong = [name for name, parameter in self.parameters.items() if parameter.kind != "uniform"]
+            if wrong:
+                raise ValueError(f"a search needs the limits of each parameter: give {wrong[0]} a key uniform")
+            self._check_search(self.optimise)
+            return self
+        if self.tolerances:
+            raise ValueError("tolerances: belong to a search; without [optimise] draws are parameters")
+        if drawn and self.samples is None:
+            raise ValueError(f"parameters.{drawn[0]} is drawn from a distribution: say how often, samples = 64")
+        if self.samples is not None and not drawn:
+            raise ValueError("samples: no parameter has a distribution; leave it out")
+        self._check_sobol(bool(drawn))
+        steps = [parameter.kind == "step" for parameter in self.parameters.values()]
+        if any(steps) and not all(steps):
+            raise ValueError("local derivatives: give each parameter a step, or none")
+        return self
+
+    def _check_search(self, wanted: OptimisationSection) -> None:
+        for key, names in (("minimise", wanted.minimise), ("limits", list(wanted.limits))):
+            lost = [name for name in names if name not in self.figures]
+            if lost:
+                raise ValueError(f"optimise.{key}: no figure {lost[0]!r}; figures are {', '.join(self.figures)}")
+        if len(set(wanted.minimise)) < len(wanted.minimise):
+            raise ValueError(f"optimise.minimise: {wanted.minimise[0]} against itself; name two figures, or one")
+        listed = [name for name, tolerance in self.tolerances.items() if not tolerance.is_drawn]
+        if listed:
+            raise ValueError(f"tolerances.{listed[0]}: give it a distribution: normal, uniform or iso1328")
+        if self.tolerances and self.samples is None:
+            raise ValueError("tolerances: say how many draws each point has, samples = 32")
+        if not self.tolerances and wanted.percentile is not None:
+            raise ValueError("optimise.percentile: is taken over tolerances; give [tolerances.NAME], or leave it out")
+        self._check_sobol(bool(self.tolerances))
+
+    def _check_sobol(self, drawn: bool) -> None:
+        if drawn and self.sampling == "sobol" and self.samples and self.samples & (self.samples - 1):
+            raise ValueError(f"samples = {self.samples}: a Sobol sequence is even over a power of two of points")
+
+
+# Reading a study file: TOML to checked sections, and faults as lines that name file, key and remedy
+
+LARGEST_STUDY = 10_000_000
+"""Largest study file that is read, bytes."""
+SHOWN_FAULTS = 20
+
+
+class StudyError(ValueError):
+    """A study that cannot be used; a line for each fault says file, key, value and what would be right."""
+
+
+def read_study_file(path: Path) -> StudyFile:
+    """Read and check a study file.
+
+    Raises
+    ------
+    StudyError
+        Anything wrong with the file.
+
+    Examples
+    --------
+    >>> read_study_file(Path("nowhere.study.toml"))
+    Traceback (most recent call last):
+    ...
+    exugear.studies.sections.StudyError: nowhere.study.toml: no such file
+    """
+    try:
+        text = read_text(path, LARGEST_STUDY)
+    except FileError as error:
+        raise StudyError(str(error)) from None
+    try:
+        content = parsed(lambda: tomllib.loads(text.removeprefix("\ufeff")), str(path), "TOML")
+    except ValueError as error:
+        raise StudyError(str(error)) from None
+    return parse_study(content, str(path))
+
+
+def parse_study(content: dict[str, Any], source: str) -> StudyFile:
+    """Check content already in memory.
+
+    Raises
+    ------
+    StudyError
+        Anything wrong with it.
+
+    Examples
+    --------
+    >>> parse_study({"name": "a", "case": "b.toml", "parameters": {}, "figure": {}}, "s.toml")
+    Traceback (most recent call last):
+    ...
+    exugear.studies.sections.StudyError: s.toml: parameters: must have at least 1 entry
+    s.toml: figures: this key is missing
+    s.toml: figure: unknown key; did you mean 'figures'?
+    """
+    try:
+        return StudyFile.model_validate(content)
+    except ValidationError as error:
+        faults = error.errors(include_url=False)
+    lines = list(dict.fromkeys(fault_line(source, _described(fault)) for fault in faults))
+    more = [f"and {len(lines) - SHOWN_FAULTS} more faults"] if len(lines) > SHOWN_FAULTS else []
+    raise StudyError("\n".join([*lines[:SHOWN_FAULTS], *more]))
+
+
+_REMEDIES = {
+    "missing": "this key is missing",
+    "float_type": "must be a number",
+    "int_type": "must be a whole number",
+    "string_type": "must be text in quotes",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "list_type": "must be an array in brackets",
+    "too_short": "must have at least 1 entry",
+}
+
+
+def _described(fault: Any) -> str:
+    """Key, value and what would be right."""
+    location = [str(part) for part in fault["loc"] if part not in ("[key]", "int", "float", "str", "bool")]
+    key = ".".join(location) or "the file"
+    if fault["type"] == "extra_forbidden":
+        known = _known_keys(location[:-1])
+        near = difflib.get_close_matches(location[-1][:100], known, n=1)
+        return f"{key}: unknown key; " + (
+            f"did you mean {near[0]!r}?" if near else f"known keys are {', '.join(known)}"
+        )
+    remedy = _REMEDIES.get(fault["type"])
+    if remedy is None:
+        text = str(fault["msg"]).removeprefix("Value error, ").removeprefix("Input ")
+        remedy = text[:1].lower() + text[1:]
+    value = fault["input"]
+    shown = "" if isinstance(value, dict) or fault["type"] == "missing" else f" = {shortened(value)}"
+    return f"{key}{shown}: {remedy}"
+
+
+def _known_keys(location: list[str]) -> list[str]:
+    """Keys of the table at a place of the file."""
+    section: Any = StudyFile
+    for part in location:
+        fields = getattr(section, "model_fields", {})
+        kind = fields[part].annotation if part in fields else section
+        section = next((model for model in _models(kind)), section)
+    return list(getattr(section, "model_fields", {}))
+
+
+def _models(kind: Any) -> list[Any]:
+    own = [kind] if hasattr(kind, "model_fields") else []
+    return own + [model for part in getattr(kind, "__args__", ()) for model in _models(part)]

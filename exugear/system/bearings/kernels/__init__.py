@@ -1,1 +1,0 @@
-"""Compiled laws of bearings on arrays of coordinates."""

@@ -1,0 +1,530 @@
+"""Laws of supports: stiffness and damping as matrices, or rows of rolling elements with a law of their own.
+
+A bearing with `law = "stiffness"` is linear: given matrices through the origin, or the tangent of its rows through the
+point that they are in under the static load. One with `law = "iso16281"` keeps its rows. The housing factor f stands
+for the seat: it gives way in proportion to the bearing, so that the bearing takes the share f of a deflection under any
+load. A linear bearing is then f times as stiff, and the rows of a non-linear one see f times the deflection: both agree
+in the limit of small motions, and forces keep a potential. A clearance closes without load, which no share of a
+deflection does: such rows want an elastic housing or no factor.
+
+Catalogue bearings take their laws from the static load at one position of the carrier, where planets may be loaded
+unequally. As the carrier turns every planet passes all positions: what lasts is the mean. Left as they are, unequal
+planets would be an asymmetry that turns with the carrier, and make sidebands. Of rows of rolling elements the mean is
+that of their places, which follow the load's direction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Bearing, Body, stiffness_matrix
+from exugear.gearbox.sections.connections import CatalogueSection
+from exugear.gearbox.variant import Variant
+from exugear.system.bearings.rolling.catalogue import catalogue_rows
+from exugear.system.bearings.rolling.contact import pitch_averaged_tangent
+from exugear.system.bearings.rolling.point_contact import rolling_arrays
+from exugear.system.bearings.rolling.ratings import basic_dynamic_rating
+from exugear.system.bearings.rolling.rows import BearingError, BearingOfRows, RollingRow
+from exugear.system.kernels.connectors import ConnectorArrays
+from fe_ste.tools.arrays import Floats, Integers
+
+# 6x6 matrices of bearings: symmetric about the axis, turned, in series with their seats, regularised
+
+
+def axially_symmetric(stiffness: Floats) -> Floats:
+    """Mean of a 6x6 stiffness over all directions in the plane of the bearing.
+
+    Parameters
+    ----------
+    stiffness : (6, 6) in the frame of the bearing
+
+    Returns
+    -------
+    (6, 6) unchanged by any turn about z, for models that want one radial and one tilting stiffness
+
+    Examples
+    --------
+    >>> mean = axially_symmetric(np.diag([3.0, 1.0, 0.5, 4.0, 2.0, 0.0]))
+    >>> [round(float(entry), 12) for entry in np.diag(mean)]
+    [2.0, 2.0, 0.5, 3.0, 3.0, 0.0]
+    """
+    # The entries hold harmonics up to the second of the turning angle: three positions average them out.
+    turned = [rotate_stiffness(stiffness, 2.0 * math.pi * position / 3.0) for position in range(3)]
+    mean: Floats = np.mean(turned, axis=0)
+    return mean
+
+
+def rotate_stiffness(stiffness: Floats, angle: float) -> Floats:
+    """Turn a 6x6 stiffness about z by an angle (rad), shape (6, 6)."""
+    cosine = math.cos(angle)
+    sine = math.sin(angle)
+    turn = np.kron(np.eye(2), np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]))
+    turned: Floats = turn @ stiffness @ turn.T
+    return turned
+
+
+def regularised(stiffness: Floats, floor: ArrayLike) -> Floats:
+    """Give directions without stiffness the one that is stated.
+
+    Parameters
+    ----------
+    stiffness : (6, 6) symmetric stiffness
+    floor : (6,) least diagonal entries, N/m and N m/rad; zero leaves a direction free
+
+    Returns
+    -------
+    (6, 6) the diagonal raised to the floor where it lies below, everything else as before
+
+    Examples
+    --------
+    >>> held = regularised(np.diag([4e9, 4e9, 0.0, 1e6, 1e6, 0.0]), (0.0, 0.0, 1e8, 0.0, 0.0, 0.0))
+    >>> float(held[2, 2]), float(held[5, 5])
+    (100000000.0, 0.0)
+    """
+    least = np.asarray(floor, dtype=np.float64)
+    if least.shape != (6,) or np.any(least < 0.0):
+        raise BearingError(f"regularisation: floor = {floor!r} must be six numbers, none negative")
+    raised: Floats = stiffness + np.diag(np.maximum(least - np.diag(stiffness), 0.0))
+    return raised
+
+
+def in_series(first: Floats, second: Floats) -> Floats:
+    """Stiffness of two elements that carry the same load one behind the other.
+
+    Parameters
+    ----------
+    first, second : (6, 6) symmetric, positive semi-definite: for example bearing and housing seat, about the same point
+
+    Returns
+    -------
+    (6, 6)
+        Parallel sum ``A (A + B)^+ B`` of the matrices: ``(A^-1 + B^-1)^-1`` where these exist; a direction
+        that either leaves free is free.
+
+    Examples
+    --------
+    >>> series = in_series(np.diag([2.0, 2.0, 0.0, 1.0, 1.0, 0.0]), np.diag([2.0, 6.0, 5.0, 1.0, 1.0, 0.0]))
+    >>> [round(float(entry), 12) for entry in np.diag(series)]
+    [1.0, 1.5, 0.0, 0.5, 0.5, 0.0]
+    """
+    # Forces and moments differ by orders of magnitude: scale to a unit diagonal before a rank is decided.
+    total = first + second
+    scale = np.sqrt(np.where(np.diag(total) > 0.0, np.diag(total), 1.0))
+    scales = np.outer(scale, scale)
+    inverse = np.linalg.pinv(total / scales, rcond=1e-13, hermitian=True) / scales
+    series = first @ inverse @ second
+    symmetric: Floats = 0.5 * (series + series.T)
+    return symmetric
+
+
+def proportional_damping(stiffness: Floats, time_constant: float) -> Floats:
+    """Viscous damping ``beta K``.
+
+    Parameters
+    ----------
+    stiffness : (6, 6) stiffness
+    time_constant : beta, s. A mode of frequency f with all its strain energy here gets the damping ratio ``pi f beta``.
+
+    Returns
+    -------
+    (6, 6)
+
+    Examples
+    --------
+    >>> float(proportional_damping(1e9 * np.eye(6), 4e-6)[0, 0])
+    4000.0
+    """
+    if time_constant < 0.0:
+        raise BearingError(f"damping: time_constant = {time_constant} s must not be negative")
+    return time_constant * stiffness
+
+
+# Laws of supports: stiffness and damping as matrices, or rows of rolling elements with a law of their own
+
+NOMINAL_LOAD = 0.1
+"""Load over the basic dynamic rating at which a bearing's stiffness is taken where its load is not known yet."""
+LEAST_LOAD = 0.01
+"""Load over the basic dynamic rating below which a linear bearing counts as loaded by this: none has no stiffness."""
+HOLDING_LOAD = 1.25
+"""Axial load over the least that one row with a contact angle needs beside a radial one, where neither is known."""
+QUARTER_PITCH = 0.25
+"""Place of a cage that stands still, in pitches past the load: the stiffness has its mean over the pitch there, to
+the second harmonic."""
+
+
+@dataclass(frozen=True)
+class SupportLaw:
+    """Law of one support, in the axes of what it sits on."""
+
+    stiffness: Floats
+    damping: Floats
+    """(6, 6) linear part, N/m .. N m/rad, and times s."""
+    rows: tuple[RollingRow, ...] = ()
+    """Rows of rolling elements that act beside it; none for a linear support."""
+    scale: float = 1.0
+    """Displacement of the inner ring against the outer one over that of the body against what it sits on."""
+    damping_time: float = 0.0
+    """Damping over the stiffness of the rows, s."""
+    cage_ratio: float = 0.0
+    """Turns of the cage per turn of the body against what it sits on; 0 for a cage that stands still."""
+    phase: float = 0.0
+    """Polar angle of the first rolling element, rad."""
+    point_strain: Floats = field(default_factory=lambda: np.zeros(6))
+    point_load: Floats = field(default_factory=lambda: np.zeros(6))
+    """(6,) displacement (m, rad) and load (N, N m) that the linear part passes; the origin by default."""
+
+
+def load_stands_still(bearing: Bearing, bodies: Mapping[str, Body]) -> bool:
+    """Tell whether a bearing's load keeps its direction in the axes of what it sits on, of bodies by their names.
+
+    So it does on the ground, and where planets sit on their carrier.
+    """
+    return bearing.on not in bodies or bodies[bearing.on].fixed or bodies[bearing.body].carrier == bearing.on
+
+
+def law_in_words(bearing: Bearing, stands_still: bool = True) -> str:
+    """Say what a bearing's force follows; one whose load does not stand still knows but the axial part of its point.
+
+    Examples
+    --------
+    >>> from exugear.gearbox.gearbox import Gearbox
+    >>> bearings = {bearing.family: bearing for bearing in Gearbox.from_toml("cases/grc750/gearbox.toml").bearings}
+    >>> [law_in_words(bearings[name]) for name in ("plc_a", "pl_a")]
+    ['linear, at a stated load, through the origin', 'linear, at the static load']
+    """
+    if bearing.catalogue is None:
+        return "linear, stiffness given"
+    if bearing.law == "iso16281":
+        return f"rows by ISO/TS 16281, cage {bearing.cage}"
+    if not is_catalogued(bearing):
+        return "linear, at a stated load, through the origin"
+    return f"linear, at the static load{'' if stands_still else ', across the axis through the origin'}"
+
+
+def is_catalogued(bearing: Bearing) -> bool:
+    """Tell whether rows of rolling elements give a bearing's stiffness at the load that the statics find."""
+    return bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None
+
+
+def bearing_rows(bearing: Bearing) -> tuple[RollingRow, ...]:
+    """Rows of rolling elements of a catalogue bearing.
+
+    Raises
+    ------
+    BearingError
+        It has no catalogue, or dimensions that are impossible.
+    """
+    if bearing.catalogue is None:
+        raise BearingError(f"bearing {bearing.name}: has no catalogue data")
+    return catalogue_rows(bearing.catalogue)
+
+
+def misplaced_factor(bearing: Bearing) -> str:
+    """Say why a housing factor cannot stand for the seat of a bearing; empty if it can.
+
+    Examples
+    --------
+    >>> from exugear.gearbox.gearbox import Gearbox
+    >>> bearing = next(b for b in Gearbox.from_toml("cases/grc750/gearbox.toml").bearings if b.name == "hss_a")
+    >>> misplaced_factor(bearing)
+    ''
+    """
+    rows = () if bearing.catalogue is None else catalogue_rows(bearing.catalogue)
+    if bearing.law == "iso16281" and bearing.factor != 1.0 and any(row.radial_clearance > 0.0 for row in rows):
+        return (
+            f'bearings.{bearing.family}: law = "iso16281" with clearance and the housing factor {bearing.factor:g}: '
+            "a clearance closes without load, so the factor does not apply; set housing_factor_applies = false, or "
+            "use the variant flexible with an elastic housing"
+        )
+    return ""
+
+
+def linear_law(bearing: Bearing, damping_time: float, of_rows: Floats | None = None) -> SupportLaw:
+    """Linear law of a support, housing factor included.
+
+    Parameters
+    ----------
+    damping_time : damping over stiffness where the file gives no damping, s
+    of_rows : (6, 6)
+        Stiffness of its rows of rolling elements; by default that at the load which the file states, or at
+        `NOMINAL_LOAD`. Directions below the stiffness that the file gives beside a catalogue are raised to it.
+
+    Raises
+    ------
+    BearingError
+        The catalogue dimensions or the load are impossible.
+    """
+    stiffness = stiffness_matrix(bearing.stiffness)
+    if bearing.catalogue is not None:
+        rows_stiffness = catalogue_stiffness(bearing.catalogue) if of_rows is None else of_rows
+        stiffness = regularised(rows_stiffness, np.diag(stiffness))
+    stiffness = bearing.factor * stiffness
+    if bearing.damping is not None:
+        return SupportLaw(stiffness, stiffness_matrix(bearing.damping))
+    return SupportLaw(stiffness, proportional_damping(stiffness, damping_time))
+
+
+def rolling_law(bearing: Bearing, damping_time: float, of_rows: Floats, direction: float) -> SupportLaw:
+    """Law of a bearing's rows of rolling elements, and what the file adds in directions that they leave free.
+
+    Parameters
+    ----------
+    bearing : one with catalogue dimensions
+    damping_time : damping over stiffness where the file gives no damping, s
+    of_rows : (6, 6) stiffness of the rows at their load: the file's stiffness adds what lacks there
+    direction : polar angle of the load on the inner ring, rad: a cage that stands still is placed by it
+    """
+    rows = bearing_rows(bearing)
+    if misplaced_factor(bearing):
+        raise BearingError(misplaced_factor(bearing))
+    stated = stiffness_matrix(bearing.stiffness)
+    added = bearing.factor * (regularised(of_rows, np.diag(stated)) - of_rows)
+    given = bearing.damping is not None
+    damping = stiffness_matrix(bearing.damping) if given else proportional_damping(added, damping_time)
+    turning = bearing.cage == "turning"
+    return SupportLaw(
+        stiffness=added,
+        damping=damping,
+        rows=rows,
+        scale=bearing.factor * (-1.0 if bearing.carries_outer_ring else 1.0),
+        damping_time=0.0 if given else damping_time,
+        cage_ratio=cage_ratio(rows[0], bearing.carries_outer_ring) if turning else 0.0,
+        phase=0.0 if turning else direction + QUARTER_PITCH * 2.0 * math.pi / rows[0].element_count,
+    )
+
+
+def through_point(law: SupportLaw, strain: Floats, load: Floats, stands_still: bool) -> SupportLaw:
+    """Linear law that passes a point: its load (6,) at the displacement (6,) in the axes of what the bearing sits on.
+
+    It resists no spin there. Of a load that turns in these axes only the part along the axis stays what it is: the law
+    then passes the origin across the axis.
+    """
+    kept = np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0] if stands_still else [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    return replace(law, point_strain=kept * strain, point_load=kept * load)
+
+
+def cage_ratio(row: RollingRow, outer_ring_turns: bool) -> float:
+    """Find the turns of a cage per turn of one ring while the other one stands still, without slip.
+
+    Examples
+    --------
+    >>> from exugear.system.bearings.rolling.rows import BallRow
+    >>> row = BallRow(element_diameter=0.02, pitch_diameter=0.1, element_count=10)
+    >>> round(cage_ratio(row, False), 12), round(cage_ratio(row, True), 12)
+    (0.4, 0.6)
+    """
+    return 0.5 * (1.0 + row.diameter_ratio if outer_ring_turns else 1.0 - row.diameter_ratio)
+
+
+def with_laws(connectors: ConnectorArrays, laws: Sequence[SupportLaw]) -> ConnectorArrays:
+    """Connectors at their places, with the laws of all supports."""
+    return connectors._replace(
+        stiffness=np.array([law.stiffness for law in laws]).reshape(-1, 6, 6),
+        damping=np.array([law.damping for law in laws]).reshape(-1, 6, 6),
+        point_strain=np.array([law.point_strain for law in laws]).reshape(-1, 6),
+        point_load=np.array([law.point_load for law in laws]).reshape(-1, 6),
+        rolling=rolling_arrays(
+            [law.rows for law in laws],
+            scale=[law.scale for law in laws],
+            time=[law.damping_time for law in laws],
+            cage_ratio=[law.cage_ratio for law in laws],
+            phase=[law.phase for law in laws],
+        ),
+    )
+
+
+@lru_cache(maxsize=64)
+def catalogue_stiffness(section: CatalogueSection) -> Floats:
+    """Stiffness (6, 6) of rows at the load that the file states, else a nominal one; the same in all directions.
+
+    Raises
+    ------
+    BearingError
+        The catalogue dimensions or the load are impossible.
+    """
+    rows = catalogue_rows(section)
+    if section.radial_load_kN is not None:
+        force = (1e3 * section.radial_load_kN, 0.0, 1e3 * (section.axial_load_kN or 0.0))
+    else:
+        force = holding_force(rows, NOMINAL_LOAD * basic_dynamic_rating(rows, section.type))
+    return axially_symmetric(pitch_averaged_tangent(BearingOfRows(rows), force))
+
+
+def holds_one_way(rows: Sequence[RollingRow]) -> bool:
+    """Tell whether rows hold the inner ring in one direction along the axis only."""
+    angles = [row.contact_angle for row in rows]
+    return min(angles) > 0.0 or max(angles) < 0.0
+
+
+def holding_force(rows: Sequence[RollingRow], radial: float, direction: float = 0.0) -> tuple[float, float, float]:
+    """Force (N) on the inner ring with a radial part along a polar angle (rad), and the axial one that it needs.
+
+    Rows of one contact angle are pushed apart by a radial load alone.
+    """
+    axial = HOLDING_LOAD * radial * math.tan(rows[0].contact_angle) if holds_one_way(rows) else 0.0
+    return radial * math.cos(direction), radial * math.sin(direction), axial
+
+
+# Planets made equal: bearings of a planet set get the mean of their laws, each seen along its own radius
+
+FEWEST = 3
+"""Planets that a set needs: fewer do not average out what their turning does to the others."""
+SPACING = 1e-6
+"""Largest departure of planets from equal spacing, rad."""
+
+
+def planet_families(bodies: Iterable[Body]) -> list[list[Body]]:
+    """Find the sets of planets: those of one family on one carrier that turns."""
+    families: dict[tuple[str, str], list[Body]] = {}
+    for body in bodies:
+        if body.carrier is not None:
+            families.setdefault((body.carrier, body.family), []).append(body)
+    return list(families.values())
+
+
+def equally_spaced(planets: Sequence[Body]) -> bool:
+    """Tell whether planets of a set stand at equal distances around their carrier, three of them or more."""
+    spacing = 2.0 * math.pi / len(planets)
+    turned = np.array([planet.orbit_angle - planets[0].orbit_angle for planet in planets]) % (2.0 * math.pi)
+    return len(planets) >= FEWEST and bool(np.abs(turned - spacing * np.arange(len(planets))).max() <= SPACING)
+
+
+class PlanetSupports(NamedTuple):
+    """Supports of one family, one of each planet of a set."""
+
+    numbers: Integers
+    """(N,) among all supports, in the order of the planets."""
+    angles: Floats
+    """(N,) of the planets in the carrier's axes, rad."""
+
+
+def planet_supports(supports: Sequence[Bearing], planets: Sequence[str], angles: Floats) -> list[PlanetSupports]:
+    """Families of supports that each planet (names) of a set has one of; angles (N,) of the planets, rad."""
+    found = []
+    for family in sorted({support.family for support in supports if support.body in planets}):
+        numbers = [n for name in planets for n, own in enumerate(supports) if own.body == name and own.family == family]
+        if len(numbers) == len(planets):
+            found.append(PlanetSupports(np.array(numbers, dtype=np.int64), angles))
+    return found
+
+
+def with_equal_planets(connectors: ConnectorArrays, sets: Iterable[PlanetSupports]) -> tuple[ConnectorArrays, float]:
+    """Connectors whose planets are equal, and the largest change of stiffness that this took, over it.
+
+    Notes
+    -----
+    Cages that turn stay where they are.
+    """
+    stiffness, damping, phase = (
+        values.copy() for values in (connectors.stiffness, connectors.damping, connectors.rolling.phase)
+    )
+    strain = connectors.point_strain.copy()
+    load = connectors.point_load.copy()
+    with_rows = np.diff(connectors.rolling.first) > 0
+    largest = 0.0
+    for own, angles in sets:
+        if with_rows[own].all() and not connectors.rolling.cage_ratio[own].any():
+            phase[own] = angles + _mean_angle(phase[own] - angles)
+        turns = np.array([_turn(angle) for angle in angles])
+        back = turns.transpose(0, 2, 1)
+        largest = max(largest, _spread(back @ stiffness[own] @ turns))
+        for matrices in (stiffness, damping):
+            matrices[own] = turns @ (back @ matrices[own] @ turns).mean(axis=0) @ back
+        for vectors in (strain, load):
+            mean = np.einsum("nij,nj->ni", back, vectors[own]).mean(axis=0)
+            vectors[own] = turns @ mean
+    rolling = connectors.rolling._replace(phase=phase)
+    equal = connectors._replace(
+        stiffness=stiffness, damping=damping, point_strain=strain, point_load=load, rolling=rolling
+    )
+    if largest or with_rows.any():
+        return (equal, largest)
+    return (connectors, 0.0)
+
+
+def _spread(matrices: Floats) -> float:
+    """Largest difference of the displacements' stiffness (n, 6, 6) from its mean, over it."""
+    mean = matrices.mean(axis=0)
+    size = np.sqrt(np.abs(np.diag(mean)).clip(min=1e-9 * np.abs(mean).max(initial=0.0) + 1e-300))
+    return float(np.abs((matrices - mean) / np.outer(size, size))[:, :3, :3].max())
+
+
+def _mean_angle(angles: Floats) -> float:
+    """Mean of angles (n,) that are near each other on the circle, rad."""
+    return math.atan2(float(np.sin(angles).mean()), float(np.cos(angles).mean()))
+
+
+def _turn(angle: float) -> Floats:
+    """Matrix (6, 6) that turns displacements and tilts about z by an angle (rad)."""
+    c = math.cos(angle)
+    s = math.sin(angle)
+    turn = np.eye(6)
+    turn[:2, :2] = turn[3:5, 3:5] = [[c, -s], [s, c]]
+    return turn
+
+
+# What holds the bodies of a variant: which supports are at work
+
+
+def unsupported(gearbox: Gearbox, variant: str) -> str:
+    """Say what a variant lacks that its bodies are held by; empty if nothing.
+
+    Off bearings every body needs its joint: without one it would not turn on a fixed axis.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> unsupported(gearbox, "bushing"), unsupported(gearbox.varied({"bearings": {}}), "bushing")
+    ('', 'the gearbox file has no [bearings]')
+    """
+    chosen = Variant.of(variant)
+    elastic = elastic_names(gearbox)
+    if not chosen.on_bearings:
+        held = {joint.body for joint in gearbox.joints}
+        missing = [b.name for b in gearbox.bodies() if not (b.fixed or b.spin_only or b.name in held)]
+        if missing:
+            return f"no joint holds {', '.join(missing)}; add one under [joints]"
+        sprung = list(gearbox.held_by_torsion)
+        if sprung:
+            return (
+                f"{', '.join(sprung)}: held against turning by the torsion of a bearing, which this variant does not "
+                f"have; take the variant bushing, or let the body stand (bodies.{sprung[0]}.fixed = true)"
+            )
+        return ""
+    if gearbox.unknown_bearings:
+        names = ", ".join(f"bearings.{name} ({text})" for name, text in gearbox.unknown_bearings.items())
+        return f"only the designation is known of {names}; give each a [.catalogue] or a [.stiffness] table"
+    if not gearbox.bearings:
+        return "the gearbox file has no [bearings]"
+    if chosen.is_elastic and not elastic:
+        return 'no body is elastic; give one a shape and flexibility = "elastic"'
+    mounted = {mount.body for mount in mounts_at_work(gearbox)}
+    for body in gearbox.bodies():
+        if chosen.is_elastic and body.fixed and body.name in elastic and body.name not in mounted:
+            return f"body {body.name} is elastic, but nothing holds it; add [mounts] on the ground"
+    return ""
+
+
+def elastic_names(gearbox: Gearbox) -> tuple[str, ...]:
+    """Names of the bodies that are elastic in variants that have such."""
+    return tuple(body.name for body in gearbox.bodies() if gearbox.case.bodies[body.family].flexibility != "none")
+
+
+def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:
+    """Mounts that hold the gearbox in the variant `flexible`: none where no fixed body is elastic.
+
+    A fixed body that is rigid is the ground itself, and so needs no mount.
+    """
+    elastic = elastic_names(gearbox)
+    bodies = {body.name: body for body in gearbox.bodies()}
+    if not any(bodies[name].fixed for name in elastic):
+        return ()
+    return tuple(mount for mount in gearbox.mounts if mount.body in elastic or not bodies[mount.body].fixed)

@@ -1,1 +1,0 @@
-"""Compiled laws of elastic bodies on arrays of coordinates."""

@@ -1,0 +1,555 @@
+"""The elastic bodies of a gearbox: all that are elastic, reduced, with the rigid inertia of an inertia set.
+
+The mass of a body that turns comes from its shape and the blanks on it. What the body's inertia set says beyond that
+(or short of it) is spread over the rigid part of the motion, so that an elastic body accelerates and orbits exactly as
+the rigid one does and only its deformation is new. A fixed body has no inertia set: its mass is that of its solid.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import LARGEST_SOLID
+from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.sections.bodies import (
+    BlankSection,
+    ShaftSectionSection,
+    ShapeSection,
+    SolidSeatSection,
+    SolidSection,
+)
+from exugear.gearbox.sections.gears import MaterialSection
+from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
+from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody
+from exugear.system.bodies.reduction import Blank, Frame, ReducedBody, ReductionError, RigidInertia, with_rigid_inertia
+from exugear.system.bodies.shaft_sections import MeshSize, SeatBand, ShaftError, ShaftSection, check_shaft, narrowed
+from exugear.system.bodies.solid_elements import SolidError, SolidSeat
+from exugear.system.bodies.solid_files import GEOMETRY, MESHES, UNPERMITTED, SolidFile
+from exugear.system.bodies.solids import (
+    SolidModel,
+    load_or_reduce_floating,
+    load_or_reduce_solid,
+    reduce_solid,
+    reduction_file,
+    with_inertia,
+)
+from exugear.system.bodies.turned_section import Shaft, turned_hexahedra
+from exugear.system.bodies.turned_shaft import ShaftModel, load_or_reduce_shaft, reduce_shaft
+from fe_ste.geometry.gears import Material
+
+# Sections of the gearbox file as a reduction takes them: materials, blanks, frames, widths of seats
+
+
+def material_of(section: MaterialSection) -> Material:
+    """Material of a body, Pa and kg/m3."""
+    return Material(section.youngs_modulus_GPa * 1e9, section.poissons_ratio, section.density_kg_per_m3)
+
+
+def blank_of(section: BlankSection) -> Blank:
+    """Rigid ring on a seat, kg and kg m2."""
+    return Blank(section.mass_kg, section.transverse_kg_m2, section.axial_kg_m2)
+
+
+def seat_width(bearing: Bearing) -> float:
+    """Width of a bearing's seat (m): that of its rows; a plane where only a stiffness is given."""
+    if bearing.catalogue is None:
+        return 0.0
+    rows = 1 if bearing.catalogue.arrangement == "single" else 2
+    return rows * bearing.catalogue.width_mm * 1e-3
+
+
+def frame_of(gearbox: Gearbox, body: Body) -> Frame:
+    """Frame that an elastic body is seen from: the ground, its own that turns, or one that does not."""
+    if body.fixed:
+        return "ground"
+    if any(other.carrier == body.name for other in gearbox.bodies()):
+        return "carrier"
+    return "nonrotating"
+
+
+# Turned shafts of a gearbox: shapes from its file, seats where gears and bearings sit
+
+POINT = 0.01
+"""Bore over that of the other end where a conical bore has its point: elements cannot begin in one."""
+TORQUE_SEAT = "torque"
+"""Name of the seat where torques and couplings act."""
+SAME_PLACE = 1e-6
+"""Distance of places, and difference of widths, below which two seats are one, m."""
+SOLID_SIZE = MeshSize(0.05, 0.05, 1)
+"""Elements of a shaft as a solid: frequencies of its normal modes come out up to 0.6 % too high."""
+
+
+def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
+    """All that the reduction of a body's shaft depends on.
+
+    Raises
+    ------
+    CaseError
+        The body has no shape, or a shape that its gears and bearings do not fit on.
+    """
+    body = gearbox.body(name)
+    shape = _shape_of(gearbox, body)
+    if frame_of(gearbox, body) == "carrier":
+        raise gearbox.fault(f"bodies.{body.family}.shape: the body carries planets; give a .solid table instead")
+    sections = tuple(map(_section_of, shape.sections))
+    seats = tuple(narrowed(sections, seat) for seat in _seats(gearbox, body, shape))
+    names = [seat.name for seat in seats]
+    doubled = next((seat for seat in names if names.count(seat) > 1), None)
+    if doubled is not None:
+        raise gearbox.fault(f"bodies.{body.family}: a gear and a bearing on it are both named {doubled!r}; rename one")
+    key = f"bodies.{body.family}.shape"
+    unknown = next((blank for blank in shape.blanks if blank not in names), None)
+    if unknown is not None:
+        raise gearbox.fault(f"{key}.blanks.{unknown}: no such seat; seats are {', '.join(names)}")
+    shared = _shared(seats)
+    blanks = {shared.get(seat, seat): blank_of(blank) for seat, blank in shape.blanks.items()}
+    if len(blanks) < len(shape.blanks):
+        raise gearbox.fault(f"{key}.blanks: two of {', '.join(shape.blanks)} sit on one seat; give one blank for both")
+    return ShaftModel(
+        name=name,
+        sections=sections,
+        material=material_of(shape.material),
+        origin=(*body.axis, shape.start_z_mm * 1e-3),
+        seats=tuple(seat for seat in seats if seat.name not in shared),
+        blanks=blanks,
+        band=gearbox.case.elasticity.band_Hz,
+        limit=gearbox.case.elasticity.limit_Hz,
+    )
+
+
+def shared_seats(gearbox: Gearbox, name: str) -> dict[str, str]:
+    """Seats of a body's shaft that another one stands for, which has their place and width, by their names.
+
+    Two of one place and width would move alike: nothing could tell what each carries.
+    """
+    body = gearbox.body(name)
+    shape = _shape_of(gearbox, body)
+    sections = tuple(map(_section_of, shape.sections))
+    return _shared(tuple(narrowed(sections, seat) for seat in _seats(gearbox, body, shape)))
+
+
+def _shared(seats: Sequence[SeatBand]) -> dict[str, str]:
+    shared: dict[str, str] = {}
+    for n, seat in enumerate(seats):
+        for other in seats[:n]:
+            if other.name not in shared and max(abs(seat.z - other.z), abs(seat.width - other.width)) < SAME_PLACE:
+                shared[seat.name] = other.name
+                break
+    return shared
+
+
+def narrowed_seats(gearbox: Gearbox, name: str) -> Iterator[str]:
+    """Say which seats of a body's shaft reach a little across a shoulder, or beyond its end, and so end there."""
+    body = gearbox.body(name)
+    shape = _shape_of(gearbox, body)
+    sections = tuple(map(_section_of, shape.sections))
+    for seat in _seats(gearbox, body, shape):
+        across = 500.0 * (seat.width - narrowed(sections, seat).width)
+        if across > 0.0:
+            yield (
+                f"bodies.{body.family}.shape: the seat of {seat.name} reaches {across:.3g} mm across a shoulder or the "
+                f"end of the shaft; it ends there, and as far from its middle on the other side"
+            )
+
+
+def _shape_of(gearbox: Gearbox, body: Body) -> ShapeSection:
+    """Section of a body's shape, which must be there."""
+    shape = gearbox.case.bodies[body.family].shape
+    if shape is None:
+        raise gearbox.fault(f"bodies.{body.family}: no shape; give a [bodies.{body.family}.shape] table")
+    return shape
+
+
+def _section_of(section: ShaftSectionSection) -> ShaftSection:
+    """Piece of a shaft, m."""
+    outer_end = section.outer_diameter_end_mm
+    inner = section.inner_diameter_mm
+    inner_end = section.inner_diameter_end_mm
+    if inner_end is not None:
+        inner, inner_end = max(inner, POINT * inner_end), max(inner_end, POINT * inner)
+    return ShaftSection(
+        1e-3 * section.length_mm,
+        1e-3 * section.outer_diameter_mm,
+        1e-3 * inner,
+        None if outer_end is None else 1e-3 * outer_end,
+        None if inner_end is None else 1e-3 * inner_end,
+    )
+
+
+def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBand]:
+    """Each seat as the file has it, from the beginning of the shaft."""
+    start = shape.start_z_mm * 1e-3
+    for gear, z in body.wheels.items():
+        yield SeatBand(gear, z - start, gearbox.gears[gear].face_width)
+    for bearing in gearbox.bearings:
+        if body.name in (bearing.body, bearing.on):
+            yield SeatBand(bearing.name, bearing.position[2] - start, seat_width(bearing))
+    for mount in mounts_at_work(gearbox):
+        if mount.body == body.name:
+            yield SeatBand(mount.name, mount.position[2] - start, 0.0)
+    if shape.torque_z_mm is not None:
+        yield SeatBand(TORQUE_SEAT, shape.torque_z_mm * 1e-3 - start, 0.0)
+
+
+def solid_of_shaft(model: ShaftModel, size: MeshSize = SOLID_SIZE) -> SolidModel:
+    """Return the same shaft as a solid of hexahedra with the same seats.
+
+    Raises
+    ------
+    exugear.system.bodies.shaft_sections.ShaftError
+        A shaft that cannot be, or a seat that does not lie on it.
+    """
+    shaft = Shaft(model.sections, model.material, model.seats, size)
+    seats = []
+    x, y, z = model.origin
+    for seat in model.seats:
+        section = shaft.section_under(seat)
+        if section.is_cone:
+            raise ShaftError(f"seat {seat.name}: it lies on a cone, and seats of a solid are cylinders")
+        hole = section.inner_diameter / 2.0 if seat.width == 0.0 else 0.0
+        seats.append(SolidSeat(seat.name, (x, y, z + seat.z), section.outer_diameter / 2.0, seat.width, hole))
+    return SolidModel(
+        name=model.name,
+        mesh=turned_hexahedra(shaft).translated(model.origin),
+        material=model.material,
+        seats=tuple(seats),
+        frame="nonrotating",
+        band=model.band,
+        limit=model.limit,
+        blanks=model.blanks,
+        axis=(x, y),
+    )
+
+
+# Solids of a gearbox: shapes and meshes from files, seats where gears, bearings and mounts sit
+
+
+@dataclass(frozen=True)
+class SolidBody:
+    """A solid of the gearbox file."""
+
+    model: SolidModel
+    """All that its reduction depends on."""
+    main_seat: str
+    sectors: Mapping[str, tuple[str, ...]]
+    shared_seats: Mapping[str, str]
+    """As in `exugear.system.bodies.of_gearbox.ElasticBody`."""
+
+
+def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
+    """Everything that the gearbox file says of a body's solid; its file is there and may be read, but is not yet.
+
+    Raises
+    ------
+    CaseError
+        The body has no solid, its file is not there, in no format that is read, or lies where it may not, or a seat of
+        something on it is missing or not known well enough.
+    """
+    body = gearbox.body(name)
+    section = gearbox.case.bodies[body.family]
+    key = f"bodies.{body.family}.solid"
+    solid = section.solid
+    if solid is None:
+        raise gearbox.fault(f"bodies.{body.family}: no solid; give a [{key}] table")
+    frame = frame_of(gearbox, body)
+    if section.flexibility in ("nonrotating", "ffrf") and frame != "nonrotating":
+        raise gearbox.fault(
+            f"bodies.{body.family}.flexibility = {section.flexibility!r}: the body carries planets and is seen from "
+            "its own turning frame; use 'elastic'"
+        )
+    file = SolidFile(
+        gearbox.file(f"{key}.file", solid.file, LARGEST_SOLID),
+        solid.length_unit_mm * 1e-3,
+        (solid.element_size_mm or 0.0) * 1e-3,
+        solid.elements_around,
+        gearbox.permissions.scripts,
+    )
+    if not file.is_geometry and not file.is_mesh:
+        endings = ", ".join((*GEOMETRY, *MESHES))
+        raise gearbox.fault(f"{key}.file = {solid.file!r}: no format that is read; its name must end in {endings}")
+    if file.is_geometry and solid.element_size_mm is None:
+        raise gearbox.fault(f"{key}.element_size_mm: this key is missing; {solid.file} has to be meshed")
+    band = solid.band_Hz or gearbox.case.elasticity.band_Hz
+    if band >= gearbox.case.elasticity.limit_Hz:
+        raise gearbox.fault(f"{key}.band_Hz = {band:g}: it must be below elasticity.limit_Hz")
+    seats, sectors, shared = _solid_seats(gearbox, body, solid)
+    names = [seat.name for seat in seats]
+    if solid.torque_seat is not None and solid.torque_seat not in names:
+        raise gearbox.fault(f"{key}.torque_seat = {solid.torque_seat!r}: no such seat; seats are {', '.join(names)}")
+    model = SolidModel(
+        name=name,
+        mesh=file,
+        material=material_of(solid.material),
+        seats=tuple(seats),
+        frame=frame,
+        band=band,
+        limit=gearbox.case.elasticity.limit_Hz,
+        blanks=_solid_blanks(gearbox, body, solid, names),
+        axis=body.axis,
+    )
+    return SolidBody(model, solid.torque_seat or names[0], sectors, shared)
+
+
+@dataclass(frozen=True)
+class _Item:
+    """What sits on a solid: its position (m), and diameter and width (m) of its seat where they are known.
+
+    `family` is its name in the file, `noun` what it is, `needed` whether there must be a seat for it.
+    """
+
+    family: str
+    noun: str
+    position: tuple[float, float, float]
+    diameter: float | None
+    width: float | None
+    needed: bool = True
+
+
+def _items(gearbox: Gearbox, body: Body) -> dict[str, _Item]:
+    """All that sits on a body, by the name of its seat."""
+    items = {}
+    for name, z in body.wheels.items():
+        gear = gearbox.gears[name]
+        items[name] = _Item(name, "gear", (*body.axis, z), gear.held_diameter, gear.face_width)
+    for bearing in gearbox.bearings:
+        if body.name not in (bearing.body, bearing.on):
+            continue
+        diameter = None
+        width = None
+        if bearing.catalogue is not None:
+            # A planet turns about its bearing, all other bodies in theirs.
+            inside = (bearing.body == body.name) != bearing.carries_outer_ring
+            diameter = 1e-3 * (bearing.catalogue.bore_mm if inside else bearing.catalogue.outer_diameter_mm)
+            width = seat_width(bearing)
+        items[bearing.name] = _Item(bearing.family, "bearing", bearing.position, diameter, width)
+    at_work = {mount.name for mount in mounts_at_work(gearbox)}
+    for mount in gearbox.mounts:
+        if mount.body == body.name:
+            items[mount.name] = _Item(mount.name, "mount", mount.position, None, None, mount.name in at_work)
+    return items
+
+
+def _solid_seats(
+    gearbox: Gearbox, body: Body, solid: SolidSection
+) -> tuple[list[SolidSeat], dict[str, tuple[str, ...]], dict[str, str]]:
+    """Seats of a solid, the sectors of its gears, and the seats that bearings share."""
+    key = f"bodies.{body.family}.solid.seats"
+    items = _items(gearbox, body)
+    families = {item.family for item in items.values()}
+    sections = {name: solid.seats.get(name, solid.seats.get(item.family)) for name, item in items.items()}
+    others = {name: section for name, section in solid.seats.items() if name not in items and name not in families}
+    seats: list[SolidSeat] = []
+    sectors: dict[str, tuple[str, ...]] = {}
+    shared_seats: dict[str, str] = {}
+    for name, section in (sections | others).items():
+        item = items.get(name)
+        if section is not None and section.same_as is not None:
+            shared_seats[name] = section.same_as
+        elif item is None or section is not None or item.needed:
+            seat = _solid_seat(gearbox, f"{key}.{name}", name, item, section or SolidSeatSection())
+            count = None if section is None else section.sectors
+            if count is not None and (item is None or item.noun != "gear"):
+                raise gearbox.fault(f"{key}.{name}.sectors = {count}: only the seat of a gear has sectors")
+            parts = [seat] if count is None else _parts(seat, count)
+            seats += parts
+            if count is not None:
+                sectors[name] = tuple(part.name for part in parts)
+    names = [seat.name for seat in seats]
+    doubled = next((name for name in names if names.count(name) > 1), None)
+    if doubled is not None:
+        raise gearbox.fault(f"{key}: two seats are both named {doubled!r}; rename one")
+    for name, other in shared_seats.items():
+        if other not in names:
+            raise gearbox.fault(f"{key}.{name}.same_as = {other!r}: no such seat; seats are {', '.join(names)}")
+    if not seats:
+        raise gearbox.fault(f"{key}: nothing sits on the body; give at least one seat")
+    return seats, sectors, shared_seats
+
+
+def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, section: SolidSeatSection) -> SolidSeat:
+    """One seat, from what the file says of it and what is known of the item on it."""
+    diameter, width = (None, None) if item is None else (item.diameter, item.width)
+    if section.diameter_mm is not None:
+        diameter = 1e-3 * section.diameter_mm
+    if section.width_mm is not None:
+        width = 1e-3 * section.width_mm
+    if section.inner_diameter_mm is not None:
+        width = 0.0
+    position = None if item is None else item.position
+    if section.position_mm is not None:
+        x, y, z = section.position_mm
+        position = (1e-3 * x, 1e-3 * y, 1e-3 * z)
+    given = (("diameter_mm", diameter), ("width_mm", width), ("position_mm", position))
+    missing = [word for word, value in given if value is None]
+    if missing or diameter is None or width is None or position is None:
+        what = "a seat that no gear, bearing or mount of the body has the name of" if item is None else item.noun
+        raise gearbox.fault(f"{key}: {what} {name!r} needs its seat; give {' and '.join(missing)} in [{key}]")
+    return SolidSeat(name, position, diameter / 2.0, width, 0.5e-3 * (section.inner_diameter_mm or 0.0))
+
+
+def _parts(seat: SolidSeat, count: int) -> list[SolidSeat]:
+    """Equal sectors of a seat, numbered from 1, the first in the middle of +x."""
+    extent = 2.0 * math.pi / count
+    return [
+        SolidSeat(f"{seat.name}_{n + 1}", seat.centre, seat.radius, seat.width, seat.inner_radius, (n * extent, extent))
+        for n in range(count)
+    ]
+
+
+def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list[str]) -> dict[str, Blank]:
+    """Blanks by seat; one given for a bearing of all planets goes on each of its seats."""
+    families = {name: item.family for name, item in _items(gearbox, body).items()}
+    blanks: dict[str, Blank] = {}
+    for name, section in solid.blanks.items():
+        on = [seat for seat in names if name in (seat, families.get(seat))]
+        if not on:
+            raise gearbox.fault(f"bodies.{body.family}.solid.blanks.{name}: no such seat; seats are {', '.join(names)}")
+        blanks |= dict.fromkeys(on, blank_of(section))
+    return blanks
+
+
+def solids_of(gearbox: Gearbox) -> Iterator[tuple[str, SolidModel]]:
+    """Key and model of each solid that the variant `flexible` takes; files are there, but none is read or run yet.
+
+    Raises
+    ------
+    CaseError
+        As `solid_body`.
+    """
+    for name in elastic_names(gearbox):
+        family = gearbox.body(name).family
+        if gearbox.case.bodies[family].solid is not None:
+            yield f"bodies.{family}.solid", solid_body(gearbox, name).model
+
+
+def check_solids(gearbox: Gearbox, folder: Path) -> None:
+    """Refuse solids that cannot be taken, and scripts that would have to run and may not, before any work.
+
+    Parameters
+    ----------
+    folder : where reductions are stored: a script whose reduction is there need not run
+
+    Raises
+    ------
+    CaseError
+        A script that may not run, or as `solid_body`.
+    """
+    for key, model in solids_of(gearbox):
+        file: SolidFile = model.mesh
+        if file.is_script and not file.scripts and not reduction_file(model, folder).is_file():
+            raise gearbox.fault(f"{key}.file = {file.path.name!r}: {UNPERMITTED}")
+
+
+# The elastic bodies of a gearbox: all that are elastic, reduced, with the rigid inertia of an inertia set
+
+
+def reduced_bodies(
+    gearbox: Gearbox, inertias: str, folder: Path | None = None, begin: Callable[[str], None] | None = None
+) -> dict[str, ElasticBody]:
+    """Reduce all elastic bodies of a gearbox, or take them from where they are stored.
+
+    Parameters
+    ----------
+    inertias : inertia set whose rigid inertias the bodies get that turn
+    folder : folder of a results folder in which reductions are stored; only the process remembers them otherwise
+    begin : called with the name of each body before it is reduced
+
+    Raises
+    ------
+    CaseError
+        A shape or solid that cannot be, or that its gears and bearings do not fit on.
+    """
+    bodies = {}
+    for name in elastic_names(gearbox):
+        if begin is not None:
+            begin(name)
+        bodies[name] = _elastic_body(gearbox, gearbox.body(name, inertias), folder)
+    return bodies
+
+
+def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticBody:
+    section = gearbox.case.bodies[body.family]
+    solid = None if section.solid is None else solid_body(gearbox, body.name)
+    key = "shape" if solid is None else "solid"
+    model = shaft_model(gearbox, body.name) if solid is None else solid.model
+    floating = None
+    try:
+        if section.flexibility == "ffrf":
+            of_shape, floating = _floating(_Hashed(model), folder)
+        else:
+            of_shape = _reduced(_Hashed(model), folder)
+    except (ShaftError, SolidError, ReductionError) as error:
+        raise gearbox.fault(f"bodies.{body.family}.{key}: {error}") from None
+    wanted = RigidInertia(body.mass, (*body.axis, body.centre_of_mass_z), body.transverse, body.axial)
+    reduced = of_shape if body.fixed else with_rigid_inertia(of_shape, wanted)
+    floating = None if floating is None else with_inertia(floating, wanted)
+    inertia = of_shape.rigid_inertia
+    if solid is not None:
+        digest = hashlib.sha256(solid.model.mesh.path.read_bytes()).hexdigest()
+        return ElasticBody(reduced, inertia, solid.main_seat, solid.sectors, solid.shared_seats, floating, digest)
+    seats = [seat.name for seat in of_shape.seats]
+    shared = shared_seats(gearbox, body.name)
+    torque = shared.get(TORQUE_SEAT, TORQUE_SEAT)
+    main = torque if torque in seats else seats[0]
+    return ElasticBody(reduced, inertia, main, shared_seats=shared, floating=floating)
+
+
+def check_elastic_body(gearbox: Gearbox, name: str) -> None:
+    """Refuse an elastic body before its finite elements are made.
+
+    Raises
+    ------
+    CaseError
+        A shape or solid that cannot be, a solid whose file is not there, seats that do not fit.
+    """
+    family = gearbox.body(name).family
+    if gearbox.case.bodies[family].solid is not None:
+        solid_body(gearbox, name)
+        return
+    model = shaft_model(gearbox, name)
+    if not model.seats:
+        raise gearbox.fault(
+            f"bodies.{family}.shape: nothing sits on the body; give it a gear, a bearing or torque_z_mm"
+        )
+    try:
+        check_shaft(model.sections, model.seats)
+    except ShaftError as error:
+        raise gearbox.fault(f"bodies.{family}.shape: {error}") from None
+
+
+class _Hashed:
+    """A model of a body by its key, so that it can be looked up."""
+
+    def __init__(self, model: ShaftModel | SolidModel) -> None:
+        self.model = model
+        self.key = model.key
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Hashed) and self.key == other.key
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+
+@lru_cache(maxsize=64)
+def _reduced(hashed: _Hashed, folder: Path | None) -> ReducedBody:
+    model = hashed.model
+    if isinstance(model, SolidModel):
+        if folder is None:
+            return reduce_solid(model)
+        return load_or_reduce_solid(model, folder)
+    if folder is None:
+        return reduce_shaft(model)
+    return load_or_reduce_shaft(model, folder)
+
+
+@lru_cache(maxsize=16)
+def _floating(hashed: _Hashed, folder: Path | None) -> tuple[ReducedBody, FloatingBody]:
+    model = hashed.model
+    return load_or_reduce_floating(model if isinstance(model, SolidModel) else solid_of_shaft(model), folder)

@@ -1,0 +1,261 @@
+"""Solids from files: shapes meshed with tetrahedra by gmsh, meshes read by meshio.
+
+Files may come from a stranger. Scripts of gmsh run only where they are permitted to; shapes are read without what
+lies beside them, meshes in formats that refer to no other file.
+
+gmsh (under the GPL) and meshio are loaded only where used.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import signal
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from exugear.system.bodies.solid_elements import CORNERS, SolidError, second_order
+
+SCRIPT = ".geo"
+"""Ending of gmsh scripts. Such a script can run any command of the system."""
+CAD = {".step": "step", ".stp": "step", ".brep": "brep"}
+"""Formats of shapes that hold nothing to run, by the ending of the file."""
+GEOMETRY = (SCRIPT, *CAD)
+"""Endings of files that gmsh meshes."""
+MESHES = {".msh": "gmsh", ".inp": "abaqus", ".vtu": "vtu", ".vtk": "vtk"}
+"""Formats of meshes that are read, by the ending of the file: one file each, which refers to no other, and whose
+reader comes to an end on a file that is cut short (that of Nastran's does not)."""
+UNPERMITTED = (
+    "a gmsh script can run any command; if you trust it, permit it with --allow-scripts (modes, run, view) or "
+    "EXUGEAR_ALLOW_SCRIPTS=1; a STEP file needs no permission"
+)
+"""Why a script is refused, and what would be right."""
+
+
+def tetrahedra(build: Callable[[Any], None], size: float, curvature: int = 12) -> Any:
+    """Mesh a solid with tetrahedra of second order by gmsh.
+
+    Parameters
+    ----------
+    build : is given `gmsh.model.occ` and adds volumes to it, in m. Fused pieces keep the edges between them.
+    size : largest element, m
+    curvature : elements around a full circle, at least
+
+    Returns
+    -------
+    skfem.MeshTet2
+
+    Raises
+    ------
+    SolidError
+        gmsh or a library of the system is missing, or the shape has no volume.
+
+    Examples
+    --------
+    >>> tetrahedra(lambda occ: occ.addBox(0.0, 0.0, 0.0, 1.0, 0.5, 0.25), 0.25)  # doctest: +SKIP
+    <skfem MeshTet2 object>
+    """
+
+    def load(gmsh: Any) -> None:
+        build(gmsh.model.occ)
+        gmsh.model.occ.synchronize()
+
+    return _meshed(load, size, curvature)
+
+
+def mesh_geometry(path: Path, size: float, curvature: int = 12, unit: float = 1e-3, scripts: bool = False) -> Any:
+    """Mesh a STEP or BREP file or a gmsh script (.geo, OpenCASCADE kernel) with tetrahedra of second order.
+
+    Parameters
+    ----------
+    path : a script is one file: what it includes is not noticed when a reduction is looked up
+    size, curvature : as in `tetrahedra`; m
+    unit : length of the file's unit, m. gmsh reads STEP in mm whatever its unit is
+    scripts : whether a script may run. It can do all that the user can.
+
+    Returns
+    -------
+    skfem.MeshTet2
+
+    Raises
+    ------
+    SolidError
+        As `tetrahedra`; also a file that is missing or that gmsh cannot read, and a script that may not run. After a
+        syntax error in a script gmsh reads no other one in the same process.
+    """
+    if not path.is_file():
+        raise SolidError(f"{path}: no such file")
+    kind = path.suffix.lower()
+    if kind not in GEOMETRY:
+        raise SolidError(f"{path}: no geometry; its name must end in {', '.join(GEOMETRY)}")
+    if kind == SCRIPT and not scripts:
+        raise SolidError(f"{path.name}: {UNPERMITTED}")
+
+    def load(gmsh: Any) -> None:
+        if kind == SCRIPT:
+            gmsh.open(str(path))
+            return
+        # gmsh.open would run a script of options that lies beside the shape; labels may refer to other files.
+        gmsh.option.setNumber("Geometry.OCCImportLabels", 0)
+        gmsh.model.occ.importShapes(str(path), format=CAD[kind])
+        gmsh.model.occ.synchronize()
+
+    try:
+        return _meshed(load, size / unit, curvature, unit)
+    except SolidError as error:
+        raise SolidError(f"{path}: {error}") from None
+
+
+def _meshed(load: Callable[[Any], None], size: float, curvature: int, unit: float = 1.0) -> Any:
+    """Mesh what `load` puts into gmsh, in lengths of `unit` (m)."""
+    gmsh = _library("gmsh")
+    handlers = _signal_handlers()
+    gmsh.initialize(["exugear", "-nopopup"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setNumber("Geometry.OCCUnionUnify", 0)  # edges between fused pieces stay: bands end on them
+        load(gmsh)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", curvature)
+        # Without a size at the corners gmsh takes a tenth of the whole.
+        gmsh.model.mesh.setSize(gmsh.model.getEntities(0), size)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.model.mesh.optimize("HighOrder")  # edges laid on coarse curves may turn an element inside out
+        tags, places, _ = gmsh.model.mesh.getNodes()
+        kinds, _, nodes = gmsh.model.mesh.getElements(3)
+    except Exception as error:  # gmsh raises nothing narrower
+        raise SolidError(f"gmsh cannot mesh it ({str(error).strip()})") from error
+    finally:
+        gmsh.finalize()
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+    if not len(kinds):
+        raise SolidError("the shape has no volume to mesh")
+    order = np.argsort(tags)
+    cells = order[np.searchsorted(tags[order], nodes[0])].reshape(-1, 10)
+    # gmsh numbers the last two edges of a tetrahedron the other way round than VTK.
+    return second_order(unit * places.reshape(-1, 3), cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]], "tetra10")
+
+
+def _signal_handlers() -> dict[int, Any]:
+    """Handlers that gmsh sets back to their defaults: its broken pipes and requests to stop would end the process."""
+    if threading.current_thread() is not threading.main_thread():
+        return {}
+    handlers = {number: signal.getsignal(number) for number in signal.valid_signals()}
+    return {number: handler for number, handler in handlers.items() if handler not in (None, signal.SIG_DFL)}
+
+
+def read_solid(path: Path, unit: float = 1.0) -> Any:
+    """Read a mesh of tetrahedra or hexahedra, first or second order, in one of the formats `MESHES`.
+
+    Parameters
+    ----------
+    unit : length of the file's unit, m; 1e-3 for a file in mm
+
+    Returns
+    -------
+    skfem.MeshTet2 or skfem.MeshHex2
+
+    Raises
+    ------
+    SolidError
+        Another format, meshio is missing or cannot read the file, or it holds no solid elements of one kind.
+    """
+    kind = MESHES.get(path.suffix.lower())
+    if kind is None:
+        raise SolidError(f"{path}: no mesh that is read; its name must end in {', '.join(MESHES)}")
+    meshio = _library("meshio")
+    if not path.is_file():
+        raise SolidError(f"{path}: no such file")
+    if kind == "abaqus" and _includes(path):
+        raise SolidError(f"{path}: refers to another file by *INCLUDE; put all of the mesh into one file")
+    try:
+        content = getattr(meshio, kind).read(str(path))
+    except Exception as error:  # its readers let out whatever damaged content makes them stumble on
+        raise SolidError(f"{path}: meshio cannot read it as {kind} ({error or type(error).__name__})") from None
+    solid: dict[str, list[Any]] = {}
+    for block in content.cells:
+        if block.type in CORNERS:
+            solid.setdefault(block.type, []).append(block.data)
+    if len(solid) != 1:
+        found = ", ".join(solid or sorted({block.type for block in content.cells})) or "nothing"
+        raise SolidError(f"{path}: found {found}; a solid needs elements of one kind among {', '.join(CORNERS)}")
+    kind, blocks = solid.popitem()
+    return second_order(unit * np.asarray(content.points), np.concatenate(blocks).astype(np.int64), kind)
+
+
+def _includes(path: Path) -> bool:
+    """Tell whether a file of Abaqus takes in another one; keywords as meshio understands them."""
+    with path.open(encoding="utf-8", errors="replace") as lines:
+        return any(line.partition(",")[0].strip().replace("*", "").upper() == "INCLUDE" for line in lines)
+
+
+@dataclass(frozen=True)
+class SolidFile:
+    """A solid in a file, meshed or read when its mesh is asked for."""
+
+    path: Path
+    """Geometry (`GEOMETRY`) or mesh."""
+    unit: float
+    """Length of the file's unit, m."""
+    size: float = 0.0
+    curvature: int = 12
+    """Largest element (m) and elements around a circle, for a geometry."""
+    scripts: bool = False
+    """Whether it may run if it is a script."""
+
+    @property
+    def is_geometry(self) -> bool:
+        """Tell whether gmsh has to mesh it."""
+        return self.path.suffix.lower() in GEOMETRY
+
+    @property
+    def is_mesh(self) -> bool:
+        """Tell whether it holds a mesh in a format that is read."""
+        return self.path.suffix.lower() in MESHES
+
+    @property
+    def is_script(self) -> bool:
+        """Tell whether it can run commands of the system."""
+        return self.path.suffix.lower() == SCRIPT
+
+    @cached_property
+    def mesh(self) -> Any:
+        """Mesh of the file.
+
+        Raises
+        ------
+        SolidError
+            As `mesh_geometry` and `read_solid`.
+        """
+        if self.is_geometry:
+            return mesh_geometry(self.path, self.size, self.curvature, self.unit, self.scripts)
+        return read_solid(self.path, self.unit)
+
+    @property
+    def digest(self) -> bytes:
+        """Hash of the file's content and of how it is meshed; the mesh is not needed for it."""
+        if not self.path.is_file():
+            raise SolidError(f"{self.path}: no such file")
+        how = f"{self.path.suffix.lower()} {self.unit!r} {self.size!r} {self.curvature}"
+        return hashlib.sha256(self.path.read_bytes() + how.encode()).digest()
+
+
+def _library(name: str) -> Any:
+    """Import an optional library, or tell what to install."""
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError:
+        raise SolidError(f"{name} is not installed: pip install 'exugear[mesh]'") from None
+    except OSError as error:
+        raise SolidError(
+            f"{name} is installed, but a library of the system is missing ({error}): "
+            "on Debian and Ubuntu install libglu1-mesa, libxcursor1, libxft2 and libxinerama1"
+        ) from None

@@ -1,1 +1,0 @@
-"""Eigenmodes at the static load: shapes, energies, what moves them."""

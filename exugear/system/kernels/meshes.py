@@ -1,0 +1,606 @@
+r"""Compiled geometry of gear meshes on arrays of coordinates: what deflects, at what rate, and where the gears stand.
+
+Each mesh lives in a frame that carries its line of centres: ground, or a carrier of spin psi. With R the
+rotation by psi, p a gear's place relative to the frame's axis and S = z x,
+
+    z_b   = R^T (p_b + x_b) - p_b,  tilts likewise,  spin_b - psi          displacements seen from the frame
+    delta = sum_b W_b . z_b                                                deflection, W constant
+    pmc   = phase + (spin_1 - psi) cycles                                  position in the mesh cycle
+    f     = -F dg/dq,  g = sum_b V_b . z_b                                 generalized force of a scalar force F
+
+A law along a row that resists misalignment gamma has the deflection and the moment of
+`exugear.system.tooth_mesh.contact_state` instead: e = delta - (zt + w) (gamma - g0) for delta, and + M d gamma/dq
+beside it.
+
+The row g does not change when everything turns with psi: the carrier's share of the force balances moments exactly.
+Which force F a deflection raises is the matter of the mesh laws (`exugear.system.tooth_mesh.laws`). Errors of pitch and
+run-out, given over a revolution of each gear, are subtracted from the deflection of any law.
+
+Coordinates are those of `exugear.system.kernels.coordinates`.
+
+The formulas are those of `exugear.system.kernels.meshes`, which the tests hold them against. What differs:
+sines of the frames' angles are taken once per evaluation and handed in, missing coordinates point to one that stays
+zero, so that the loops need no exceptions, and nothing is allocated.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from exugear.system.kernels.coordinates import AXIAL, BODY_SIZE, PADDED, PADDED_SPIN, PADDED_TILT, SPIN, TILT
+from exugear.system.kernels.table_law import NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT, Scratch, TableArrays, piece_at
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.compilation import compiled, kernel
+from fe_ste.tools.octets import eight, put, sum_of
+
+FRAME = 2 * BODY_SIZE
+"""Local coordinates of a mesh: six of gear 1, six of gear 2, then the spin of the frame."""
+ROW_SIZE = FRAME + 1
+SPIN_1 = SPIN
+SPIN_2 = BODY_SIZE + SPIN
+
+DEFLECTION, RATE, PMC, STIFFNESS, FORCE, ENERGY, DAMPED_POWER, CYCLE_POWER, OTHER_POWER, OUTSIDE = range(10)
+"""Columns of `mesh_state`.
+
+Deflection (m), its rate (m/s), pmc in [0, 1), tangent stiffness (N/m), F_bt (N, negative on the other flank), elastic
+energy (J); powers (W): damped, of the stiffness that changes with pmc, of a force that is not conjugate to its
+deflection; 1 where the mesh is outside its table.
+"""
+STATE_SIZE = 10
+TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT, TILT_REST = range(5)
+"""Columns of `MeshArrays.tilt`."""
+TILT_COLUMNS = 5
+WAY_COLUMNS, MOMENT_BEYOND = 8, 4
+"""Columns of `MeshArrays.way`, and the first of the moment in them."""
+
+
+class MeshArrays(NamedTuple):
+    """All meshes of a system as arrays; m meshes, n cubic pieces at most."""
+
+    coordinates: Integers
+    """(m, 13) position of each local coordinate in the state, -1 where there is none."""
+    axis: Floats
+    """(m, 2, 2) axis of each gear relative to the frame's axis at zero angles, m."""
+    form: Integers
+    """(m,) number of the law's compiled form, which `exugear.system.tooth_mesh.laws.mesh_forces` chooses by."""
+    deflection: Floats
+    force: Floats
+    """(m, 12) rows W and V, m/m and m/rad."""
+    cycles: Floats
+    """(m,) mesh cycles per rad of gear 1 relative to the frame, signed by the loaded flank."""
+    phase: Floats
+    """(m,) position in the mesh cycle at zero angles."""
+    pieces: Integers
+    """(m,) number of equal pieces over the mesh cycle."""
+    stiffness: Floats
+    """(m, n, c) coefficients of the law over each piece; of a stiffness four of a cubic, N/m."""
+    damping: Floats
+    """(m,) N s/m."""
+    tilt: Floats
+    """(m, 5) of a law along a row that resists misalignment: tilt stiffness kg (N m/rad) and damping (N m s/rad),
+    lever zt (m), moment F0 (zc - zt) (N m) and misalignment g0 (rad); zeros where it does not."""
+    way_pieces: Integers
+    """(m,) number of equal pieces of the load's ways along the face; 0 where it stays."""
+    way: Floats
+    """(m, w, 8) coefficients over each piece of the mesh cycle: of the way w of what a little more deflection adds:
+    to the load, m, then of the moment F0 (c - w) that the load itself has beyond it, N m."""
+    line_of_action: Floats
+    """(m,) F_bt per scalar mesh force."""
+    error_pieces: Integers
+    """(m, 2) number of equal cubic pieces of each gear's error over its revolution; 0 for no error."""
+    error: Floats
+    """(m, 2, e, 4) coefficients of the error over each piece, m along the transverse line of action."""
+    table: TableArrays
+    """Tables of the meshes that follow one."""
+
+    def one(self, n: int) -> MeshArrays:
+        """Arrays of mesh n alone."""
+        table = TableArrays._make(values[n : n + 1] for values in self.table)
+        others = {name: values[n : n + 1] for name, values in self._asdict().items() if name != "table"}
+        return MeshArrays(**others, table=table)
+
+
+def periodic_cubic(samples: Floats) -> Floats:
+    """Coefficients of a periodic C1 cubic through equally spaced samples over one cycle.
+
+    Slopes are central differences (Catmull and Rom 1974), so that a sample acts on its neighbourhood only.
+
+    Parameters
+    ----------
+    samples : (n,) values at pmc = 0, 1/n, ...; one sample means a constant
+
+    Returns
+    -------
+    (n, 4) coefficients c of sum_j c_j t^j on each piece, t from 0 to 1
+
+    Examples
+    --------
+    >>> periodic_cubic(np.array([1.0, 2.0, 1.0, 0.0]))[0]
+    array([ 1.,  1.,  1., -1.])
+    """
+    values = np.asarray(samples, dtype=np.float64)
+    following = np.roll(values, -1)
+    slope = 0.5 * (following - np.roll(values, 1))
+    next_slope = np.roll(slope, -1)
+    rise = following - values
+    return np.stack([values, slope, 3.0 * rise - 2.0 * slope - next_slope, slope + next_slope - 2.0 * rise], axis=1)
+
+
+@kernel
+def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float]:
+    """Stiffness (N/m) and its slope per cycle at any position in the mesh cycle; coefficients (n, 4)."""
+    # pmc is unwrapped: only its fraction tells the piece, and t in [0, 1) the position in that piece.
+    scaled = (pmc - math.floor(pmc)) * pieces
+    piece = piece_at(scaled, pieces)
+    t = scaled - piece
+    c = coefficients[piece]
+    value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+    # The cubic's derivative is per piece; there are `pieces` of them to a cycle.
+    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
+    return value, slope
+
+
+@kernel
+def way_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float, float, float]:
+    """Way (m) and moment (N m) of coefficients (n, 8), each with its slope per cycle, as `stiffness_at`."""
+    scaled = (pmc - math.floor(pmc)) * pieces
+    piece = piece_at(scaled, pieces)
+    t = scaled - piece
+    c = coefficients[piece]
+    way: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+    moving = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
+    moment: float = c[4] + t * (c[5] + t * (c[6] + t * c[7]))
+    return way, moving, moment, (c[5] + t * (2.0 * c[6] + t * 3.0 * c[7])) * pieces
+
+
+@kernel
+def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: Floats, turning: Floats) -> float:
+    """Value of sum W . z with its gradient (13,) and the gradient's derivative to psi (13,) for one mesh."""
+    psi = q[index[FRAME]] if index[FRAME] >= 0 else 0.0
+    c = math.cos(psi)
+    s = math.sin(psi)
+    value = 0.0
+    gradient[:] = 0.0
+    turning[:] = 0.0
+    for end in range(2):
+        o = BODY_SIZE * end
+        # Translations and tilts are vectors in the plane, both turned back by psi. Only translations have a lever p.
+        for pair in (0, TILT):
+            if index[o + pair] < 0:
+                continue
+            px, py = (axis[end, 0], axis[end, 1]) if pair == 0 else (0.0, 0.0)
+            x = px + q[index[o + pair]]
+            y = py + q[index[o + pair + 1]]
+            lx = c * x + s * y
+            ly = c * y - s * x
+            wx = row[o + pair]
+            wy = row[o + pair + 1]
+            value += wx * (lx - px) + wy * (ly - py)
+            # dz/dq = R^T, so the gradient is the row turned forward; its derivative to psi is that turned by 90 deg.
+            gradient[o + pair] = c * wx - s * wy
+            gradient[o + pair + 1] = s * wx + c * wy
+            turning[o + pair] = -gradient[o + pair + 1]
+            turning[o + pair + 1] = gradient[o + pair]
+            # dl/dpsi = -S l, l the gear's place from the frame's axis as the frame sees it; twice gives -l.
+            gradient[FRAME] += wx * ly - wy * lx
+            turning[FRAME] -= wx * lx + wy * ly
+        # Along z and about it the frame's turning changes nothing but the spin that is seen.
+        if index[o + AXIAL] >= 0:
+            value += row[o + AXIAL] * q[index[o + AXIAL]]
+            gradient[o + AXIAL] = row[o + AXIAL]
+        spin = q[index[o + SPIN]] if index[o + SPIN] >= 0 else 0.0
+        value += row[o + SPIN] * (spin - psi)
+        gradient[o + SPIN] = row[o + SPIN]
+        gradient[FRAME] -= row[o + SPIN]
+    return value
+
+
+@kernel
+def error_at(m: int, end: int, angle: float, meshes: MeshArrays) -> tuple[float, float, float]:
+    """Error (m) of one gear of mesh m at its angle (rad) seen from the frame, with two derivatives by the angle."""
+    pieces = meshes.error_pieces[m, end]
+    if pieces == 0:
+        return 0.0, 0.0, 0.0
+    # As in `stiffness_at`, over a revolution instead of a mesh cycle.
+    turns = angle / (2.0 * math.pi)
+    scaled = (turns - math.floor(turns)) * pieces
+    piece = piece_at(scaled, pieces)
+    t = scaled - piece
+    c = meshes.error[m, end, piece]
+    per_rad = pieces / (2.0 * math.pi)
+    value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
+    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * per_rad
+    return value, slope, (2.0 * c[2] + 6.0 * t * c[3]) * per_rad * per_rad
+
+
+@kernel
+def net_deflection(
+    q: Floats, m: int, meshes: MeshArrays, row: Floats, side: float, gradient: Floats, turning: Floats, bend: Floats
+) -> float:
+    """Value of a row less the gears' errors (side 1; plus them for the other flank, -1), gradient as `frame_row`.
+
+    The errors' second derivatives by the two spins go to `bend` (2,).
+    """
+    index = meshes.coordinates[m]
+    value: float = frame_row(q, index, meshes.axis[m], row, gradient, turning)
+    psi = q[index[FRAME]] if index[FRAME] >= 0 else 0.0
+    for end in range(2):
+        o = BODY_SIZE * end + SPIN
+        spin = q[index[o]] if index[o] >= 0 else 0.0
+        error, slope, curvature = error_at(m, end, spin - psi, meshes)
+        value -= side * error
+        # The error depends on spin - psi: what its slope adds to one it takes from the other.
+        gradient[o] -= side * slope
+        gradient[FRAME] += side * slope
+        bend[end] = -side * curvature
+    return value
+
+
+@kernel
+def mesh_pmc(q: Floats, m: int, meshes: MeshArrays) -> float:
+    """Position in the mesh cycle of mesh m, unwrapped."""
+    spin = q[meshes.coordinates[m, SPIN_1]] if meshes.coordinates[m, SPIN_1] >= 0 else 0.0
+    psi = q[meshes.coordinates[m, FRAME]] if meshes.coordinates[m, FRAME] >= 0 else 0.0
+    pmc: float = meshes.phase[m] + meshes.cycles[m] * (spin - psi)
+    return pmc
+
+
+@kernel
+def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float, float, float]:
+    """Way w (m) of the load of mesh m at a position in its cycle, its slope; moment F0 (c - w) (N m), its slope."""
+    if meshes.way_pieces[m] == 0:
+        return 0.0, 0.0, 0.0, 0.0
+    return way_at(meshes.way[m], meshes.way_pieces[m], pmc)
+
+
+@kernel
+def row_dot(index: Integers, row: Floats, v: Floats) -> float:
+    """Scalar product of a local row (13,) with the state's entries it belongs to."""
+    total = 0.0
+    for i in range(ROW_SIZE):
+        if index[i] >= 0:
+            total += row[i] * v[index[i]]
+    return total
+
+
+@kernel
+def relative_spin(v: Floats, index: Integers, end: int) -> float:
+    """Spin of a gear of a mesh seen from the mesh's frame; of coordinates or of their rates."""
+    spin = v[index[BODY_SIZE * end + SPIN]] if index[BODY_SIZE * end + SPIN] >= 0 else 0.0
+    psi = v[index[FRAME]] if index[FRAME] >= 0 else 0.0
+    difference: float = spin - psi
+    return difference
+
+
+@compiled
+def gear_position(q: Floats, m: int, meshes: MeshArrays, row: Floats, nominal: float) -> float:
+    """Centre distance (m) or misalignment (rad) of mesh m by its row."""
+    gradient = np.empty(ROW_SIZE)
+    turning = np.empty(ROW_SIZE)
+    index = meshes.coordinates[m]
+    value: float = nominal + frame_row(q, index, meshes.axis[m], row, gradient, turning)
+    return value
+
+
+@kernel
+def turn_rows(turning: Floats, bend: Floats, factor: float, out: Floats) -> None:
+    """Add factor times the second derivatives of a row's value, (13, 13)."""
+    # The value is bilinear in psi and the others: a full row and column of psi, whose corner counts once.
+    for i in range(ROW_SIZE):
+        out[i, FRAME] += factor * turning[i]
+        if i != FRAME:
+            out[FRAME, i] += factor * turning[i]
+    # An error bends with spin - psi.
+    for end in range(2):
+        o = BODY_SIZE * end + SPIN
+        out[o, o] += factor * bend[end]
+        out[FRAME, FRAME] += factor * bend[end]
+        out[o, FRAME] -= factor * bend[end]
+        out[FRAME, o] -= factor * bend[end]
+
+
+@kernel
+def rate_gradient(v: Floats, index: Integers, turning: Floats, bend: Floats, out: Floats) -> None:
+    """Differentiate a row's rate by the coordinates, (13,)."""
+    # d(gradient . v)/dq is the second derivative times v: the same pattern as in `turn_rows`.
+    psi_rate = v[index[FRAME]] if index[FRAME] >= 0 else 0.0
+    for i in range(ROW_SIZE):
+        out[i] = turning[i] * psi_rate
+    out[FRAME] = row_dot(index, turning, v)
+    for end in range(2):
+        change = bend[end] * relative_spin(v, index, end)
+        out[BODY_SIZE * end + SPIN] += change
+        out[FRAME] -= change
+
+
+@compiled
+def gear_positions(q: Floats, meshes: MeshArrays, out: Floats) -> None:
+    """Fill (m, 2): centre distance (m) and misalignment of the loaded flank (rad) of each mesh."""
+    table = meshes.table
+    for m in range(meshes.coordinates.shape[0]):
+        out[m, 0] = gear_position(q, m, meshes, table.centre[m], table.nominal[m, NOMINAL_DISTANCE])
+        out[m, 1] = gear_position(q, m, meshes, table.misalignment[m], table.nominal[m, NOMINAL_MISALIGNMENT])
+
+
+# Compiled geometry of gear meshes, arranged for speed: value, rate and gradient of a row in one pass
+
+ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
+"""Rows of `MeshMemory.gradient`."""
+LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE, LAST_ENERGY, LAST_DAMPED, LAST_CYCLE, LAST_OTHER = range(8)
+LAST_CENTRE, LAST_MISALIGNMENT, LAST_CENTRE_RATE = range(8, 11)
+"""Columns of `MeshMemory.states`: deflection (m), rate (m/s), 1 outside a table, scalar force (N; of a table F_bt), and
+what an account of energy takes of the mesh: elastic energy (J); power damped, of the stiffness that changes with pmc,
+and of a force that is not conjugate to its deflection (W); of a table change of centre distance (m),
+misalignment (rad) and rate of the centre distance (m/s)."""
+STATES_SIZE = 11
+DEFLECTION_ROW, FORCE_ROW = range(2)
+"""Rows of `Meshes.rows`."""
+FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
+"""First columns of the parts of each of them, and of those of the second gear."""
+TILT_ROW_X, TILT_ROW_Y, TILT_SHIFT, TILT_RESISTANCE, TILT_DAMPER, TILT_ARM, TILT_PUSH = range(7)
+"""Columns of `Meshes.tilt`: the misalignment's row over the tilts of gear 1, its negative being that of gear 2;
+misalignment at zero tilts against that of the contact's state (rad); tilt stiffness, damping, lever and moment as in
+`exugear.system.kernels.meshes.MeshArrays.tilt`."""
+PADDED_FRAME = 2 * PADDED
+"""Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
+KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
+"""Columns of an account of energy, as runs take it (`exugear.transient.compiled.sampling`).
+
+Kinetic and elastic energy (J); powers (W): of the loads, damped, of the stiffness that changes with pmc, of mesh forces
+that are not conjugate to their deflection, of bearings whose rate is not the derivative of their displacement.
+"""
+
+
+class Meshes(NamedTuple):
+    """Meshes as in `system.tooth_mesh.kernels.meshes.MeshArrays`; missing coordinates point to one that stays zero."""
+
+    coordinates: Integers
+    """(m, 13)"""
+    slot: Integers
+    """(m,) where the cosine and sine of the frame's angle stand among those of all angles that turn anything."""
+    axis: Floats
+    """(m, 2, 2) zero for gears without translations."""
+    form: Integers
+    deflection: Floats
+    force: Floats
+    conjugate: Integers
+    """(m,) 1 where the force row is the deflection row."""
+    tilting: Integers
+    """(m,) 1 where a law along a row resists misalignment."""
+    tilt: Floats
+    """(m, 7) columns as named in this module."""
+    way_pieces: Integers
+    way: Floats
+    """Of the load's ways along the face."""
+    spinning: Integers
+    """(m,) 1 where the gears have their spins alone."""
+    ends: Integers
+    """(m, 2) numbers of the two gears' places."""
+    rows: Floats
+    """(m, 2, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose:
+    row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame."""
+    offsets: Floats
+    """(m, 2, 3) of each row: what cos psi, sin psi and psi itself add to its value."""
+    cycles: Floats
+    phase: Floats
+    pieces: Integers
+    stiffness: Floats
+    damping: Floats
+    mean: Floats
+    """(m, 2) stiffness (N/m) and damping (N s/m) at the static load, mean over the cycle."""
+    line_of_action: Floats
+    error_pieces: Integers
+    error: Floats
+    nominal: Floats
+    """(m,) deflection of gears in their nominal place, m."""
+    table: TableArrays | None
+    """None where no mesh follows one."""
+
+
+class MeshMemory(NamedTuple):
+    """Memory of the meshes' laws."""
+
+    gradient: Floats
+    """(3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table."""
+    gradients: Floats
+    """(4, 17) gradients over two padded places and the frame's angle; the last one is a sum."""
+    states: Floats
+    """(m, 11) what each mesh does, columns as named in this module."""
+    pieces: Integers
+    """(m, 2) load piece of each flank's table that was used last."""
+    law: Scratch | None
+    """Memory of the law `table`; None where no mesh has it."""
+    row: Floats
+    """(12,) row of the push between the axes and the moment of misalignment."""
+    damping: Floats
+    """(5,) directions and sizes of the damping of a table."""
+
+
+class MeshWork(Protocol):
+    """What laws read and fill of the memory of a loop over time: `exugear.transient.compiled.packing.Work`."""
+
+    @property
+    def force(self) -> Floats:
+        """Generalized forces."""
+
+    @property
+    def turns(self) -> Floats:
+        """Cosine and sine of all angles that turn anything, (k, 2)."""
+
+    @property
+    def places(self) -> Floats:
+        """Padded coordinates and rates of all places, (p, 16)."""
+
+    @property
+    def loads(self) -> Floats:
+        """Generalized forces on all places, padded alike, (p, 16)."""
+
+    @property
+    def mesh(self) -> MeshMemory:
+        """Memory of the laws."""
+
+
+def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:
+    """Rows over padded places, their parts and offsets: see `Meshes`.
+
+    Parameters
+    ----------
+    rows : (m, r, 12) rows over the coordinates of both gears seen from the frame
+    axis : (m, 2, 2) axis of each gear relative to the frame's at zero angles, m; zero for gears without translations
+
+    Returns
+    -------
+    rows : (m, r, 48)
+    offsets : (m, r, 3)
+    """
+    count, kinds = rows.shape[:2]
+    gears = rows.reshape(count, kinds, 2, BODY_SIZE)
+    parts = np.zeros((count, kinds, 2, SECOND))
+    parts[..., FIXED + AXIAL], parts[..., FIXED + PADDED_SPIN] = gears[..., AXIAL], gears[..., SPIN]
+    for i, o in ((0, 0), (TILT, PADDED_TILT)):
+        # Turned forward by psi: (c x - s y, s x + c y).
+        parts[..., ALONG_COSINE + o], parts[..., ALONG_COSINE + o + 1] = gears[..., i], gears[..., i + 1]
+        parts[..., ALONG_SINE + o], parts[..., ALONG_SINE + o + 1] = -gears[..., i + 1], gears[..., i]
+    offsets = np.zeros((count, kinds, 3))
+    x = gears[..., 0]
+    y = gears[..., 1]
+    px = axis[:, None, :, 0]
+    py = axis[:, None, :, 1]
+    offsets[..., 0], offsets[..., 1] = (x * px + y * py).sum(axis=2), (x * py - y * px).sum(axis=2)
+    offsets[..., 2] = -gears[..., SPIN].sum(axis=2)
+    return parts.reshape(count, kinds, 2 * SECOND), offsets
+
+
+@kernel
+def row_motion(
+    m: int, kind: int, psi: float, psi_rate: float, c: float, s: float, meshes: Meshes, places: Floats, gradient: Floats
+) -> tuple[float, float]:
+    """Value and rate of a row of mesh m; fills its gradient (17,). c and s are those of the frame's angle psi."""
+    row = meshes.rows[m, kind]
+    offsets = meshes.offsets[m, kind]
+    first = places[meshes.ends[m, 0]]
+    second = places[meshes.ends[m, 1]]
+    along = eight(row, ALONG_COSINE)
+    across = eight(row, ALONG_SINE)
+    gradient_1 = eight(row, FIXED) + along * c + across * s
+    turning_1 = across * c - along * s
+    along = eight(row, SECOND + ALONG_COSINE)
+    across = eight(row, SECOND + ALONG_SINE)
+    gradient_2 = eight(row, SECOND + FIXED) + along * c + across * s
+    turning_2 = across * c - along * s
+    place_1 = eight(first, 0)
+    place_2 = eight(second, 0)
+    level = offsets[0]
+    lever = offsets[1]
+    spins = offsets[2]
+    # What the frame's turning does to all of the above at once.
+    turning = sum_of(turning_1 * place_1 + turning_2 * place_2) + (c * lever - s * level) + spins
+    value = sum_of(gradient_1 * place_1 + gradient_2 * place_2) + ((c * level + s * lever - level) + spins * psi)
+    rate = sum_of(gradient_1 * eight(first, PADDED) + gradient_2 * eight(second, PADDED)) + turning * psi_rate
+    put(gradient, 0, gradient_1)
+    put(gradient, PADDED, gradient_2)
+    gradient[PADDED_FRAME] = turning
+    return value, rate
+
+
+@kernel
+def tilt_motion(
+    m: int, psi_rate: float, c: float, s: float, meshes: Meshes, places: Floats
+) -> tuple[float, float, float, float, float]:
+    """Misalignment of mesh m against that of its contact's state, and its rate; its gradient in three numbers.
+
+    These are those by both tilts of gear 1, whose negatives belong to gear 2, and by the frame's angle.
+    """
+    row = meshes.tilt[m]
+    first = places[meshes.ends[m, 0]]
+    second = places[meshes.ends[m, 1]]
+    x = c * row[TILT_ROW_X] - s * row[TILT_ROW_Y]
+    y = s * row[TILT_ROW_X] + c * row[TILT_ROW_Y]
+    a = first[PADDED_TILT] - second[PADDED_TILT]
+    b = first[PADDED_TILT + 1] - second[PADDED_TILT + 1]
+    turning = x * b - y * a
+    a_rate = first[PADDED + PADDED_TILT] - second[PADDED + PADDED_TILT]
+    b_rate = first[PADDED + PADDED_TILT + 1] - second[PADDED + PADDED_TILT + 1]
+    return row[TILT_SHIFT] + x * a + y * b, x * a_rate + y * b_rate + turning * psi_rate, x, y, turning
+
+
+@kernel
+def mesh_row(
+    q: Floats, v: Floats, index: Integers, axis: Floats, row: Floats, c: float, s: float, gradient: Floats
+) -> tuple[float, float]:
+    """Value and rate of a row over the coordinates seen from its frame; fills its gradient (13,)."""
+    psi = q[index[FRAME]]
+    psi_rate = v[index[FRAME]]
+    value = 0.0
+    rate = 0.0
+    turning = 0.0
+    for end in range(2):
+        o = BODY_SIZE * end
+        px = axis[end, 0]
+        py = axis[end, 1]
+        for pair in (0, TILT):
+            i = index[o + pair]
+            j = index[o + pair + 1]
+            # Turned back by psi; the row turned forward is its gradient, whose product with v is the rate.
+            x = px + q[i]
+            y = py + q[j]
+            lx = c * x + s * y
+            ly = c * y - s * x
+            wx = row[o + pair]
+            wy = row[o + pair + 1]
+            gx = c * wx - s * wy
+            gy = s * wx + c * wy
+            value += wx * (lx - px) + wy * (ly - py)
+            rate += gx * v[i] + gy * v[j]
+            turning += wx * ly - wy * lx
+            gradient[o + pair], gradient[o + pair + 1] = gx, gy
+            px, py = 0.0, 0.0  # tilts have no lever
+        axial = row[o + AXIAL]
+        spin = row[o + SPIN]
+        value += axial * q[index[o + AXIAL]] + spin * (q[index[o + SPIN]] - psi)
+        rate += axial * v[index[o + AXIAL]] + spin * v[index[o + SPIN]]
+        turning -= spin
+        gradient[o + AXIAL], gradient[o + SPIN] = axial, spin
+    # The frame's angle comes last: what its turning does to all of the above at once.
+    gradient[FRAME] = turning
+    return value, rate + turning * psi_rate
+
+
+@kernel
+def error_and_slope_at(m: int, end: int, angle: float, meshes: Meshes) -> tuple[float, float]:
+    """Error (m) of one gear of mesh m at its angle (rad) seen from the frame, and its slope per rad."""
+    pieces = meshes.error_pieces[m, end]
+    turns = angle / (2.0 * math.pi)
+    scaled = (turns - math.floor(turns)) * pieces
+    piece = piece_at(scaled, pieces)
+    t = scaled - piece
+    c = meshes.error[m, end, piece]
+    slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces / (2.0 * math.pi)
+    return c[0] + t * (c[1] + t * (c[2] + t * c[3])), slope
+
+
+@kernel
+def subtract_errors(
+    q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats, size: int, spin_place: int, frame: int
+) -> tuple[float, float]:
+    """Change of a deflection and its rate by the gears' errors; changes its gradient too.
+
+    The gradient has `size` places for each gear, the spin at `spin_place` of them, and the frame's angle at `frame`.
+    """
+    delta = 0.0
+    rate = 0.0
+    index = meshes.coordinates[m]
+    for end in range(2):
+        if meshes.error_pieces[m, end] > 0:
+            spin = index[BODY_SIZE * end + SPIN]
+            psi = index[FRAME]
+            error, slope = error_and_slope_at(m, end, q[spin] - q[psi], meshes)
+            # A flank that stands back closes later; seen from the other flank it stands ahead (side -1).
+            delta -= side * error
+            rate -= side * slope * (v[spin] - v[psi])
+            gradient[size * end + spin_place] -= side * slope
+            gradient[frame] += side * slope
+    return delta, rate

@@ -1,0 +1,473 @@
+"""Eigenmodes of a gearbox variant: frequencies, damping, where the energy sits, and what moves in words.
+
+Linearised about the static equilibrium under the file's static load, PMC frozen and mesh stiffness averaged
+over the cycle. The tangent of the law at that load is used: k'(PMC) times the deflection would give the free
+rotation a false stiffness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.versions import MODES
+from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
+from exugear.system.build import assemble
+from exugear.system.kernels.coordinates import SPIN
+from exugear.system.kernels.meshes import STIFFNESS, TILT_COLUMNS, TILT_STIFFNESS
+from exugear.system.statics import (
+    RIGID_BODY_LIMIT,
+    Linearised,
+    beside_unsolved_states,
+    growth_rate,
+    linearise,
+    static_state,
+    undamped_modes,
+)
+from exugear.system.system import Assembly, input_hash
+from exugear.system.tooth_mesh.element import Angles, MeshData
+from exugear.system.tooth_mesh.laws.registry import LAWS
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed, TitledRows
+from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Where the energy of modes sits: kinetic by body and motion, strain by element, and what moves in words
+
+BODY_MOTIONS = ("spin", "radial", "axial", "tilt", "bending", "twist", "stretch", "deformation")
+"""What a body does: four motions as a rigid body, three deformations of an elastic shaft, the last of other bodies."""
+RIGID_MOTIONS = slice(0, 4)
+BENDING, TWIST, STRETCH, DEFORMATION = range(4, 8)
+"""Their places in `BODY_MOTIONS`."""
+COORDINATES_OF_MOTIONS = ((SPIN,), (UX, UY), (UZ,), (TILT_X, TILT_Y))
+"""Coordinates of a rigid body that belong to each of its four motions."""
+
+
+def kinetic_shares(assembly: Assembly, shapes: Floats, q: Floats) -> Floats:
+    """Share of kinetic energy (n, bodies, 8) by body and motion of modes (size, n) about coordinates q (size,)."""
+    energy = np.diag(assembly.mass_matrix)[:, None] * shapes**2
+    shares = np.zeros((shapes.shape[1], len(assembly.bodies), len(BODY_MOTIONS)))
+    for n, body in enumerate(assembly.bodies):
+        if body.name in assembly.elastic_bodies:
+            of_body = assembly.elastic_slices[body.name]
+            body_shapes = shapes[of_body]
+            if body.name in assembly.turning:  # its matrices are those of its own frame
+                turning = assembly.turning[body.name]
+                body_shapes = turning.rotated(body_shapes, -turning.angle(q[of_body]))
+            shares[:, n] = _elastic_energies(assembly.elastic_bodies[body.name].reduced, body_shapes)
+            continue
+        index = assembly.coordinates[body.name]
+        for motion, coordinates in enumerate(COORDINATES_OF_MOTIONS):
+            for coordinate in coordinates:
+                if index[coordinate] >= 0:
+                    shares[:, n, motion] += energy[index[coordinate]]
+    total: Floats = shares.sum(axis=(1, 2), keepdims=True)
+    return shares / total
+
+
+def _elastic_energies(body: ReducedBody, shapes: Floats) -> Floats:
+    """Twice the kinetic energy (n, motions) of an elastic body: of its rigid part, and of each deformation.
+
+    The rigid part is what the momentum of the whole tells; the rest is orthogonal to it. Turns about all three axes
+    share their energy in the proportion that each has alone: a housing's products of inertia couple them.
+    """
+    rigid = body.rigid_motions(body.rigid_inertia.centre)
+    inertia = rigid.T @ body.mass @ rigid
+    # Rigid motions that have the momentum of the whole.
+    velocities = np.linalg.solve(inertia, rigid.T @ body.mass @ shapes)
+    rigid_energies = np.diag(inertia)[:, None] * velocities**2
+    turning = np.einsum("im,ij,jm->m", velocities[3:], inertia[3:, 3:], velocities[3:])
+    rigid_energies[3:] *= turning / np.maximum(rigid_energies[3:].sum(axis=0), 1e-300)
+    ux, uy, uz, tilt_x, tilt_y, spin = rigid_energies
+    energies = np.zeros((shapes.shape[1], len(BODY_MOTIONS)))
+    energies[:, RIGID_MOTIONS] = np.stack([spin, ux + uy, uz, tilt_x + tilt_y], axis=1)
+    deformed = shapes - rigid @ velocities
+    for block in body.blocks:
+        if body.spin[block].any():
+            motion = TWIST
+        elif rigid[block, UZ].any():
+            motion = STRETCH
+        else:
+            motion = BENDING
+        if len(body.blocks) == 1:  # a solid, which falls into no planes
+            motion = DEFORMATION
+        mass = body.mass[np.ix_(block, block)]
+        energies[:, motion] += np.einsum("im,ij,jm->m", deformed[block], mass, deformed[block])
+    return energies
+
+
+def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Floats, strain: Floats) -> str:
+    """Describe a mode: who moves how, until 80 % of the kinetic energy is told, and what is strained most.
+
+    Parameters
+    ----------
+    kinetic : (bodies, motions) share by body and motion
+    strain : (elements,) share by mesh, bearing, coupling and elastic body
+    """
+    moving: dict[str, float] = {}
+    for body, shares in zip(assembly.bodies, kinetic, strict=True):
+        for motion, share in zip(BODY_MOTIONS, shares, strict=True):
+            family = "planets" if body.carrier else body.name
+            moving[f"{family} {motion}"] = moving.get(f"{family} {motion}", 0.0) + float(share)
+    strained: dict[str, float] = {}
+    # Those of all planets together; other names keep their digits.
+    families = {mesh.name: mesh.family for mesh in assembly.gearbox.meshes}
+    families |= {support.name: support.family for support in assembly.supports}
+    for name, share in zip(element_names, strain, strict=True):
+        family = families.get(name, name)
+        strained[family] = strained.get(family, 0.0) + float(share)
+    words = []
+    told = 0.0
+    for what, share in sorted(moving.items(), key=lambda item: -item[1]):
+        if told >= 0.8 or share < 0.05:
+            break
+        words.append(f"{what} {100 * share:.0f} %")
+        told += share
+    most = max(strained, key=lambda name: strained[name])
+    itself = most.removesuffix("_body")
+    what = f"{itself} itself" if itself != most and itself in assembly.elastic_bodies else most
+    return f"{', '.join(words)}; strained: {what} {100 * strained[most]:.0f} %"
+
+
+# Eigenmodes of a gearbox variant: frequencies, damping, where the energy sits, and what moves in words
+
+RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
+FREE_ROTATION = "free rotation of the train"
+"""Name of the modes without any deflection."""
+SHOWN_MODES = 12
+"""Modes in the table that a notebook shows."""
+
+
+@dataclass(frozen=True)
+class Modes(Displayed):
+    """Eigenmodes in order of frequency; n modes, in the variant `flexible` those in the band of its elastic bodies."""
+
+    assembly: Assembly
+    """What was linearised."""
+    frequency: Floats
+    """(n,) undamped, Hz."""
+    damping_ratio: Floats
+    """(n,) share of critical damping, from the damping matrix in the mode."""
+    shapes: Floats
+    """(size, n) real, unit modal mass."""
+    element_names: tuple[str, ...]
+    strain: Floats
+    """(n, elements) share of strain energy by mesh, bearing, coupling and elastic body."""
+    kinetic: Floats
+    """(n, bodies, 8) share of kinetic energy by body and motion, see `BODY_MOTIONS`."""
+    overall: Floats
+    """(n,) overall DTE of the mode at unit modal mass, m / sqrt(kg)."""
+    amplification: Floats
+    """(n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m."""
+    names: tuple[str, ...]
+    """What moves, in words."""
+    growth_rate: float
+    """Fastest growth of any disturbance, 1/s; above 0 only where the law `seed` makes a mode flutter."""
+
+    def _line(self) -> str:
+        assembly = self.assembly
+        return (
+            f" of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_law}: "
+            f"{len(self.frequency)} modes up to {self.frequency.max(initial=0.0):.5g} Hz"
+        )
+
+    def _table(self) -> TitledRows:
+        rows = {
+            f"{number}: {frequency:.1f} Hz, damping {100.0 * ratio:.2f} %": name
+            for number, (frequency, ratio, name) in enumerate(
+                zip(self.frequency[:SHOWN_MODES], self.damping_ratio[:SHOWN_MODES], self.names, strict=False), start=1
+            )
+        }
+        return repr(self).strip("<>"), rows
+
+    @property
+    def label(self) -> str:
+        """What the modes belong to: variant, mesh law, inertia set and housing factor."""
+        assembly = self.assembly
+        law = f"law {assembly.mesh_law}, inertias {assembly.inertias}"
+        return f"{assembly.variant}, {law}, housing factor {assembly.housing_factor:g}"
+
+    def nearest(self, frequency: float) -> int:
+        """Find the number of the mode nearest to a frequency (Hz)."""
+        return int(np.argmin(np.abs(self.frequency - frequency)))
+
+    def to_dataset(self) -> xr.Dataset:
+        """Labelled arrays with units, what `save` writes."""
+        import xarray as xr
+
+        assembly = self.assembly
+        coordinate_names = coordinate_labels(assembly)
+        variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
+            "frequency": (("mode",), self.frequency, {"units": "Hz"}),
+            "damping_ratio": (("mode",), self.damping_ratio, {"units": "1"}),
+            "shape": (("coordinate", "mode"), self.shapes, {"units": "1/sqrt(kg) or 1/(m sqrt(kg))"}),
+            "strain_energy_share": (("mode", "element"), self.strain, {"units": "1"}),
+            "kinetic_energy_share": (("mode", "body", "motion"), self.kinetic, {"units": "1"}),
+            "overall_dte": (("mode",), self.overall, {"units": "m/sqrt(kg)"}),
+            "amplification": (("mode", "mesh"), self.amplification, {"units": "m/m"}),
+            "name": (("mode",), np.array(self.names, dtype=object), {}),
+        }
+        coordinates: dict[str, Any] = {
+            "mode": np.arange(1, len(self.names) + 1),
+            "coordinate": np.array(coordinate_names, dtype=object),
+            "element": np.array(self.element_names, dtype=object),
+            "body": np.array([body.name for body in assembly.bodies], dtype=object),
+            "motion": np.array(BODY_MOTIONS, dtype=object),
+            "mesh": np.array(assembly.mesh_names, dtype=object),
+        }
+        attributes = {
+            "gearbox": assembly.gearbox.name,
+            "variant": str(assembly.variant),
+            "mesh_law": assembly.mesh_law,
+            "inertias": assembly.inertias,
+            "input_hash": input_hash(assembly),
+            "method_version": MODES,
+            "housing_factor": assembly.housing_factor,
+            "bearing_laws": assembly.bearing_laws,
+            "mesh_contact": assembly.contacts.in_words,
+            "growth_rate": self.growth_rate,
+            "beside_unsolved_states": ", ".join(beside_unsolved_states(assembly)),
+        }
+        return xr.Dataset(variables, coordinates, attributes)
+
+    def save(self, path: str | Path) -> Path:
+        """Write to netCDF (atomically) and return the path."""
+        path = Path(path)
+        write_dataset(path, self.to_dataset())
+        return path
+
+
+_LAYOUT = Layout(
+    "eigenmodes",
+    MODES,
+    {
+        "frequency": ("mode",),
+        "damping_ratio": ("mode",),
+        "shape": ("coordinate", "mode"),
+        "strain_energy_share": ("mode", "element"),
+        "kinetic_energy_share": ("mode", "body", "motion"),
+        "overall_dte": ("mode",),
+        "amplification": ("mode", "mesh"),
+        "name": ("mode",),
+    }
+    | {name: (name,) for name in ("mode", "coordinate", "element", "body", "motion", "mesh")},
+    ("gearbox", "variant", "mesh_law", "inertias", "input_hash", "housing_factor", "growth_rate"),
+)
+
+
+def load_modes(path: str | Path) -> xr.Dataset:
+    """Read what `Modes.save` wrote.
+
+    Raises
+    ------
+    FileError
+        The file is missing, damaged, or of another version.
+
+    Examples
+    --------
+    >>> load_modes("nowhere/modes.nc")
+    Traceback (most recent call last):
+    fe_ste.tools.files.FileError: nowhere/modes.nc: no such file
+    """
+    return load_dataset(Path(path), _LAYOUT)
+
+
+def kept_modes(path: Path, assembly: Assembly) -> Modes | None:
+    """Read modes of exactly this assembly that `Modes.save` wrote, the same to the bit; None where there are none."""
+    data = Store(path, input_hash(assembly)).read_dataset(_LAYOUT)
+    if data is None:
+        return None
+    return Modes(
+        assembly=assembly,
+        frequency=data["frequency"].to_numpy(),
+        damping_ratio=data["damping_ratio"].to_numpy(),
+        shapes=data["shape"].to_numpy(),
+        element_names=tuple(data["element"].to_numpy().tolist()),
+        strain=data["strain_energy_share"].to_numpy(),
+        kinetic=data["kinetic_energy_share"].to_numpy(),
+        overall=data["overall_dte"].to_numpy(),
+        amplification=data["amplification"].to_numpy(),
+        names=tuple(data["name"].to_numpy().tolist()),
+        growth_rate=float(data.attrs["growth_rate"]),
+    )
+
+
+def coordinate_labels(assembly: Assembly) -> list[str]:
+    """Name of each coordinate, such as `hss.spin`, or `hss.hs_pinion.spin` at a seat of an elastic body."""
+    labels = [""] * assembly.size
+    for body in assembly.bodies:
+        for motion, index in zip(RIGID_COORDINATES, assembly.coordinates[body.name], strict=True):
+            if index >= 0:
+                labels[index] = f"{body.name}.{motion}"
+    for name, of_body in assembly.elastic_slices.items():
+        reduced = assembly.elastic_bodies[name].reduced
+        body_labels = [f"{seat.name}.{motion}" for seat in reduced.seats for motion in RIGID_COORDINATES]
+        body_labels += [f"{group.replace(' ', '_')}_{n}" for n, group in enumerate(reduced.modal_groups, start=1)]
+        labels[of_body] = [f"{name}.{label}" for label in body_labels]
+    return labels
+
+
+def eigenmodes(
+    gearbox: Gearbox,
+    choice: Choice,
+    stiffness: Mapping[str, MeshData],
+    bodies: Mapping[str, ElasticBody] | None = None,
+    *,
+    angles: Angles = "reference",
+) -> Modes:
+    """Eigenmodes of a gearbox variant at its static load.
+
+    Parameters
+    ----------
+    choice : variant, mesh law and inertia set
+    stiffness : mapping of pair name to (n,) array
+        Mesh stiffness F_bt / STE over the cycle, N/m, for example from the STE tables.
+    bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
+    angles : {"reference", "operating"}
+        Angles of the law `seed`.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> modes = eigenmodes(gearbox, Choice("rigid"), stiffness)
+    >>> len(modes.frequency), modes.names[0]
+    (8, 'free rotation of the train')
+    """
+    return modes_of(assemble(gearbox, choice, stiffness, bodies, angles=angles))
+
+
+def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
+    """Eigenmodes of an assembly, at its static load or (preload False) unloaded."""
+    assembly = assembly if preload else assembly.unloaded
+    q = static_state(assembly).q if preload else np.zeros(assembly.size)
+    linear = linearise(assembly, q)
+    frequency, shapes = undamped_modes(linear.mass, linear.total_stiffness, assembly.motions)
+    if assembly.elastic_bodies:  # beyond the band the bodies' normal modes are only what keeps their statics right
+        inside = frequency <= assembly.gearbox.case.elasticity.band_Hz
+        frequency = frequency[inside]
+        shapes = shapes[:, inside]
+    masses = np.einsum("im,ij,jm->m", shapes, linear.mass, shapes)
+    shapes = shapes / np.sqrt(masses)
+    omega = 2.0 * np.pi * frequency
+    modal_damping = np.einsum("im,ij,jm->m", shapes, linear.total_damping, shapes)
+    elastic = frequency > RIGID_BODY_LIMIT
+    with np.errstate(over="ignore"):  # a static load beyond anything: its modes are damped infinitely
+        ratio = np.divide(modal_damping, 2.0 * omega, out=np.zeros_like(omega), where=elastic)
+    strain = np.array([np.einsum("im,ij,jm->m", shapes, k, shapes) for k in linear.stiffness.values()])
+    strain = strain.reshape(len(linear.stiffness), len(frequency)).T  # gears that only roll have no element
+    strain = np.where(elastic[:, None], strain / np.maximum(strain.sum(axis=1, keepdims=True), 1e-300), 0.0)
+    kinetic = kinetic_shares(assembly, shapes, q)
+    overall = overall_row(assembly) @ shapes
+    element_names = tuple(linear.stiffness)
+    return Modes(
+        assembly=assembly,
+        frequency=np.where(elastic, frequency, 0.0),
+        damping_ratio=ratio,
+        shapes=shapes,
+        element_names=element_names,
+        strain=strain,
+        kinetic=kinetic,
+        overall=np.abs(overall),
+        amplification=_amplification(assembly, q, linear, shapes, overall, omega, ratio, elastic),
+        names=tuple(
+            mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else FREE_ROTATION
+            for m in range(frequency.size)
+        ),
+        growth_rate=growth_rate(linear) if LAWS[assembly.mesh_law].has_force else 0.0,
+    )
+
+
+def overall_row(assembly: Assembly) -> Floats:
+    """Build the row (size,) of the overall DTE as a length: (output - ratio input) times base radius, m.
+
+    In a train of several degrees of freedom the shares of the further bodies that fix the output are taken off, too.
+    """
+    overall = assembly.gearbox.case.overall
+    radius = assembly.gearbox.output_radius
+    row = np.zeros(assembly.size)
+    row[assembly.spin[overall.output]] += radius
+    for body, share in assembly.gearbox.train.shares.items():
+        row[assembly.spin[body]] -= radius * share
+    return row
+
+
+def _amplification(
+    assembly: Assembly,
+    q: Floats,
+    linear: Linearised,
+    shapes: Floats,
+    overall: Floats,
+    omega: Floats,
+    ratio: Floats,
+    elastic: NDArray[np.bool_],
+) -> Floats:
+    """Overall DTE at resonance per unit STE of each mesh: |overall| |k w phi| / (2 zeta omega^2), k tangent at q."""
+    amplification = np.zeros((omega.size, len(assembly.mesh_names)))
+    resonance = np.where(elastic, 2.0 * ratio * omega**2, np.inf)
+    resonance = np.where(resonance > 0.0, resonance, np.inf)
+    tangents = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)[:, STIFFNESS]
+    for n, name in enumerate(assembly.mesh_names):
+        mean = float(tangents[n])
+        # What tilts against the resistance of the teeth does not close them.
+        closed = linear.stiffness[name] - _tilt_stiffness(assembly, q, n)
+        strain = np.einsum("im,ij,jm->m", shapes, closed, shapes)
+        closing = np.sqrt(np.maximum(strain, 0.0) / mean)
+        amplification[:, n] = np.abs(overall) * mean * closing / resonance
+    return amplification
+
+
+def _tilt_stiffness(assembly: Assembly, q: Floats, n: int) -> Floats:
+    """Stiffness (size, size) that a mesh with a law along a row has against misalignment: zero without any."""
+    mesh = assembly.mean_meshes.one(n)
+    rest = np.zeros(assembly.size)
+    if not mesh.tilt[0, TILT_STIFFNESS] > 0.0:
+        return np.zeros((assembly.size,) * 2)
+    twice = mesh._replace(tilt=mesh.tilt * (1.0 + (np.arange(TILT_COLUMNS) == TILT_STIFFNESS)))
+    return assembly.mesh_jacobians(q, rest, mesh)[0] - assembly.mesh_jacobians(q, rest, twice)[0]
+
+
+def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats]:
+    """Find for each mode the one that it becomes when bodies become elastic or others are added.
+
+    Parameters
+    ----------
+    before, after
+        Such as those of the variants `bushing` and `flexible` of one gearbox. The second has all bodies of the first;
+        one that is elastic in both has one shape.
+
+    Returns
+    -------
+    place : (n,) array of int
+        Its place among the modes of `after`, each used once; the sum of the shares is largest.
+    share : (n,) squared overlap, 1 for the same motion: the kinetic energy that both shapes share
+    """
+    source = before.assembly
+    target = after.assembly
+    carried = np.zeros((target.size, source.size))  # coordinates of `after` that the shapes of `before` have
+    for body in source.bodies:
+        if body.name in source.elastic_bodies:
+            of_body = source.elastic_slices[body.name]
+            carried[target.elastic_slices[body.name], of_body] = np.eye(of_body.stop - of_body.start)
+            continue
+        index = [i for i in source.coordinates[body.name] if i >= 0]
+        if body.name in target.elastic_bodies:
+            rigid = target.elastic_bodies[body.name].reduced.rigid_motions((*body.axis, body.centre_of_mass_z))
+            carried[target.elastic_slices[body.name], index[0] : index[-1] + 1] = rigid
+        else:
+            carried[[i for i in target.coordinates[body.name] if i >= 0], index] = 1.0
+    share = (after.shapes.T @ target.mass_matrix @ carried @ before.shapes) ** 2
+    import scipy.optimize  # a quarter of a second that a run need not wait
+
+    _, place = scipy.optimize.linear_sum_assignment(share.T, maximize=True)
+    return np.asarray(place, dtype=np.int64), share[place, np.arange(len(place))]

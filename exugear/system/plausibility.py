@@ -1,0 +1,441 @@
+"""What is possible and hardly meant: masses, bores, places and centre distances beside what the gears' dimensions say.
+
+Limits are wide: a unit mistaken is a factor of ten or more, and no gearbox that is meant so is to raise an alarm.
+
+From macro geometry and the static load alone, so that it costs nothing before the finite elements do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from exugear.gearbox.gear_parts import thinning_range
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.parts import Bearing, Body, PairSpec
+from exugear.gearbox.sections.connections import CatalogueSection
+from exugear.system.bearings.rolling.dimensions import boundary_of
+from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
+from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.transmission_error.search import pitch_point_pressure
+
+LEAST_CLASH, CLASHING_SHARE = 1e-3, 0.15
+"""Height (m), and part of the width of a row, by which a gear and a bearing stand in each other before it is told.
+
+Rings of tapered bearings are narrower than the bearing, and faces in files wider than teeth with chamfers.
+"""
+STEEL = 7850.0
+"""Density that masses are compared by, kg/m3."""
+MOST_MASS, LEAST_MASS = 50.0, 0.02
+"""Mass of a body over that of the steel cylinder around its gears and bearings."""
+MOST_GYRATION, LEAST_GYRATION = 8.0, 0.02
+"""Radius of gyration of a body over the reach of its gears and bearings: one disc beside small gears may be large."""
+LEAST_OVERLAP = 0.9
+"""Part of the face of a pair on which both gears have teeth."""
+MOST_BACKLASH = 3.0
+"""Backlash over that of `usual_backlash`, above which a profile shift or centre distance looks wrong."""
+LEAST_BORE, MOST_RIM = 0.02, 2.0
+"""Bore of a gear, and outside of a ring's rim, over the root diameter."""
+WHEEL, LEAST_SEAT, LEAST_OVER_SHAFT = 1.5, 0.98, 0.9
+"""Roots over the shaft beside them from which a gear is a wheel on a shaft, not one piece with it; and least bore of a
+wheel over the bores of the bearings on both sides of it, and over the shaft that the file draws under it."""
+OTHER_SIZE, MOST_WALL = 0.01, 4.0
+"""Difference of a diameter from that of the designation, and outer diameter of a bearing over its bore."""
+TILTING = ("deep_groove_ball", "self_aligning_ball", "angular_contact_ball", "four_point_ball", "spherical_roller")
+"""Types of bearings of which a single row does not keep a shaft from tilting."""
+
+
+def doubts_about_parts(gearbox: Gearbox) -> Iterator[str]:
+    """Say what looks like a mistake: key, value, and what it is compared with."""
+    yield from _masses(gearbox)
+    yield from _bores(gearbox)
+    yield from _seats(gearbox)
+    yield from _bearings(gearbox)
+    yield from _faces(gearbox)
+    yield from _backlashes(gearbox)
+    yield from _shafts_on_one_bearing(gearbox)
+    yield from _faces_in_bearings(gearbox)
+
+
+def _masses(gearbox: Gearbox) -> Iterator[str]:
+    """Compare mass and moments of inertia of bodies with gears with a steel cylinder around these."""
+    told = set()
+    for inertias in gearbox.inertia_sets:
+        for body in gearbox.bodies(inertias):
+            reach = _reach(gearbox, body)
+            key = f"bodies.{body.family}.inertia.{inertias}"
+            if reach is None or body.fixed or key in told:
+                continue
+            for doubt in _doubts_about_mass(body, *reach):
+                told.add(key)
+                yield f"{key}.{doubt}"
+
+
+def _reach(gearbox: Gearbox, body: Body) -> tuple[float, float] | None:
+    """Largest tip radius of a body's gears, and length from the first to the last gear or bearing, m."""
+    gears = {name: gearbox.gears[name] for name in body.wheels}
+    if not gears or body.spin_only:
+        return None
+    ends = [body.wheels[name] + side * gear.face_width for name, gear in gears.items() for side in (-0.5, 0.5)]
+    ends += [bearing.position[2] for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
+    radius = max(gear.held_diameter / 2.0 if gear.internal else gear.tip_radius for gear in gears.values())
+    return radius, max(ends) - min(ends)
+
+
+def _doubts_about_mass(body: Body, radius: float, length: float) -> Iterator[str]:
+    """Compare a body's mass and inertias with those of a cylinder of steel."""
+    cylinder = STEEL * math.pi * radius**2 * length
+    if not LEAST_MASS * cylinder < body.mass < MOST_MASS * cylinder:
+        yield (
+            f"mass_kg = {body.mass:g}: a steel cylinder as wide and long as its gears and bearings, {2e3 * radius:.4g} "
+            f"by {1e3 * length:.4g} mm, weighs {cylinder:.3g} kg; is the unit right?"
+        )
+        return  # radii of gyration would only repeat it
+    across = math.hypot(radius, length)
+    for key, inertia, size in (("axial_kg_m2", body.axial, radius), ("transverse_kg_m2", body.transverse, across)):
+        gyration = math.sqrt(inertia / body.mass)
+        if not LEAST_GYRATION * size < gyration < MOST_GYRATION * size:
+            yield (
+                f"{key} = {inertia:g}: with {body.mass:g} kg a radius of gyration of {1e3 * gyration:.3g} mm, where "
+                f"its gears and bearings reach {1e3 * size:.3g} mm; is the unit right?"
+            )
+
+
+def _bores(gearbox: Gearbox) -> Iterator[str]:
+    """Tell bores and rims that no gear has, and bores that the shaft does not pass."""
+    for name, gear in gearbox.gears.items():
+        key = f"gears.{name}.held_diameter_mm"
+        held = gear.held_diameter
+        root = 2.0 * gear.root_radius
+        if gear.internal and held > MOST_RIM * root:
+            yield (
+                f"{key} = {1e3 * held:g}: a rim {500.0 * (held - root):.4g} mm thick around roots of {1e3 * root:.4g} "
+                "mm diameter; it is the outside of the ring's rim"
+            )
+        elif not gear.internal and held < LEAST_BORE * root:
+            yield (
+                f"{key} = {1e3 * held:g}: hardly a bore under roots of {1e3 * root:.4g} mm diameter; it is the bore "
+                "or the shaft under the teeth"
+            )
+
+
+def _seats(gearbox: Gearbox) -> Iterator[str]:
+    """Tell bores of wheels that are narrower than the shaft on either side of them, or than the shaft under them."""
+    told = set()
+    for body in gearbox.bodies():
+        for name, wheel in body.wheels.items():
+            gear = gearbox.gears[name]
+            if gear.internal or body.planet_of is not None or name in told:
+                continue
+            beside = _bores_beside(gearbox, body, wheel)
+            under = _shaft_under(gearbox, body, gear, wheel)
+            root = 2.0 * gear.root_radius
+            key = f"gears.{name}.held_diameter_mm = {1e3 * gear.held_diameter:g}"
+            if under is not None and root >= WHEEL * under and gear.held_diameter < LEAST_OVER_SHAFT * under:
+                told.add(name)
+                yield (
+                    f"{key}: bodies.{body.family}.shape is {1e3 * under:g} mm thick there; it is the bore of a wheel "
+                    "on that shaft"
+                )
+            elif beside and root >= WHEEL * max(beside) and gear.held_diameter < LEAST_SEAT * min(beside):
+                told.add(name)
+                yield (
+                    f"{key}: the bearings on both sides of it have bores of {1e3 * beside[0]:g} and "
+                    f"{1e3 * beside[1]:g} mm; a wheel between them has a bore that goes over the thinner end"
+                )
+
+
+def _bores_beside(gearbox: Gearbox, body: Body, place: float) -> tuple[float, float] | None:
+    """Bores (m) of the nearest bearings of a body on both sides of a place on it; None without both."""
+    known = [
+        (bearing.position[2], 1e-3 * bearing.catalogue.bore_mm)
+        for bearing in gearbox.bearings
+        if bearing.catalogue is not None and bearing.body == body.name
+    ]
+    before = [one for one in known if one[0] < place]
+    behind = [one for one in known if one[0] > place]
+    if before and behind:
+        return (max(before)[1], min(behind)[1])
+    return None
+
+
+def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> float | None:
+    """Least diameter (m) of the shape of a body under a gear; None without one."""
+    section = gearbox.case.bodies.get(body.family)
+    if section is None or section.shape is None:
+        return None
+    start = 1e-3 * section.shape.start_z_mm
+    found = []
+    for piece in section.shape.sections:
+        end = start + 1e-3 * piece.length_mm
+        if start < place + 0.5 * gear.face_width and end > place - 0.5 * gear.face_width:
+            found.append(1e-3 * min(piece.outer_diameter_mm, piece.outer_diameter_end_mm or piece.outer_diameter_mm))
+        start = end
+    return min(found, default=None)
+
+
+def _bearings(gearbox: Gearbox) -> Iterator[str]:
+    """Tell bearings of other diameters than their designation says, or than any bearing has."""
+    for name, section in gearbox.case.bearings.items():
+        catalogue = section.catalogue
+        if catalogue is None:
+            continue
+        known = boundary_of(catalogue.designation)
+        bore = catalogue.bore_mm
+        outer = catalogue.outer_diameter_mm
+        off = known is not None and max(abs(bore / known.bore - 1.0), abs(outer / known.outer - 1.0)) > OTHER_SIZE
+        if known is not None and off:
+            yield (
+                f"bearings.{name}.catalogue.bore_mm = {bore:g}: with outer_diameter_mm = {outer:g} is not the "
+                f"{catalogue.designation!r} of its designation, {known.bore:g} by {known.outer:g} mm ({known.source})"
+            )
+        elif outer > MOST_WALL * bore:
+            yield (
+                f"bearings.{name}.catalogue.bore_mm = {bore:g}: no usual bearing of {outer:g} mm outer diameter has a "
+                f"bore below {outer / MOST_WALL:.3g} mm"
+            )
+
+
+def _faces(gearbox: Gearbox) -> Iterator[str]:
+    """Tell gears in mesh that miss each other along the axis by a part of their face."""
+    bodies = gearbox.named_bodies
+    told = set()
+    for mesh in gearbox.meshes:
+        places = [
+            bodies[body].wheels.get(gear.name)
+            for body, gear in ((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear))
+        ]
+        if None in places or mesh.family in told:
+            continue
+        gears = (mesh.pair.pinion, mesh.pair.gear)
+        low = max(place - 0.5 * gear.face_width for place, gear in zip(places, gears, strict=True) if place is not None)
+        high = min(
+            place + 0.5 * gear.face_width for place, gear in zip(places, gears, strict=True) if place is not None
+        )
+        if high - low < LEAST_OVERLAP * mesh.pair.face_width:
+            told.add(mesh.family)
+            family = bodies[mesh.gear].family
+            yield (
+                f"bodies.{family}.wheels_z_mm.{gears[1].name} = {1e3 * (places[1] or 0.0):g}: {mesh.family} has "
+                f"{1e3 * max(high - low, 0.0):.4g} mm of its face in mesh, and counts with "
+                f"{1e3 * mesh.pair.face_width:.4g} mm; move a gear, or give common_face_width_mm"
+            )
+
+
+def usual_backlash(pair: GearPair) -> float:
+    """Least normal backlash that ISO/TR 10064-2 recommends for gears of usual accuracy in usual housings, m.
+
+    Examples
+    --------
+    >>> pair = Gearbox.from_toml("cases/grc750/gearbox.toml").gear_pairs["high_speed"]
+    >>> round(1e6 * usual_backlash(pair))
+    235
+    """
+    distance = abs(pair.centre_distance)
+    module = pair.pinion.normal_module
+    return 2.0 / 3.0 * (0.06e-3 + 0.0005 * distance + 0.03 * module)
+
+
+def _backlashes(gearbox: Gearbox) -> Iterator[str]:
+    """Tell pairs with far more backlash than drawings ask for: shifts and centre distance do not belong together."""
+    for name in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
+        pair = gearbox.gear_pairs[name]
+        usual = usual_backlash(pair)
+        backlash = pair.circumferential_backlash
+        if backlash > MOST_BACKLASH * usual:
+            yield (
+                f"pairs.{name}.centre_distance_mm = {1e3 * pair.centre_distance:g}: leaves {1e6 * backlash:.0f} um of "
+                f"backlash where some {1e6 * usual:.0f} um are usual; check it, and profile_shift of both gears "
+                f"({pair.pinion.profile_shift:g} and {pair.gear.profile_shift:g}) with its sign"
+            )
+
+
+def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
+    """Tell shafts with gears that only one bearing of a type holds which gives way to tilting."""
+    told = set()
+    for body in gearbox.bodies():
+        bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
+        if len(bearings) != 1 or body.fixed or body.planet_of is not None or body.family in told or not body.wheels:
+            continue
+        catalogue = bearings[0].catalogue
+        if catalogue is not None and catalogue.type in TILTING and catalogue.arrangement == "single":
+            told.add(body.family)
+            yield (
+                f"bearings.{bearings[0].family}: is the only bearing of {body.family}, and one "
+                f"{catalogue.type.replace('_', ' ')} bearing hardly keeps a shaft from tilting; is one missing?"
+            )
+
+
+def _faces_in_bearings(gearbox: Gearbox) -> Iterator[str]:
+    """Tell gears that run into a bearing of their own body."""
+    told = set()
+    for body in gearbox.bodies():
+        bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
+        for name, wheel in body.wheels.items():
+            for bearing in bearings:
+                depth = _clash(gearbox.gears[name], wheel, bearing)
+                if depth > 0.0 and (name, bearing.family) not in told:
+                    told.add((name, bearing.family))
+                    yield (
+                        f"bodies.{body.family}.wheels_z_mm.{name} = {1e3 * wheel:g}: its face runs {1e3 * depth:.3g} "
+                        f"mm into bearings.{bearing.family} at z_mm = {1e3 * bearing.position[2]:g}; move one of them"
+                    )
+
+
+def _clash(gear: Gear, place: float, bearing: Bearing) -> float:
+    """Length along the axis (m) over which a gear's body and a bearing's rings share space; zero if hardly any."""
+    catalogue = bearing.catalogue
+    if catalogue is None:
+        return 0.0
+    along = 0.5 * (gear.face_width + _width(catalogue)) - abs(place - bearing.position[2])
+    inside, outside = sorted((0.5 * gear.held_diameter, gear.tip_radius))
+    across = min(outside, 0.5e-3 * catalogue.outer_diameter_mm) - max(inside, 0.5e-3 * catalogue.bore_mm)
+    if across > LEAST_CLASH and along > CLASHING_SHARE * 1e-3 * catalogue.width_mm:
+        return along
+    return 0.0
+
+
+def _width(catalogue: CatalogueSection) -> float:
+    """Width of a bearing with all its rows, m."""
+    return (1 if catalogue.arrangement == "single" else 2) * 1e-3 * catalogue.width_mm
+
+
+# How near gear pairs are to what tables cut off or what wears out: form circles, tips, pressure at the pitch point
+
+LEAST_FORM_MARGIN = 0.02
+"""Part of a flank that should be left between the mate's tip and the form circle.
+
+Elastic teeth meet a little before and after the path of contact; tables cut off what is beyond the form circle, and
+count it (`fe_ste.contact.kinematics`).
+"""
+PROPOSED_MARGIN = 0.025
+"""Part of a flank that a proposed tip diameter leaves."""
+
+
+@dataclass(frozen=True)
+class PairMargins:
+    """Margins of a gear pair."""
+
+    form: tuple[float, float]
+    """Of gear 1 and gear 2: roll length from the form circle to where the mate's tip touches, over the roll length
+    of the flank; NaN where the root is relieved on purpose, so that contact may end there."""
+    tip_thickness: tuple[float, float]
+    """Of both tips in the normal section, in normal modules."""
+    pitch_point_pressure: float
+    """By Hertz under the static load, Pa; zero where the pair carries none."""
+
+
+def pair_margins(spec: PairSpec) -> PairMargins:
+    """Find the margins of a pair.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> margins = pair_margins(gearbox.pairs["high_speed"])
+    >>> bool(min(margins.form) > LEAST_FORM_MARGIN), round(1e-6 * margins.pitch_point_pressure)
+    (True, 842)
+    """
+    pair = spec.pair
+    torque = spec.static_torque
+    first, second = (gear.tip_thickness / gear.normal_module for gear in (pair.pinion, pair.gear))
+    return PairMargins(
+        form=_form_margins(pair),
+        tip_thickness=(first, second),
+        pitch_point_pressure=pitch_point_pressure(pair, torque) if torque > 0.0 else 0.0,
+    )
+
+
+@dataclass(frozen=True)
+class ThicknessRange:
+    """What allowances of the tooth thickness make of a gear, from the thinnest to the thickest tooth."""
+
+    thickness: tuple[float, float]
+    """On the reference circle, normal section, m."""
+    span_teeth: int | None
+    """Number of teeth of the base tangent; None for internal gears."""
+    span: tuple[float, float]
+    """Base tangent length over them, m; zero for internal gears."""
+
+
+def thickness_range(gearbox: Gearbox, name: str) -> ThicknessRange:
+    """Tooth thickness of a gear within its allowances, and the base tangent length that an inspector finds."""
+    gear = gearbox.gears[name]
+    thick, thin = (replace(gear, tooth_thinning=thinning) for thinning in thinning_range(gearbox.case.gears[name]))
+    count = None if gear.internal else gear.usual_span
+    spans = (0.0, 0.0) if count is None else (thin.span_measurement(count), thick.span_measurement(count))
+    return ThicknessRange((thin.normal_tooth_thickness, thick.normal_tooth_thickness), count, spans)
+
+
+def backlash_range(gearbox: Gearbox, pair: GearPair) -> tuple[float, float, float]:
+    """Least, computed and greatest backlash of a pair on its working circles, m: of the thickest and thinnest teeth.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [round(1e6 * play) for play in backlash_range(gearbox, gearbox.gear_pairs["high_speed"])]
+    [201, 201, 201]
+    """
+    given = pair.circumferential_backlash
+    across = 1.0 / math.cos(pair.working_pressure_angle)
+    ends = [0.0, 0.0]
+    for gear in (pair.pinion, pair.gear):
+        # Thickness and radius grow alike along the involute: the base circle's share, on the working circle.
+        thinnings = thinning_range(gearbox.case.gears[gear.name])
+        share = math.cos(gear.transverse_pressure_angle) * across
+        ends = [end + share * (thinning - gear.tooth_thinning) for end, thinning in zip(ends, thinnings, strict=True)]
+    return given + ends[0], given, given + ends[1]
+
+
+def _form_margins(pair: GearPair) -> tuple[float, float]:
+    """Margins of both gears, as `PairMargins` has them."""
+    tangent = pair.base_tangent_length
+    on_pinion = pair.pinion_roll_length(pair.gear.tip_roll_length)
+    pinion_tip = pair.pinion.tip_roll_length
+    on_gear = tangent + pinion_tip if pair.gear.internal else tangent - pinion_tip
+    return _margin(pair.pinion, on_pinion), _margin(pair.gear, on_gear)
+
+
+def _margin(gear: Gear, roll_length: float) -> float:
+    if gear.has_relieved_root:
+        return math.nan
+    flank = gear.tip_roll_length - gear.form_roll_length  # negative for a ring, as the numerator is
+    return (roll_length - gear.form_roll_length) / flank
+
+
+def doubts_about_pairs(gearbox: Gearbox) -> Iterator[str]:
+    """Say which margins of pairs at work are small: key, value, and what would be right."""
+    at_work = {mesh.pair.name for mesh in gearbox.meshes}
+    for name, spec in gearbox.pairs.items():
+        if name not in at_work:
+            continue
+        margins = pair_margins(spec)
+        gears = (spec.pair.pinion, spec.pair.gear)
+        for gear, mate, margin in zip(gears, gears[::-1], margins.form, strict=True):
+            if margin < LEAST_FORM_MARGIN and spec.table:
+                key = f"gears.{mate.name}.tip_diameter_mm = {2e3 * mate.tip_radius:.6g}"
+                yield (
+                    f"{key}: its tip comes within {100 * margin:.2g} % of the flank to the form circle of {gear.name}, "
+                    f"where contact under load ends; the table of {name} counts what it cuts off there; "
+                    f"{1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves {100 * PROPOSED_MARGIN:g} %"
+                )
+    for name, gear in gearbox.gears.items():
+        thickness = gear.tip_thickness / gear.normal_module
+        if thickness < USUAL_TIP_THICKNESS:
+            yield (
+                f"gears.{name}.tip_diameter_mm = {2e3 * gear.tip_radius:.6g}: leaves a tip {thickness:.3f} normal "
+                f"modules thick; {USUAL_TIP_THICKNESS:g} is the usual least, 0.4 for case-hardened teeth"
+            )
+
+
+def _clear_tip_diameter(pair: GearPair, mate: Gear) -> float:
+    """Tip diameter of a gear, m, that leaves the proposed margin on the other one of its pair."""
+    if mate is pair.gear:
+        other = pair.pinion
+        on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
+        roll = on_other + pair.base_tangent_length if mate.internal else pair.base_tangent_length - on_other
+    else:
+        other = pair.gear
+        on_other = other.form_roll_length + PROPOSED_MARGIN * (other.tip_roll_length - other.form_roll_length)
+        roll = pair.pinion_roll_length(on_other)
+    return 2.0 * math.hypot(mate.base_radius, roll)

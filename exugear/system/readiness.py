@@ -1,0 +1,273 @@
+"""All parts of a gearbox built once, as far as that is quick: what a later step refuses is told before it begins.
+
+Small motions of rigid bodies about the reference state. Every support holds the directions in which its stiffness
+acts, every mesh its line of action, every coupling a difference of spins; how stiff they are does not matter here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases import torque_series
+from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.reading import CaseError, fault_line, readable
+from exugear.gearbox.variant import Variant
+from exugear.system.bearings.rolling.catalogue import catalogue_rows
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.bearings.stiffness import elastic_names, linear_law, misplaced_factor, mounts_at_work, unsupported
+from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
+from exugear.system.plausibility import doubts_about_pairs, doubts_about_parts
+from exugear.system.tooth_mesh.placement import MeshError, line_of_action_row, loaded_flanks, tooth_places
+from fe_ste.tools.arrays import Floats
+
+# What bearings and meshes leave free: a body without stiffness in some direction has no static state
+
+TILT_LENGTH = 0.1
+"""Length (m) that turns a tilt into a displacement, so that both are compared."""
+HOLDING_SHARE = 1e-10
+"""Least stiffness of a support in a direction over its largest that counts as holding."""
+FREE_STRETCH = 1e-8
+"""Largest stretch of all springs, per unit of motion, that counts as none."""
+ROLLING_TOLERANCE = 1e-3
+"""Share of a free motion beside rolling up to which it counts as rolling."""
+_SCALE = np.array([1.0, 1.0, 1.0, 1.0 / TILT_LENGTH, 1.0 / TILT_LENGTH, 1.0 / TILT_LENGTH])
+"""Rows are over displacements and over rotations times `TILT_LENGTH`."""
+DIRECTIONS = ("move along x", "move along y", "move along z", "tilt about x", "tilt about y", "turn about z")
+
+
+def free_motion(gearbox: Gearbox, variant: str) -> str:
+    """Say which body of a variant on bearings can move without resistance, and how; empty if none can.
+
+    Rolling, in which meshes and couplings do not deflect, is what a gearbox is for and does not count.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> free_motion(gearbox, "bushing")
+    ''
+    >>> pair = {"type": "cylindrical_roller", "contact_angle_deg": 0.0}
+    >>> floating = {f"bearings.lss_bc.catalogue.{key}": value for key, value in pair.items()}
+    >>> free_motion(gearbox.varied({**floating, "bearings.lss_a.stiffness": {}}), "bushing")
+    'body lss can move along z without resistance; add or stiffen a bearing'
+    """
+    elastic = elastic_names(gearbox) if Variant.of(variant).is_elastic else ()
+    moving = [body for body in gearbox.bodies() if not body.fixed or body.name in elastic]
+    starts = {body.name: 6 * number for number, body in enumerate(moving)}
+    rows = np.array([row for row in _held_directions(gearbox, Variant.of(variant), starts) if row.any()])
+    if not rows.size:
+        return "no bearing holds anything"
+    # Each row of one length: how stiff a support is does not matter, only that it holds.
+    _, singular, basis = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+    free = basis[int(np.sum(singular > FREE_STRETCH * singular[0])) :]
+    rolling = _rolling_motions(gearbox, moving, starts)
+    beyond = free - free @ rolling.T @ rolling
+    amount = np.linalg.norm(beyond, axis=1)
+    if not amount.size or amount.max() < ROLLING_TOLERANCE:
+        return ""
+    body, direction = divmod(int(np.argmax(np.abs(beyond[np.argmax(amount)]))), BODY_SIZE)
+    return f"body {moving[body].name} can {DIRECTIONS[direction]} without resistance; add or stiffen a bearing"
+
+
+def _held_directions(gearbox: Gearbox, variant: Variant, starts: Mapping[str, int]) -> Iterator[Floats]:
+    """Rows over all coordinates, rotations times `TILT_LENGTH`, of what supports, meshes and couplings hold."""
+    bodies = {body.name: body for body in gearbox.bodies()}
+    size = 6 * len(starts)
+    for support in (*gearbox.bearings, *(mounts_at_work(gearbox) if variant.is_elastic else ())):
+        motion = np.zeros((6, size))
+        for name, sense in ((support.body, 1.0), (support.on, -1.0)):
+            if name in starts:
+                motion[:, starts[name] : starts[name] + 6] += sense * _motion_at(
+                    bodies[name], np.array(support.position)
+                )
+        stiffness = linear_law(support, 0.0).stiffness
+        values, vectors = np.linalg.eigh(_SCALE * stiffness * _SCALE[:, None])
+        yield from (vectors[:, values > HOLDING_SHARE * values[-1]].T / _SCALE) @ motion * np.tile(_SCALE, len(starts))
+    flanks = loaded_flanks(gearbox)
+    for mesh in gearbox.meshes:
+        nodes = (_node(bodies[mesh.pinion]), _node(bodies[mesh.gear]))
+        row = np.zeros(size)
+        ends = np.split(line_of_action_row(mesh, flanks[mesh.name], nodes), 2)
+        for name, part in zip((mesh.pinion, mesh.gear), ends, strict=True):
+            if name in starts:
+                row[starts[name] : starts[name] + 6] += part * _SCALE
+        yield row
+    for coupling in gearbox.couplings:
+        row = np.zeros(size)
+        row[starts[coupling.first] + SPIN], row[starts[coupling.second] + SPIN] = 1.0, -1.0
+        yield row
+    for body in bodies.values():
+        if body.spin_only:  # it has no other coordinate
+            yield from np.eye(size)[starts[body.name] : starts[body.name] + SPIN]
+
+
+def _node(body: Body) -> Floats:
+    return np.array([*body.axis, body.centre_of_mass_z])
+
+
+def _motion_at(body: Body, position: Floats) -> Floats:
+    """Motion (6, 6) at a position for unit coordinates of a body."""
+    x, y, z = position - _node(body)
+    motion = np.eye(6)
+    motion[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    return motion
+
+
+def _rolling_motions(gearbox: Gearbox, moving: list[Body], starts: Mapping[str, int]) -> Floats:
+    """Orthonormal rolling motions (n, size): spins, and the orbit of planets with their carrier."""
+    motions = np.zeros((gearbox.train.degrees_of_freedom, 6 * len(moving)))
+    spins = dict(zip(gearbox.spinning, gearbox.train.kinematic_modes, strict=True))
+    for body in moving:
+        begin = starts[body.name]
+        motions[:, begin + SPIN] = TILT_LENGTH * spins.get(body.name, 0.0)
+        if body.carrier is not None:
+            x, y = np.array(body.axis) - gearbox.body(body.carrier).axis
+            motions[:, begin : begin + 2] = np.outer(spins[body.carrier], [-y, x])
+    return np.asarray(np.linalg.qr(motions.T)[0].T)
+
+
+# All parts of a gearbox built once, as far as that is quick: what a later step refuses is told before it begins
+
+MOST_STATES = 200_000
+"""Most states of one table: at 50 ms each, three hours."""
+_FOLLOWING = range(5)
+"""As many values as an axis usually has that follows from the static state."""
+
+
+def check_parts(gearbox: Gearbox) -> None:
+    """Build what tables, modes and runs are made of, but no mesh of finite elements.
+
+    Raises
+    ------
+    CaseError
+        All that is wrong: bearings, teeth that do not fit, shapes and solids with their seats, axes of tables, series.
+    """
+    families = {bearing.family: bearing for bearing in gearbox.bearings}
+    attempts: list[Callable[[], object]] = [partial(_build_bearing, gearbox, bearing) for bearing in families.values()]
+    attempts += [partial(_place_teeth, gearbox), partial(_count_states, gearbox)]
+    attempts += [partial(gearbox.table_distances, name) for name in _pairs_with_axes(gearbox)]
+    attempts += [partial(torque_series, gearbox, case) for case in gearbox.load_cases.values()]
+    attempts += [partial(_build_elastic_body, gearbox, name) for name in elastic_names(gearbox)]
+    faults: list[str] = []
+    for attempt in attempts:
+        try:
+            attempt()
+        except CaseError as error:
+            faults += error.faults
+    if faults:
+        raise CaseError(*faults)
+
+
+def faults_of_bearings(content: Mapping[str, Any], source: str) -> Iterator[str]:
+    """Tell rolling bearings whose data do not fit, in content that may have other faults."""
+    for name, section in readable(content).bearings.items():
+        if section.catalogue is not None:
+            try:
+                catalogue_rows(section.catalogue)
+            except BearingError as error:
+                yield fault_line(source, f"bearings.{name}.catalogue: {error}")
+
+
+def lacking(gearbox: Gearbox, variant: str) -> str:
+    """Say why a variant cannot be built or moves without resistance; empty if it can.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> [lacking(gearbox, variant) for variant in ("rigid", "bushing", "flexible")]
+    ['', '', '']
+    """
+    chosen = Variant.of(variant)
+    lack = unsupported(gearbox, variant)
+    if lack or not chosen.on_bearings:
+        return lack
+    return _misfits(gearbox, chosen) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, chosen)
+
+
+def _misfits(gearbox: Gearbox, variant: Variant) -> str:
+    """Say which elastic body cannot be, or has a seat beside it: the first fault that `check_parts` tells of them."""
+    for name in elastic_names(gearbox) if variant.is_elastic else ():
+        try:
+            _build_elastic_body(gearbox, name)
+        except CaseError as error:
+            return error.faults[0].removeprefix(f"{gearbox.source}: ")
+    return ""
+
+
+def _misplaced_factors(gearbox: Gearbox, variant: Variant) -> str:
+    """Say which bearing's seat no factor can stand for; an elastic housing has seats of its own."""
+    elastic = elastic_names(gearbox) if variant.is_elastic else ()
+    seats = {body.name for body in gearbox.bodies() if body.fixed and body.name in elastic}
+    reasons = (misplaced_factor(bearing) for bearing in gearbox.bearings if not seats & {bearing.on, bearing.body})
+    return next(filter(None, reasons), "")
+
+
+def remarks(gearbox: Gearbox) -> tuple[str, ...]:
+    """Tell what is possible and unusual, and how it is taken; a line each. Every verb tells the same."""
+    lines = list(gearbox.warnings)
+    lines += (
+        f"pairs.{name}: carries no torque in [static_load], and so gets no table: its teeth are as stiff as "
+        "ISO 6336-1 says, and excite nothing"
+        for name in gearbox.idle_pairs
+    )
+    train = gearbox.train
+    if train.degrees_of_freedom > 1:
+        others = ", ".join(train.independent[1:])
+        lines.append(
+            f"meshes: the train has {train.degrees_of_freedom} degrees of freedom; ratio, orders and speeds of the "
+            f"input hold while {others} stand{'s' if len(train.independent) == 2 else ''}"
+        )
+    lines += doubts_about_pairs(gearbox)
+    lines += doubts_about_parts(gearbox)
+    lines += _narrowed_seats(gearbox)
+    return tuple(dict.fromkeys(lines))
+
+
+def _narrowed_seats(gearbox: Gearbox) -> Iterator[str]:
+    from exugear.system.bodies.of_gearbox import narrowed_seats
+
+    for name in elastic_names(gearbox):
+        if gearbox.case.bodies[gearbox.body(name).family].solid is None:
+            yield from narrowed_seats(gearbox, name)
+
+
+def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
+    try:
+        stiffness = linear_law(bearing, 0.0).stiffness
+    except BearingError as error:
+        raise gearbox.fault(f"bearings.{bearing.family}.catalogue: {error}") from None
+    if not np.all(np.isfinite(stiffness)):
+        raise gearbox.fault(f"bearings.{bearing.family}.catalogue: gives no finite stiffness; check its dimensions")
+
+
+def _place_teeth(gearbox: Gearbox) -> None:
+    try:
+        tooth_places(gearbox, loaded_flanks(gearbox))
+    except MeshError as error:
+        raise gearbox.fault(str(error)) from None
+
+
+def _count_states(gearbox: Gearbox) -> None:
+    axes = gearbox.ste
+    states = axes.positions * len(axes.torque_factors) * len(axes.centre_distance_offsets_um or _FOLLOWING)
+    states *= len(axes.misalignment_um or _FOLLOWING)
+    if states > MOST_STATES:
+        raise gearbox.fault(f"ste: its axes make {states} states of a table; {MOST_STATES} are the most")
+
+
+def _pairs_with_axes(gearbox: Gearbox) -> list[str]:
+    """Pairs whose tables go over centre distances; none where nobody asked for these."""
+    if gearbox.ste.centre_distance_offsets_um is None:
+        return []
+    at_work = {mesh.pair.name for mesh in gearbox.meshes}
+    return [name for name, section in gearbox.case.pairs.items() if section.table or name in at_work]
+
+
+def _build_elastic_body(gearbox: Gearbox, name: str) -> None:
+    from exugear.system.bodies.of_gearbox import check_elastic_body
+
+    check_elastic_body(gearbox, name)

@@ -1,1 +1,0 @@
-"""What a gearbox lacks, told before any work begins: parts that cannot be built, bodies that nothing holds."""

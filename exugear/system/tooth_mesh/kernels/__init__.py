@@ -1,1 +1,0 @@
-"""Compiled laws of meshes on arrays of coordinates."""

@@ -1,1 +1,0 @@
-"""What departs from the ideal flank: modifications, measured topography, errors of wheels."""

@@ -1,1 +1,0 @@
-"""Tooth root stress as read-outs of the superelement: strain gauges on the fillets of the closed ring."""

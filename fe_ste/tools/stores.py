@@ -1,0 +1,503 @@
+"""What is kept: files sealed with a checksum, stores by key, and what is computed once for all folders.
+
+HDF5 hangs, crashes or misreads when it is given damaged bytes, and crashes when the disk is full. So it never meets
+either: content is made in memory or written through `ErrorKeeper`, and a file is opened only after its last line, the
+seal, was found to fit all bytes before it. HDF5 and zip ignore what follows their own end, so that a sealed file is
+plain netCDF or npz for any other program.
+
+Two processes may compute and write one file at once. A folder that cannot be written costs nothing but time.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import io
+import logging
+import os
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fe_ste.tools.display import Displayed
+from fe_ste.tools.files import FileError, open_regular, replacement, write_all
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from _typeshed import ReadableBuffer, WriteableBuffer
+
+# Files sealed with a checksum of their content, netCDF or npz, and read only if it fits
+
+_SEAL = b"\nexugear sha256 "
+_SEAL_LENGTH = len(_SEAL) + 65
+_CHUNK = 1 << 20
+SETTLED = 2.0
+"""Age (s) from which a file is trusted to tell by its times that it was changed since: clocks of files are coarse."""
+_checked: dict[tuple[int, ...], str] = {}
+"""Checksums of the files that this process found to fit, by what the system says of each."""
+
+
+class VersionError(FileError):
+    """A whole file of another version of the method."""
+
+
+def write_sealed(path: Path, content: ReadableBuffer) -> str:
+    """Write a file whole or not at all, with the checksum of its content behind it; return that."""
+    checksum = hashlib.sha256(content).hexdigest()
+    with replacement(path) as file:
+        write_all(file, content)
+        write_all(file, _seal(checksum))
+    return checksum
+
+
+def seal(file: IO[bytes]) -> None:
+    """Add the checksum of all that an open file holds."""
+    file.seek(0)
+    checksum = _checksum_of(file, file.seek(0, os.SEEK_END))
+    file.seek(0, os.SEEK_END)
+    write_all(file, _seal(checksum))
+
+
+def _seal(checksum: str) -> bytes:
+    return _SEAL + checksum.encode("ascii") + b"\n"
+
+
+def _checksum_of(file: IO[bytes], length: int) -> str:
+    """Checksum of the first bytes of a file."""
+    file.seek(0)
+    checksum = hashlib.sha256()
+    while length:
+        chunk = file.read(min(_CHUNK, length))
+        if not chunk:
+            break
+        checksum.update(chunk)
+        length -= len(chunk)
+    return checksum.hexdigest()
+
+
+def _check_seal(file: IO[bytes], path: Path) -> str:
+    """Return the checksum of a file if its content fits it."""
+    length = file.seek(0, os.SEEK_END) - _SEAL_LENGTH
+    written = b""
+    if length >= 0:
+        file.seek(length)
+        written = file.read(_SEAL_LENGTH)
+    if not (written.startswith(_SEAL) and written.endswith(b"\n")):
+        raise FileError(
+            f"{path}: has no checksum at its end: it was cut short, or written by an earlier version or another program"
+        )
+    facts = _facts_of(file)
+    checksum = _checked.get(facts) or _checksum_of(file, length)
+    if written != _seal(checksum):
+        raise FileError(f"{path}: is damaged, its content does not fit its checksum")
+    if time.time() - 1e-9 * max(facts[-2:]) > SETTLED:
+        _checked[facts] = checksum
+    return checksum
+
+
+def _facts_of(file: IO[bytes]) -> tuple[int, ...]:
+    """Which file it is, its size, and when content and entry were changed last (ns)."""
+    facts = os.fstat(file.fileno())
+    return facts.st_dev, facts.st_ino, facts.st_size, facts.st_mtime_ns, facts.st_ctime_ns
+
+
+@contextmanager
+def open_sealed(path: Path) -> Iterator[tuple[IO[bytes], str]]:
+    """Open a sealed file whose content fits, and give its checksum.
+
+    What is read is what was checked: files are replaced as a whole, so an open one does not change. One that this
+    process has checked, and that the system says was not touched since, is not checked again: runs are large.
+
+    Raises
+    ------
+    FileError
+        It is missing, cannot be read, or does not fit its checksum.
+    """
+    with open_regular(path) as file:
+        try:
+            checksum = _check_seal(file, path)
+        except FileError:
+            raise
+        except OSError as error:
+            raise FileError(f"{path}: cannot be read ({error.strerror})") from error
+        file.seek(0)
+        yield file, checksum
+
+
+class ErrorKeeper(io.RawIOBase):
+    """File for HDF5 to write into: the first error is kept, and raised by `check` instead of inside HDF5.
+
+    HDF5 cannot go on after a write that failed; told nothing, it ends in order, and the file is thrown away.
+
+    Parameters
+    ----------
+    file : binary file without a buffer
+    """
+
+    def __init__(self, file: IO[bytes]) -> None:
+        self._file = file
+        self._error: OSError | None = None
+
+    def check(self) -> None:
+        """Raise the error that a writing met."""
+        if self._error is not None:
+            raise self._error
+
+    def readable(self) -> bool:
+        """Tell that it can be read."""
+        return True
+
+    def writable(self) -> bool:
+        """Tell that it can be written."""
+        return True
+
+    def seekable(self) -> bool:
+        """Tell that it has a position."""
+        return True
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Move the position."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """Return the position."""
+        return self._file.tell()
+
+    def readinto(self, buffer: WriteableBuffer) -> int:
+        """Fill a buffer as far as the file reaches."""
+        content = self._file.read(len(memoryview(buffer)))
+        memoryview(buffer)[: len(content)] = content
+        return len(content)
+
+    def write(self, content: ReadableBuffer) -> int:
+        """Write, or keep the error."""
+        if self._error is None:
+            try:
+                write_all(self._file, content)
+            except OSError as error:
+                self._error = error
+        return len(memoryview(content))
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the length, or keep the error."""
+        size = self._file.tell() if size is None else size
+        if self._error is None:
+            try:
+                self._file.truncate(size)
+            except OSError as error:
+                self._error = error
+        return size
+
+
+def write_arrays(path: Path, arrays: Mapping[str, Any], *, compressed: bool = False) -> str:
+    """Write a sealed npz file of arrays by name whole or not at all; return its checksum."""
+    content = io.BytesIO()
+    save = np.savez_compressed if compressed else np.savez
+    save(content, allow_pickle=False, **arrays)
+    return write_sealed(path, content.getbuffer())
+
+
+def load_arrays(path: Path) -> dict[str, NDArray[Any]]:
+    """Read a sealed npz file into memory; what would run code in it is refused.
+
+    Raises
+    ------
+    FileError
+        It is missing, damaged, or no npz file.
+    """
+    with open_sealed(path) as (file, _):
+        try:
+            with np.load(file, allow_pickle=False) as content:
+                return {name: content[name] for name in content.files}
+        # As in `open_dataset`: only a file of another make comes here.
+        except Exception as error:
+            raise FileError(f"{path}: is no npz file ({error})") from error
+
+
+def write_dataset(path: Path, dataset: xr.Dataset) -> None:
+    """Write a sealed netCDF file whole or not at all."""
+    content = io.BytesIO()
+    dataset.to_netcdf(content, engine="h5netcdf")
+    write_sealed(path, content.getvalue())
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a netCDF file of one kind holds."""
+
+    kind: str
+    """In words, for messages."""
+    version: int
+    """Version of the method whose numbers it holds, its attribute ``method_version``."""
+    variables: Mapping[str, tuple[str, ...]]
+    """Dimensions by variable; there may be more."""
+    attributes: tuple[str, ...] = ()
+    """Attributes that are there; there may be more."""
+
+    def check(self, dataset: xr.Dataset, path: Path) -> None:
+        """Refuse a dataset of another kind or version.
+
+        Raises
+        ------
+        FileError
+            `VersionError` if it is of another version only.
+        """
+        for name, dimensions in self.variables.items():
+            if name not in dataset.variables or dataset[name].dims != dimensions:
+                raise FileError(f"{path}: holds no {self.kind}: {name} over ({', '.join(dimensions)}) is missing")
+        for name in self.attributes:
+            if name not in dataset.attrs:
+                raise FileError(f"{path}: holds no {self.kind}: its attribute {name} is missing")
+        version = dataset.attrs.get("method_version")
+        if version != self.version:
+            raise VersionError(
+                f"{path}: was computed by version {version} of its method, now at {self.version}; compute it again"
+            )
+
+
+@contextmanager
+def open_dataset(path: Path, layout: Layout) -> Iterator[xr.Dataset]:
+    """Open a sealed netCDF file; its arrays are read when they are used.
+
+    Raises
+    ------
+    FileError
+        It is missing, damaged, or not of this layout.
+    """
+    import xarray as xr
+
+    with open_sealed(path) as (file, _):
+        try:
+            dataset = xr.open_dataset(file, engine="h5netcdf")
+        # What the checksum fits was written whole: only a file of another make comes here, and there HDF5, h5netcdf
+        # and xarray raise what they like.
+        except Exception as error:
+            raise FileError(f"{path}: is no netCDF file ({error})") from error
+        with dataset:
+            layout.check(dataset, path)
+            yield dataset
+
+
+def load_dataset(path: Path, layout: Layout, names: Sequence[str] | None = None) -> xr.Dataset:
+    """Read a sealed netCDF file into memory.
+
+    Parameters
+    ----------
+    names : variables; all by default
+
+    Raises
+    ------
+    FileError
+        As `open_dataset`, or a variable is not there.
+    """
+    with open_dataset(path, layout) as dataset:
+        for name in names or ():
+            if name not in dataset.variables:
+                raise FileError(f"{path}: holds no {name}")
+        if names is None:
+            return dataset.load()
+        return dataset[list(names)].load()
+
+
+# Files of what belongs to one key: arrays or a dataset, whole or absent
+
+Arrays = dict[str, NDArray[Any]]
+Content = TypeVar("Content")
+
+_KEY = "key"
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Store:
+    """File of what was computed from one input, and is computed again where the file does not serve.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> store = Store(Path(folder.name) / "angles.npz", key="this input")
+    >>> store.write({"angle": np.array([0.0, 0.1])})
+    >>> store.read(lambda arrays: arrays["angle"].tolist())
+    [0.0, 0.1]
+    >>> print(Store(store.path, key="another input").read(dict))
+    None
+    >>> folder.cleanup()
+    """
+
+    path: Path
+    """Its directory is made when something is written."""
+    key: str
+    """Hash of the whole input and of the version of the method. A file of another key is not read."""
+
+    def read(self, unpack: Callable[[Arrays], Content]) -> Content | None:
+        """Read what `write` wrote.
+
+        Parameters
+        ----------
+        unpack : makes what is wanted of the arrays by name. What it misses, or cannot take, means a damaged file.
+
+        Returns
+        -------
+        What `unpack` gives, or None if the file is missing, of another key, or damaged, which the log tells.
+        """
+        try:
+            arrays = load_arrays(self.path)
+            if str(arrays.pop(_KEY, "")) == self.key:
+                return unpack(arrays)
+            return None
+        except (OSError, ValueError, TypeError, LookupError, AttributeError) as error:
+            self._tell_of(error)
+            return None
+
+    def write(self, arrays: Mapping[str, Any], *, compressed: bool = False) -> None:
+        """Write arrays by name, whole or not at all.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written.
+        """
+        write_arrays(self.path, {_KEY: np.array(self.key), **arrays}, compressed=compressed)
+
+    def read_dataset(self, layout: Layout) -> xr.Dataset | None:
+        """Read a dataset with the attribute ``input_hash``; None as in `read`."""
+        try:
+            dataset = load_dataset(self.path, layout)
+        except VersionError:
+            return None
+        except OSError as error:
+            self._tell_of(error)
+            return None
+        if dataset.attrs.get("input_hash") == self.key:
+            return dataset
+        return None
+
+    def write_dataset(self, dataset: xr.Dataset) -> None:
+        """Write a dataset whose attribute ``input_hash`` is the key, whole or not at all; OSError as in `write`."""
+        write_dataset(self.path, dataset.assign_attrs(input_hash=self.key))
+
+    def discard(self) -> None:
+        """Remove the file: what it was kept for is done."""
+        self.path.unlink(missing_ok=True)
+
+    def _tell_of(self, error: Exception) -> None:
+        """Log why a file that is there is not read."""
+        if os.path.exists(self.path):
+            reason = str(error) if isinstance(error, OSError) else f"{self.path}: is damaged ({error!r})"
+            _log.warning("%s; it is computed again", reason)
+
+
+# What is computed once for all results folders: kept in memory, and in files for the next process
+
+#: Environment variable: another folder for what is kept, or "off" for none.
+FOLDER_VARIABLE = "EXUGEAR_FLANKS"
+
+Value = TypeVar("Value")
+
+
+class Cache(Displayed, Generic[Value]):
+    """Values by key, those used least lately removed.
+
+    Parameters
+    ----------
+    name : of a value, in one word: files are ``<name>-<key>.npz`` in `kept_folder`
+    in_memory : values that are kept in memory
+    in_files : bytes that are kept in files
+
+    Examples
+    --------
+    >>> squares = Cache[int]("square", in_memory=2, in_files=1000)
+    >>> squares
+    <Cache: 0 of square in memory>
+    """
+
+    def __init__(self, name: str, *, in_memory: int, in_files: int) -> None:
+        self.in_files = in_files
+        self._name, self._in_memory = name, in_memory
+        self._values: OrderedDict[str, Value] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def _line(self) -> str:
+        return f": {len(self._values)} of {self._name} in memory"
+
+    def get(self, key: str, unpack: Callable[[Arrays], Value]) -> Value | None:
+        """Value of a key from memory or from its file, as `fe_ste.tools.stores.Store.read` does; None without."""
+        with self._lock:
+            value = self._values.get(key)
+        if value is None and (store := self._store(key)):
+            value = store.read(unpack)
+            with suppress(OSError):
+                os.utime(store.path)  # when it was used last
+        if value is not None:
+            self._remember(key, value)
+        return value
+
+    def keep(self, key: str, value: Value, arrays: Mapping[str, Any]) -> None:
+        """Keep a value in memory, and its arrays in a file; the log tells where that cannot be written."""
+        self._remember(key, value)
+        if store := self._store(key):
+            try:
+                store.write(arrays)
+                self._remove_oldest(store.path.parent)
+            except OSError as error:
+                _tell_unkept(self._name, str(store.path.parent), str(error.strerror))
+
+    def forget(self) -> None:
+        """Drop all values from memory."""
+        with self._lock:
+            self._values.clear()
+
+    def _store(self, key: str) -> Store | None:
+        folder = kept_folder()
+        if folder is None:
+            return None
+        return Store(folder / f"{self._name}-{key}.npz", key)
+
+    def _remember(self, key: str, value: Value) -> None:
+        with self._lock:
+            self._values[key] = value
+            self._values.move_to_end(key)
+            while len(self._values) > self._in_memory:
+                self._values.popitem(last=False)
+
+    def _remove_oldest(self, folder: Path) -> None:
+        """Remove the files used least lately beyond the bound; another process may do so, too."""
+        files = []
+        for entry in os.scandir(folder):
+            if entry.name.startswith(f"{self._name}-") and entry.name.endswith(".npz"):
+                with suppress(OSError):
+                    status = entry.stat()
+                    files.append((status.st_mtime, status.st_size, entry.path))
+        total = 0
+        for _, size, path in sorted(files, reverse=True):
+            total += size
+            if total > self.in_files:
+                with suppress(OSError):
+                    os.unlink(path)
+
+
+@functools.cache
+def _tell_unkept(name: str, folder: str, reason: str) -> None:
+    _log.warning("%s: each %s cannot be kept (%s); the next process computes it again", folder, name, reason)
+
+
+def kept_folder() -> Path | None:
+    """Folder of what is computed once and kept for all results folders; None where nothing is to be kept."""
+    asked = os.environ.get(FOLDER_VARIABLE, "")
+    if asked:
+        if asked == "off":
+            return None
+        return Path(asked)
+    import platformdirs  # needed for a table only: not worth its time at each start
+
+    user = platformdirs.user_cache_path("exugear", appauthor=False)
+    return user / "flanks" if user.is_absolute() else None  # a user without a home has none

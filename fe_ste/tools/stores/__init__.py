@@ -1,1 +1,0 @@
-"""What is kept under a key, in one file or in many."""
