@@ -25,8 +25,8 @@ from typing import Any
 import numpy as np
 
 from exugear import Choice, Gearbox, Modes, Project
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.templates.kinds import template
+from exugear.gearbox.units import RPM
 from exugear.steady.peaks import Peak, peaks
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.system.statics import static_state

@@ -19,7 +19,7 @@ import search_3215 as search
 from one_variant import grc_project
 
 from exugear import Choice, Gearbox, Project, SpeedRange, SteadySettings, eigenmodes, steady_response
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.report.pictures.scene import draw_mode
 from exugear.report.pictures.shapes import bodies_of, mode_scene, motions_of
 from fe_ste.tools.drawing import WARNING_COLOUR, drawing_style, finish_figure, new_figure

@@ -13,7 +13,7 @@ import math
 from one_variant import grc_project, show
 
 from exugear import Choice, load_run
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.results.spectra.resonances import OrderCut, run_up_cut, sweep_rate
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.peaks import ComparedPeak, compared_peaks

@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.gearbox.named_files import LARGEST_TABLE
-from exugear.gearbox.parts import RPM, Bearing, Body, Coupling, Joint, LoadCase
+from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
 from exugear.gearbox.sections.case import LoadCaseSection
 from exugear.gearbox.sections.connections import BearingSection, CouplingSection, JointSection, MountSection
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import GearSection, PinSection
+from exugear.gearbox.units import MM, RPM, UM
 from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
 
 # Bodies from their sections, position errors of planets' pins, and load cases
@@ -76,7 +77,7 @@ def _body(
         name=family + suffix,
         family=family,
         axis=axis,
-        centre_of_mass_z=1e-3 * ((inertia and inertia.centre_of_mass_z_mm) or 0.0),
+        centre_of_mass_z=MM * ((inertia and inertia.centre_of_mass_z_mm) or 0.0),
         mass=(inertia and inertia.mass_kg) or 0.0,
         axial=inertia.axial_kg_m2 if inertia else 0.0,
         transverse=(inertia and inertia.transverse_kg_m2) or 0.0,
@@ -98,7 +99,7 @@ def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
     rings: list[MassProperties] = []
     shape = section.shape
     if shape is not None:
-        start = 1e-3 * shape.start_z_mm
+        start = MM * shape.start_z_mm
         for piece in shape.sections:
             tubes.append(_tube(piece, start, shape.material.density_kg_per_m3))
             start += tubes[-1].length
@@ -123,9 +124,9 @@ def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
     outer_end, inner_end = (None if end is None else 1e-3 * end for end in ends)
     return Tube(
         start=start,
-        length=1e-3 * piece.length_mm,
-        outer=1e-3 * piece.outer_diameter_mm,
-        inner=1e-3 * piece.inner_diameter_mm,
+        length=MM * piece.length_mm,
+        outer=MM * piece.outer_diameter_mm,
+        inner=MM * piece.inner_diameter_mm,
         density=density,
         outer_end=outer_end,
         inner_end=inner_end,
@@ -134,9 +135,9 @@ def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
 
 def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
     """Body of a gear in the middle of its face at z (m) on a shaft: a tube up to its reference circle."""
-    reference = 1e-3 * gear.teeth * gear.normal_module_mm / math.cos(math.radians(gear.helix_angle_deg))
-    width = 1e-3 * gear.face_width_mm
-    held = 1e-3 * gear.held_diameter_mm
+    reference = MM * gear.teeth * gear.normal_module_mm / math.cos(math.radians(gear.helix_angle_deg))
+    width = MM * gear.face_width_mm
+    held = MM * gear.held_diameter_mm
     under = [one.outer for one in shaft if one.start < z + 0.5 * width and one.start + one.length > z - 0.5 * width]
     inner, outer = (reference, held) if gear.internal else (min(max([held, *under]), reference), reference)
     density = gear.material.density_kg_per_m3
@@ -175,7 +176,7 @@ def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[f
         if body is None or body.planet_of is None:
             planets = ", ".join(planet.name for planet in bodies.values() if planet.planet_of) or "none"
             raise origin.fault(f"pins.{name}.body = {section.body!r}: no planet; planets are {planets}")
-        error = 1e-6 * complex(section.radial_um, section.tangential_um)
+        error = UM * complex(section.radial_um, section.tangential_um)
         error *= complex(math.cos(body.orbit_angle), math.sin(body.orbit_angle))
         return section.body, (error.real, error.imag)
 
@@ -377,4 +378,4 @@ def _stands_aside(origin: Origin, key: str, section: MountSection | CouplingSect
 
 
 def _position(body: Body, z_mm: float) -> tuple[float, float, float]:
-    return (*body.axis, z_mm * 1e-3)
+    return (*body.axis, z_mm * MM)

@@ -23,6 +23,7 @@ from exugear.gearbox.sections.gears import (
     ModificationSection,
     PairSection,
 )
+from exugear.gearbox.units import GPA, MM, UM
 from fe_ste.flanks import (
     FlankModification,
     FlankTopography,
@@ -68,7 +69,7 @@ def gears(origin: Origin) -> dict[str, Gear]:
     def of_section(name: str, section: GearSection) -> Gear:
         gear = fitted[name]
         if section.tip_chamfer_mm:
-            height = gear.outward * section.tip_chamfer_mm * 1e-3
+            height = gear.outward * section.tip_chamfer_mm * MM
             gear = replace(gear, tip_form_diameter=2.0 * (gear.tip_radius - height))
         return origin.guarded(
             f"gears.{name}", Gear, **{field.name: getattr(gear, field.name) for field in fields(gear)}
@@ -89,7 +90,7 @@ def _pairs_of(origin: Origin, gears: Mapping[str, UncheckedGear], name: str) -> 
         both = [gears[one] for one in (section.pinion, section.gear) if one in gears]
         if name in (section.pinion, section.gear) and len(both) == 2:
             first, second = sorted(both, key=lambda gear: (gear.internal, gear.teeth))
-            distance = 1e-3 * section.centre_distance_mm
+            distance = MM * section.centre_distance_mm
             yield pair, UncheckedPair(name=pair, pinion=first, gear=second, centre_distance=distance)
 
 
@@ -132,24 +133,24 @@ def _unchecked(name: str, section: GearSection) -> UncheckedGear:
     return UncheckedGear(
         name=name,
         teeth=section.teeth,
-        normal_module=section.normal_module_mm * 1e-3,
+        normal_module=section.normal_module_mm * MM,
         normal_pressure_angle=math.radians(section.normal_pressure_angle_deg),
         helix_angle=math.radians(section.helix_angle_deg),
         profile_shift=section.profile_shift,
-        face_width=section.face_width_mm * 1e-3,
-        held_diameter=section.held_diameter_mm * 1e-3,
+        face_width=section.face_width_mm * MM,
+        held_diameter=section.held_diameter_mm * MM,
         internal=section.internal,
         rack=BasicRack(section.rack.addendum, section.rack.dedendum, section.rack.tip_radius),
-        tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * 1e-3,
-        root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * 1e-3,
+        tip_diameter=None if section.tip_diameter_mm is None else section.tip_diameter_mm * MM,
+        root_diameter=None if section.root_diameter_mm is None else section.root_diameter_mm * MM,
         tooth_thinning=sum(thinning_range(section)) / 2.0,
         material=Material(
-            youngs_modulus=section.material.youngs_modulus_GPa * 1e9,
+            youngs_modulus=section.material.youngs_modulus_GPa * GPA,
             poissons_ratio=section.material.poissons_ratio,
             density=section.material.density_kg_per_m3,
         ),
-        tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * 1e-3,
-        root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * 1e-3,
+        tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * MM,
+        root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * MM,
         cutter=_cutter(section),
     )
 
@@ -163,16 +164,14 @@ def _cutter(section: GearSection) -> PinionCutter | None:
     if cutter.addendum is not None:
         reference = cutter.teeth / math.cos(math.radians(section.helix_angle_deg))
         tip_mm = section.normal_module_mm * (reference + 2.0 * (cutter.profile_shift + cutter.addendum))
-    return PinionCutter(
-        cutter.teeth, cutter.tip_radius, cutter.profile_shift, None if tip_mm is None else 1e-3 * tip_mm
-    )
+    return PinionCutter(cutter.teeth, cutter.tip_radius, cutter.profile_shift, None if tip_mm is None else MM * tip_mm)
 
 
 def thinning_range(section: GearSection) -> tuple[float, float]:
     """Least and greatest thinning of a gear's teeth, transverse section, m; both are the same without allowances."""
     allowances = section.tooth_thickness
     if allowances is None:
-        return section.tooth_thinning_mm * 1e-3, section.tooth_thinning_mm * 1e-3
+        return section.tooth_thinning_mm * MM, section.tooth_thinning_mm * MM
     upper = allowances.upper_allowance_um
     lower = allowances.lower_allowance_um
     if lower is None:
@@ -226,11 +225,11 @@ def _modification(gear: Gear, section: GearSection, find: Callable[[str], Path])
     modification = FlankModification(
         tip_relief=_relief(gear, given, "tip", radius_at_roll_length_from_tip),
         root_relief=_relief(gear, given, "root", radius_at_roll_length_from_root),
-        profile_crowning=1e-6 * given.profile_crowning_um,
-        lead_crowning=1e-6 * given.lead_crowning_um,
-        profile_slope=1e-6 * given.profile_slope_um,
-        helix_slope=1e-6 * given.helix_slope_um,
-        twist=1e-6 * given.twist_um,
+        profile_crowning=UM * given.profile_crowning_um,
+        lead_crowning=UM * given.lead_crowning_um,
+        profile_slope=UM * given.profile_slope_um,
+        helix_slope=UM * given.helix_slope_um,
+        twist=UM * given.twist_um,
         topography=None if given.topography is None else FlankTopography.from_csv(find(given.topography)),
     )
     modification.gap(gear, np.array(gear.tip_radius), np.array(0.0))  # refuses a relief that starts off the involute
@@ -243,7 +242,7 @@ def _relief(
     length_mm = getattr(given, f"{kind}_relief_length_mm")
     start_roll_deg = getattr(given, f"{kind}_relief_start_roll_deg")
     if length_mm is not None:
-        radius = from_end(gear, 1e-3 * length_mm)
+        radius = from_end(gear, MM * length_mm)
     elif start_roll_deg is not None:
         radius = gear.base_radius * math.hypot(1.0, math.radians(start_roll_deg))
     else:
@@ -285,8 +284,8 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
             name=name,
             pinion=first,
             gear=second,
-            centre_distance=section.centre_distance_mm * 1e-3,
-            common_face_width=(None if section.common_face_width_mm is None else section.common_face_width_mm * 1e-3),
+            centre_distance=section.centre_distance_mm * MM,
+            common_face_width=(None if section.common_face_width_mm is None else section.common_face_width_mm * MM),
         )
 
     return part_of_each(of_section, origin.case.pairs)
@@ -481,7 +480,7 @@ def deviations(
 
 
 def _deviation(origin: Origin, key: str, gear: Gear, section: DeviationSection) -> WheelDeviation:
-    pitch = np.array(section.cumulative_pitch_um) * 1e-6
+    pitch = np.array(section.cumulative_pitch_um) * UM
     if len(pitch) not in (0, gear.teeth):
         raise origin.fault(f"{key}.cumulative_pitch_um: {len(pitch)} values; {gear.name} has {gear.teeth} teeth")
     amounts = {"cumulative_pitch_um": max(map(abs, section.cumulative_pitch_um), default=0.0)}

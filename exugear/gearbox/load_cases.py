@@ -16,9 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM, LoadCase
+from exugear.gearbox.parts import LoadCase
 from exugear.gearbox.reading import CaseError, fault_line, shortened
 from exugear.gearbox.train import UNLOADED
+from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed, TitledRows, value_range

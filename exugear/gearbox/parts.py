@@ -11,13 +11,11 @@ from typing import Literal
 import numpy as np
 
 from exugear.gearbox.sections.connections import CatalogueSection, StiffnessSection
+from exugear.gearbox.units import RPM
 from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed, TitledRows, value_range
-
-RPM = math.pi / 30.0
-"""One revolution a minute, rad/s."""
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.sections.loads import RatingSection
+from exugear.gearbox.units import RPM
 from exugear.results.folder import modes_path, run_directory
 from exugear.results.run_file import FINAL_NAME, read_run
 from exugear.steady.mean_system.mesh_waves import wave_name

@@ -18,6 +18,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.loads import RatingSection, StrengthSection
+from exugear.gearbox.units import MPA, UM
 from exugear.gearbox.versions import LIFE
 from exugear.life.dynamic_factors import DynamicFactor
 from exugear.life.load_spectrum.counted import FLANKS, ToothExposure
@@ -294,7 +295,7 @@ class _Case:
         contact, bending = life_curves(strength)
         allowed = self._contact_strength(strength, speed)[:, None, None]
         endured = root_strength(strength, self.pair, self.tooth.member)
-        static = 1e6 * strength.sigma_H_lim_MPa * contact.factors[0]
+        static = MPA * strength.sigma_H_lim_MPa * contact.factors[0]
         by_contact = damages(contact, hertz / allowed, 1.0, cycles).sum(axis=(1, 2))
         by_root = damages(bending, root, endured, cycles).sum(axis=(1, 2))
         values = (
@@ -329,12 +330,12 @@ class _Case:
         """Pa at a life factor of one, for each speed (rad/s) of the loaded body."""
         other = (self.pair.gear, self.pair.pinion)[self.tooth.member].name
         mate = self.rating.gears.get(other, strength)
-        softer = 1e6 * min(strength.sigma_H_lim_MPa, mate.sigma_H_lim_MPa)
+        softer = MPA * min(strength.sigma_H_lim_MPa, mate.sigma_H_lim_MPa)
         roughness = 0.5 * (roughness_of(strength) + roughness_of(mate))
         still = lubricant_factor(softer, self.gearbox.viscosity_40)
         still *= roughness_factor(softer, roughness, reduced_radius(self.pair))
         moving = np.array([velocity_factor(softer, self._velocity(float(one))) for one in speed])
-        return 1e6 * strength.sigma_H_lim_MPa * still * moving
+        return MPA * strength.sigma_H_lim_MPa * still * moving
 
     def _velocity(self, speed: float) -> float:
         """Pitch line velocity (m/s) at a speed (rad/s) of the loaded body."""
@@ -344,7 +345,7 @@ class _Case:
 
 def roughness_of(strength: StrengthSection) -> float:
     """Rz of a gear's flanks, m."""
-    return 1e-6 * (strength.roughness_Rz_um or RZ_OF_RA * (strength.roughness_Ra_um or 0.0))
+    return UM * (strength.roughness_Rz_um or RZ_OF_RA * (strength.roughness_Ra_um or 0.0))
 
 
 def hardening_of(strength: StrengthSection) -> Hardening:
@@ -360,7 +361,7 @@ def root_factors(strength: StrengthSection, pair: GearPair, member: int) -> tupl
     notch = root_stress_factors(pair, member).notch
     return (
         notch_factor(notch, hardening),
-        surface_factor(1e-6 * strength.root_roughness_Rz_um),
+        surface_factor(UM * strength.root_roughness_Rz_um),
         size_factor(pair.pinion.normal_module, hardening),
     )
 
@@ -369,7 +370,7 @@ def root_strength(strength: StrengthSection, pair: GearPair, member: int) -> flo
     """Root stress (Pa) that a gear withstands at a life factor of one."""
     both_ways = strength.mean_stress_factor or 1.0
     factors = math.prod(root_factors(strength, pair, member))
-    return 1e6 * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * factors * both_ways
+    return MPA * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * factors * both_ways
 
 
 def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:

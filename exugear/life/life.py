@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.sections.loads import LubricantSection, RatingSection
+from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import LIFE
 from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.dynamic_factors import WITHIN, DynamicFactor

@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 
 from exugear.gearbox.choice import Choice
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, words_of
 from exugear.report.findings.facts import best_words, levers_of, shift_text

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, channels_of, loudest_order
 from exugear.report.findings.loudness import TOP, ConstantSpeed

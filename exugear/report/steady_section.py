@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from exugear.gearbox.load_cases import summarise_loads
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.entries import GROUND
+from exugear.gearbox.units import RPM
 from exugear.report.findings.context import Context, choice_of, words_of
 from exugear.report.findings.words import figure_text
 from exugear.report.material import Axis, Curve, Material, Part, chart, model_name

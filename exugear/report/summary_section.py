@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.facts import Fact, facts_of, facts_of_response
 from exugear.report.findings.groups import RankedResonance, RunGroup

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.report.findings.context import choice_of, words_of
 from exugear.report.findings.verdicts import run_figures
 from exugear.report.material import Material, Part

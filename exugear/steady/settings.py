@@ -12,7 +12,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, operating_range, rim_radii, summarise_loads
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import STEADY
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.system.system import Assembly, input_hash

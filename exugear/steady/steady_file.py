@@ -13,7 +13,7 @@ import numpy as np
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import operating_range
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import STEADY
 from exugear.results.folder import modes_path
 from exugear.steady.campbell import LAYOUT

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from exugear.gearbox.load_cases import operating_range
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.steady.campbell import Campbell, ModeTracks, campbell_of, modes_over_speed
 from exugear.steady.crossings import (
     HARMONICS,

@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.steady.peaks import line_name, peaks
 from exugear.studies.point_results import PointError, PointResults
 from exugear.system.modes import FREE_ROTATION, Modes

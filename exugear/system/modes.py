@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from exugear.gearbox.choice import Choice
@@ -23,15 +24,7 @@ from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY, UZ, ReducedB
 from exugear.system.build import assemble
 from exugear.system.kernels.coordinates import SPIN
 from exugear.system.kernels.meshes import STIFFNESS, TILT_COLUMNS, TILT_STIFFNESS
-from exugear.system.statics import (
-    RIGID_BODY_LIMIT,
-    Linearised,
-    beside_unsolved_states,
-    growth_rate,
-    linearise,
-    static_state,
-    undamped_modes,
-)
+from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, beside_unsolved_states, linearise, static_state
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.element import Angles, MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -471,3 +464,30 @@ def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats
 
     _, place = scipy.optimize.linear_sum_assignment(share.T, maximize=True)
     return np.asarray(place, dtype=np.int64), share[place, np.arange(len(place))]
+
+
+def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = None) -> tuple[Floats, Floats]:
+    """Solve M x'' + K x = 0 for frequencies (Hz, ascending) and real shapes; M symmetric, K any.
+
+    A preloaded connector or the law `seed` makes K unsymmetric. Equal frequencies may then come out as a complex pair
+    that differs from real by round-off; its real and imaginary parts span the same plane. `motions` (size, n) are
+    those that are free, all by default.
+    """
+    # In coordinates with unit mass the problem is an ordinary one; only in free motions, an orthonormal basis of them.
+    root = np.linalg.cholesky(mass)
+    basis = scipy.linalg.orth(root.T @ (np.eye(len(mass)) if motions is None else motions))
+    free = np.linalg.solve(root.T, basis)
+    values, vectors = scipy.linalg.eig(free.T @ stiffness @ free)
+    shapes = free @ np.where(values.imag < 0.0, vectors.imag, vectors.real)
+    order = np.argsort(values.real)
+    frequency = np.sqrt(np.maximum(values.real[order], 0.0)) / (2.0 * np.pi)
+    return frequency, shapes[:, order]
+
+
+def growth_rate(linear: Linearised) -> float:
+    """Largest real part of the eigenvalues of M x'' + D x' + K x = 0, 1/s, the free rotation left out."""
+    size = len(linear.mass)
+    lower = np.linalg.solve(linear.mass, np.hstack([-linear.total_stiffness, -linear.total_damping]))
+    values = scipy.linalg.eigvals(np.vstack([np.eye(size, 2 * size, size), lower]))
+    elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
+    return float(values.real[elastic].max(initial=-np.inf))

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.units import KN
 from exugear.system.bearings.duty import BearingDuty, OperatingPoint, duty_of, operating_point
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import bearing_load, equilibrium, row_contacts
@@ -322,7 +323,7 @@ def bearing_points(assembly: Assembly) -> tuple[OperatingPoint, ...]:
 def _stated_point(bearing: Bearing) -> OperatingPoint:
     """Operating point of a bearing whose load the file states: along x, the stiffness the same in all directions."""
     assert bearing.catalogue is not None and bearing.catalogue.radial_load_kN is not None
-    force = (1e3 * bearing.catalogue.radial_load_kN, 0.0, 1e3 * (bearing.catalogue.axial_load_kN or 0.0))
+    force = (KN * bearing.catalogue.radial_load_kN, 0.0, KN * (bearing.catalogue.axial_load_kN or 0.0))
     displacement = equilibrium(BearingOfRows(catalogue_rows(bearing.catalogue)), force).displacement
     return replace(operating_point(bearing, displacement, False), stiffness=catalogue_stiffness(bearing.catalogue))
 

@@ -15,6 +15,7 @@ from exugear.gearbox.gear_parts import thinning_range
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Bearing, Body, PairSpec
 from exugear.gearbox.sections.connections import CatalogueSection
+from exugear.gearbox.units import MM
 from exugear.system.bearings.rolling.dimensions import boundary_of
 from fe_ste.geometry.checks import USUAL_TIP_THICKNESS
 from fe_ste.geometry.gears import Gear, GearPair
@@ -149,7 +150,7 @@ def _seats(gearbox: Gearbox) -> Iterator[str]:
 def _bores_beside(gearbox: Gearbox, body: Body, place: float) -> tuple[float, float] | None:
     """Bores (m) of the nearest bearings of a body on both sides of a place on it; None without both."""
     known = [
-        (bearing.position[2], 1e-3 * bearing.catalogue.bore_mm)
+        (bearing.position[2], MM * bearing.catalogue.bore_mm)
         for bearing in gearbox.bearings
         if bearing.catalogue is not None and bearing.body == body.name
     ]
@@ -165,12 +166,12 @@ def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> floa
     section = gearbox.case.bodies.get(body.family)
     if section is None or section.shape is None:
         return None
-    start = 1e-3 * section.shape.start_z_mm
+    start = MM * section.shape.start_z_mm
     found = []
     for piece in section.shape.sections:
-        end = start + 1e-3 * piece.length_mm
+        end = start + MM * piece.length_mm
         if start < place + 0.5 * gear.face_width and end > place - 0.5 * gear.face_width:
-            found.append(1e-3 * min(piece.outer_diameter_mm, piece.outer_diameter_end_mm or piece.outer_diameter_mm))
+            found.append(MM * min(piece.outer_diameter_mm, piece.outer_diameter_end_mm or piece.outer_diameter_mm))
         start = end
     return min(found, default=None)
 
@@ -291,14 +292,14 @@ def _clash(gear: Gear, place: float, bearing: Bearing) -> float:
     along = 0.5 * (gear.face_width + _width(catalogue)) - abs(place - bearing.position[2])
     inside, outside = sorted((0.5 * gear.held_diameter, gear.tip_radius))
     across = min(outside, 0.5e-3 * catalogue.outer_diameter_mm) - max(inside, 0.5e-3 * catalogue.bore_mm)
-    if across > LEAST_CLASH and along > CLASHING_SHARE * 1e-3 * catalogue.width_mm:
+    if across > LEAST_CLASH and along > CLASHING_SHARE * MM * catalogue.width_mm:
         return along
     return 0.0
 
 
 def _width(catalogue: CatalogueSection) -> float:
     """Width of a bearing with all its rows, m."""
-    return (1 if catalogue.arrangement == "single" else 2) * 1e-3 * catalogue.width_mm
+    return (1 if catalogue.arrangement == "single" else 2) * MM * catalogue.width_mm
 
 
 # How near gear pairs are to what tables cut off or what wears out: form circles, tips, pressure at the pitch point

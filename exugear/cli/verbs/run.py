@@ -212,7 +212,7 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
     import numpy as np
 
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
     from exugear.results.run_file import read_run
     from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
     from exugear.transient.plan import EXPECTATIONS

@@ -141,7 +141,7 @@ def _settings(
 
 
 def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
     from exugear.report.findings.loudness import ranking_of
 
     growth = float(data.attrs["growth_rate"])
@@ -192,7 +192,7 @@ def _whole_summary(
     pulling: tuple[Pull, ...],
     excited: bool,
 ) -> dict[str, Any]:
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
     from exugear.steady.peaks import peaks
 
     found = [peak for peak in peaks(data) if peak.amplitude > LEAST_AMPLITUDE]
@@ -228,7 +228,7 @@ def _whole_summary(
 
 
 def _speeds_of(ranking: Ranking) -> str:
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
 
     low, high = (speed / RPM for speed in ranking.speeds)
     return f"{low:.4g} to {high:.4g} rpm"
@@ -259,7 +259,7 @@ def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
 
 def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
     """Say which meshes would have to pull, where the law does not let their teeth part."""
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
     from exugear.steady.peaks import pulls
     from exugear.system.tooth_mesh.laws.registry import LAWS
 
@@ -276,14 +276,14 @@ def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
 
 
 def _pull_summary(pull: Pull) -> dict[str, Any]:
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
 
     return {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
 
 
 def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
     """Say which speeds have no steady state, and where it does not last."""
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
 
     for missing in json.loads(data.attrs["unsolved"]):
         note(f"{missing['speed'] / RPM:.4g} rpm: {missing['reason']}", style="yellow")
@@ -346,7 +346,7 @@ def _tell_of_harmonics(data: xr.Dataset) -> None:
 
 def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
     """Say how non-linear bearings were taken, what unequal loads of planets leave out, and which loads swing far."""
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
     from exugear.steady.peaks import STRAINED, bearing_swings
 
     if data.attrs["bearings_in_time"]:
@@ -377,7 +377,7 @@ def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
 
 
 def _swing_summary(swing: BearingSwing) -> dict[str, Any]:
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
 
     return {
         "bearing": swing.bearing,
@@ -388,7 +388,7 @@ def _swing_summary(swing: BearingSwing) -> dict[str, Any]:
 
 
 def _summary(peak: Peak) -> dict[str, Any]:
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
 
     return {
         "line": peak.line,
@@ -400,7 +400,7 @@ def _summary(peak: Peak) -> dict[str, Any]:
 
 
 def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
 
     found: dict[str, Any] = {
         "line": resonance.line,
@@ -418,7 +418,7 @@ def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
 
 
 def _row(resonance: Resonance) -> dict[str, str]:
-    from exugear.gearbox.parts import RPM
+    from exugear.gearbox.units import RPM
 
     found = {"line": resonance.line, "rpm": f"{resonance.speed / RPM:.2f}", "Hz": f"{resonance.frequency:.1f}"}
     for quantity, loudness in resonance.loudness.items():

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM, Mesh
+from exugear.gearbox.parts import Mesh
+from exugear.gearbox.units import RPM
 from exugear.life.load_spectrum.counting import DurationDistribution, LoadPoints, equivalent_load
 from exugear.life.load_spectrum.series import COMPONENTS, RANGE_EXPONENTS
 from exugear.life.load_spectrum.sources import (

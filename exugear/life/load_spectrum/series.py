@@ -17,8 +17,8 @@ import numpy as np
 from exugear.exchange.channels import LONG_SERIES, Channels, LoadFileError
 from exugear.exchange.series_files import read_channels
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.sections.loads import SourceSection
+from exugear.gearbox.units import RPM
 from exugear.life.load_spectrum.counting import Rainflow, equivalent_range
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import Displayed

@@ -27,9 +27,9 @@ from exugear.exchange.series_files import (
     table_rows,
 )
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import shortened
 from exugear.gearbox.sections.loads import LoadsSection, SourceSection, WindSection
+from exugear.gearbox.units import RPM
 from exugear.life.load_spectrum.counting import DurationDistribution, LoadPoints, load_duration, load_points
 from exugear.life.load_spectrum.series import (
     HUB_LOADS,

@@ -12,8 +12,9 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM, Mesh
+from exugear.gearbox.parts import Mesh
 from exugear.gearbox.sections.loads import RatingSection
+from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.life.dynamic_factors import stated_factors
 from exugear.life.gear_life import check_strengths, flank_lives

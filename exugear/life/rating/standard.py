@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.sections.loads import StrengthSection
+from exugear.gearbox.units import MPA
 from exugear.life.gear_life import hardening_of, life_curves, root_factors, root_strength, roughness_of
 from fe_ste.geometry.gears import GearPair
 from fe_ste.standards.iso1328 import tolerance
@@ -148,7 +149,7 @@ def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
     strength = rules.strength
     if strength is not None:
         curve, bending = life_curves(strength)
-        endured = 1e6 * strength.sigma_H_lim_MPa * allowed.prod(axis=1)
+        endured = MPA * strength.sigma_H_lim_MPa * allowed.prod(axis=1)
         broken = root_strength(strength, rules.pair, rules.member)
         by_load = damages(curve, contact / endured, 1.0, loads.turns)
         if 0.0 < by_load.sum() < math.inf:
@@ -162,7 +163,7 @@ def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
         if strength.root_factor is None:
             found |= dict(zip(ROOT_STRENGTH, relative, strict=True))
         found["Y_M"] = strength.mean_stress_factor or 1.0
-        found |= {"sigma_Hlim": 1e6 * strength.sigma_H_lim_MPa, "sigma_Flim": 1e6 * strength.sigma_F_lim_MPa}
+        found |= {"sigma_Hlim": MPA * strength.sigma_H_lim_MPa, "sigma_Flim": MPA * strength.sigma_F_lim_MPa}
     found |= dict(zip(("Z_L", "Z_v", "Z_R"), allowed[decides].tolist(), strict=True))
     place = {"torque": float(loads.torque[decides]), "N_L": float(loads.turns.sum())}
     return {**place, **factors[decides], **stresses[decides], **found}
@@ -243,7 +244,7 @@ def _run_in(rules: FlankRules, deviations: FlankDeviations | None, velocity: flo
 def _mean(rules: FlankRules, taken: Callable[[Hardening, float], float]) -> float:
     """Mean of both gears of what running in takes; nothing without their strength."""
     known = [strength for strength in rules.strengths if strength is not None]
-    values = [taken(hardening_of(one), 1e6 * one.sigma_H_lim_MPa) for one in known]
+    values = [taken(hardening_of(one), MPA * one.sigma_H_lim_MPa) for one in known]
     if values:
         return sum(values) / len(values)
     return 0.0
@@ -285,7 +286,7 @@ def _contact_influences(rules: FlankRules, velocity: float) -> tuple[float, floa
     known = [strength for strength in rules.strengths if strength is not None]
     if not known:
         return math.nan, math.nan, math.nan
-    softer = 1e6 * min(one.sigma_H_lim_MPa for one in known)
+    softer = MPA * min(one.sigma_H_lim_MPa for one in known)
     roughness = sum(roughness_of(one) for one in known) / len(known)
     return (
         lubricant_factor(softer, rules.viscosity),

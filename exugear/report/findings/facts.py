@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.report.findings.groups import RankedResonance, RunGroup

@@ -19,7 +19,7 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.named_files import Permissions
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RunGroup

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from exugear.system.tooth_mesh.tables import TableRequest

@@ -10,7 +10,7 @@ from textwrap import shorten
 import numpy as np
 from numpy.typing import ArrayLike
 
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.results.spectra.waterfall import OrderLine, Waterfall, overlapping_frames
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import Displayed, TitledRows, value_range

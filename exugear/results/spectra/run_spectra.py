@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.results.run_file import read_run as read_arrays
 from exugear.results.spectra.resonances import (
     Pick,

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed, TitledRows, value_range
 

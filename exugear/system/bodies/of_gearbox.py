@@ -25,6 +25,7 @@ from exugear.gearbox.sections.bodies import (
     SolidSection,
 )
 from exugear.gearbox.sections.gears import MaterialSection
+from exugear.gearbox.units import GPA, MM
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
 from exugear.system.bodies.elastic_body import ElasticBody, FloatingBody
 from exugear.system.bodies.reduction import Blank, Frame, ReducedBody, ReductionError, RigidInertia, with_rigid_inertia
@@ -48,7 +49,7 @@ from fe_ste.geometry.gears import Material
 
 def material_of(section: MaterialSection) -> Material:
     """Material of a body, Pa and kg/m3."""
-    return Material(section.youngs_modulus_GPa * 1e9, section.poissons_ratio, section.density_kg_per_m3)
+    return Material(section.youngs_modulus_GPa * GPA, section.poissons_ratio, section.density_kg_per_m3)
 
 
 def blank_of(section: BlankSection) -> Blank:
@@ -61,7 +62,7 @@ def seat_width(bearing: Bearing) -> float:
     if bearing.catalogue is None:
         return 0.0
     rows = 1 if bearing.catalogue.arrangement == "single" else 2
-    return rows * bearing.catalogue.width_mm * 1e-3
+    return rows * bearing.catalogue.width_mm * MM
 
 
 def frame_of(gearbox: Gearbox, body: Body) -> Frame:
@@ -115,7 +116,7 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
         name=name,
         sections=sections,
         material=material_of(shape.material),
-        origin=(*body.axis, shape.start_z_mm * 1e-3),
+        origin=(*body.axis, shape.start_z_mm * MM),
         seats=tuple(seat for seat in seats if seat.name not in shared),
         blanks=blanks,
         band=gearbox.case.elasticity.band_Hz,
@@ -174,8 +175,8 @@ def _section_of(section: ShaftSectionSection) -> ShaftSection:
     if inner_end is not None:
         inner, inner_end = max(inner, POINT * inner_end), max(inner_end, POINT * inner)
     return ShaftSection(
-        1e-3 * section.length_mm,
-        1e-3 * section.outer_diameter_mm,
+        MM * section.length_mm,
+        MM * section.outer_diameter_mm,
         1e-3 * inner,
         None if outer_end is None else 1e-3 * outer_end,
         None if inner_end is None else 1e-3 * inner_end,
@@ -184,7 +185,7 @@ def _section_of(section: ShaftSectionSection) -> ShaftSection:
 
 def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBand]:
     """Each seat as the file has it, from the beginning of the shaft."""
-    start = shape.start_z_mm * 1e-3
+    start = shape.start_z_mm * MM
     for gear, z in body.wheels.items():
         yield SeatBand(gear, z - start, gearbox.gears[gear].face_width)
     for bearing in gearbox.bearings:
@@ -194,7 +195,7 @@ def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBa
         if mount.body == body.name:
             yield SeatBand(mount.name, mount.position[2] - start, 0.0)
     if shape.torque_z_mm is not None:
-        yield SeatBand(TORQUE_SEAT, shape.torque_z_mm * 1e-3 - start, 0.0)
+        yield SeatBand(TORQUE_SEAT, shape.torque_z_mm * MM - start, 0.0)
 
 
 def solid_of_shaft(model: ShaftModel, size: MeshSize = SOLID_SIZE) -> SolidModel:
@@ -265,8 +266,8 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
         )
     file = SolidFile(
         gearbox.file(f"{key}.file", solid.file, LARGEST_SOLID),
-        solid.length_unit_mm * 1e-3,
-        (solid.element_size_mm or 0.0) * 1e-3,
+        solid.length_unit_mm * MM,
+        (solid.element_size_mm or 0.0) * MM,
         solid.elements_around,
         gearbox.permissions.scripts,
     )
@@ -325,7 +326,7 @@ def _items(gearbox: Gearbox, body: Body) -> dict[str, _Item]:
         if bearing.catalogue is not None:
             # A planet turns about its bearing, all other bodies in theirs.
             inside = (bearing.body == body.name) != bearing.carries_outer_ring
-            diameter = 1e-3 * (bearing.catalogue.bore_mm if inside else bearing.catalogue.outer_diameter_mm)
+            diameter = MM * (bearing.catalogue.bore_mm if inside else bearing.catalogue.outer_diameter_mm)
             width = seat_width(bearing)
         items[bearing.name] = _Item(bearing.family, "bearing", bearing.position, diameter, width)
     at_work = {mount.name for mount in mounts_at_work(gearbox)}
@@ -376,9 +377,9 @@ def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, secti
     """One seat, from what the file says of it and what is known of the item on it."""
     diameter, width = (None, None) if item is None else (item.diameter, item.width)
     if section.diameter_mm is not None:
-        diameter = 1e-3 * section.diameter_mm
+        diameter = MM * section.diameter_mm
     if section.width_mm is not None:
-        width = 1e-3 * section.width_mm
+        width = MM * section.width_mm
     if section.inner_diameter_mm is not None:
         width = 0.0
     position = None if item is None else item.position

@@ -10,8 +10,8 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.units import RPM
 from exugear.life.dynamic_factors import DynamicFactor, factors, family_factors, response_path, window_factors
 from exugear.life.life import rating_of
 from exugear.project import Project

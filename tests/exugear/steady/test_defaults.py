@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from exugear import Project
-from exugear.gearbox.parts import RPM
+from exugear.gearbox.units import RPM
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.system.operating_points import contact_places
 from exugear.system.statics import static_state

@@ -8,8 +8,8 @@ import scipy.optimize
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.templates.kinds import template
+from exugear.gearbox.units import RPM
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.mean_system.signals import quantities_of

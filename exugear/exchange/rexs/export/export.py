@@ -21,8 +21,9 @@ from exugear.exchange.rexs.to_case.notes import Rules
 from exugear.exchange.rexs.tree import Model, RexsError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import RPM, Body, seat_key
+from exugear.gearbox.parts import Body, seat_key
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import VariantError
 from exugear.results.folder import bodies_folder, read_duties
 from exugear.results.run_file import FINAL_NAME, load_run

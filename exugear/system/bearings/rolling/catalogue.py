@@ -28,6 +28,7 @@ from exugear.gearbox.sections.connections import (
     BearingType,
     CatalogueSection,
 )
+from exugear.gearbox.units import MM, UM
 from exugear.system.bearings.rolling import dimensions
 from exugear.system.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows, rib_row
 
@@ -236,7 +237,7 @@ def _radial_clearance(section: CatalogueSection) -> Estimate | None:
     if section.type not in dimensions.CLEARANCE_UM:
         return None
     fixed, per_bore = dimensions.CLEARANCE_UM[section.type]
-    return Estimate("radial_clearance_mm", 0.0, 0.0, 1e-3 * (fixed + per_bore * section.bore_mm), "mm")
+    return Estimate("radial_clearance_mm", 0.0, 0.0, MM * (fixed + per_bore * section.bore_mm), "mm")
 
 
 def _axial_preload(section: CatalogueSection) -> Estimate | None:
@@ -296,7 +297,7 @@ def _common(section: CatalogueSection) -> dict[str, Any]:
         "element_diameter": 1e-3 * diameter,
         "pitch_diameter": 1e-3 * pitch,
         "element_count": count,
-        "radial_clearance": 1e-3 * section.radial_clearance_mm,
+        "radial_clearance": MM * section.radial_clearance_mm,
         "aligning": section.type in SPHERES,
     }
 
@@ -342,7 +343,7 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
         return tuple(moved(row, each, 0.0) for each in (-angle, angle))
     if section.arrangement != "single":
         distance = 1e-3 * _given(section, "row_distance_mm")
-        preload = 1e-6 * section.axial_preload_um
+        preload = UM * section.axial_preload_um
         return pair_rows(moved(row, signed, 0.0), section.arrangement, distance, preload)
     if section.type == "thrust_spherical_roller":
         # All rollers press on one point of the axis, beside the bearing.

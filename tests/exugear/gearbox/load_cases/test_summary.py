@@ -21,8 +21,8 @@ from exugear.gearbox.load_cases import (
     doubts_about,
     summarise_loads,
 )
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.units import RPM
 from exugear.system.build import assemble
 from exugear.system.statics import accelerating_start
 from exugear.transient.runup import simulate

@@ -10,8 +10,8 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import operating_range
-from exugear.gearbox.parts import RPM
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.units import RPM
 from exugear.report.findings.loudness import HOUSING, SHAFTS, ranking_of
 from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.settings import SpeedRange, SteadySettings
