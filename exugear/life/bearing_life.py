@@ -43,8 +43,6 @@ LAMINAE = 40
 """Slices of a roller for its loads; 60 change the life by 0.1 %."""
 LOAD_SHARES = (0.15, 0.3, 0.5, 0.7, 0.85, 1.0)
 """Loads over the largest at which roller loads are solved; lives between them are straight in logarithms."""
-LARGEST_PRESSURE = 4000e6
-"""Contact stress of roller bearings at their static rating, Pa (ISO 76:2006)."""
 
 
 @dataclass(frozen=True)

@@ -52,11 +52,6 @@ def words_of(choice: Choice) -> str:
     return f"{choice.variant}, law {choice.mesh_law}, inertias {choice.inertias}"
 
 
-def file_part(choice: Choice) -> str:
-    """Return a choice for names of files."""
-    return f"{choice.variant}-{choice.mesh_law}-{choice.inertias}"
-
-
 @dataclass(frozen=True)
 class Notes:
     """What is told at the top of the page; each list in the order in which it was noted."""

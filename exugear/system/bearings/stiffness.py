@@ -97,35 +97,6 @@ def regularised(stiffness: Floats, floor: ArrayLike) -> Floats:
     return raised
 
 
-def in_series(first: Floats, second: Floats) -> Floats:
-    """Stiffness of two elements that carry the same load one behind the other.
-
-    Parameters
-    ----------
-    first, second : (6, 6) symmetric, positive semi-definite: for example bearing and housing seat, about the same point
-
-    Returns
-    -------
-    (6, 6)
-        Parallel sum ``A (A + B)^+ B`` of the matrices: ``(A^-1 + B^-1)^-1`` where these exist; a direction
-        that either leaves free is free.
-
-    Examples
-    --------
-    >>> series = in_series(np.diag([2.0, 2.0, 0.0, 1.0, 1.0, 0.0]), np.diag([2.0, 6.0, 5.0, 1.0, 1.0, 0.0]))
-    >>> [round(float(entry), 12) for entry in np.diag(series)]
-    [1.0, 1.5, 0.0, 0.5, 0.5, 0.0]
-    """
-    # Forces and moments differ by orders of magnitude: scale to a unit diagonal before a rank is decided.
-    total = first + second
-    scale = np.sqrt(np.where(np.diag(total) > 0.0, np.diag(total), 1.0))
-    scales = np.outer(scale, scale)
-    inverse = np.linalg.pinv(total / scales, rcond=1e-13, hermitian=True) / scales
-    series = first @ inverse @ second
-    symmetric: Floats = 0.5 * (series + series.T)
-    return symmetric
-
-
 def proportional_damping(stiffness: Floats, time_constant: float) -> Floats:
     """Viscous damping ``beta K``.
 

@@ -16,7 +16,6 @@ from exugear.system.bearings.rolling.rows import (
 )
 from exugear.system.bearings.stiffness import (
     axially_symmetric,
-    in_series,
     proportional_damping,
     regularised,
     rotate_stiffness,
@@ -33,20 +32,6 @@ def test_axially_symmetric_mean_does_not_change_with_a_turn():
     mean = axially_symmetric(pitch_averaged_tangent(PAIR, (21.8e3, 0.0, 12.9e3), positions=1))
     np.testing.assert_allclose(rotate_stiffness(mean, 0.7), mean, atol=1e-12 * np.abs(mean).max())
     assert mean[0, 0] == mean[1, 1] or mean[0, 0] == pytest.approx(mean[1, 1], rel=1e-12)
-
-
-def test_series_with_a_seat_of_known_flexibility():
-    rng = np.random.default_rng(1)
-    a, b = (matrix @ matrix.T + np.eye(6) for matrix in rng.normal(size=(2, 6, 6)))
-    expected = np.linalg.inv(np.linalg.inv(a) + np.linalg.inv(b))
-    np.testing.assert_allclose(in_series(a, b), expected, rtol=1e-10)
-
-
-def test_series_keeps_free_what_the_bearing_leaves_free():
-    stiffness = pitch_averaged_tangent(NJ2232, (129.9e3, 0.0, 0.0), positions=1)
-    series = in_series(stiffness, np.diag([1e9, 1e9, 1e9, 1e7, 1e7, 1e7]))
-    assert np.abs(series[2]).max() < 1e-6 and np.abs(series[5]).max() < 1e-6  # of 1e9
-    assert series[0, 0] == pytest.approx(1.0 / (1.0 / stiffness[0, 0] + 1e-9), rel=1e-9)
 
 
 def test_regularisation_touches_only_what_lies_below_the_floor():
