@@ -10,7 +10,7 @@ import pytest
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.element import MeshCurve
 
-from .contact_case import curves_of
+from .cases.contact import curves_of
 
 CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
 

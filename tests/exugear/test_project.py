@@ -18,7 +18,7 @@ from exugear.results.run_file import load_run
 from exugear.system.build import assemble
 from exugear.system.modes import load_modes
 
-from .spur_case import SPUR_CASE
+from .cases.spur import SPUR_CASE
 
 SPUR = Choice("bushing", "iso6336", load_case="run_up")
 

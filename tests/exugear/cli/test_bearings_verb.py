@@ -16,7 +16,7 @@ from exugear.system.modes import load_modes
 from exugear.system.signals import energy_residual
 from exugear.system.statics import BalanceError
 
-from ..bearing_case import BEARING_CASE, NAMES
+from ..cases.bearing import BEARING_CASE, NAMES
 
 FIGURES = {"radial_load_kN", "radial_stiffness_N_per_m", "contact_pressure_MPa", "L10_Mrev", "L10r_Mrev", "remarks"}
 

@@ -27,8 +27,8 @@ from exugear.transient.runup import SOLVERS
 from exugear.transient.runup import simulate as real_simulate
 from fe_ste.tools.drawing import RenderingError
 
-from ..floating_case import FLOATING_CASE
-from ..spur_case import COARSE_INPUT, SPUR_CASE
+from ..cases.floating import FLOATING_CASE
+from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
 
 @pytest.fixture(autouse=True)

@@ -16,9 +16,9 @@ from exugear.gearbox.variant import OFFERED
 from exugear.project import Project
 from exugear.system.tooth_mesh import tables
 
-from ..case_mutations import toml_text
-from ..gear_trains import KINDS
-from ..spur_case import COARSE_INPUT
+from ..cases.case_mutations import toml_text
+from ..cases.gear_trains import KINDS
+from ..cases.spur import COARSE_INPUT
 
 GUIDE = Path(__file__).parents[3] / "docs" / "reference" / "gear_trains.md"
 IN_EACH_CHANGE = ("planetary, ring held", "rotor without gears")

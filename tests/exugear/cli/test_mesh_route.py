@@ -21,8 +21,8 @@ from exugear.results.run_file import load_run
 from exugear.transient.exudyn_model import system
 from exugear.transient.runup import simulate
 
-from ..spur_case import SPUR_CASE
-from ..table_case import surfaces
+from ..cases.spur import SPUR_CASE
+from ..cases.table import surfaces
 
 GRC = Path(__file__).parents[3] / "cases" / "grc750"
 SIGNALS = ("input_speed", "overall_dte", "mesh_dte", "mesh_force", "support_force", "elastic_energy", "work_of_loads")

@@ -24,9 +24,9 @@ from exugear.system.tooth_mesh import tables
 from exugear.system.tooth_mesh.laws.iso6336 import iso6336_stiffness
 from exugear.system.tooth_mesh.placement import loaded_flanks
 
-from ..case_mutations import toml_text
-from ..ring_case import ring_content
-from ..spur_case import COARSE_INPUT, SPUR_CASE
+from ..cases.case_mutations import toml_text
+from ..cases.ring import ring_content
+from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
 SHORT = ("--duration", 0.01)
 TWO_SPEEDS = ("--speeds", "1000:1010:2")

@@ -18,7 +18,7 @@ import xarray as xr
 from exugear.cli.console import StoppedError, exit_codes, say_what_is_logged
 from exugear.results.run_file import load_run
 
-from ..spur_case import SPUR_CASE
+from ..cases.spur import SPUR_CASE
 
 pytestmark = pytest.mark.usefixtures("terminal_signals")
 ROOT = Path(__file__).parents[3]

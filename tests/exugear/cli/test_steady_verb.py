@@ -13,8 +13,8 @@ from exugear.cli.app import app
 from exugear.cli.verbs.steady import Level
 from exugear.steady.settings import LEVELS
 
-from ..bearing_case import BEARING_CASE
-from ..spur_case import COARSE_INPUT, SPUR_CASE
+from ..cases.bearing import BEARING_CASE
+from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
 
 @pytest.fixture(autouse=True)

@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.studies.dataset import load_study
 
-from ..spur_case import COARSE_INPUT
-from ..study_case import written_case
+from ..cases.spur import COARSE_INPUT
+from ..cases.study import written_case
 
 STUDY = """
 name = "seats"

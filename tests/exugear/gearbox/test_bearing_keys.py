@@ -13,7 +13,7 @@ from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.connections import TYPES_OF_KEYS
 from exugear.system.readiness import check_parts
 
-from ..case_mutations import bases
+from ..cases.case_mutations import bases
 
 Content = tuple[Path, dict[str, Any]]
 

@@ -21,9 +21,9 @@ from exugear.system.readiness import check_parts, lacking, remarks
 from exugear.system.statics import locked_equilibrium
 from exugear.system.tooth_mesh.tables import wanted_table
 
-from .. import gear_trains
-from ..assembled import assembled, modes_with_bodies
-from ..case_mutations import bases, toml_text
+from ..cases import gear_trains
+from ..cases.assembled import assembled, modes_with_bodies
+from ..cases.case_mutations import bases, toml_text
 
 ISO = {"sun_planet": np.array([3.8e9]), "ring_planet": np.array([4.9e9])}
 HELD = {"radial_N_per_m": 1e9, "axial_N_per_m": 1e9, "tilt_N_m_per_rad": 1e7}

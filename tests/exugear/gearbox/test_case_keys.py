@@ -37,8 +37,8 @@ from exugear.system.operating_points import bearing_duties
 from exugear.system.readiness import check_parts, lacking, remarks
 from exugear.system.tooth_mesh.tables import wanted_table
 
-from .. import gear_trains
-from ..case_mutations import bases, toml_text
+from ..cases import gear_trains
+from ..cases.case_mutations import bases, toml_text
 
 ELSEWHERE = {f"CaseFile.{table}" for table in ("labels", "operation", "loads", "rating", "lubricant")}
 """Keys of pages and of a life, whose computation takes too long here: another test looks for them in the program."""

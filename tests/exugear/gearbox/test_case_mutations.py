@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.gearbox.reading import LONGEST_FAULT, SHOWN_FAULTS
 
-from ..case_mutations import bases, mutant, toml_text
+from ..cases.case_mutations import bases, mutant, toml_text
 
 LIMIT = 60.0
 """Longest that a verb may take on a small file, s."""

@@ -22,7 +22,7 @@ from exugear.gearbox.reading import CaseError
 from exugear.system.bodies.solid_elements import SolidError
 from exugear.system.bodies.solid_files import mesh_geometry, read_solid
 
-from ..spur_case import SPUR_CASE
+from ..cases.spur import SPUR_CASE
 
 
 def works(library: str) -> bool:

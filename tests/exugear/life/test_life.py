@@ -39,9 +39,9 @@ from fe_ste.root_stress import MeshCycleStress
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import root_stress_factors
 
-from ..case_mutations import toml_text
-from ..spur_case import SPUR_CASE
-from ..table_case import surfaces
+from ..cases.case_mutations import toml_text
+from ..cases.spur import SPUR_CASE
+from ..cases.table import surfaces
 
 BASE = 30e-3 * math.cos(math.radians(20.0))
 STRENGTH = {
@@ -147,11 +147,11 @@ def test_life_of_a_spur_pair_as_a_user_meets_it(first):
 
 
 def killed_lives(first: Project, folder: Path, every: int) -> dict[str, Any]:
-    """What `tests.exugear.killed_lives` finds, with tables and stresses of a life that is there."""
+    """What `tests.exugear.cases.killed_lives` finds, with tables and stresses of a life that is there."""
     (folder / "gearbox.toml").write_text(toml_text(content_of(TABLE, folder)))
     for known in ("tables", "stress"):
         shutil.copytree(first.folder / known, folder / "known" / known)
-    command = [sys.executable, "-m", "tests.exugear.killed_lives", "life", str(folder), str(every)]
+    command = [sys.executable, "-m", "tests.exugear.cases.killed_lives", "life", str(folder), str(every)]
     ended = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[3], check=False)
     assert ended.returncode == 0, ended.stderr
     found: dict[str, Any] = json.loads(ended.stdout)

@@ -14,8 +14,8 @@ from exugear.life.static_balance import static_balance
 from exugear.system.build import assemble
 from exugear.system.statics import accelerating_start
 
-from .. import table_case
-from ..spur_case import SPUR_CASE
+from ..cases import table as table_case
+from ..cases.spur import SPUR_CASE
 
 WEIGHT = {"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}
 STIFFNESS = 5e8

@@ -16,7 +16,7 @@ from exugear.life.static_balance import KeptAngles, static_balance
 from exugear.system.build import assemble
 from fe_ste.tools.stores import Store
 
-from ..table_case import surfaces
+from ..cases.table import surfaces
 
 KILLED = """
 import os, signal, sys

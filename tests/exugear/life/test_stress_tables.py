@@ -20,7 +20,7 @@ from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.transmission_error.mean_contact import face_load_factor
 
-from ..coarse_contact import coarse_curves, coarse_input
+from ..cases.coarse_contact import coarse_curves, coarse_input
 
 GRC = Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml"
 POSITIONS = 10

@@ -35,7 +35,7 @@ from exugear.system.bearings.rolling.life import (
 )
 from fe_ste.root_stress import MeshCycleStress
 
-from ..spur_case import COARSE_INPUT, SPUR_CASE
+from ..cases.spur import COARSE_INPUT, SPUR_CASE
 from .test_life import TABLE, content_of, hub_assembly
 
 GRC = Path("cases/grc750/gearbox.toml")

@@ -19,8 +19,8 @@ from exugear.results.folder import keep_case, modes_path
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.tables import requested_tables
 
-from ..assembled import modes_with_bodies, simulated
-from ..spur_case import COARSE_INPUT, SPUR_CASE
+from ..cases.assembled import modes_with_bodies, simulated
+from ..cases.spur import COARSE_INPUT, SPUR_CASE
 from .page_view import IN_BROWSER, SIZES, View, opened
 
 LAW = "line_of_action"

@@ -23,8 +23,8 @@ from exugear.steady.steady_file import load_response, steady_path, stored_or_com
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.tables import requested_tables
 
-from ..assembled import assembled, simulated
-from ..spur_case import COARSE_INPUT, SPUR_CASE
+from ..cases.assembled import assembled, simulated
+from ..cases.spur import COARSE_INPUT, SPUR_CASE
 from .page_view import IN_BROWSER, SIZES, View, opened
 
 LAW = "line_of_action"

@@ -29,7 +29,7 @@ from exugear.report.web import html as page
 from exugear.results.spectra.waterfall import OrderLine
 from fe_ste.tools.drawing import RenderingError
 
-from ..spur_case import SPUR_CASE
+from ..cases.spur import SPUR_CASE
 
 MARKUP = "[/] [bold]:warning:"
 HTML = """@DATA@<img src=x onerror=alert(1)></script><!--<script>'"&"""

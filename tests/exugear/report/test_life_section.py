@@ -11,7 +11,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
 from exugear.report.writer import write_report
 
-from ..spur_case import COARSE_INPUT, SPUR_CASE
+from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
 LOADS = {"body": "shaft_1", "life_years": 10.0, "sources": {"s": {"file": "loads.csv", "hours_per_year": 1000.0}}}
 STRENGTH = {

@@ -26,8 +26,8 @@ from exugear.system.system import input_hash
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.tables import requested_tables
 
-from ..assembled import assembled, modes_with_bodies, simulated
-from ..spur_case import COARSE_INPUT, SPUR_CASE
+from ..cases.assembled import assembled, modes_with_bodies, simulated
+from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
 LAW = "line_of_action"
 

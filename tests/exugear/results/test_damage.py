@@ -23,7 +23,7 @@ from fe_ste.tools.files import FileError
 from fe_ste.tools.stores import write_dataset
 
 from ...fe_ste.damage import damages
-from ..spur_case import SPUR_CASE
+from ..cases.spur import SPUR_CASE
 from ..transient.test_kills import stopped_run
 
 MODES = Path("rigid") / "iso6336-disc" / "modes.nc"

@@ -17,7 +17,7 @@ from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 
-from ..bearing_case import BEARING_CASE, NON_LINEAR
+from ..cases.bearing import BEARING_CASE, NON_LINEAR
 
 LINEAR = Gearbox.from_dict(tomllib.loads(BEARING_CASE))
 STATIC = np.array([300.0, -400.0, 0.0])

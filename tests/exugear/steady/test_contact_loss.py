@@ -23,8 +23,9 @@ from exugear.steady.settling import SettlingRun
 from exugear.steady.steady_response import follow_branch, response_of
 from exugear.system.build import assemble
 
-from .. import gear_trains, table_case
-from ..spur_case import SPUR_CASE
+from ..cases import gear_trains
+from ..cases import table as table_case
+from ..cases.spur import SPUR_CASE
 from .test_steady_in_time import fitted
 
 TEETH = 20

@@ -17,10 +17,10 @@ from exugear.steady.steady_file import stored_or_computed
 from exugear.steady.steady_response import follow_branch
 from exugear.system.build import assemble
 
-from .. import table_case
-from ..assembled import assembled
-from ..bearing_case import BEARING_CASE, NAMES, NON_LINEAR
-from ..spur_case import SPUR_CASE
+from ..cases import table as table_case
+from ..cases.assembled import assembled
+from ..cases.bearing import BEARING_CASE, NAMES, NON_LINEAR
+from ..cases.spur import SPUR_CASE
 from .test_steady_in_time import apart, solver_of
 
 PLAIN = Gearbox.from_dict(tomllib.loads(BEARING_CASE)).varied(NON_LINEAR)

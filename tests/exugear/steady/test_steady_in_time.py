@@ -21,9 +21,10 @@ from exugear.system.modes import overall_row
 from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.transient.compiled.solver import CompiledSystem
 
-from .. import gear_trains, table_case
-from ..assembled import assembled
-from ..spur_case import SPUR_CASE
+from ..cases import gear_trains
+from ..cases import table as table_case
+from ..cases.assembled import assembled
+from ..cases.spur import SPUR_CASE
 
 SPUR = Gearbox.from_dict(tomllib.loads(SPUR_CASE))
 

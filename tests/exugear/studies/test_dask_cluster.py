@@ -17,7 +17,7 @@ from exugear.studies.dataset import load_study
 from exugear.studies.executors import processes
 from exugear.studies.sweep import sweep
 
-from ..study_case import figures_of, small_study, study_content
+from ..cases.study import figures_of, small_study, study_content
 
 pytest.importorskip("distributed")
 ROOT = Path(__file__).parents[3]

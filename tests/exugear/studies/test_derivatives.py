@@ -8,7 +8,7 @@ from exugear.studies.dataset import slopes
 from exugear.studies.executors import processes
 from exugear.studies.sweep import sweep
 
-from ..study_case import small_study
+from ..cases.study import small_study
 
 
 def derivatives(folder, **settings):

@@ -12,8 +12,8 @@ from exugear.studies.sections import StudyError, parse_study
 from exugear.studies.study import Study
 from fe_ste.standards.iso1328 import tolerance
 
+from ..cases.study import small_study, study_content
 from ..conftest import CASE
-from ..study_case import small_study, study_content
 
 PINS = {
     f"pins.pin_{number}.{key}": value

@@ -27,10 +27,10 @@ from exugear.studies.sections import StudyError
 from exugear.studies.study import Study
 from exugear.studies.sweep import sweep
 
-from ..case_mutations import toml_text
+from ..cases.case_mutations import toml_text
+from ..cases.spur import COARSE_INPUT
 from ..life.test_life import TABLE, content_of
 from ..life.test_verdicts import hertzian, planets_with
-from ..spur_case import COARSE_INPUT
 
 CASE = "gearbox.toml"
 FIGURES = {

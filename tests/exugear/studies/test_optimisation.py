@@ -11,7 +11,7 @@ from exugear.studies.figures import FIGURES, Figure
 from exugear.studies.study import Study
 from exugear.studies.sweep import optimise
 
-from ..study_case import study_content
+from ..cases.study import study_content
 
 HERE = processes(1)
 

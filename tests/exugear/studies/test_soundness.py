@@ -11,7 +11,7 @@ from exugear.studies.executors import processes
 from exugear.studies.sections import StudyError
 from exugear.studies.sweep import sweep
 
-from ..study_case import small_study
+from ..cases.study import small_study
 
 SEAT = {"path": "housing.factor", "values": [0.2, 0.4]}
 FREQUENCIES = {"figure": "frequencies", "count": 2}

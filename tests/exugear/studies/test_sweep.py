@@ -35,8 +35,8 @@ from exugear.studies.point_results import Shared
 from exugear.studies.sweep import Shard, sweep, task_of
 from fe_ste.transmission_error.table import MeshTable
 
-from ..spur_case import COARSE_INPUT
-from ..study_case import figures_of, small_study, study_content
+from ..cases.spur import COARSE_INPUT
+from ..cases.study import figures_of, small_study, study_content
 
 ROOT = Path(__file__).parents[3]
 HERE = processes(1)
@@ -106,17 +106,16 @@ def test_a_study_whose_main_process_is_killed_computes_no_finished_point_again(h
 import sys
 sys.path.insert(0, {str(ROOT)!r})
 import os, time
-from exugear.studies import batches
-from exugear.studies.executors import processes
+from exugear.studies import executors
 from exugear.studies.study import Study
 from exugear.studies.sweep import sweep
 
-compute = batches.compute_point
+compute = executors.compute_point
 def slow(task, work):
     time.sleep(0.2)
     return compute(task, work)
-batches.compute_point = slow
-sweep(Study.from_dict({study_content(home)!r}), {str(tmp_path / "again")!r}, processes(1))
+executors.compute_point = slow
+sweep(Study.from_dict({study_content(home)!r}), {str(tmp_path / "again")!r}, executors.processes(1))
 """
     running = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT)
     deadline = time.monotonic() + 120.0

@@ -20,8 +20,8 @@ from exugear.studies.sections import StudyError
 from exugear.studies.study import Study
 from exugear.studies.sweep import optimise
 
-from ..case_mutations import toml_text
-from ..study_case import study_content
+from ..cases.case_mutations import toml_text
+from ..cases.study import study_content
 
 HERE = processes(1)
 SMALL = {"population": 6, "generations": 8}

@@ -13,7 +13,7 @@ from exugear.system.modes import modes_of
 from exugear.system.system import input_hash
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
-from ..gear_trains import pair, planetary
+from ..cases.gear_trains import pair, planetary
 
 
 def hashes(changes: dict[str, Any]) -> tuple[str, str]:

@@ -19,7 +19,7 @@ from exugear.system.modes import FREE_ROTATION, eigenmodes, modes_of
 from exugear.system.statics import linearise, locked_equilibrium
 from exugear.transient.exudyn_model.system import ExudynSystem
 
-from ..assembled import modes_with_bodies
+from ..cases.assembled import modes_with_bodies
 
 STIFFNESS = {"sun_planet": np.array([3e8]), "ring_planet": np.array([4e8])}
 

@@ -30,7 +30,7 @@ from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.exudyn_model.system import ExudynSystem
 
-from ..bearing_case import NON_LINEAR, STIFFNESS, bearing_gearbox
+from ..cases.bearing import NON_LINEAR, STIFFNESS, bearing_gearbox
 
 BUSHING = Choice("bushing")
 

@@ -27,7 +27,7 @@ from exugear.system.statics import BalanceError, static_state
 from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem
 
-from ..bearing_case import NON_LINEAR, STIFFNESS, bearing_gearbox
+from ..cases.bearing import NON_LINEAR, STIFFNESS, bearing_gearbox
 
 # Along the line of action at 20 deg: 100 N m on a base radius of 28.19 mm.
 MESH_FORCE = 100.0 / (0.03 * math.cos(math.radians(20.0)))

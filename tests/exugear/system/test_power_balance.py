@@ -41,9 +41,9 @@ from exugear.transient.compiled.integrator import choose_integration
 from exugear.transient.compiled.solver import CompiledSystem
 from fe_ste.tools.compilation import compiled
 
-from ..assembled import assembled
-from ..plain_connectors import add_forces
-from ..plain_signals import energies_of, sampled
+from ..cases.assembled import assembled
+from ..cases.plain_connectors import add_forces
+from ..cases.plain_signals import energies_of, sampled
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 SHARE = 1e-5

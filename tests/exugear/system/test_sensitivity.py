@@ -22,7 +22,7 @@ from exugear.system.sensitivity import (
 )
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
-from ..spur_case import SPUR_CASE
+from ..cases.spur import SPUR_CASE
 
 
 @pytest.fixture(scope="module")

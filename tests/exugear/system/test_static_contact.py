@@ -27,7 +27,7 @@ from fe_ste.transmission_error.mean_contact import forget_contacts, mean_contact
 from fe_ste.transmission_error.table import prepared_compliance
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 
-from ..coarse_contact import coarse_curves, coarse_input, coarse_surfaces
+from ..cases.coarse_contact import coarse_curves, coarse_input, coarse_surfaces
 
 GRC = Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml"
 RELIEF = {"tip_relief_um": 12.0, "tip_relief_length_mm": 4.0, "lead_crowning_um": 4.0}

@@ -15,7 +15,7 @@ from exugear.system.kernels.meshes import TILT_STIFFNESS
 from exugear.system.statics import BalanceError, accelerating_start, linearise, locked_equilibrium, tangent_stiffness
 from exugear.system.system import Assembly
 
-from ..assembled import assembled
+from ..cases.assembled import assembled
 
 TORQUE = {"carrier": 240e3}
 # Line-of-action forces of the specification, kN: sums over the planets, intermediate, high speed.

@@ -17,7 +17,7 @@ from exugear.system.statics import accelerating_start, locked_equilibrium, rolle
 from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import Observer
 
-from ..table_case import surfaces
+from ..cases.table import surfaces
 
 TORQUE = {"carrier": 240e3}
 MESH_FORCE = 270e3

@@ -23,7 +23,7 @@ from exugear.transient.outcome import Progress
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.table import MeshTable
 
-from ..spur_case import SPUR_CASE
+from ..cases.spur import SPUR_CASE
 
 ROOT = Path(__file__).parents[3]
 DIRECTORY = Path("rigid") / "run_up-iso6336-disc"
@@ -50,7 +50,7 @@ def python(program: str, *arguments: object, **options) -> subprocess.Popen:
 
 
 def kills(case: Path, out: Path, solver: str, every: int) -> dict:
-    command = [sys.executable, "-m", "tests.exugear.killed_runs", str(case), str(out), solver, str(every)]
+    command = [sys.executable, "-m", "tests.exugear.cases.killed_runs", str(case), str(out), solver, str(every)]
     ended = subprocess.run(command, capture_output=True, text=True, cwd=ROOT, check=False)
     assert ended.returncode == 0, ended.stderr
     return json.loads(ended.stdout)
@@ -279,7 +279,7 @@ import sys
 from pathlib import Path
 import exugear.system.tooth_mesh.tables
 from exugear.gearbox.gearbox import Gearbox
-from tests.exugear.spur_case import COARSE_INPUT
+from tests.exugear.cases.spur import COARSE_INPUT
 
 exugear.system.tooth_mesh.tables.TableInput = COARSE_INPUT
 (request,) = exugear.system.tooth_mesh.tables.requested_tables(Gearbox.from_toml(sys.argv[1]), Path(sys.argv[2]))

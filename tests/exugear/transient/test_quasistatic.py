@@ -19,7 +19,7 @@ from exugear.system.tooth_mesh.laws.stiffness import pack
 from fe_ste.transmission_error.surface import SteSurface
 from fe_ste.transmission_error.table import MeshTable, TableInput
 
-from ..spur_case import COARSE_INPUT, SPUR_CASE
+from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
 FACTORS = (0.2, 0.5, 1.0, 2.0)
 

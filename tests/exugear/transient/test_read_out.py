@@ -18,8 +18,8 @@ from exugear.transient.compiled.integrator import RUNGE_KUTTA, Method, adams, st
 from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.filters import Decimator, plain_filter, stored_filter
 
-from ..assembled import assembled
-from ..table_case import surfaces
+from ..cases.assembled import assembled
+from ..cases.table import surfaces
 
 FASTEST_RPM = 215.0
 """The high-speed mesh is at 6.42 kHz."""

@@ -12,8 +12,8 @@ from exugear.gearbox.choice import Choice
 from exugear.project import Project
 from exugear.results.run_file import load_run
 
-from ..case_mutations import toml_text
-from ..gear_trains import planetary
+from ..cases.case_mutations import toml_text
+from ..cases.gear_trains import planetary
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ from exugear.transient.exudyn_model.system import ExudynSystem
 from exugear.transient.outcome import Progress, RunError
 from exugear.transient.runup import simulate
 
-from ..assembled import simulated
+from ..cases.assembled import simulated
 
 
 def opened(path: Path) -> xr.Dataset:

@@ -32,8 +32,8 @@ from exugear.transient.compiled.integrator import highest_rate
 from exugear.transient.outcome import LIMITS, Judge, LimitError, Progress, RunError
 from exugear.transient.runup import simulate
 
-from ..assembled import simulated
-from ..spur_case import SPUR_CASE
+from ..cases.assembled import simulated
+from ..cases.spur import SPUR_CASE
 
 BALANCED = "{ shaft_1 = 100.0, shaft_2 = 140.0 }"
 RUNAWAY = "{ shaft_1 = 100.0, shaft_2 = -140.0 }"

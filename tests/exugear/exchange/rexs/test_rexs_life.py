@@ -9,7 +9,7 @@ from exugear.cli.app import app
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.gearbox.gearbox import Gearbox
 
-from ...spur_case import COARSE_INPUT
+from ...cases.spur import COARSE_INPUT
 from .own_files import spur_pair
 
 LIMITS = {"endurance_limit_flank": 1500.0, "endurance_limit_root": 461.0}

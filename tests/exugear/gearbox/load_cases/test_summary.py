@@ -27,7 +27,7 @@ from exugear.system.build import assemble
 from exugear.system.statics import accelerating_start
 from exugear.transient.runup import simulate
 
-from ...spur_case import SPUR_CASE
+from ...cases.spur import SPUR_CASE
 
 INERTIA = 1e-2 + 3e-2 / 2.25
 """Of both shafts at the pinion, kg m2."""

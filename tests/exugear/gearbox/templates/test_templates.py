@@ -16,7 +16,7 @@ from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import KINDS
 
-from ...spur_case import COARSE_INPUT
+from ...cases.spur import COARSE_INPUT
 
 QUICKLY_REPORTED = ("pair", "planetary")
 """Templates whose report is written here as well; those of all are by the verbs with tables below."""

@@ -18,7 +18,7 @@ from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.transient.runup import simulate
 
-from ...gear_trains import (
+from ...cases.gear_trains import (
     KINDS,
     SPEED_RPM,
     STIFFNESS,

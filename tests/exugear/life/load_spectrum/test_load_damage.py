@@ -17,10 +17,10 @@ from typer.testing import CliRunner
 
 from exugear.cli.app import app
 
-from ...case_mutations import mutant, toml_text
+from ...cases.case_mutations import mutant, toml_text
+from ...cases.spur import SPUR_CASE
 from ...exchange.load_files.test_load_files import packed
 from ...gearbox.test_case_mutations import at_most, is_refused_in_words
-from ...spur_case import SPUR_CASE
 
 LIMIT = 60.0
 MANY = range(1000, 1500)
@@ -216,7 +216,7 @@ def test_a_full_disk_is_a_sentence_and_what_was_there_stays(case):
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_count_that_was_killed_is_done_again_to_the_same_bits(case):
     (case.parent / "known").mkdir()
-    command = [sys.executable, "-m", "tests.exugear.killed_lives", "loads", str(case.parent), "7"]
+    command = [sys.executable, "-m", "tests.exugear.cases.killed_lives", "loads", str(case.parent), "7"]
     ended = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[4], check=False)
     assert ended.returncode == 0, ended.stderr
     found = json.loads(ended.stdout)

@@ -25,8 +25,8 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards.iso6336 import mesh_stiffness
 from fe_ste.standards.pitting import CASE_HARDENED_BENDING, CASE_HARDENED_CONTACT
 
-from ...case_mutations import toml_text
-from ...spur_case import COARSE_INPUT, SPUR_CASE
+from ...cases.case_mutations import toml_text
+from ...cases.spur import COARSE_INPUT, SPUR_CASE
 
 GRC = Path("cases/grc750/gearbox.toml")
 STRENGTH: dict[str, Any] = {

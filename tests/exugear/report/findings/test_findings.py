@@ -14,7 +14,7 @@ from exugear.results.spectra.run_spectra import is_among, other_windows, survive
 from exugear.system.modes import modes_of
 from exugear.system.sensitivity import Parameter, ParameterVariation
 
-from ...assembled import assembled
+from ...cases.assembled import assembled
 from ...results.spectra.run_ups import STORED_LINE
 
 STIFFNESS = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}

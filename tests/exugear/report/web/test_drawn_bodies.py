@@ -17,9 +17,9 @@ from exugear.report.web.document import ArrayStore
 from exugear.report.web.stage import drawn_bodies, drawn_mode, stage_data, turn_between, write_mode_page
 from exugear.system.modes import modes_of
 
-from ... import gear_trains
-from ...assembled import assembled
-from ...spur_case import SPUR_CASE
+from ...cases import gear_trains
+from ...cases.assembled import assembled
+from ...cases.spur import SPUR_CASE
 
 SHAFT = """
 [bodies.shaft_1.shape]

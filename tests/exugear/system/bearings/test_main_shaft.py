@@ -25,7 +25,7 @@ from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.exudyn_model.system import ExudynSystem
 
-from ...assembled import assembled, modes_with_bodies
+from ...cases.assembled import assembled, modes_with_bodies
 
 TORQUE = {"main_shaft": 240e3}
 YOUNG, SHEAR, DENSITY = 206e9, 206e9 / 2.6, 7850.0

@@ -19,7 +19,7 @@ from exugear.system.bearings.stiffness import (
     rolling_law,
 )
 
-from ...bearing_case import bearing_gearbox
+from ...cases.bearing import bearing_gearbox
 
 SECTION = CatalogueSection(
     type="cylindrical_roller",

@@ -19,11 +19,11 @@ from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
-from ...assembled import assembled, simulated
-from ...plain_signals import energies_of, sampled
-from ...ring_case import ring_content
-from ...rounding import allowed_difference
-from ...stated_loads import STATED_LOADS
+from ...cases.assembled import assembled, simulated
+from ...cases.plain_signals import energies_of, sampled
+from ...cases.ring import ring_content
+from ...cases.rounding import allowed_difference
+from ...cases.stated_loads import STATED_LOADS
 
 LOAD = {"carrier": 240e3, "lss": -38e3}
 STEP = 5e-6

@@ -37,8 +37,8 @@ from exugear.transient.exudyn_model.system import ExudynSystem
 from exugear.transient.outcome import RunError
 from fe_ste.geometry.gears import Material
 
-from ...assembled import assembled, simulated
-from ...floating_case import FLOATING_CASE
+from ...cases.assembled import assembled, simulated
+from ...cases.floating import FLOATING_CASE
 
 LOAD = {"shaft": 6.0, "wheel": 9.0}
 SPEED = 420.0

@@ -26,11 +26,11 @@ from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
-from ...assembled import assembled, modes_with_bodies
-from ...limit_case import unchecked
-from ...plain_signals import energies_of, sampled
-from ...rounding import allowed_difference
-from ...stated_loads import STATED_LOADS
+from ...cases.assembled import assembled, modes_with_bodies
+from ...cases.limit import unchecked
+from ...cases.plain_signals import energies_of, sampled
+from ...cases.rounding import allowed_difference
+from ...cases.stated_loads import STATED_LOADS
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 STEP = 1e-5

@@ -30,10 +30,10 @@ from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.exudyn_model.system import ExudynSystem
 from fe_ste.elimination import factorise
 
-from ...assembled import assembled, bodies_of, modes_with_bodies, simulated
-from ...box_case import box_content
-from ...limit_case import unchecked
-from ...plain_signals import sampled
+from ...cases.assembled import assembled, bodies_of, modes_with_bodies, simulated
+from ...cases.box import box_content
+from ...cases.limit import unchecked
+from ...cases.plain_signals import sampled
 
 STIFFNESS = {"spur": 2e8 * (1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(16) / 16))}
 LOAD = {"shaft_1": 100.0, "shaft_2": 140.0}

@@ -22,10 +22,10 @@ from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
-from ...assembled import assembled
-from ...limit_case import unchecked
-from ...plain_signals import energies_of, sampled
-from ...stated_loads import STATED_LOADS
+from ...cases.assembled import assembled
+from ...cases.limit import unchecked
+from ...cases.plain_signals import energies_of, sampled
+from ...cases.stated_loads import STATED_LOADS
 
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("meshio") is None, reason="meshio (extra mesh) is missing")
 

@@ -20,8 +20,8 @@ from exugear.system.kernels.connectors import (
 )
 from exugear.system.kernels.rolling import no_rolling
 
-from ...plain_connectors import DISPLACEMENT, add_forces, connector_load, connector_motion
-from ...rolling_case import BALLS, CYLINDRICAL
+from ...cases.plain_connectors import DISPLACEMENT, add_forces, connector_load, connector_motion
+from ...cases.rolling import BALLS, CYLINDRICAL
 
 ENDS = np.array([[-1, 0], [0, 6], [12, -1], [6, 12], [0, 12]])
 SIZE = 20

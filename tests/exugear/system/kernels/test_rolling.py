@@ -32,7 +32,7 @@ from exugear.system.kernels.rolling import (
     selected_rolling,
 )
 
-from ...rolling_case import BALLS, CYLINDRICAL, TAPERED, plain_energy_and_load
+from ...cases.rolling import BALLS, CYLINDRICAL, TAPERED, plain_energy_and_load
 
 NEEDLES = RollerRow(
     element_diameter=0.003,

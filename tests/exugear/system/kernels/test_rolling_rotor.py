@@ -16,8 +16,8 @@ from exugear.system.kernels.connectors import ConnectorArrays, add_connector_for
 from exugear.system.kernels.coordinates import InertiaArrays, accelerations, kinetic_energies
 from exugear.system.kernels.rolling import STORED, rolling_forces, rolling_memory, rolling_tangent
 
-from ...plain_connectors import add_forces
-from ...rolling_case import BALLS, CYLINDRICAL
+from ...cases.plain_connectors import add_forces
+from ...cases.rolling import BALLS, CYLINDRICAL
 
 STEP = 1 / 60e3
 MASS, TRANSVERSE, AXIAL_INERTIA = 400.0, 25.0, 5.0

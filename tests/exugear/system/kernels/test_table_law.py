@@ -36,10 +36,10 @@ from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.runup import simulate
 from fe_ste.transmission_error.surface import SteSurface
 
-from ...assembled import assembled, modes_with_bodies, simulated
-from ...plain_signals import energies_of, sampled
-from ...spur_case import SPUR_CASE
-from ...table_case import STIFFNESS, surface_of, surfaces
+from ...cases.assembled import assembled, modes_with_bodies, simulated
+from ...cases.plain_signals import energies_of, sampled
+from ...cases.spur import SPUR_CASE
+from ...cases.table import STIFFNESS, surface_of, surfaces
 
 VARIANTS = ["rigid", "bushing"]
 

@@ -14,8 +14,8 @@ from fe_ste.contact.kinematics import reaches_form_circle
 from fe_ste.transmission_error.search import contact_state, pitch_point_pressure
 from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 
-from ...gear_trains import pair
-from ...spur_case import COARSE_INPUT
+from ...cases.gear_trains import pair
+from ...cases.spur import COARSE_INPUT
 
 
 def spur(shift: float = 0.0, **large: Any) -> Gearbox:

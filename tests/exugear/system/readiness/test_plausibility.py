@@ -17,7 +17,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.system.plausibility import doubts_about_parts, usual_backlash
 from exugear.system.readiness import check_parts, remarks
 
-from ...gear_trains import KINDS
+from ...cases.gear_trains import KINDS
 
 ROOT = Path(__file__).parents[4]
 REXS = ROOT / "tests" / "exugear" / "exchange" / "rexs" / "data"

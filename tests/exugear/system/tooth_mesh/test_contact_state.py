@@ -40,8 +40,8 @@ from exugear.system.tooth_mesh.laws.stiffness import pack
 from exugear.system.tooth_mesh.placement import loaded_flanks
 from exugear.system.tooth_mesh.tables import wanted_table
 
-from ...contact_case import contacts
-from ...table_case import STIFFNESS, surface_of
+from ...cases.contact import contacts
+from ...cases.table import STIFFNESS, surface_of
 from .test_element import mesh_forces, random_state, states
 
 ALONG_A_ROW = [name for name, law in LAWS.items() if law.has_force and not law.needs_axes]

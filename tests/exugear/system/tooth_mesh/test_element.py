@@ -18,7 +18,7 @@ from exugear.system.tooth_mesh.laws.registry import LAWS as ALL_LAWS
 from exugear.system.tooth_mesh.laws.registry import law_of
 from exugear.system.tooth_mesh.placement import MeshError, MeshGeometry, loaded_flanks, mesh_phases
 
-from ...assembled import assembled
+from ...cases.assembled import assembled
 
 LAWS = [name for name, law in ALL_LAWS.items() if law.has_force and not law.needs_axes]
 RATED = 22.1 * math.pi / 30

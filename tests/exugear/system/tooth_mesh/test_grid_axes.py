@@ -27,7 +27,7 @@ from exugear.system.tooth_mesh.tables import (
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.transmission_error.table import MeshTable, TableError
 
-from ...spur_case import COARSE_INPUT, SPUR_CASE
+from ...cases.spur import COARSE_INPUT, SPUR_CASE
 
 GEAR = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3, tooth_thinning=1e-4)
 PAIR = GearPair(name="pair", pinion=GEAR, gear=GEAR, centre_distance=90e-3)

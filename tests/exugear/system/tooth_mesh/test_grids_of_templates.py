@@ -17,7 +17,7 @@ from exugear.gearbox.templates.kinds import template
 from exugear.system.tooth_mesh.tables import fitting_table
 from fe_ste.transmission_error.states import CUT_OFF
 
-from ...spur_case import COARSE_INPUT
+from ...cases.spur import COARSE_INPUT
 
 WIDE = (
     "\n[ste]\npositions = {positions}\ntorque_factors = {loads}\n"

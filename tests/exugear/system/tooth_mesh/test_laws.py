@@ -23,7 +23,7 @@ from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.laws.table import TABLE_FORM
 from exugear.system.tooth_mesh.placement import MeshError
 
-from ...table_case import surfaces
+from ...cases.table import surfaces
 
 GUIDE = Path(__file__).parents[4] / "docs" / "reference" / "choices.md"
 WITH_FORCE = [name for name, law in LAWS.items() if law.has_force]

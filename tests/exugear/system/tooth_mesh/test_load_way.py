@@ -16,7 +16,7 @@ from exugear.system.tooth_mesh.contact_state import ContactCycle
 from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.placement import loaded_flanks
 
-from ...contact_case import contacts
+from ...cases.contact import contacts
 
 MESH = "high_speed"
 

@@ -21,7 +21,7 @@ from exugear.system.tooth_mesh.tables import (
 from fe_ste.transmission_error.states import CUT_OFF
 from fe_ste.transmission_error.table import MeshTable
 
-from ...spur_case import SPUR_CASE
+from ...cases.spur import SPUR_CASE
 
 REASON = "pmc 0.250, torque 100 N m: no balance"
 

@@ -20,7 +20,7 @@ from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import missing_tables, requested_tables, wanted_table
 
-from ...spur_case import COARSE_INPUT, SPUR_CASE
+from ...cases.spur import COARSE_INPUT, SPUR_CASE
 
 AXES = """ste = { positions = 8, torque_factors = [0.2, 1.0], centre_distance_offsets_um = [0.0, 50.0],
   misalignment_um = [0.0, 20.0] }"""

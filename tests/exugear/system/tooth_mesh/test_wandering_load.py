@@ -14,7 +14,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.system.tooth_mesh.tables import fitting_table, requested_tables, wandering_loads
 
-from ...spur_case import COARSE_INPUT, SPUR_CASE
+from ...cases.spur import COARSE_INPUT, SPUR_CASE
 
 
 @pytest.fixture(autouse=True)

@@ -21,8 +21,8 @@ from exugear.system.tooth_mesh.placement import MeshGeometry, contact_line_share
 from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.runup import simulate
 
-from ...assembled import assembled
-from ...table_case import surfaces
+from ...cases.assembled import assembled
+from ...cases.table import surfaces
 
 LOAD = {"carrier": 240e3}
 

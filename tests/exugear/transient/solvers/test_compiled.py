@@ -29,11 +29,11 @@ from exugear.transient.exudyn_model.system import ExudynSystem
 from exugear.transient.outcome import RunError
 from exugear.transient.runup import simulate
 
-from ...assembled import assembled, simulated
-from ...contact_case import contacts, curves_of
-from ...plain_signals import energies_of, sampled
-from ...rolling_case import BALLS, CYLINDRICAL, TAPERED, on_rolling
-from ...rounding import allowed_difference
+from ...cases.assembled import assembled, simulated
+from ...cases.contact import contacts, curves_of
+from ...cases.plain_signals import energies_of, sampled
+from ...cases.rolling import BALLS, CYLINDRICAL, TAPERED, on_rolling
+from ...cases.rounding import allowed_difference
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 STEP = 2.5e-5

@@ -17,7 +17,7 @@ from exugear.system.statics import StartState, accelerating_start, linearise
 from exugear.system.system import Assembly
 from exugear.transient.exudyn_model.system import ExudynSystem
 
-from ...assembled import assembled
+from ...cases.assembled import assembled
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 STEP = 2.5e-5

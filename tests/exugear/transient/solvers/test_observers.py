@@ -20,7 +20,7 @@ from exugear.system.signals import (
 )
 from exugear.transient.compiled import sampling, solver
 
-from ...table_case import surfaces
+from ...cases.table import surfaces
 
 
 def function_named(name: str) -> object:

@@ -17,9 +17,9 @@ from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
-from ...assembled import assembled
-from ...floating_case import FLOATING_CASE
-from ...rolling_case import BALLS, CYLINDRICAL, TAPERED, on_rolling
+from ...cases.assembled import assembled
+from ...cases.floating import FLOATING_CASE
+from ...cases.rolling import BALLS, CYLINDRICAL, TAPERED, on_rolling
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 STEP = 1 / 60e3

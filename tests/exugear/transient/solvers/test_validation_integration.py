@@ -15,8 +15,8 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.system.signals import BALANCE_TERMS
 from exugear.transient.runup import simulate
 
-from ...assembled import bodies_of
-from ...table_case import surfaces
+from ...cases.assembled import bodies_of
+from ...cases.table import surfaces
 
 SIGNALS = ("overall_dte", "mesh_dte", "mesh_force", "support_force")
 FINE = 2.5e-6

@@ -28,7 +28,7 @@ from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem
 from fe_ste.transmission_error.surface import SteSurface
 
-from ...spur_case import SPUR_CASE
+from ...cases.spur import SPUR_CASE
 
 MEAN, VARIATION, DAMPING_RATIO = 3e8, 0.3, 0.04
 FORCE = 3000.0

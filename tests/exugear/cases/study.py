@@ -9,7 +9,7 @@ import xarray as xr
 
 from exugear.studies.study import Study
 
-from .spur_case import SPUR_CASE
+from .spur import SPUR_CASE
 
 TOLD_APART = ("seconds", "memory")
 """What two runs of one study differ in."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from exugear.gearbox.gearbox import Gearbox
 
-from .spur_case import SPUR_CASE
+from .spur import SPUR_CASE
 
 BEARINGS = """
 [bearings.ball]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import skfem
 
-from .spur_case import SPUR_CASE
+from .spur import SPUR_CASE
 
 THICKNESS = 12.0
 

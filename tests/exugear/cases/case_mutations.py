@@ -19,9 +19,9 @@ from pydantic import BaseModel
 from exugear.gearbox.sections.case import CaseFile
 from exugear.gearbox.sections.entries import Range
 
-from .spur_case import SPUR_CASE
+from .spur import SPUR_CASE
 
-GRC = Path(__file__).parents[2] / "cases" / "grc750"
+GRC = Path(__file__).parents[3] / "cases" / "grc750"
 JUNK: tuple[Any, ...] = (
     "20", "", " ", "yes", "ground", "räder", "a b", "x\ny", "\x00", "\x1b[31m", "[/]", "${HOME}", "../../etc/passwd",
     "<img src=x onerror=alert(1)>", "n" * 100_000, "\U0001f600",
