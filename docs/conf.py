@@ -54,6 +54,8 @@ autodoc_member_order = "bysource"
 autodoc_docstring_signature = False  # signatures stand in the code, not in first lines of docstrings
 autodoc_typehints = "signature"  # docstrings tell what annotations do not: shapes, units, meaning
 autodoc_type_aliases = {name: name for name in arrays.__all__}  # Floats, not its long form
+# A type of a signature whose name several modules have, such as LoadCase, is linked to one of them.
+suppress_warnings = ["ref.python"]
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
