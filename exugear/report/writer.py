@@ -1,4 +1,4 @@
-"""The report of a results folder: one web page that needs nothing else.
+"""The report of a results folder: one web page that needs nothing else, its headline and what stands around sections.
 
 `SECTIONS` is the order of the page; a section is a function of the `Material` that gives its `Part`.
 """
@@ -39,7 +39,7 @@ def page_body(material: Material, parts: Sequence[Part]) -> str:
     warning = "Runs that are not to be trusted; what follows shows them all the same"
     head = html.element(
         "header",
-        _brand(material) + _tools() + _contents(parts),
+        _headline(material) + _tools() + _contents(parts),
         class_="top",
     )
     above = html.alert(warning, notes.distrusted) if notes.distrusted else ""
@@ -53,7 +53,7 @@ def page_body(material: Material, parts: Sequence[Part]) -> str:
     return skip + head + main + foot + live + tip
 
 
-def _brand(material: Material) -> str:
+def _headline(material: Material) -> str:
     gearbox = material.context.gearbox
     shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
     line = f"Where it rings, how loud, and why. Ratio {gearbox.train.ratio:.6f}"

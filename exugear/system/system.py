@@ -1,6 +1,6 @@
 """A gearbox variant as equations of motion on one vector of coordinates, independent of any solver.
 
-Everything is packed once into arrays for the kernels: Exudyn (system.py) and the compiled solver are built
+Everything is packed once into arrays for the kernels: Exudyn (`exugear.transient.exudyn_model`) and the compiled solver are built
 from the same assembly, so they solve the same equations in the same coordinates.
 
 Bodies with six coordinates come first, in the order of the file, then those with their spin alone. In the

@@ -1,11 +1,11 @@
 """Laws of supports: stiffness and damping as matrices, or rows of rolling elements with a law of their own.
 
 A bearing with `law = "stiffness"` is linear: given matrices through the origin, or the tangent of its rows through the
-point that they are in under the static load. One with `law = "iso16281"` keeps its rows. The housing factor f stands
-for the seat: it gives way in proportion to the bearing, so that the bearing takes the share f of a deflection under any
-load. A linear bearing is then f times as stiff, and the rows of a non-linear one see f times the deflection: both agree
-in the limit of small motions, and forces keep a potential. A clearance closes without load, which no share of a
-deflection does: such rows want an elastic housing or no factor.
+point that they are in under the static load, which `exugear.system.operating_points` finds. One with `law = "iso16281"`
+keeps its rows. The housing factor f stands for the seat: it gives way in proportion to the bearing, so that the bearing
+takes the share f of a deflection under any load. A linear bearing is then f times as stiff, and the rows of a non-
+linear one see f times the deflection: both agree in the limit of small motions, and forces keep a potential. A
+clearance closes without load, which no share of a deflection does: such rows want an elastic housing or no factor.
 
 Catalogue bearings take their laws from the static load at one position of the carrier, where planets may be loaded
 unequally. As the carrier turns every planet passes all positions: what lasts is the mean. Left as they are, unequal

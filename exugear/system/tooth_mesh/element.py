@@ -1,4 +1,4 @@
-"""The mesh force element: frames, signs and phases of every mesh, and its parameters for the kernel.
+"""The mesh force element: frames, signs and phases of every mesh, its stiffness and damping for the kernel.
 
 Frames and signs, in this one place
 -----------------------------------

@@ -6,6 +6,8 @@ through the last k accelerations integrated twice (Stoermer, Cowell); the accele
 corrects both by its difference from the extrapolated one (predict, evaluate, correct; Hairer, Norsett and Wanner,
 Solving Ordinary Differential Equations I, section III.1 and III.10).
 
+The steps themselves, which move coordinates and velocities on, are in `exugear.transient.compiled.solver`.
+
 Numbers here become part of machine code: `fe_ste.tools.compilation` compiles anew when this file changes.
 """
 
