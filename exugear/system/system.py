@@ -1,7 +1,7 @@
 """A gearbox variant as equations of motion on one vector of coordinates, independent of any solver.
 
-Everything is packed once into arrays for the kernels: Exudyn (`exugear.transient.exudyn_model`) and the compiled solver are built
-from the same assembly, so they solve the same equations in the same coordinates.
+Everything is packed once into arrays for the kernels: Exudyn (`exugear.transient.exudyn_model`) and the compiled solver
+are built from the same assembly, so they solve the same equations in the same coordinates.
 
 Bodies with six coordinates come first, in the order of the file, then those with their spin alone. In the
 variant `rigid` every body has its spin alone: ideal joints leave nothing else, and a planet rides on its
