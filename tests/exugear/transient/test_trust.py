@@ -115,8 +115,7 @@ def test_a_good_run_is_trusted(tmp_path):
     assert (kept["trusted"], kept["verdict"]) == (1, "within all limits")
 
 
-@pytest.mark.sample
-@pytest.mark.parametrize("solver", ["compiled", "exudyn"])
+@pytest.mark.parametrize("solver", ["compiled", pytest.param("exudyn", marks=pytest.mark.validation)])
 def test_parametric_instability_is_stopped_at_a_part_of_the_tooth_height(tmp_path, solver):
     gearbox = spur()
     samples = float(stiffness_of(gearbox)["spur"][0]) * (1.0 + 0.4 * np.cos(2.0 * np.pi * np.arange(50) / 50))
