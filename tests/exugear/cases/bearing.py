@@ -1,4 +1,4 @@
-"""The spur pair of `spur_case` on two catalogue bearings a shaft: balls and cylindrical rollers, two tapered ones."""
+"""The spur pair of `spur` on two catalogue bearings a shaft: balls and cylindrical rollers, two tapered ones."""
 
 from __future__ import annotations
 

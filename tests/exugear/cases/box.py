@@ -1,4 +1,4 @@
-"""The spur pair of `spur_case` in an elastic plate of ten elements: the smallest housing there is."""
+"""The spur pair of `spur` in an elastic plate of ten elements: the smallest housing there is."""
 
 from __future__ import annotations
 

@@ -29,9 +29,9 @@ PROGRAM = "from exugear.cli.app import main; main()"
 #: The same with few elements a tooth.
 COARSE_PROGRAM = f"""
 import sys
-sys.path.insert(0, {str(Path(__file__).parents[1])!r})
-import exugear.system.tooth_mesh.tables, spur_case
-exugear.system.tooth_mesh.tables.TableInput = spur_case.COARSE_INPUT
+sys.path.insert(0, {str(Path(__file__).parents[1] / "cases")!r})
+import exugear.system.tooth_mesh.tables, spur
+exugear.system.tooth_mesh.tables.TableInput = spur.COARSE_INPUT
 {PROGRAM}
 """
 

@@ -246,8 +246,7 @@ import sys
 import tomllib
 import numpy as np
 from exugear.system.build import assemble
-from exugear.transient.compiled.solver import Observer
-from exugear.transient.compiled.solver import CompiledSystem
+from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.system.loads import LoadTable
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
@@ -255,8 +254,8 @@ from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 
 sys.path.insert(0, sys.argv[1])
-from spur_case import SPUR_CASE
-from table_case import surfaces
+from spur import SPUR_CASE
+from table import surfaces
 
 reference = Gearbox.from_toml(sys.argv[2])
 errors = "[deviations.one]\\nbody = 'shaft_1'\\nrunout_um = 30.0\\n"
@@ -285,7 +284,7 @@ print("alive")
 
 @pytest.mark.validation
 def test_angles_that_are_no_numbers_or_too_large_do_not_crash_the_process(grc):
-    command = [sys.executable, "-c", DIVERGED, str(Path(__file__).parents[1]), grc.source]
+    command = [sys.executable, "-c", DIVERGED, str(Path(__file__).parents[1] / "cases"), grc.source]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=500, check=False)
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout == "alive\n"
