@@ -69,9 +69,10 @@ def with_full_matrices(assembly: Assembly, off_axis: float) -> Assembly:
 
 
 def assemblies(grc: Gearbox, stiffness: dict) -> Iterator[Assembly]:
-    for variant in ("rigid", "bushing"):
-        for law in (name for name, law in LAWS.items() if law.has_force and not law.needs_axes):
-            yield assembled(grc, Choice(variant, law), stiffness)
+    for law in (name for name, law in LAWS.items() if law.has_force and not law.needs_axes):
+        yield assembled(grc, Choice("rigid", law), stiffness)
+    for law in ("line_of_action", "seed"):  # of one row, and of two
+        yield assembled(grc, Choice("bushing", law), stiffness)
     for choice in (Choice("rigid"), Choice("bushing")):
         yield assemble(grc, choice, curves_of(stiffness), contact=contacts(grc))
     yield assemble(grc, Choice("rigid", "rigid"), {})
