@@ -12,7 +12,6 @@ import numpy as np
 
 from fe_ste.elasticity.hexmesh import MeshSettings, OpenSector, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.reference.position import StressField
 from fe_ste.tools.arrays import Floats, Integers, Pixels
 from fe_ste.tools.display import Displayed
 from fe_ste.tools.drawing import (
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from fe_ste.contact.kinematics import Cells
+    from fe_ste.reference.position import StressField
 
 #: Colours of the two gears of a pair.
 PINION_COLOUR = "#B9C4D0"
