@@ -17,7 +17,7 @@ from exugear.transient.exudyn_model.system import ExudynSystem, MeshRoute
 
 
 class PythonMesh:
-    """One mesh as the textbook would write it: the law of `system.tooth_mesh.kernels.meshes` in plain Python."""
+    """One mesh as the textbook would write it: the law of `exugear.system.kernels.meshes` in plain Python."""
 
     def __init__(self, system: ExudynSystem, element: MeshElement) -> None:
         mesh = element.mesh

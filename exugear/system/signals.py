@@ -292,7 +292,7 @@ SIGNALS = (
 The account of energy: the loads' work = change of kinetic and elastic energy + the other four. The last two of these
 are what the law `seed` does because its force has parts that its deflection does not see, and what the bearings do
 because their rate is not the derivative of their displacement (see
-`exugear.system.kernels.connectors.connector_motion`).
+`exugear.system.kernels.connectors`).
 """
 MESH_TIMES = tuple(signal.name for signal in SIGNALS if signal.is_mesh_time)
 """Times (s) that a run adds up for each mesh."""

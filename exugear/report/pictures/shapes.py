@@ -2,7 +2,7 @@
 
 NumPy alone. Frame of the gearbox: z along the shafts, lengths in m.
 
-NumPy alone: `exugear.report.pictures.scene` draws them, `exugear.report.pictures.viewer` writes them into a web page.
+NumPy alone: `exugear.report.pictures.scene` draws them, `exugear.report.web.stage` writes them into a web page.
 """
 
 from __future__ import annotations

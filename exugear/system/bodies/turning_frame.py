@@ -1,4 +1,4 @@
-"""Elastic bodies in their own turning frame, one at a time; `system.bodies.kernels.turning` has the compiled laws."""
+"""Elastic bodies in their own turning frame, one at a time; `exugear.system.kernels.turning` has the compiled laws."""
 
 from __future__ import annotations
 

@@ -355,7 +355,7 @@ that are not conjugate to their deflection, of bearings whose rate is not the de
 
 
 class Meshes(NamedTuple):
-    """Meshes as in `system.tooth_mesh.kernels.meshes.MeshArrays`; missing coordinates point to one that stays zero."""
+    """Meshes as in `MeshArrays`; missing coordinates point to one that stays zero."""
 
     coordinates: Integers
     """(m, 13)"""

@@ -110,7 +110,7 @@ def observe_meshes(meshes: Meshes, work: Work, columns: Columns, sample: Floats,
 
 @kernel
 def true_rate(strain: Floats, rate: Floats, first_body: Floats, out: Floats) -> None:
-    """Fill the derivative of a connector's strain: see `system.bearings.kernels.connectors.connector_motion`."""
+    """Fill the derivative of a connector's strain: see `exugear.system.kernels.connectors`."""
     d = strain
     w = rate
     x = first_body[0] * first_body[W_X] + first_body[3] * first_body[W_Y] + first_body[6] * first_body[W_Z]

@@ -389,7 +389,7 @@ bearings, whose estimates count the balls once and reach 0.73 of what is printed
 have the largest static ratio of full complement rollers.
 """
 FULL_COMPLEMENT_MARGIN = 1.27
-"""The same of cylindrical rollers without a cage (static ratings, see `system.bearings.rolling.proportions`)."""
+"""The same of cylindrical rollers without a cage (static ratings, see `exugear.system.bearings.rolling.dimensions`)."""
 _LISTED = re.compile(r"(NUP|NU|NJ|N)?\s?(\d{3,5})(?!\d)[\s-]?([A-Z0-9-]*)")
 _SEALED = re.compile(r"2?RS|LL|DDU|VV|UU")
 
