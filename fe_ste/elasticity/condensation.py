@@ -375,7 +375,7 @@ def sector_halves(
 def turn_signs(mesh: SectorMesh) -> Floats:
     """Return what a half turn about the middle of the cut face does to its unknowns: 1 or -1 each, (m,), ones first."""
     nodes = len(np.setdiff1d(mesh.section.plus_cut, mesh.section.held))
-    _, signs = _turn_basis(len(mesh.axial_positions))
+    _, signs = turn_basis(len(mesh.axial_positions))
     return np.asarray(np.sort(np.tile(signs, nodes))[::-1])
 
 
@@ -384,7 +384,7 @@ def _line_turn(layers: int) -> Floats:
     return np.asarray(np.kron(np.eye(layers)[::-1], np.diag(_HALF_TURN)))
 
 
-def _turn_basis(layers: int) -> tuple[Floats, Floats]:
+def turn_basis(layers: int) -> tuple[Floats, Floats]:
     """Orthonormal vectors, one a column, that the half turn of a line keeps or reverses, and these signs."""
     turn = _line_turn(layers)
     front = 3 * (layers // 2)
@@ -421,7 +421,8 @@ class _Halving:
     def common_parts(self) -> dict[Front, Floats]:
         """Parts of the half that know nothing of even and odd: away from the middle line and the held surface."""
         own_images = np.flatnonzero(self._mirrored == np.arange(self._nodes))
-        coupled = np.union1d(self._elements.corners, [node for node, _ in self._pairs])
+        loaded = np.array([node for node, _ in self._pairs], dtype=np.int64)
+        coupled = np.union1d(self._elements.corners, loaded)
         crossing = self._mirrored[coupled[self._below[coupled]]]
         parts = parts_without(self._plan, np.concatenate([own_images, crossing, [self._nodes]]))
         maps = self._maps(EVEN)
@@ -433,7 +434,7 @@ class _Halving:
         sizes = self._sizes(maps)
         matrix = mirrored_lower(self._condensed(self._plan, maps, common))
         # Kept blocks come by their numbers: the face's nodes, the turn of the held surface, the columns.
-        signs = np.tile(_turn_basis(self._layers)[1], len(self._face))
+        signs = np.tile(turn_basis(self._layers)[1], len(self._face))
         face = np.concatenate([np.flatnonzero(signs > 0), np.flatnonzero(signs < 0)])
         readings = np.arange(len(signs) + sizes[self._nodes], len(matrix))
         torque = matrix[len(signs)] if parity == ODD else np.zeros(len(matrix))
@@ -477,7 +478,7 @@ class _Halving:
         """Block, and the node's unknowns by those of the block, of all nodes that are no plain block of their own."""
         section = self._mesh.section
         layers = self._layers
-        turn, (basis, signs) = _line_turn(layers), _turn_basis(layers)
+        turn, (basis, signs) = _line_turn(layers), turn_basis(layers)
         maps = {}
         half_pitch = self._mesh.gear.angular_pitch / 2
         cosine = np.cos(half_pitch)

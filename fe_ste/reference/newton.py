@@ -39,6 +39,18 @@ class TurningHub:
 
 
 @dataclass(frozen=True)
+class CondensedPart:
+    """Elastic material beside the bricks, condensed onto some of their nodes, in small strains."""
+
+    nodes: Integers
+    """(k,) none of them on the hub."""
+    stiffness: Floats
+    """(3 k, 3 k) N/m."""
+    turns: bool
+    """Whether it is held by the hub and turns with it; else it is held in place."""
+
+
+@dataclass(frozen=True)
 class ContactModel(Displayed):
     """Elastic bodies, what holds and loads them, and where they may touch."""
 
@@ -60,6 +72,7 @@ class ContactModel(Displayed):
     allowed_overlap: float = 0.0
     """Overlap of the undeformed surfaces that a mesh of chords may have, m."""
     hub: TurningHub | None = None
+    condensed: tuple[CondensedPart, ...] = ()
 
     def _line(self) -> str:
         facets = f"surfaces of {len(self.first.facets)} and {len(self.second.facets)} facets"
@@ -197,6 +210,7 @@ class _Numbering:
     _columns: Integers = field(init=False)
     _starts: Integers = field(init=False)
     _hub_elements: Integers = field(init=False)
+    condensed: SparseMatrix = field(init=False)
 
     def __post_init__(self) -> None:
         """Sort out which displacements are unknown, and where the entries of the bricks go."""
@@ -216,11 +230,17 @@ class _Numbering:
         pairs, self._pair_of_block = np.unique(nodes[:, :, None] * size + nodes[:, None, :], return_inverse=True)
         self._columns = pairs % size
         self._starts = np.searchsorted(pairs // size, np.arange(size + 1))
+        self.condensed = scipy.sparse.csr_matrix((3 * size, 3 * size))
+        for part in self.model.condensed:
+            unknowns = (3 * part.nodes[:, None] + np.arange(3)).ravel()
+            places = np.repeat(unknowns, len(unknowns)), np.tile(unknowns, len(unknowns))
+            self.condensed += scipy.sparse.csr_matrix((part.stiffness.ravel(), places), (3 * size, 3 * size))
 
-    def matrix(self, tangent: BrickTangent, motion: Floats, curvature: float) -> SparseMatrix:
+    def matrix(self, tangent: BrickTangent, motion: Floats, carried: Floats, curvature: float) -> SparseMatrix:
         """Tangent matrix of the free unknowns, and of the hub where there is one.
 
-        ``motion`` (n, 3) are the displacements per unit of the hub's, ``curvature`` its geometric stiffness.
+        ``motion`` (n, 3) are the displacements of the hub's nodes per unit of the hub's, ``carried`` (n, 3) those of
+        condensed parts that turn with it as rigid bodies, ``curvature`` its geometric stiffness.
         """
         blocks = np.empty((len(self._columns), 3, 3))
         by_node = tangent.stiffness.reshape(-1, 8, 3, 8, 3)
@@ -228,7 +248,8 @@ class _Numbering:
             for b in range(3):
                 blocks[:, a, b] = summed(self._pair_of_block, by_node[:, :, a, :, b], len(blocks))
         size = motion.size
-        whole: SparseMatrix = scipy.sparse.bsr_matrix((blocks, self._columns, self._starts), shape=(size, size)).tocsr()
+        bricks = scipy.sparse.bsr_matrix((blocks, self._columns, self._starts), shape=(size, size)).tocsr()
+        whole: SparseMatrix = bricks + self.condensed
         stiffness: SparseMatrix = whole[self.free][:, self.free]
         if self.model.hub is None:
             return stiffness
@@ -236,9 +257,12 @@ class _Numbering:
         # the geometric stiffness of forces whose arms turn.
         unknowns = self.model.bricks.unknowns[self._hub_elements]
         forces = np.einsum("eij,ej->ei", tangent.stiffness[self._hub_elements], motion.ravel()[unknowns])
-        coupling = summed(unknowns, forces, size)
+        # A condensed part takes up its displacements less the rigid turn.
+        by_parts = self.condensed @ carried.ravel()
+        coupling = summed(unknowns, forces, size) - by_parts
+        own = float(motion.ravel() @ coupling + carried.ravel() @ by_parts)
         column: SparseMatrix = scipy.sparse.csr_matrix(coupling[self.free][:, None])
-        corner: SparseMatrix = scipy.sparse.csr_matrix([[float(motion.ravel() @ coupling) + curvature]])
+        corner: SparseMatrix = scipy.sparse.csr_matrix([[own + curvature]])
         return scipy.sparse.bmat([[stiffness, column], [column.T, corner]], format="csr")
 
     def reduced(self, forces: Floats, motion: Floats) -> Floats:
@@ -289,25 +313,34 @@ class _Search:
 
     def hub_motion(self, hub_displacement: float) -> tuple[Floats, Floats, Floats]:
         """Displacement of the hub's nodes, and its first and second derivative by the hub's displacement, (n, 3)."""
-        hub = self.model.hub
+        if self.model.hub is None:
+            return (np.zeros_like(self.model.bricks.points),) * 3
+        return self._turned(self.model.hub.nodes, self.model.hub, hub_displacement)
+
+    def carried_motion(self, hub_displacement: float) -> tuple[Floats, Floats, Floats]:
+        """Do as `hub_motion` for the nodes of condensed parts that turn with the hub, as rigid bodies."""
+        carried = [part.nodes for part in self.model.condensed if part.turns]
+        if self.model.hub is None or not carried:
+            return (np.zeros_like(self.model.bricks.points),) * 3
+        return self._turned(np.concatenate(carried), self.model.hub, hub_displacement)
+
+    def _turned(self, nodes: Integers, hub: TurningHub, hub_displacement: float) -> tuple[Floats, Floats, Floats]:
         points = self.model.bricks.points
         displacement = np.zeros_like(points)
         slope = np.zeros_like(points)
         curvature = np.zeros_like(points)
-        if hub is None:
-            return displacement, slope, curvature
-        x, y = (points[hub.nodes, :2] - hub.axis).T
+        x, y = (points[nodes, :2] - hub.axis).T
         angle = hub_displacement / hub.lever
         if not self.model.bricks.finite:
-            slope[hub.nodes, :2] = np.stack([-y, x], axis=1) / hub.lever
+            slope[nodes, :2] = np.stack([-y, x], axis=1) / hub.lever
             return slope * hub_displacement, slope, curvature
         # A finite rotation: nodes move on circles, and the second derivative points to the axis.
         cosine = math.cos(angle)
         sine = math.sin(angle)
         turned = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
-        displacement[hub.nodes, :2] = turned - np.stack([x, y], axis=1)
-        slope[hub.nodes, :2] = np.stack([-turned[:, 1], turned[:, 0]], axis=1) / hub.lever
-        curvature[hub.nodes, :2] = -turned / hub.lever**2
+        displacement[nodes, :2] = turned - np.stack([x, y], axis=1)
+        slope[nodes, :2] = np.stack([-turned[:, 1], turned[:, 0]], axis=1) / hub.lever
+        curvature[nodes, :2] = -turned / hub.lever**2
         return displacement, slope, curvature
 
     def _moved(self, state: _State, step: Floats, tangent: BrickTangent, length: float, pressure: Floats) -> _State:
@@ -340,12 +373,19 @@ class _Search:
             opened = self.at_rest.gap + self.at_rest.gradient @ state.displacement.ravel()
             contact = replace(self.at_rest, gap=opened)
         # External and contact forces less the internal ones: zero in equilibrium.
-        imbalance = load * model.forces - tangent.force + self.contact_force(contact, state.pressure)
+        by_parts = self.condensed_force(state)
+        imbalance = load * model.forces - tangent.force - by_parts + self.contact_force(contact, state.pressure)
         _, motion, _ = self.hub_motion(state.hub)
         reduced = self.numbering.reduced(imbalance, motion)
         if model.hub is not None:
-            reduced[-1] += load * model.hub.force
+            _, carried, _ = self.carried_motion(state.hub)
+            reduced[-1] += load * model.hub.force + float(np.sum(carried * by_parts))
         return _Evaluation(state, tangent, contact, self._facing_gap(contact), reduced)
+
+    def condensed_force(self, state: _State) -> Floats:
+        """Internal nodal forces (n, 3) of the condensed parts."""
+        own = state.displacement - self.carried_motion(state.hub)[0]
+        return np.asarray((self.numbering.condensed @ own.ravel()).reshape(-1, 3))
 
     def contact_force(self, contact: WeightedGap, pressure: Floats) -> Floats:
         """Nodal forces (n, 3) of contact pressures."""
@@ -448,9 +488,11 @@ class _Search:
     def _newton_step(self, now: _Evaluation, active: Booleans) -> tuple[Floats, Floats]:
         """Step of the unknowns and the pressures after it, from the linearised equilibrium with the gaps closed."""
         _, motion, curvature = self.hub_motion(now.state.hub)
-        # What the hub's nodes are held by does work on the curvature of their paths.
+        _, carried, bending = self.carried_motion(now.state.hub)
+        # What the hub's nodes are held by does work on the curvature of their paths; so do the condensed parts.
         held_force = self.contact_force(now.contact, now.state.pressure) - now.tangent.force
-        stiffness = self.numbering.matrix(now.tangent, motion, -float(np.sum(curvature * held_force)))
+        geometric = -float(np.sum(curvature * held_force) + np.sum(bending * self.condensed_force(now.state)))
+        stiffness = self.numbering.matrix(now.tangent, motion, carried, geometric)
         numbers = np.flatnonzero(active)
         gradient = now.contact.gradient[numbers]
         weight = now.contact.weight[numbers]
@@ -537,6 +579,6 @@ def fixed_body_displacement(model: ContactModel) -> tuple[Floats, Floats]:
     displacement = np.zeros_like(bricks.points)
     modes = bricks.modes_at_rest()
     tangent = bricks.evaluate(displacement, modes)
-    with factorise(numbering.matrix(tangent, displacement, 0.0)) as factor:
+    with factorise(numbering.matrix(tangent, displacement, displacement, 0.0)) as factor:
         displacement.ravel()[numbering.free] = factor.solve(numbering.reduced(model.forces, displacement))
     return displacement, bricks.stepped_modes(modes, tangent, displacement, 1.0)

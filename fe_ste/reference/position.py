@@ -16,11 +16,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fe_ste.contact.kinematics import Cells
-from fe_ste.elasticity.hexmesh import ContactMesh, OpenSector, refined_sectors
+from fe_ste.elasticity.gear_mesh import ContactMesh, GearMesh, refined_gears
 from fe_ste.geometry.gears import GearPair
 from fe_ste.reference.finite_deformation import Bricks, von_mises
 from fe_ste.reference.mortar import Surface
 from fe_ste.reference.newton import (
+    CondensedPart,
     ContactModel,
     Equilibrium,
     EquilibriumError,
@@ -47,21 +48,25 @@ _ALLOWED_OVERLAP = 2e-3
 class NonlinearSettings(Displayed):
     """How a position is analysed."""
 
-    teeth: int = 5
-    """Odd number of teeth of each open sector."""
+    teeth: int | None = None
+    """Odd number of teeth of each gear that are meshed; by default those that touch, and one more on either side."""
     mesh: ContactMesh = field(default_factory=ContactMesh)
+    closed: bool = True
+    """False leaves the other teeth away: open sectors with free cut faces, which are too soft where bodies are deep."""
     finite_deformation: bool = True
     """False leaves geometric non-linearity out: small strains, contact on the undeformed flanks."""
     newton: NewtonSettings = field(default_factory=NewtonSettings)
 
     def __post_init__(self) -> None:
-        """Refuse sectors without a tooth in the middle."""
-        if self.teeth < 1 or self.teeth % 2 == 0:
+        """Refuse meshed teeth without one in the middle."""
+        if self.teeth is not None and (self.teeth < 1 or self.teeth % 2 == 0):
             raise ValueError(f"teeth = {self.teeth}: must be an odd number")
 
     def _line(self) -> str:
         strains = "finite deformation" if self.finite_deformation else "small strains"
-        return f": sectors of {self.teeth} teeth, {self.mesh.layers} layers, {strains}"
+        gears = "whole gears" if self.closed else "open sectors"
+        teeth = "" if self.teeth is None else f" with {self.teeth} teeth meshed"
+        return f": {gears}{teeth}, {self.mesh.layers} layers, {strains}"
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ class NonlinearPosition(Displayed):
     model: ContactModel
     """Gear 1's nodes and bricks first."""
     equilibrium: Equilibrium
-    sectors: tuple[OpenSector, OpenSector]
+    sectors: tuple[GearMesh, GearMesh]
     """Gear 1, gear 2."""
     load_share: dict[int, float]
     """Tooth pair -> part of the normal load."""
@@ -138,7 +143,7 @@ def nonlinear_position(
     settings = settings or NonlinearSettings()
     started = time.perf_counter()
     half_width = hertz_half_width(pair, normal_load(pair, torque) / least_contact_length(pair))
-    sectors = refined_sectors(pair, settings.mesh, settings.teeth, pmc, half_width)
+    sectors = refined_gears(pair, settings.mesh, pmc, half_width, settings.teeth, settings.closed)
     model = gear_model(pair, torque, sectors, settings.finite_deformation)
     try:
         equilibrium = solve_contact(model, settings.newton, report)
@@ -158,7 +163,7 @@ def nonlinear_position(
 
 
 def gear_model(
-    pair: GearPair, torque: float, sectors: tuple[OpenSector, OpenSector], finite_deformation: bool = True
+    pair: GearPair, torque: float, sectors: tuple[GearMesh, GearMesh], finite_deformation: bool = True
 ) -> ContactModel:
     """Put two sectors, in their places, together to a contact problem.
 
@@ -202,10 +207,15 @@ def gear_model(
             lever=mate_sign * pair.gear.base_radius,
             force=torque / pair.pinion.base_radius,
         ),
+        condensed=tuple(
+            CondensedPart(mesh.others.nodes + first, mesh.others.stiffness, turns)
+            for mesh, first, turns in ((pinion_sector, 0, False), (gear_sector, shift, True))
+            if mesh.others is not None
+        ),
     )
 
 
-def _load_share(sector: OpenSector, model: ContactModel, equilibrium: Equilibrium) -> dict[int, float]:
+def _load_share(sector: GearMesh, model: ContactModel, equilibrium: Equilibrium) -> dict[int, float]:
     """Part of the normal load of each tooth pair: its nodal pressures over their areas."""
     load = equilibrium.pressure * equilibrium.weight
     shares = {}
@@ -238,7 +248,7 @@ class StressField(Displayed):
     """On gear 1, N m."""
     pmc: float
     method: str
-    sectors: tuple[OpenSector, OpenSector]
+    sectors: tuple[GearMesh, GearMesh]
     """Undeformed gear 1 and gear 2; the nodes below are gear 1's, then gear 2's."""
     displacement: Floats
     """(n, 3) m."""
@@ -298,7 +308,7 @@ def stress_of_state(
     pair = compliance.pair
     settings = settings or NonlinearSettings()
     half_width = hertz_half_width(pair, state.normal_load / least_contact_length(pair))
-    sectors = refined_sectors(pair, settings.mesh, settings.teeth, state.pmc, half_width)
+    sectors = refined_gears(pair, settings.mesh, state.pmc, half_width, settings.teeth, settings.closed)
     model = gear_model(pair, torque, sectors, finite_deformation=False)
     rotation = state.pmc * pair.pinion.angular_pitch
     load_points, loads = _point_loads(pair, state.cells, state.solution.force, rotation, compliance)
