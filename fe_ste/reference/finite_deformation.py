@@ -23,6 +23,7 @@ from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 from fe_ste.tools.display import Displayed
+from fe_ste.tools.threads import side_by_side
 
 _POINTS = 8
 _FUNCTIONS = 11
@@ -151,12 +152,21 @@ def _brick(
 def _add_geometric_stiffness(at_point: Floats, mean: Floats, stress: Floats, matrix: Floats) -> None:
     """Add the stress times the second derivative of the strain, which has no square of the deviation."""
     # S : d2E, d2E = sym(grad N_i (x) grad N_j) for each direction alike, less that of the deviations.
-    deviation = at_point - mean
-    whole = at_point @ stress @ at_point.T - deviation @ stress @ deviation.T
     for i in range(_FUNCTIONS):
+        of_whole = (0.0, 0.0, 0.0)
+        of_deviation = (0.0, 0.0, 0.0)
+        for b in range(3):
+            x, y, z = stress[b]
+            own = at_point[i, b]
+            apart = own - mean[i, b]
+            of_whole = (of_whole[0] + own * x, of_whole[1] + own * y, of_whole[2] + own * z)
+            of_deviation = (of_deviation[0] + apart * x, of_deviation[1] + apart * y, of_deviation[2] + apart * z)
         for j in range(i, _FUNCTIONS):
+            total = 0.0
             for a in range(3):
-                matrix[3 * i + a, 3 * j + a] += whole[i, j]
+                total += of_whole[a] * at_point[j, a] - of_deviation[a] * (at_point[j, a] - mean[j, a])
+            for a in range(3):
+                matrix[3 * i + a, 3 * j + a] += total
 
 
 @compiled
@@ -368,21 +378,17 @@ class Bricks(Displayed):
         force = np.empty((count, 24))
         stiffness = np.empty((count, 24, 24))
         recovery = np.empty((count, 9, 25))
-        inverted = _all_bricks(
-            displacement,
-            modes,
-            self.nodes,
-            self.gradients,
-            self.volumes,
-            self.lame,
-            self.shear,
-            self.finite,
-            force,
-            stiffness,
-            recovery,
-        )
-        if inverted >= 0:
-            raise InvertedElementError(f"element {inverted} is turned inside out")
+
+        def part(chosen: slice) -> int:
+            given = (self.nodes, self.gradients, self.volumes, self.lame, self.shear)
+            filled = (force[chosen], stiffness[chosen], recovery[chosen])
+            own = (array[chosen] for array in given)
+            return _all_bricks(displacement, modes[chosen], *own, self.finite, *filled)
+
+        halves = (slice(0, count // 2), slice(count // 2, count))
+        for half, inverted in zip(halves, side_by_side(part, halves), strict=True):
+            if inverted >= 0:
+                raise InvertedElementError(f"element {half.start + inverted} is turned inside out")
         nodal = np.zeros(self.points.size)
         np.add.at(nodal, self.unknowns, force)
         return BrickTangent(nodal.reshape(-1, 3), stiffness, recovery)

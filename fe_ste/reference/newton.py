@@ -142,9 +142,12 @@ def convergence_table(iterations: Sequence[Iteration]) -> str:
 
 # Equilibrium of elastic bricks in frictionless contact: Newton's method with a primal-dual active set
 
-#: Stiffness added on active gaps, in Young's moduli times the node's width: what is left falls by it per solve.
-_AUGMENTATION = 100.0
+#: Stiffness added on active gaps, in Young's moduli times the node's width: the more, the fewer solves a step takes.
+_AUGMENTATION = 1000.0
 _MOST_AUGMENTATIONS = 25
+
+#: Pressures still to be added when a Newton step is taken, as part of the largest.
+_PRESSURE_LEFT = 1e-9
 
 #: Nodes that face the other surface with less than this part of their area carry no pressure.
 _LEAST_FACING = 1e-3
@@ -206,14 +209,16 @@ class _Numbering:
     model: ContactModel
     free: Integers = field(init=False)
     count: int = field(init=False)
-    _pair_of_block: Integers = field(init=False)
-    _columns: Integers = field(init=False)
-    _starts: Integers = field(init=False)
-    _hub_elements: Integers = field(init=False)
     condensed: SparseMatrix = field(init=False)
+    """Stiffness of the condensed parts, (3 n, 3 n)."""
+    _pair_of_block: Integers = field(init=False)
+    _fixed: Floats = field(init=False)
+    _hub_elements: Integers = field(init=False)
+    _pattern: SparseMatrix = field(init=False)
+    _source: Integers = field(init=False)
 
     def __post_init__(self) -> None:
-        """Sort out which displacements are unknown, and where the entries of the bricks go."""
+        """Sort out which displacements are unknown, and where the entries of bricks and condensed parts go."""
         nodes = self.model.bricks.nodes
         hub = self.model.hub
         size = len(self.model.bricks.points)
@@ -225,16 +230,43 @@ class _Numbering:
         self.free = np.flatnonzero(~bound.ravel())
         self.count = len(self.free)
         self._hub_elements = np.flatnonzero(on_hub[nodes].any(axis=1))
-        # One number per pair of nodes that share a brick: the entries of all bricks are then summed without a sort at
-        # each iteration, since the pattern of the matrix stays.
-        pairs, self._pair_of_block = np.unique(nodes[:, :, None] * size + nodes[:, None, :], return_inverse=True)
-        self._columns = pairs % size
-        self._starts = np.searchsorted(pairs // size, np.arange(size + 1))
-        self.condensed = scipy.sparse.csr_matrix((3 * size, 3 * size))
-        for part in self.model.condensed:
-            unknowns = (3 * part.nodes[:, None] + np.arange(3)).ravel()
-            places = np.repeat(unknowns, len(unknowns)), np.tile(unknowns, len(unknowns))
-            self.condensed += scipy.sparse.csr_matrix((part.stiffness.ravel(), places), (3 * size, 3 * size))
+        # One number per pair of nodes that share a brick or a condensed part: the entries are then summed without a
+        # sort at each iteration, since the pattern of the matrix stays.
+        parts = self.model.condensed
+        of_bricks = (nodes[:, :, None] * size + nodes[:, None, :]).ravel()
+        of_parts = [(part.nodes[:, None] * size + part.nodes).ravel() for part in parts]
+        pairs, number = np.unique(np.concatenate([of_bricks, *of_parts]), return_inverse=True)
+        self._pair_of_block, numbers_of_parts = np.split(number, [len(of_bricks)])
+        blocks = np.zeros((len(pairs), 3, 3))
+        first = 0
+        for part in parts:
+            count = len(part.nodes)
+            entries = part.stiffness.reshape(count, 3, count, 3).transpose(0, 2, 1, 3).reshape(-1, 3, 3)
+            blocks[numbers_of_parts[first : first + count**2]] = entries
+            first += count**2
+        self._fixed = blocks
+        columns = pairs % size
+        starts = np.searchsorted(pairs // size, np.arange(size + 1))
+
+        def matrix_of(values: Floats) -> SparseMatrix:
+            return scipy.sparse.bsr_matrix((values, columns, starts), shape=(3 * size, 3 * size)).tocsr()
+
+        self.condensed = matrix_of(blocks)
+        self.condensed.eliminate_zeros()
+        # Where each entry of the matrix of the unknowns comes from: a matrix of the numbers of the entries, from 1.
+        entry: SparseMatrix = matrix_of(1.0 + np.arange(blocks.size).reshape(blocks.shape))[self.free][:, self.free]
+        if hub is not None:
+            touched = np.zeros((size, 3), dtype=np.bool_)
+            touched[nodes[self._hub_elements]] = True
+            for part in parts:
+                touched[part.nodes] |= part.turns
+            rows = np.flatnonzero(touched.ravel()[self.free])
+            value = 1.0 + blocks.size + self.free[rows]
+            column = scipy.sparse.csr_matrix((value, (rows, np.zeros_like(rows))), shape=(self.count, 1))
+            corner = scipy.sparse.csr_matrix([[1.0 + blocks.size + 3 * size]])
+            entry = scipy.sparse.bmat([[entry, column], [column.T, corner]], format="csr")
+        self._source = entry.data.astype(np.int64) - 1
+        self._pattern = entry
 
     def matrix(self, tangent: BrickTangent, motion: Floats, carried: Floats, curvature: float) -> SparseMatrix:
         """Tangent matrix of the free unknowns, and of the hub where there is one.
@@ -242,28 +274,22 @@ class _Numbering:
         ``motion`` (n, 3) are the displacements of the hub's nodes per unit of the hub's, ``carried`` (n, 3) those of
         condensed parts that turn with it as rigid bodies, ``curvature`` its geometric stiffness.
         """
-        blocks = np.empty((len(self._columns), 3, 3))
+        blocks = self._fixed.copy()
         by_node = tangent.stiffness.reshape(-1, 8, 3, 8, 3)
         for a in range(3):
             for b in range(3):
-                blocks[:, a, b] = summed(self._pair_of_block, by_node[:, :, a, :, b], len(blocks))
-        size = motion.size
-        bricks = scipy.sparse.bsr_matrix((blocks, self._columns, self._starts), shape=(size, size)).tocsr()
-        whole: SparseMatrix = bricks + self.condensed
-        stiffness: SparseMatrix = whole[self.free][:, self.free]
-        if self.model.hub is None:
-            return stiffness
+                blocks[:, a, b] += summed(self._pair_of_block, by_node[:, :, a, :, b], len(blocks))
         # The hub's nodes move by motion times one unknown: its column is K motion, its diagonal motion' K motion and
-        # the geometric stiffness of forces whose arms turn.
+        # the geometric stiffness of forces whose arms turn. A condensed part takes displacements less the rigid turn.
         unknowns = self.model.bricks.unknowns[self._hub_elements]
         forces = np.einsum("eij,ej->ei", tangent.stiffness[self._hub_elements], motion.ravel()[unknowns])
-        # A condensed part takes up its displacements less the rigid turn.
         by_parts = self.condensed @ carried.ravel()
-        coupling = summed(unknowns, forces, size) - by_parts
+        coupling = summed(unknowns, forces, motion.size) - by_parts
         own = float(motion.ravel() @ coupling + carried.ravel() @ by_parts)
-        column: SparseMatrix = scipy.sparse.csr_matrix(coupling[self.free][:, None])
-        corner: SparseMatrix = scipy.sparse.csr_matrix([[own + curvature]])
-        return scipy.sparse.bmat([[stiffness, column], [column.T, corner]], format="csr")
+        values = np.concatenate([blocks.ravel(), coupling, [own + curvature]])
+        result = self._pattern.copy()
+        result.data = values[self._source]
+        return result
 
     def reduced(self, forces: Floats, motion: Floats) -> Floats:
         """Gather the forces on the unknowns from nodal forces (n, 3)."""
@@ -507,12 +533,23 @@ class _Search:
         pressure = np.where(active, now.state.pressure, 0.0)[numbers]
         gap = now.contact.gap[numbers]
         with factorise(augmented.tocsr()) as factor:
+            step = factor.solve(balance + rows.T @ (pressure - added * gap))
+            # Conjugate gradients on the pressures; what the penalties would add is the preconditioner.
+            overlap = -(gap + rows @ step)
+            change = added * overlap
+            direction = change
             for _ in range(_MOST_AUGMENTATIONS):
-                step = factor.solve(balance + rows.T @ (pressure - added * gap))
-                change = -added * (gap + rows @ step)
-                pressure = pressure + change
-                if np.abs(change).max() <= 1e-12 * np.abs(pressure).max():
+                if np.abs(change).max() <= _PRESSURE_LEFT * np.abs(pressure).max():
                     break
+                moved = factor.solve(rows.T @ direction)
+                closed = rows @ moved
+                before = float(overlap @ change)
+                length = before / float(direction @ closed)
+                step += length * moved
+                pressure = pressure + length * direction
+                overlap -= length * closed
+                change = added * overlap
+                direction = change + float(overlap @ change) / before * direction
         result = np.zeros(len(self.area))
         result[numbers] = pressure
         return step, result
