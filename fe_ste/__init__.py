@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from fe_ste.contact.kinematics import ContactError, ContactSettings
-    from fe_ste.elasticity.hexmesh import ContactMesh, MeshSettings
+    from fe_ste.elasticity.gear_mesh import ContactMesh
+    from fe_ste.elasticity.hexmesh import MeshSettings
     from fe_ste.flanks import FlankModification, FlankTopography, Relief, ReliefShape
     from fe_ste.geometry.checks import GeometryError
     from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
@@ -65,7 +66,7 @@ _HOMES = {
     "BasicRack": "fe_ste.geometry.gears",
     "Checkpoint": "fe_ste.transmission_error.grid",
     "ContactError": "fe_ste.contact.kinematics",
-    "ContactMesh": "fe_ste.elasticity.hexmesh",
+    "ContactMesh": "fe_ste.elasticity.gear_mesh",
     "ContactSettings": "fe_ste.contact.kinematics",
     "FlankModification": "fe_ste.flanks",
     "FlankTopography": "fe_ste.flanks",

@@ -16,7 +16,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from fe_ste.elasticity.hexmesh import OpenSector
+from fe_ste.elasticity.gear_mesh import GearMesh
 from fe_ste.geometry.gears import GearPair
 
 _M_TO_MM = 1e3
@@ -74,7 +74,7 @@ class CalculixResult:
 def write_input(
     path: Path,
     pair: GearPair,
-    sectors: tuple[OpenSector, OpenSector],
+    sectors: tuple[GearMesh, GearMesh],
     torque: float,
     expected: float,
     settings: CalculixSettings,
@@ -85,7 +85,7 @@ def write_input(
     ----------
     path : Path
     pair : GearPair
-    sectors : tuple of OpenSector
+    sectors : tuple of GearMesh
     torque : float
         On gear 1, N m.
     expected : float

@@ -21,7 +21,8 @@ from typing import Any
 from ccx_model import CalculixSettings, run_calculix, write_input
 
 from fe_ste.contact.kinematics import ContactSettings
-from fe_ste.elasticity.hexmesh import MeshSettings, placed_sectors
+from fe_ste.elasticity.gear_mesh import placed_gears
+from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.reference.newton import solve_contact
 from fe_ste.reference.position import gear_model
@@ -107,7 +108,7 @@ def superelement(case: Case, contact: ContactSettings | None = None) -> dict[str
 def calculix(case: Case, expected: float, folder: Path, threads: int = 1) -> dict[str, float | int | str]:
     """Solve a case by CalculiX; `expected` (m) only sets how far the first step closes the flanks."""
     pair = PAIRS[case.pair]()
-    sectors = placed_sectors(pair, case.mesh, TEETH, case.pmc)
+    sectors = placed_gears(pair, case.mesh, TEETH, case.pmc, closed=False)
     path = folder / "pair.inp"
     write_input(path, pair, sectors, case.torque, expected, case.calculix)
     result = run_calculix(path, pair, 3 * sum(len(sector.points) for sector in sectors), threads)
@@ -126,7 +127,7 @@ def nonlinear(case: Case) -> dict[str, float | int]:
     """Solve a case by the program's own full non-linear analysis, on the mesh that CalculiX gets."""
     pair = PAIRS[case.pair]()
     started, spent = time.perf_counter(), time.process_time()
-    sectors = placed_sectors(pair, case.mesh, TEETH, case.pmc)
+    sectors = placed_gears(pair, case.mesh, TEETH, case.pmc, closed=False)
     model = gear_model(pair, case.torque, sectors, case.calculix.large_displacements)
     found = solve_contact(model)
     return {

@@ -19,7 +19,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from fe_ste.elasticity.hexmesh import ContactMesh, MeshSettings
+from fe_ste.elasticity.gear_mesh import ContactMesh
+from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.reference.position import NonlinearSettings, nonlinear_position
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
 from fe_ste.transmission_error.search import contact_state

@@ -158,7 +158,7 @@ def sector(load: LoadCase, number: int, fineness: Fineness) -> Sector:
 
 def _line(load: LoadCase, number: int, tooth: int, z: Floats) -> Floats:
     """Roll angle of the rigid contact line of a tooth pair on gear 0 or 1."""
-    from fe_ste.elasticity.hexmesh import contact_line_rolls
+    from fe_ste.elasticity.gear_mesh import contact_line_rolls
 
     return contact_line_rolls(load.pair, tooth, load.pmc, z)[number]
 

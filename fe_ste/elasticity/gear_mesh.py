@@ -37,37 +37,63 @@ class ContactMesh:
 
     Examples
     --------
-    >>> ContactMesh().refined(1.5).layers
-    9
+    >>> ContactMesh().refined(2.0).layers
+    18
     """
 
-    layers: int = 6
-    """Elements along the face width."""
+    layers: int = 9
+    """Elements along the face width; of helical gears with fewer, contact lines that end between two layers bear too
+    little."""
     contact_elements: float = 5.0
     """Elements across the Hertzian contact width."""
     band: float = 1.6
     """Half width of the uniformly fine band about the contact line, in Hertzian half widths."""
     growth: float = 0.6
     """Growth of the element size per length beyond the band."""
-    thickness: int = 9
+    growth_through: float = 0.35
+    """Growth of the element size per length from the loaded flank through the tooth."""
+    thickness: int | None = None
+    """Elements through the tooth; by default as many as `growth_through` asks for."""
     fillet: int = 4
     root: int = 3
-    rim: int = 10
-    """As in `fe_ste.elasticity.hexmesh.MeshSettings`; through the tooth, elements are graded towards the loaded
-    flank."""
+    rim: int = 8
+    """As in `fe_ste.elasticity.hexmesh.MeshSettings`."""
     far_flank: int = 6
     """Elements along flanks that do not touch; others have no fewer."""
 
     def __post_init__(self) -> None:
         """Refuse what no mesh can have; the counts are checked with the mesh."""
-        if not (self.contact_elements >= 1.0 and self.band >= 1.0 and self.growth > 0.0):
-            raise ValueError("contact_elements and band must be at least 1, growth positive")
+        if not (self.contact_elements >= 1.0 and self.band >= 1.0 and min(self.growth, self.growth_through) > 0.0):
+            raise ValueError("contact_elements and band must be at least 1, growth and growth_through positive")
 
     def refined(self, factor: float) -> ContactMesh:
         """Return the settings with every element size divided by about `factor`."""
-        names = ("layers", "thickness", "fillet", "root", "rim", "far_flank")
-        counts = {name: math.ceil(getattr(self, name) * factor) for name in names}
-        return replace(self, contact_elements=self.contact_elements * factor, growth=self.growth / factor, **counts)
+        return replace(
+            self,
+            layers=math.ceil(self.layers * factor),
+            contact_elements=self.contact_elements * factor,
+            growth=self.growth / factor,
+            growth_through=self.growth_through / factor,
+            thickness=None if self.thickness is None else math.ceil(self.thickness * factor),
+            fillet=math.ceil(self.fillet * factor),
+            root=math.ceil(self.root * factor),
+            rim=math.ceil(self.rim * factor),
+            far_flank=math.ceil(self.far_flank * factor),
+        )
+
+    def smallest(self, half_width: float) -> float:
+        """Return the size of the elements at the contact, m, of a Hertzian half width (m)."""
+        return 2.0 * half_width / self.contact_elements
+
+    def tooth(self, gear: Gear, flank: int, half_width: float) -> MeshSettings:
+        """Return the numbers of elements of one tooth with so many along its flanks."""
+        thickness = self.thickness
+        if thickness is None:
+            across = 0.5 * math.pi * gear.transverse_module
+            thickness = math.ceil(_elements_within(across, self.smallest(half_width), 0.0, self.growth_through))
+        return MeshSettings(
+            layers=self.layers, flank=flank, thickness=thickness, fillet=self.fillet, root=self.root, rim=self.rim
+        )
 
 
 @dataclass(frozen=True)
@@ -174,16 +200,9 @@ def refined_gears(
     closed : False leaves the other teeth away
     """
     count = teeth or meshed_teeth(pair, pmc)
-    others = MeshSettings(
-        layers=settings.layers,
-        flank=settings.far_flank,
-        thickness=settings.thickness,
-        fillet=settings.fillet,
-        root=settings.root,
-        rim=settings.rim,
-    )
     gears = []
     for placement in _placements(pair, pmc):
+        others = settings.tooth(placement.gear, settings.far_flank, half_width)
         numbers = placement.sense * (np.arange(count) - count // 2)
         meshes = [_refined_tooth(pair, placement, settings, int(number), pmc, half_width) for number in numbers]
         gears.append(_gear_of_sectors(placement, meshes, others if closed else None))
@@ -232,7 +251,7 @@ def _refined_tooth(
     length = gear.base_radius * abs(tip - form) / 2.0
     fraction_on_flank = (roll**2 - form) / (tip - form)
     touches = bool(((fraction_on_flank > -_LINE_MARGIN) & (fraction_on_flank < 1.0 + _LINE_MARGIN)).any())
-    smallest = 2.0 * half_width / settings.contact_elements
+    smallest = settings.smallest(half_width)
     band = settings.band * half_width
     if touches:
         within = 2.0 * _elements_within(length / 2.0, smallest, band, settings.growth)
@@ -242,15 +261,8 @@ def _refined_tooth(
     else:
         count = settings.far_flank
         flank_fractions = np.tile(np.linspace(0.0, 1.0, count + 1), (settings.layers + 1, 1))
-    counts = MeshSettings(
-        layers=settings.layers,
-        flank=count,
-        thickness=settings.thickness,
-        fillet=settings.fillet,
-        root=settings.root,
-        rim=settings.rim,
-    )
-    across = _graded(settings.thickness, smallest / (0.5 * math.pi * gear.transverse_module))
+    counts = settings.tooth(gear, count, half_width)
+    across = _graded(counts.thickness, smallest / (0.5 * math.pi * gear.transverse_module))
     return refined_sector_mesh(gear, counts, flank_fractions, 1.0 - across[::-1] if placement.side > 0 else across)
 
 
@@ -318,7 +330,7 @@ def _gear_of_sectors(placement: _Placement, meshes: list[SectorMesh], others: Me
             raise ValueError(f"gear {gear.name}: neighbouring sectors are {apart:.3g} m apart")
         target[ahead] = target[behind]
     kept, renumbered = np.unique(target, return_inverse=True)
-    mesh = GearMesh(
+    result = GearMesh(
         points=all_points[kept] + np.array([placement.axis_x, 0.0, 0.0]),
         hexahedra=renumbered[np.concatenate(bricks)],
         held=np.unique(renumbered[np.concatenate(held)]),
@@ -329,10 +341,10 @@ def _gear_of_sectors(placement: _Placement, meshes: list[SectorMesh], others: Me
     )
     count = gear.teeth - len(meshes)
     if others is None or count == 0:
-        return mesh
+        return result
     ends = [meshes[-1].cut_nodes(1) + first_point[len(meshes) - 1], meshes[0].cut_nodes(-1)]
     first_angle = placement.angle + (numbers[-1] + 1) * gear.angular_pitch
-    return replace(mesh, others=_other_teeth(gear, others, count, first_angle, [renumbered[end] for end in ends]))
+    return replace(result, others=_other_teeth(gear, others, count, first_angle, [renumbered[end] for end in ends]))
 
 
 def whole_ring(mesh: GearMesh) -> GearMesh:

@@ -11,7 +11,6 @@ line of that layer; the cut faces between teeth do not move with them.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from fe_ste.elasticity.hexmesh import MeshSettings, OpenSector, sector_mesh
+from fe_ste.elasticity.gear_mesh import GearMesh
+from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats, Integers, Pixels
 from fe_ste.tools.display import Displayed
@@ -465,7 +466,7 @@ def _grid(field: StressField, number: int, bricks: Integers, magnification: floa
 
 def _flank_view(
     field: StressField,
-    sector: OpenSector,
+    sector: GearMesh,
     flank: _LoadedFlank,
     magnification: float,
     top: float,

@@ -380,10 +380,19 @@ class Bricks(Displayed):
         recovery = np.empty((count, 9, 25))
 
         def part(chosen: slice) -> int:
-            given = (self.nodes, self.gradients, self.volumes, self.lame, self.shear)
-            filled = (force[chosen], stiffness[chosen], recovery[chosen])
-            own = (array[chosen] for array in given)
-            return _all_bricks(displacement, modes[chosen], *own, self.finite, *filled)
+            return _all_bricks(
+                displacement,
+                modes[chosen],
+                self.nodes[chosen],
+                self.gradients[chosen],
+                self.volumes[chosen],
+                self.lame[chosen],
+                self.shear[chosen],
+                self.finite,
+                force[chosen],
+                stiffness[chosen],
+                recovery[chosen],
+            )
 
         halves = (slice(0, count // 2), slice(count // 2, count))
         for half, inverted in zip(halves, side_by_side(part, halves), strict=True):
@@ -393,10 +402,10 @@ class Bricks(Displayed):
         np.add.at(nodal, self.unknowns, force)
         return BrickTangent(nodal.reshape(-1, 3), stiffness, recovery)
 
-    def stepped_modes(self, modes: Floats, tangent: BrickTangent, step: Floats, length: float) -> Floats:
-        """Incompatible modes after `length` times a Newton step of the displacements, (n, 3)."""
+    def stepped_modes(self, modes: Floats, recovery: Floats, step: Floats, length: float) -> Floats:
+        """Incompatible modes after `length` times a Newton step of the displacements, (n, 3); see `BrickTangent`."""
         element_step = step.ravel()[self.unknowns]
-        change = tangent.recovery[:, :, 0] + np.einsum("ekj,ej->ek", tangent.recovery[:, :, 1:], element_step)
+        change = recovery[:, :, 0] + np.einsum("ekj,ej->ek", recovery[:, :, 1:], element_step)
         return np.asarray(modes - length * change.reshape(-1, 3, 3))
 
     def nodal_stress(self, displacement: Floats, modes: Floats) -> Floats:

@@ -73,6 +73,8 @@ class ContactModel(Displayed):
     """Overlap of the undeformed surfaces that a mesh of chords may have, m."""
     hub: TurningHub | None = None
     condensed: tuple[CondensedPart, ...] = ()
+    clearance: Floats | None = None
+    """(s,) gap at the nodes of the first surface beside that between the meshes, m: material that is removed."""
 
     def _line(self) -> str:
         facets = f"surfaces of {len(self.first.facets)} and {len(self.second.facets)} facets"
@@ -196,7 +198,12 @@ class _Evaluation:
     """A state with its forces, tangents and gaps."""
 
     state: _State
-    tangent: BrickTangent
+    bricks_force: Floats
+    """(n, 3) internal forces of the bricks."""
+    recovery: Floats
+    """As in `fe_ste.reference.finite_deformation.BrickTangent`."""
+    blocks: Floats
+    """Stiffness of bricks and condensed parts by pair of nodes, see `_Numbering`."""
     contact: WeightedGap
     mean_gap: Floats
     imbalance: Floats
@@ -212,9 +219,10 @@ class _Numbering:
     condensed: SparseMatrix = field(init=False)
     """Stiffness of the condensed parts, (3 n, 3 n)."""
     _pair_of_block: Integers = field(init=False)
-    _fixed: Floats = field(init=False)
-    _hub_elements: Integers = field(init=False)
-    _pattern: SparseMatrix = field(init=False)
+    _pair_of_part: Integers = field(init=False)
+    _pairs: tuple[Integers, Integers] = field(init=False)
+    _starts: Integers = field(init=False)
+    _columns: Integers = field(init=False)
     _source: Integers = field(init=False)
 
     def __post_init__(self) -> None:
@@ -229,67 +237,71 @@ class _Numbering:
             on_hub[hub.nodes] = True
         self.free = np.flatnonzero(~bound.ravel())
         self.count = len(self.free)
-        self._hub_elements = np.flatnonzero(on_hub[nodes].any(axis=1))
         # One number per pair of nodes that share a brick or a condensed part: the entries are then summed without a
         # sort at each iteration, since the pattern of the matrix stays.
         parts = self.model.condensed
         of_bricks = (nodes[:, :, None] * size + nodes[:, None, :]).ravel()
         of_parts = [(part.nodes[:, None] * size + part.nodes).ravel() for part in parts]
         pairs, number = np.unique(np.concatenate([of_bricks, *of_parts]), return_inverse=True)
-        self._pair_of_block, numbers_of_parts = np.split(number, [len(of_bricks)])
-        blocks = np.zeros((len(pairs), 3, 3))
-        first = 0
-        for part in parts:
-            count = len(part.nodes)
-            entries = part.stiffness.reshape(count, 3, count, 3).transpose(0, 2, 1, 3).reshape(-1, 3, 3)
-            blocks[numbers_of_parts[first : first + count**2]] = entries
-            first += count**2
-        self._fixed = blocks
-        columns = pairs % size
-        starts = np.searchsorted(pairs // size, np.arange(size + 1))
-
-        def matrix_of(values: Floats) -> SparseMatrix:
-            return scipy.sparse.bsr_matrix((values, columns, starts), shape=(3 * size, 3 * size)).tocsr()
-
-        self.condensed = matrix_of(blocks)
+        self._pair_of_block, self._pair_of_part = np.split(number, [len(of_bricks)])
+        self._pairs = pairs % size, np.searchsorted(pairs // size, np.arange(size + 1))
+        self.condensed = self._whole(self._parts(np.zeros((len(pairs), 3, 3)))).tocsr()
         self.condensed.eliminate_zeros()
         # Where each entry of the matrix of the unknowns comes from: a matrix of the numbers of the entries, from 1.
-        entry: SparseMatrix = matrix_of(1.0 + np.arange(blocks.size).reshape(blocks.shape))[self.free][:, self.free]
+        entries = 9 * len(pairs)
+        numbers = np.arange(1.0, entries + 1.0, dtype=np.float64).reshape(-1, 3, 3)
+        entry: SparseMatrix = self._whole(numbers).tocsr()[self.free][:, self.free]
         if hub is not None:
             touched = np.zeros((size, 3), dtype=np.bool_)
-            touched[nodes[self._hub_elements]] = True
+            touched[nodes[on_hub[nodes].any(axis=1)]] = True
             for part in parts:
                 touched[part.nodes] |= part.turns
             rows = np.flatnonzero(touched.ravel()[self.free])
-            value = 1.0 + blocks.size + self.free[rows]
+            value = 1.0 + entries + self.free[rows]
             column = scipy.sparse.csr_matrix((value, (rows, np.zeros_like(rows))), shape=(self.count, 1))
-            corner = scipy.sparse.csr_matrix([[1.0 + blocks.size + 3 * size]])
+            corner = scipy.sparse.csr_matrix([[1.0 + entries + 3 * size]])
             entry = scipy.sparse.bmat([[entry, column], [column.T, corner]], format="csr")
         self._source = entry.data.astype(np.int64) - 1
-        self._pattern = entry
+        self._columns, self._starts = entry.indices, entry.indptr
 
-    def matrix(self, tangent: BrickTangent, motion: Floats, carried: Floats, curvature: float) -> SparseMatrix:
+    def _whole(self, blocks: Floats) -> SparseMatrix:
+        columns, starts = self._pairs
+        size = 3 * len(self.model.bricks.points)
+        return scipy.sparse.bsr_matrix((blocks, columns, starts), shape=(size, size))
+
+    def _parts(self, blocks: Floats) -> Floats:
+        """Add the stiffness of the condensed parts to blocks by pair of nodes, which are returned."""
+        first = 0
+        for part in self.model.condensed:
+            count = len(part.nodes)
+            entries = part.stiffness.reshape(count, 3, count, 3).transpose(0, 2, 1, 3).reshape(-1, 3, 3)
+            blocks[self._pair_of_part[first : first + count**2]] += entries
+            first += count**2
+        return blocks
+
+    def blocks(self, tangent: BrickTangent) -> Floats:
+        """Stiffness (p, 3, 3) of bricks and condensed parts by pair of nodes."""
+        by_node = tangent.stiffness.reshape(-1, 8, 3, 8, 3)
+        blocks = np.empty((len(self._pairs[0]), 3, 3))
+        for a in range(3):
+            for b in range(3):
+                blocks[:, a, b] = summed(self._pair_of_block, by_node[:, :, a, :, b], len(blocks))
+        return self._parts(blocks)
+
+    def matrix(self, blocks: Floats, motion: Floats, carried: Floats, curvature: float) -> SparseMatrix:
         """Tangent matrix of the free unknowns, and of the hub where there is one.
 
         ``motion`` (n, 3) are the displacements of the hub's nodes per unit of the hub's, ``carried`` (n, 3) those of
         condensed parts that turn with it as rigid bodies, ``curvature`` its geometric stiffness.
         """
-        blocks = self._fixed.copy()
-        by_node = tangent.stiffness.reshape(-1, 8, 3, 8, 3)
-        for a in range(3):
-            for b in range(3):
-                blocks[:, a, b] += summed(self._pair_of_block, by_node[:, :, a, :, b], len(blocks))
         # The hub's nodes move by motion times one unknown: its column is K motion, its diagonal motion' K motion and
         # the geometric stiffness of forces whose arms turn. A condensed part takes displacements less the rigid turn.
-        unknowns = self.model.bricks.unknowns[self._hub_elements]
-        forces = np.einsum("eij,ej->ei", tangent.stiffness[self._hub_elements], motion.ravel()[unknowns])
         by_parts = self.condensed @ carried.ravel()
-        coupling = summed(unknowns, forces, motion.size) - by_parts
+        coupling = self._whole(blocks) @ motion.ravel() - by_parts
         own = float(motion.ravel() @ coupling + carried.ravel() @ by_parts)
         values = np.concatenate([blocks.ravel(), coupling, [own + curvature]])
-        result = self._pattern.copy()
-        result.data = values[self._source]
-        return result
+        size = len(self._starts) - 1
+        return scipy.sparse.csr_matrix((values[self._source], self._columns, self._starts), shape=(size, size))
 
     def reduced(self, forces: Floats, motion: Floats) -> Floats:
         """Gather the forces on the unknowns from nodal forces (n, 3)."""
@@ -313,7 +325,7 @@ class _Search:
         self.numbering = _Numbering(self.model)
         self.area = self.model.first.areas(points)
         self.pairs = facing_pairs(points, self.model.first, self.model.second, self.model.search)
-        self.at_rest = weighted_gap(points, self.model.first, self.model.second, self.pairs)
+        self.at_rest = self._gap(points)
         self.history: list[Iteration] = []
         hub = self.model.hub
         self.largest_load = max(float(np.abs(self.model.forces).max()), abs(hub.force) if hub else 0.0)
@@ -333,6 +345,12 @@ class _Search:
             )
         if not np.isfinite(gap).any():
             raise EquilibriumError("no facets of the two surfaces face each other: nothing can touch")
+
+    def _gap(self, points: Floats) -> WeightedGap:
+        contact = weighted_gap(points, self.model.first, self.model.second, self.pairs)
+        if self.model.clearance is None:
+            return contact
+        return replace(contact, gap=contact.gap + self.model.clearance * contact.weight)
 
     def _facing_gap(self, contact: WeightedGap) -> Floats:
         return np.where(contact.weight > _LEAST_FACING * self.area, contact.mean, np.inf)
@@ -369,7 +387,7 @@ class _Search:
         curvature[nodes, :2] = -turned / hub.lever**2
         return displacement, slope, curvature
 
-    def _moved(self, state: _State, step: Floats, tangent: BrickTangent, length: float, pressure: Floats) -> _State:
+    def _moved(self, state: _State, step: Floats, recovery: Floats, length: float, pressure: Floats) -> _State:
         """State after `length` times a step of the unknowns."""
         hub = state.hub
         displacement = state.displacement.copy()
@@ -383,7 +401,7 @@ class _Search:
             displacement[nodes] = self.hub_motion(hub)[0][nodes]
         return _State(
             displacement=displacement,
-            modes=self.model.bricks.stepped_modes(state.modes, tangent, full_step, length),
+            modes=self.model.bricks.stepped_modes(state.modes, recovery, full_step, length),
             pressure=state.pressure + length * (pressure - state.pressure),
             hub=hub,
         )
@@ -394,7 +412,7 @@ class _Search:
         tangent = model.bricks.evaluate(state.displacement, state.modes)
         # In small displacements the contact geometry is that of the undeformed surfaces, and the gap linear.
         if model.bricks.finite:
-            contact = weighted_gap(model.bricks.points + state.displacement, model.first, model.second, self.pairs)
+            contact = self._gap(model.bricks.points + state.displacement)
         else:
             opened = self.at_rest.gap + self.at_rest.gradient @ state.displacement.ravel()
             contact = replace(self.at_rest, gap=opened)
@@ -406,10 +424,18 @@ class _Search:
         if model.hub is not None:
             _, carried, _ = self.carried_motion(state.hub)
             reduced[-1] += load * model.hub.force + float(np.sum(carried * by_parts))
-        return _Evaluation(state, tangent, contact, self._facing_gap(contact), reduced)
+        return _Evaluation(
+            state=state,
+            bricks_force=tangent.force,
+            recovery=tangent.recovery,
+            blocks=self.numbering.blocks(tangent),
+            contact=contact,
+            mean_gap=self._facing_gap(contact),
+            imbalance=reduced,
+        )
 
     def condensed_force(self, state: _State) -> Floats:
-        """Internal nodal forces (n, 3) of the condensed parts."""
+        """Return the internal nodal forces (n, 3) of the condensed parts."""
         own = state.displacement - self.carried_motion(state.hub)[0]
         return np.asarray((self.numbering.condensed @ own.ravel()).reshape(-1, 3))
 
@@ -516,9 +542,9 @@ class _Search:
         _, motion, curvature = self.hub_motion(now.state.hub)
         _, carried, bending = self.carried_motion(now.state.hub)
         # What the hub's nodes are held by does work on the curvature of their paths; so do the condensed parts.
-        held_force = self.contact_force(now.contact, now.state.pressure) - now.tangent.force
+        held_force = self.contact_force(now.contact, now.state.pressure) - now.bricks_force
         geometric = -float(np.sum(curvature * held_force) + np.sum(bending * self.condensed_force(now.state)))
-        stiffness = self.numbering.matrix(now.tangent, motion, carried, geometric)
+        stiffness = self.numbering.matrix(now.blocks, motion, carried, geometric)
         numbers = np.flatnonzero(active)
         gradient = now.contact.gradient[numbers]
         weight = now.contact.weight[numbers]
@@ -528,11 +554,11 @@ class _Search:
         # Augmented Lagrangian on the linearised problem: penalties make the indefinite saddle point system positive
         # definite; the multipliers are then iterated with the same factor (Uzawa) until the gaps are closed exactly.
         added = _AUGMENTATION * self.model.modulus * np.sqrt(self.area[numbers]) / weight**2
-        augmented = stiffness + rows.T @ scipy.sparse.diags_array(added) @ rows
+        stiffness = (stiffness + rows.T @ scipy.sparse.diags_array(added) @ rows).tocsr()
         balance = now.imbalance - self.numbering.reduced(self.contact_force(now.contact, now.state.pressure), motion)
         pressure = np.where(active, now.state.pressure, 0.0)[numbers]
         gap = now.contact.gap[numbers]
-        with factorise(augmented.tocsr()) as factor:
+        with factorise(stiffness) as factor:
             step = factor.solve(balance + rows.T @ (pressure - added * gap))
             # Conjugate gradients on the pressures; what the penalties would add is the preconditioner.
             overlap = -(gap + rows @ step)
@@ -565,7 +591,7 @@ class _Search:
         rounding = 0.1 * self.settings.force_tolerance * load * self.largest_load
         while length >= _LEAST_STEP_LENGTH:
             try:
-                trial = self.evaluate(self._moved(now.state, step, now.tangent, length, pressure), load)
+                trial = self.evaluate(self._moved(now.state, step, now.recovery, length, pressure), load)
             except InvertedElementError as error:
                 reason = str(error)
             else:
@@ -616,6 +642,6 @@ def fixed_body_displacement(model: ContactModel) -> tuple[Floats, Floats]:
     displacement = np.zeros_like(bricks.points)
     modes = bricks.modes_at_rest()
     tangent = bricks.evaluate(displacement, modes)
-    with factorise(numbering.matrix(tangent, displacement, displacement, 0.0)) as factor:
+    with factorise(numbering.matrix(numbering.blocks(tangent), displacement, displacement, 0.0)) as factor:
         displacement.ravel()[numbering.free] = factor.solve(numbering.reduced(model.forces, displacement))
-    return displacement, bricks.stepped_modes(modes, tangent, displacement, 1.0)
+    return displacement, bricks.stepped_modes(modes, tangent.recovery, displacement, 1.0)

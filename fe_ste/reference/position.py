@@ -1,7 +1,8 @@
 """The reference analysis: full finite-element contact of a gear pair with geometric non-linearity.
 
-Both gears are open sectors of some teeth, meshed afresh at each position so that they are fine where they touch there.
-The pinion's hub is held; the gear's hub is rigid and turns about its axis under the torque. The static transmission
+Both gears are whole: the teeth in and beside contact are meshed afresh at each position, fine where they touch there,
+and the other teeth of each closed ring are condensed onto the ends of those (`fe_ste.elasticity.gear_mesh`). The
+pinion's hub is held; the gear's hub is rigid and turns about its axis under the torque. The static transmission
 error is that turning, from the position in which the rigid flanks would roll, as a length on the base circle.
 """
 
@@ -11,12 +12,14 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from fe_ste.contact.kinematics import Cells
 from fe_ste.elasticity.gear_mesh import ContactMesh, GearMesh, refined_gears
+from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.reference.finite_deformation import Bricks, von_mises
 from fe_ste.reference.mortar import Surface
@@ -34,8 +37,12 @@ from fe_ste.reference.newton import (
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.transmission_error.compliance import PairCompliance
-from fe_ste.transmission_error.search import hertz_half_width, least_contact_length, normal_load
+from fe_ste.transmission_error.search import flank_radii, hertz_half_width, least_contact_length, normal_load
 from fe_ste.transmission_error.states import ContactState
+
+Modifications: TypeAlias = tuple[FlankModification, FlankModification]
+"""Of the flanks of gear 1 and gear 2."""
+UNMODIFIED: Modifications = (FlankModification(), FlankModification())
 
 #: Mesh stiffness per face width for the first guess of the approach, N/m^2 (ISO 6336-1: 14 to 20 N/(mm um)).
 _USUAL_STIFFNESS = 14e9
@@ -120,6 +127,7 @@ def nonlinear_position(
     pmc: float,
     settings: NonlinearSettings | None = None,
     report: Callable[[Iteration], None] | None = None,
+    modifications: Modifications = UNMODIFIED,
 ) -> NonlinearPosition:
     """Analyse one position of a gear pair.
 
@@ -127,6 +135,7 @@ def nonlinear_position(
     ----------
     torque : static torque on gear 1, N m, positive
     pmc : position in the mesh cycle
+    modifications : of the flanks of gear 1 and gear 2; the elements keep the unmodified flanks, whose gap is widened
     report : called after each Newton iteration
 
     Raises
@@ -145,6 +154,7 @@ def nonlinear_position(
     half_width = hertz_half_width(pair, normal_load(pair, torque) / least_contact_length(pair))
     sectors = refined_gears(pair, settings.mesh, pmc, half_width, settings.teeth, settings.closed)
     model = gear_model(pair, torque, sectors, settings.finite_deformation)
+    model = replace(model, clearance=_removed(pair, model, modifications))
     try:
         equilibrium = solve_contact(model, settings.newton, report)
     except EquilibriumError as error:
@@ -213,6 +223,17 @@ def gear_model(
             if mesh.others is not None
         ),
     )
+
+
+def _removed(pair: GearPair, model: ContactModel, modifications: Modifications) -> Floats:
+    """Material removed from both flanks at the nodes of the loaded flanks of gear 1, m."""
+    x, y, z = model.bricks.points[model.first.nodes].T
+    axis = -pair.centre_distance if pair.gear.internal else pair.centre_distance
+    removed = np.zeros(len(z))
+    for gear, place, modification in zip((pair.pinion, pair.gear), (0.0, axis), modifications, strict=True):
+        radius = np.clip(np.hypot(x - place, y), *flank_radii(gear))
+        removed = removed + modification.gap(gear, radius, z)
+    return removed
 
 
 def _load_share(sector: GearMesh, model: ContactModel, equilibrium: Equilibrium) -> dict[int, float]:

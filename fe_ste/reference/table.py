@@ -19,16 +19,21 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from fe_ste.elasticity.gear_mesh import meshed_teeth
+from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gear_relations import inputs_that_are_given
 from fe_ste.geometry.gears import GearPair
 from fe_ste.reference.finite_deformation import von_mises
 from fe_ste.reference.newton import EquilibriumError, Iteration, convergence_table
-from fe_ste.reference.position import NonlinearPosition, NonlinearSettings, nonlinear_position
+from fe_ste.reference.position import Modifications, NonlinearPosition, NonlinearSettings, nonlinear_position
+from fe_ste.tools.arrays import Integers
 from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.tools.files import FileError
 from fe_ste.tools.stores import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import NONLINEAR_TABLE
+from fe_ste.transmission_error.compliance import pair_compliance
 from fe_ste.transmission_error.table import TableError
+from fe_ste.transmission_error.transmission_error import static_transmission_error
 
 METHOD = "non-linear finite elements"
 _UNITS = {
@@ -36,10 +41,13 @@ _UNITS = {
     "torque": ("N m", "static torque on gear 1"),
     "tooth": ("1", "tooth pair, counted ahead of pair 0, which touches at the pitch point at pmc 0"),
     "ste": ("m", "static transmission error on the transverse line of action"),
+    "superelement_ste": ("m", "the same by the superelement, on which the tables of dynamics rest"),
     "mesh_stiffness": ("N/m", "secant stiffness on the transverse line of action"),
     "line_of_action_force": ("N", "torque on gear 1 over its base radius"),
     "load_share": ("1", "part of the normal load that a tooth pair carries"),
+    "superelement_load_share": ("1", "part of the normal load that a tooth pair carries, by the superelement"),
     "max_pressure": ("Pa", "largest contact pressure where a node's whole area faces the other flank"),
+    "superelement_pressure": ("Pa", "largest contact pressure away from edges by the superelement"),
     "edge_pressure": ("Pa", "largest mean contact pressure of nodes at an edge; depends on the mesh"),
     "max_von_mises": ("Pa", "largest equivalent stress at the nodes"),
     "unknowns": ("1", "displacements of the mesh"),
@@ -47,12 +55,13 @@ _UNITS = {
     "wall_time": ("s", "of the position"),
     "converged": ("1", "whether the position was solved"),
 }
+_BY_TOOTH = ("load_share", "superelement_load_share")
 _LAYOUT = Layout(
     "table of the non-linear analysis",
     NONLINEAR_TABLE,
     {name: (name,) for name in ("pmc", "torque", "tooth")}
-    | {name: ("pmc", "torque") for name in _UNITS if name not in {"pmc", "torque", "tooth", "load_share"}}
-    | {"load_share": ("pmc", "torque", "tooth")},
+    | {name: ("pmc", "torque") for name in _UNITS if name not in {"pmc", "torque", "tooth", *_BY_TOOTH}}
+    | dict.fromkeys(_BY_TOOTH, ("pmc", "torque", "tooth")),
     ("method", "input_hash", "failures", "convergence"),
 )
 _log = logging.getLogger(__name__)
@@ -77,6 +86,8 @@ class NonlinearInput(Displayed, line=" of {pair.name!r}: {positions} positions, 
     positions: int = 10
     """Equally spaced positions of the mesh cycle."""
     settings: NonlinearSettings = field(default_factory=NonlinearSettings)
+    pinion_modification: FlankModification = field(default_factory=FlankModification)
+    gear_modification: FlankModification = field(default_factory=FlankModification)
 
     def __post_init__(self) -> None:
         """Refuse a table without positions."""
@@ -86,6 +97,11 @@ class NonlinearInput(Displayed, line=" of {pair.name!r}: {positions} positions, 
     def resolved(self) -> dict[str, Any]:
         """Return the input as plain data, with everything that has a default spelled out."""
         return {"method": METHOD, "method_version": NONLINEAR_TABLE, **asdict(self, dict_factory=inputs_that_are_given)}
+
+    @property
+    def modifications(self) -> Modifications:
+        """Of gear 1 and gear 2."""
+        return self.pinion_modification, self.gear_modification
 
     @cached_property
     def hash(self) -> str:
@@ -127,9 +143,8 @@ class NonlinearTable(Displayed):
         OSError
             If the file cannot be written.
         """
-        table = cls(_without_results(wanted))
-        if path is not None:
-            table = _stored_or(table, wanted, Path(path))
+        table = None if path is None else _stored(wanted, Path(path))
+        table = table or cls(_without_results(wanted))
         solved = table.dataset["converged"].values[:, 0]
         for number in np.flatnonzero(~solved):
             done = int(solved.sum())
@@ -196,7 +211,9 @@ class NonlinearTable(Displayed):
         pmc = number / wanted.positions
         others = [line for line in self.failures if not line.startswith(f"position {pmc:.4g} ")]
         try:
-            position = nonlinear_position(wanted.pair, wanted.torque, pmc, wanted.settings, report)
+            position = nonlinear_position(
+                wanted.pair, wanted.torque, pmc, wanted.settings, report, wanted.modifications
+            )
         except EquilibriumError as error:
             dataset.attrs["failures"] = "\n".join([*others, str(error)])
             return NonlinearTable(dataset)
@@ -247,34 +264,48 @@ def _figures(position: NonlinearPosition) -> dict[str, float]:
     }
 
 
+def _by_superelement(wanted: NonlinearInput, teeth: Integers) -> dict[str, Any]:
+    """Variables of the same curve by the superelement."""
+    compliance = pair_compliance(wanted.pair).with_modifications(*wanted.modifications)
+    curve = static_transmission_error(compliance, wanted.torque, wanted.positions)
+    curve = curve.squeeze(("centre_distance", "misalignment"), drop=True)
+    found = {"superelement_ste": curve["ste"], "superelement_pressure": curve["max_pressure"]}
+    shares = curve["load_share"].reindex(tooth=teeth, fill_value=0.0).transpose("pmc", "torque", "tooth")
+    found["superelement_load_share"] = shares
+    return {name: (values.dims, values.to_numpy()) for name, values in found.items()}
+
+
 def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     """Table of the right shape with no position solved."""
     names = ("pmc", "torque")
     shape = (wanted.positions, 1)
     counts = ("unknowns", "iterations")
-    teeth = np.arange(wanted.settings.teeth) - wanted.settings.teeth // 2
-    floats = [name for name in _UNITS if name not in {*names, *counts, "tooth", "converged", "load_share"}]
+    pmc = np.arange(wanted.positions) / wanted.positions
+    meshed = wanted.settings.teeth or max(meshed_teeth(wanted.pair, at) for at in pmc)
+    teeth = np.arange(meshed) - meshed // 2
+    beside = _by_superelement(wanted, teeth)
+    floats = [name for name in _UNITS if name not in {*names, *counts, "tooth", "converged", *_BY_TOOTH, *beside}]
     variables: dict[str, Any] = {name: (names, np.full(shape, np.nan)) for name in floats}
     variables |= {name: (names, np.zeros(shape, dtype=np.int64)) for name in counts}
     variables["converged"] = (names, np.zeros(shape, dtype=np.bool_))
     variables["load_share"] = ((*names, "tooth"), np.full((*shape, len(teeth)), np.nan))
+    variables |= beside
     axes = {
-        "pmc": np.arange(wanted.positions) / wanted.positions,
+        "pmc": pmc,
         "torque": np.array([wanted.torque]),
         "tooth": teeth,
     }
     dataset = xr.Dataset(variables, axes)
     for name, (unit, meaning) in _UNITS.items():
         dataset[name].attrs = {"units": unit, "long_name": meaning}
+    bodies = f"whole gears, {meshed} teeth meshed" if wanted.settings.closed else f"open sectors of {meshed} teeth"
     packages = ("exugear", "numpy", "scipy", "scikit-fem", "numba")
     dataset.attrs = {
         "title": f"static transmission error of gear pair {wanted.pair.name}, reference analysis",
         "pair": wanted.pair.name,
-        "method": f"{METHOD} on open sectors of {wanted.settings.teeth} teeth: 8-node hexahedra with incompatible "
-        "modes, mortar contact without friction, exact multipliers, "
-        + ("finite deformation" if wanted.settings.finite_deformation else "small strains"),
-        "boundary": "pinion hub held; gear hub (or ring's outer rim) rigid and turning about its axis only; free cut "
-        "faces",
+        "method": f"{METHOD} on {bodies}: 8-node hexahedra with incompatible modes, mortar contact without friction, "
+        "exact multipliers, " + ("finite deformation" if wanted.settings.finite_deformation else "small strains"),
+        "boundary": "pinion hub held; gear hub (or ring's outer rim) rigid and turning about its axis only",
         "input": json.dumps(wanted.resolved(), sort_keys=True),
         "input_hash": wanted.hash,
         "method_version": NONLINEAR_TABLE,
@@ -285,12 +316,12 @@ def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     return dataset
 
 
-def _stored_or(table: NonlinearTable, wanted: NonlinearInput, path: Path) -> NonlinearTable:
-    """Return the table in a file if it is of the same input, else the given one."""
+def _stored(wanted: NonlinearInput, path: Path) -> NonlinearTable | None:
+    """Table in a file if it is of the same input."""
     if not path.exists():
-        return table
+        return None
     try:
         return NonlinearTable.open(path, wanted)
     except TableError as error:
         _log.warning("%s; its positions are computed again", error)
-        return table
+        return None

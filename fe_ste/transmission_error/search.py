@@ -333,7 +333,7 @@ def _modification_gap(compliance: PairCompliance, cells: Cells) -> Floats:
     gears = (compliance.pair.pinion, compliance.pair.gear)
     for gear, roll, modification in zip(gears, (cells.roll, cells.gear_roll), compliance.modifications, strict=True):
         radius = gear.base_radius * np.sqrt(1.0 + roll**2)
-        gap = gap + modification.gap(gear, np.clip(radius, *_flank_radii(gear)), axial)
+        gap = gap + modification.gap(gear, np.clip(radius, *flank_radii(gear)), axial)
     return gap
 
 
@@ -374,7 +374,8 @@ def unloaded_states(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
     return xr.Dataset({n: (names, v, {"units": "m", "long_name": meaning[n]}) for n, v in values.items()})
 
 
-def _flank_radii(gear: Gear) -> tuple[float, float]:
+def flank_radii(gear: Gear) -> tuple[float, float]:
+    """Return the smallest and the largest radius of a gear's flank, m."""
     return min(gear.form_radius, gear.tip_radius), max(gear.form_radius, gear.tip_radius)
 
 

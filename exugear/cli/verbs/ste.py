@@ -165,7 +165,11 @@ def _compute_references(
     """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
     from exugear.project import default_folder
     from exugear.results.folder import keep_case, time_noted
-    from exugear.system.tooth_mesh.reference_tables import requested_references, summarise_reference
+    from exugear.system.tooth_mesh.reference_tables import (
+        doubts_of_references,
+        requested_references,
+        summarise_reference,
+    )
 
     folder = out or default_folder(case)
     requests = requested_references(gearbox, folder, names, positions)
@@ -180,11 +184,14 @@ def _compute_references(
     if as_json:
         print_json({"case": str(case), "tables": summaries})
     else:
-        print_table("Static transmission error, non-linear finite elements", [_ste_row(row) for row in summaries])
+        print_table("Static transmission error, non-linear finite elements", [_reference_row(row) for row in summaries])
         say(f"Tables in {folder / 'tables'}")
     failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
-    if failures:
-        raise FailedError("\n".join(["positions that are not solved:", *failures]))
+    doubts = doubts_of_references(summaries)
+    faults = ["positions that are not solved:", *failures] if failures else []
+    faults += ["both methods do not agree:", *doubts] if doubts else []
+    if faults:
+        raise FailedError("\n".join(faults))
 
 
 def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -> NonlinearTable:
@@ -268,19 +275,38 @@ def _tell_tables(
 
 
 def _ste_row(summary: dict[str, Any]) -> dict[str, str]:
-    def shown(key: str, form: str, factor: float = 1.0) -> str:
-        if summary.get(key) is None:
-            return "-"
-        return format(factor * summary[key], form)
-
-    solved = summary["states"] - summary["not_converged"]
     return {
         "pair": summary["pair"],
-        "torque 1\nN m": shown("torque_gear_1_N_m", ".1f"),
-        "mean\nµm": shown("ste_mean_um", ".2f"),
-        "peak-peak\nµm": shown("ste_peak_to_peak_um", ".3f"),
-        "stiffness\nMN/m": shown("mesh_stiffness_mean_N_per_m", ".1f", 1e-6),
-        "pressure\nMPa": shown("max_pressure_MPa", ".0f"),
-        "pitch point\nMPa": shown("pitch_point_pressure_MPa", ".0f"),
-        "states\nsolved": f"{solved}/{summary['states']}",
+        "torque 1\nN m": _shown(summary, "torque_gear_1_N_m", ".1f"),
+        "mean\nµm": _shown(summary, "ste_mean_um", ".2f"),
+        "peak-peak\nµm": _shown(summary, "ste_peak_to_peak_um", ".3f"),
+        "stiffness\nMN/m": _shown(summary, "mesh_stiffness_mean_N_per_m", ".1f", 1e-6),
+        "pressure\nMPa": _shown(summary, "max_pressure_MPa", ".0f"),
+        "pitch point\nMPa": _shown(summary, "pitch_point_pressure_MPa", ".0f"),
+        "states\nsolved": _solved(summary),
     }
+
+
+def _reference_row(summary: dict[str, Any]) -> dict[str, str]:
+    """Both methods side by side."""
+    return {
+        "pair": summary["pair"],
+        "torque 1\nN m": _shown(summary, "torque_gear_1_N_m", ".1f"),
+        "mean\nµm": _shown(summary, "ste_mean_um", ".2f"),
+        "by tables\nµm": _shown(summary, "superelement_mean_um", ".2f"),
+        "differ\n%": _shown(summary, "difference_of_means_percent", "+.1f"),
+        "peak-peak\nµm": _shown(summary, "ste_peak_to_peak_um", ".3f"),
+        "by tables\nµm ": _shown(summary, "superelement_peak_to_peak_um", ".3f"),
+        "pressure\nMPa": _shown(summary, "max_pressure_MPa", ".0f"),
+        "states\nsolved": _solved(summary),
+    }
+
+
+def _shown(summary: dict[str, Any], key: str, form: str, factor: float = 1.0) -> str:
+    if summary.get(key) is None:
+        return "-"
+    return format(factor * summary[key], form)
+
+
+def _solved(summary: dict[str, Any]) -> str:
+    return f"{summary['states'] - summary['not_converged']}/{summary['states']}"

@@ -25,7 +25,8 @@ from exugear.cli.console import BadInputError, FailedError, exit_codes, interrup
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.tables import requested_tables
 from fe_ste.contact.kinematics import ContactSettings
-from fe_ste.elasticity.hexmesh import ContactMesh, MeshSettings
+from fe_ste.elasticity.gear_mesh import ContactMesh
+from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.reference.position import NonlinearSettings
 from fe_ste.reference.table import NonlinearInput
 from fe_ste.transmission_error.table import MeshTable, TableInput

@@ -8,14 +8,8 @@ import numpy as np
 import pytest
 
 from fe_ste.elasticity.bricks import brick_gradients
-from fe_ste.elasticity.hexmesh import (
-    ContactMesh,
-    MeshSettings,
-    OpenSector,
-    contact_line_rolls,
-    placed_sectors,
-    refined_sectors,
-)
+from fe_ste.elasticity.gear_mesh import ContactMesh, GearMesh, contact_line_rolls, placed_gears, refined_gears
+from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear, GearPair
 
 UNIFORM = MeshSettings(layers=3, flank=6, thickness=2, fillet=1, root=1, rim=6)
@@ -23,7 +17,7 @@ COARSE = ContactMesh(layers=4, contact_elements=3, growth=0.8, thickness=5, fill
 HALF_WIDTH = 0.3e-3
 
 
-def roll_on_gear_2(pair: GearPair, sector: OpenSector, pmc: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def roll_on_gear_2(pair: GearPair, sector: GearMesh, pmc: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Roll angle and axial place of the flank nodes of gear 2, and which tooth's involute they lie on."""
     x, y, z = sector.points[np.unique(sector.facets)].T
     sense = -1 if pair.gear.internal else 1
@@ -38,9 +32,9 @@ def roll_on_gear_2(pair: GearPair, sector: OpenSector, pmc: float) -> tuple[np.n
 def test_flanks_stand_in_the_conjugate_position(any_grc_pair, refined):
     pmc = 0.3
     if refined:
-        _, two = refined_sectors(any_grc_pair, COARSE, 3, pmc, HALF_WIDTH)
+        _, two = refined_gears(any_grc_pair, COARSE, pmc, HALF_WIDTH, 3, closed=False)
     else:
-        _, two = placed_sectors(any_grc_pair, UNIFORM, 3, pmc)
+        _, two = placed_gears(any_grc_pair, UNIFORM, 3, pmc, closed=False)
     _, _, teeth = roll_on_gear_2(any_grc_pair, two, pmc)
     # Nodes lie on the involutes to rounding: three teeth, whole pitches apart.
     assert np.abs(teeth - np.round(teeth)).max() < 1e-9
@@ -65,7 +59,7 @@ def test_flank_nodes_of_gear_2_gather_about_the_contact_line_of_each_layer(name,
     twins = GearPair(name="twins", pinion=TWIN, gear=TWIN, centre_distance=150e-3)
     pair = twins if name == "twins" else request.getfixturevalue(name)
     pmc, base, checked = 0.2, pair.gear.base_radius, 0
-    sector = refined_sectors(pair, COARSE, 3, pmc, HALF_WIDTH)[1]
+    sector = refined_gears(pair, COARSE, pmc, HALF_WIDTH, 3, closed=False)[1]
     roll, axial, tooth = roll_on_gear_2(pair, sector, pmc)
     tooth = np.round(tooth) * (1 if pair.gear.internal else -1)  # teeth of an external gear 2 count backwards
     for number in (-1, 0):
@@ -84,8 +78,8 @@ def test_flank_nodes_of_gear_2_gather_about_the_contact_line_of_each_layer(name,
     assert checked >= 5
 
 
-def test_refined_sectors_are_one_sound_mesh(any_grc_pair):
-    for sector in refined_sectors(any_grc_pair, COARSE, 3, 0.6, HALF_WIDTH):
+def test_refined_gears_are_one_sound_mesh(any_grc_pair):
+    for sector in refined_gears(any_grc_pair, COARSE, 0.6, HALF_WIDTH, 3, closed=False):
         # Raises where an element folds; a crack between sectors would leave two nodes at one place.
         brick_gradients(sector.points, sector.hexahedra)
         assert len(np.unique(np.round(sector.points, 10), axis=0)) == len(sector.points)
@@ -94,7 +88,7 @@ def test_refined_sectors_are_one_sound_mesh(any_grc_pair):
 
 
 def test_flank_facets_face_outward(any_grc_pair):
-    for sector in refined_sectors(any_grc_pair, COARSE, 3, 0.0, HALF_WIDTH):
+    for sector in refined_gears(any_grc_pair, COARSE, 0.0, HALF_WIDTH, 3, closed=False):
         corners = sector.points[sector.facets]
         normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
         inward = sector.points[sector.hexahedra[sector.contact_faces[:, 0]]].mean(axis=1) - corners.mean(axis=1)

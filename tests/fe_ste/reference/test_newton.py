@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fe_ste.elasticity.hexmesh import HEXAHEDRON_FACES
+from fe_ste.elasticity.gear_mesh import HEXAHEDRON_FACES
 from fe_ste.geometry.gears import Material
 from fe_ste.reference.finite_deformation import Bricks
 from fe_ste.reference.mortar import Surface

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from fe_ste.elasticity.hexmesh import ContactMesh
+from fe_ste.elasticity.gear_mesh import ContactMesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.reference.newton import EquilibriumError, NewtonSettings
 from fe_ste.reference.position import NonlinearSettings, nonlinear_position

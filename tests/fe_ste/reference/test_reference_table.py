@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fe_ste.elasticity.hexmesh import ContactMesh
+from fe_ste.elasticity.gear_mesh import ContactMesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.reference.newton import NewtonSettings
 from fe_ste.reference.position import NonlinearSettings

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from fe_ste.contact.kinematics import ContactSettings
-from fe_ste.elasticity.hexmesh import ContactMesh, MeshSettings
+from fe_ste.elasticity.gear_mesh import ContactMesh
+from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.pictures.teeth import draw_contact_stress
 from fe_ste.reference.position import NonlinearSettings, nonlinear_position, stress_of_position, stress_of_state
