@@ -1,4 +1,4 @@
-"""Static transmission error by the superelement, by CalculiX and by the non-linear analysis on the same open sectors.
+"""Static transmission error by the superelement, by CalculiX and by the non-linear analysis on the same meshes.
 
 Run ``python benchmarks/calculix/cross_check.py`` for all cases, or with names of cases; it renews their entries
 in ``results.json``. See README.md.
@@ -21,7 +21,7 @@ from typing import Any
 from ccx_model import CalculixSettings, run_calculix, write_input
 
 from fe_ste.contact.kinematics import ContactSettings
-from fe_ste.elasticity.gear_mesh import placed_gears
+from fe_ste.elasticity.gear_mesh import GearMesh, placed_gears, whole_ring
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.reference.newton import solve_contact
@@ -68,7 +68,16 @@ def internal_pair() -> GearPair:
     return GearPair(name="internal", pinion=planet, gear=ring, centre_distance=308e-3)
 
 
-PAIRS = {"spur": spur_pair, "helical": helical_pair, "internal": internal_pair}
+def deep_pair() -> GearPair:
+    """Spur gears of 15 and 23 teeth, module 3 mm, 10 mm wide, held at 20 mm diameter: an open sector would bend."""
+    pinion, wheel = (
+        Gear(name=name, teeth=teeth, normal_module=3e-3, face_width=10e-3, held_diameter=20e-3, profile_shift=shift)
+        for name, teeth, shift in (("pinion", 15, 0.3), ("wheel", 23, -0.3))
+    )
+    return GearPair(name="deep", pinion=pinion, gear=wheel, centre_distance=57e-3)
+
+
+PAIRS = {"spur": spur_pair, "helical": helical_pair, "internal": internal_pair, "deep": deep_pair}
 
 
 @dataclass(frozen=True)
@@ -91,13 +100,15 @@ class Case:
     pmc: float
     mesh: MeshSettings
     calculix: CalculixSettings = CalculixSettings()
+    others: MeshSettings | None = None
+    """Of the other teeth of whole gears; None for open sectors."""
 
 
 def superelement(case: Case, contact: ContactSettings | None = None) -> dict[str, float]:
     """Solve a case by the superelement: static transmission error and processor times."""
     pair = PAIRS[case.pair]()
     started = time.process_time()
-    compliance = pair_compliance(pair, case.mesh, contact, open_teeth=TEETH)
+    compliance = pair_compliance(pair, case.mesh, contact, open_teeth=None if case.others else TEETH)
     offline = time.process_time() - started
     started = time.process_time()
     state = contact_state(compliance, case.torque, case.pmc)
@@ -105,10 +116,17 @@ def superelement(case: Case, contact: ContactSettings | None = None) -> dict[str
     return {"ste_um": 1e6 * ste, "offline_cpu_s": offline, "position_cpu_s": time.process_time() - started}
 
 
+def _gears(case: Case) -> tuple[GearMesh, GearMesh]:
+    """Both gears in their places; of whole ones the other teeth are condensed."""
+    whole = case.others is not None
+    return placed_gears(PAIRS[case.pair](), case.mesh, TEETH, case.pmc, closed=whole, others=case.others)
+
+
 def calculix(case: Case, expected: float, folder: Path, threads: int = 1) -> dict[str, float | int | str]:
     """Solve a case by CalculiX; `expected` (m) only sets how far the first step closes the flanks."""
     pair = PAIRS[case.pair]()
-    sectors = placed_gears(pair, case.mesh, TEETH, case.pmc, closed=False)
+    one, two = _gears(case)
+    sectors = (whole_ring(one), whole_ring(two)) if case.others else (one, two)
     path = folder / "pair.inp"
     write_input(path, pair, sectors, case.torque, expected, case.calculix)
     result = run_calculix(path, pair, 3 * sum(len(sector.points) for sector in sectors), threads)
@@ -127,8 +145,7 @@ def nonlinear(case: Case) -> dict[str, float | int]:
     """Solve a case by the program's own full non-linear analysis, on the mesh that CalculiX gets."""
     pair = PAIRS[case.pair]()
     started, spent = time.perf_counter(), time.process_time()
-    sectors = placed_gears(pair, case.mesh, TEETH, case.pmc, closed=False)
-    model = gear_model(pair, case.torque, sectors, case.calculix.large_displacements)
+    model = gear_model(pair, case.torque, _gears(case), case.calculix.large_displacements)
     found = solve_contact(model)
     return {
         "ste_um": 1e6 * found.hub,
@@ -152,7 +169,7 @@ def compare(case: Case, threads: int = 1) -> dict[str, Any]:
         theirs = calculix(case, 1e-6 * ours["ste_um"], Path(folder), threads)
     entry = {
         "case": dataclasses.asdict(case),
-        "open_teeth": TEETH,
+        "open_teeth": None if case.others else TEETH,
         "calculix": theirs,
         "nonlinear": nonlinear(case),
         "machine": f"{platform.system()} {platform.machine()}",
@@ -166,6 +183,8 @@ def _mesh(layers: int, flank: int) -> MeshSettings:
 
 _COARSE = _mesh(5, 16)
 _FINE = MeshSettings(layers=4, flank=32, thickness=8, fillet=6, root=5, rim=12, grading=6.0)
+#: Teeth that are far from the contact.
+_OTHERS = MeshSettings(layers=4, flank=4, thickness=2, fillet=6, root=5, rim=12)
 _LARGE = CalculixSettings(large_displacements=True)
 _SOFT = CalculixSettings(contact_stiffness=50.0)
 
@@ -185,6 +204,7 @@ CASES = {
     "helical 0.5 flank 16": Case("helical", 5400.0, 0.5, _mesh(6, 16)),
     "helical 0.5 flank 24": Case("helical", 5400.0, 0.5, _mesh(9, 24)),
     "internal 0 flank 16": Case("internal", 10000.0, 0.0, _mesh(6, 16)),
+    "deep 0 whole gears": Case("deep", 100.0, 0.0, _FINE, others=_OTHERS),
     "internal 0 flank 32": Case("internal", 10000.0, 0.0, _mesh(6, 32)),
 }
 

@@ -172,17 +172,24 @@ def _placements(pair: GearPair, pmc: float) -> tuple[_Placement, _Placement]:
 
 
 def placed_gears(
-    pair: GearPair, settings: MeshSettings, teeth: int, pmc: float, closed: bool = True
+    pair: GearPair,
+    settings: MeshSettings,
+    teeth: int,
+    pmc: float,
+    closed: bool = True,
+    others: MeshSettings | None = None,
 ) -> tuple[GearMesh, GearMesh]:
-    """Both gears in the conjugate position `pmc`, every tooth meshed alike.
+    """Both gears in the conjugate position `pmc`, every meshed tooth alike.
 
     Parameters
     ----------
     teeth : odd number of teeth that are meshed; tooth pair 0, in the middle, touches at the pitch point for ``pmc = 0``
     closed : False leaves the other teeth away
+    others : of the teeth that are condensed, as `settings` by default; on the cut faces both must agree
     """
+    condensed = (others or settings) if closed else None
     pinion, gear = (
-        _gear_of_sectors(placement, [sector_mesh(placement.gear, settings)] * teeth, settings if closed else None)
+        _gear_of_sectors(placement, [sector_mesh(placement.gear, settings)] * teeth, condensed)
         for placement in _placements(pair, pmc)
     )
     return pinion, gear
@@ -399,6 +406,8 @@ def _other_teeth(
     beside = first_angle - gear.angular_pitch / 2
     frames = [_face_frame(sector, beside + turn) for turn in (0.0, count * gear.angular_pitch)]
     frame = scipy.linalg.block_diag(*frames)
+    if len(frame) != 3 * len(nodes):
+        raise ValueError(f"gear {gear.name}: the condensed teeth have another mesh on the cut faces than those meshed")
     stiffness = frame @ chain.whole(signs) @ frame.T
     by_layer = np.arange(len(nodes)).reshape(2, -1, layers).transpose(0, 2, 1).ravel()
     unknowns = (3 * by_layer[:, None] + np.arange(3)).ravel()

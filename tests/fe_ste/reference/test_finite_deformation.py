@@ -32,7 +32,7 @@ def with_modes_at_rest(bricks: Bricks, displacement: np.ndarray) -> tuple[np.nda
     modes = bricks.modes_at_rest()
     for _ in range(20):
         tangent = bricks.evaluate(displacement, modes)
-        modes = bricks.stepped_modes(modes, tangent, np.zeros_like(displacement), 1.0)
+        modes = bricks.stepped_modes(modes, tangent.recovery, np.zeros_like(displacement), 1.0)
     return modes, bricks.evaluate(displacement, modes)
 
 

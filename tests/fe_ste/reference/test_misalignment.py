@@ -35,7 +35,7 @@ def compliance():
 def load_by_full_contact(misalignment: float) -> tuple[np.ndarray, np.ndarray]:
     """Places along the face (m) and normal loads there (N) at the pitch point, gear 2 tilted in the plane of action."""
     half_width = hertz_half_width(PAIR, normal_load(PAIR, TORQUE) / least_contact_length(PAIR))
-    one, two = refined_gears(PAIR, MESH, 0.0, half_width, 3, closed=False)
+    one, two = refined_gears(PAIR, MESH, 0.0, half_width, 3)
     pitch = np.array([PAIR.pinion.reference_radius, 0.0, 0.0])
     # The normal of flank 1 at its contact says which way opens the gap.
     facet = one.points[one.facets].mean(axis=1)

@@ -1,4 +1,4 @@
-"""Open sectors in their places, uniform and refined about the contact lines."""
+"""Both gears in their places, uniform and refined about the contact lines."""
 
 from __future__ import annotations
 
