@@ -43,14 +43,16 @@ compiling=$$!; $(EXUGEAR) ste $(CASE) --out $(1) $(2); code=$$?; wait $$compilin
 endef
 
 # The inertia sets side by side: each runs up both variants, takes their modes and the steady response on bearings, one
-# process after the other; the first shows its progress, the others speak when all are done. Then the report, which
-# compares them, and whose headline is that of the steady response.
+# process after the other; the first shows its progress, the others speak when all are done. The beginning of the first
+# run-up on bearings is integrated by Exudyn, too. Then the report, which compares all of them, and whose headline is
+# that of the steady response.
 #   $(call dynamics,FOLDER,INERTIA SETS,OPTIONS OF run)
 define dynamics
 @mkdir -p $(1)
 @of_set() { \
 	for variant in rigid bushing; do \
-		$(EXUGEAR) run $(CASE) --variant $$variant --inertias $$1 --out $(1) $(3) || return; \
+		compared=; test $$variant-$$1 = bushing-$(firstword $(2)) && compared="--compare-exudyn 0.2"; \
+		$(EXUGEAR) run $(CASE) --variant $$variant --inertias $$1 --out $(1) $(3) $$compared || return; \
 	done; \
 	for variant in rigid bushing; do \
 		$(EXUGEAR) modes $(CASE) --variant $$variant --inertias $$1 --out $(1) >$(1)/modes-$$variant-$$1.txt || return; \

@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from exugear.life.rating.sheet import RatingSheet
     from exugear.life.static_balance import StaticBalance
     from exugear.report.writer import Report
+    from exugear.results.solver_comparison import SolverComparison
     from exugear.steady.settings import SteadySettings
 
 Figures = dict[tuple[str, str, str], dict[str, float]]
@@ -483,6 +484,27 @@ class Project(Displayed):
         bodies = self.bodies()
         self.keep_case()
         return simulate(self.gearbox, self.choice, stiffness, self.folder, bodies=bodies, **options)
+
+    def compare_with_exudyn(self, duration: float, **options: Any) -> SolverComparison:
+        """Integrate the beginning of the run by Exudyn, too, and compare it with the run that is there.
+
+        Parameters
+        ----------
+        duration : simulated time, s
+        options : as of `exugear.transient.runup.simulate`
+
+        Raises
+        ------
+        FileError
+            If the folder holds no run of the compiled solver from the same input.
+        """
+        from exugear.results.run_file import FINAL_NAME
+        from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
+
+        beside = self.folder / EXUDYN_FOLDER
+        given = {"duration": duration, "solver": "exudyn", "bodies": self.bodies(), **options}
+        exudyn = simulate(self.gearbox, self.choice, self.stiffness(), beside, **given)
+        return compare_solvers(self.run_directory / FINAL_NAME, exudyn.path)
 
     def report(self, near: float | None = None, tell: Callable[[str], None] | None = None) -> Report:
         """Write the report of all that the folder holds: see `exugear.report.writer.write_report`."""

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from exugear.life.load_spectrum.counted import CountedLoads
     from exugear.life.rating.sheet import RatingSheet
+    from exugear.results.solver_comparison import SolverComparison
     from exugear.steady.settings import SteadySettings
 
 
@@ -131,6 +132,15 @@ class WatchedProject(Project):
 
             row(f"{variant}: start in balance")
             return super().run(progress=show, **options)
+
+    def compare_with_exudyn(self, duration: float, **options: Any) -> SolverComparison:
+        """Compare the beginning of the run with Exudyn."""
+        with self.bars.row() as row:
+
+            def show(at: Progress) -> None:
+                row(f"Exudyn: {at.simulated:.3f} of {at.total:g} s", at.simulated, at.total)
+
+            return super().compare_with_exudyn(duration, progress=show, **options)
 
     def checked_loads(self, progress: Callable[[int, int], None] | None = None) -> CountedLoads:
         """Read the loads of a life."""

@@ -14,12 +14,14 @@ import xarray as xr
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import choice_of, words_of
 from exugear.report.findings.verdicts import run_figures
-from exugear.report.material import Material, Part
+from exugear.report.material import Axis, Curve, Material, Part, chart, model_name
 from exugear.report.web import html as pieces
 from exugear.report.web.document import libraries, licences
 from exugear.results.folder import times_spent
 from exugear.results.run_file import verdict_of
+from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
 from exugear.results.spectra.run_spectra import VariantRun
+from fe_ste.tools.files import FileError
 
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
 """Packages whose versions a report names."""
@@ -63,6 +65,8 @@ GLOSSARY = {
 
 def trust_section(material: Material) -> Part:
     """List what results rest on."""
+    charts: dict[str, Any] = {}
+    compared = "".join(_beside_exudyn(material, run, charts) for run in material.results.runs)
     parts = [
         pieces.folded("Assumptions", _assumptions(material), opened=True),
         pieces.folded("What was run, and how well its energy adds up", _runs(material)),
@@ -72,8 +76,10 @@ def trust_section(material: Material) -> Part:
         pieces.folded("Words of this page", _glossary()),
         pieces.folded("Libraries in this page, and their licences", _licences()),
     ]
+    if compared:
+        parts.insert(2, pieces.folded("The same run by Exudyn", compared))
     html = pieces.section("What was assumed, and where it comes from", *parts, name="trust")
-    return Part(html, {}, "Trust", "trust")
+    return Part(html, {"charts": charts}, "Trust", "trust")
 
 
 def _assumptions(material: Material) -> str:
@@ -125,6 +131,32 @@ def _runs(material: Material) -> str:
     if steady:
         tables.append(pieces.table(steady, ("steady response",), caption="Steady responses", name="responses"))
     return "".join(tables) or pieces.paragraph("Nothing was run.")
+
+
+def _beside_exudyn(material: Material, run: VariantRun, charts: dict[str, Any]) -> str:
+    """Say how far the compiled solver is from Exudyn where the beginning of the run was integrated by both."""
+    name = material.context.name_of(run.path)
+    path = material.context.folder / EXUDYN_FOLDER / name
+    if not path.exists():
+        return ""
+    try:
+        found = compare_solvers(run.path, path)
+    except FileError as error:
+        material.context.notes.left_out.append(str(error))
+        return ""
+    middle = found.overall[1].mean()
+    own, other = (1e6 * (values - middle) for values in found.overall)
+    html, data = chart(
+        f"exudyn-{model_name(choice_of(run.attributes))}",
+        f"Overall transmission error by both solvers, {words_of(choice_of(run.attributes))}",
+        "Change about the mean of Exudyn's.",
+        found.words,
+        [Curve("compiled solver", found.time, own), Curve("Exudyn", found.time, other, "dashed")],
+        [Axis("time / s"), Axis("overall transmission error / µm")],
+        material.arrays,
+    )
+    charts.update(data)
+    return pieces.paragraph(found.words) + html
 
 
 def _response_row(data: xr.Dataset) -> dict[str, object]:

@@ -68,13 +68,16 @@ class ContactMesh:
 
     def refined(self, factor: float) -> ContactMesh:
         """Return the settings with every element size divided by about `factor`."""
+        thickness = self.thickness
+        if thickness is not None:
+            thickness = math.ceil(thickness * factor)
         return replace(
             self,
             layers=math.ceil(self.layers * factor),
             contact_elements=self.contact_elements * factor,
             growth=self.growth / factor,
             growth_through=self.growth_through / factor,
-            thickness=None if self.thickness is None else math.ceil(self.thickness * factor),
+            thickness=thickness,
             fillet=math.ceil(self.fillet * factor),
             root=math.ceil(self.root * factor),
             rim=math.ceil(self.rim * factor),
@@ -142,8 +145,10 @@ class GearMesh(Displayed):
         nodes = len(self.points)
         elements = len(self.hexahedra)
         faces = len(self.tooth)
-        others = f", {self.others.count} teeth condensed" if self.others else ""
-        return f": {nodes} nodes, {elements} hexahedra, {faces} contact faces{others}"
+        line = f": {nodes} nodes, {elements} hexahedra, {faces} contact faces"
+        if self.others is None:
+            return line
+        return f"{line}, {self.others.count} teeth condensed"
 
 
 @dataclass(frozen=True)
@@ -187,9 +192,9 @@ def placed_gears(
     closed : False leaves the other teeth away
     others : of the teeth that are condensed, as `settings` by default; on the cut faces both must agree
     """
-    condensed = (others or settings) if closed else None
+    condensed = others or settings
     pinion, gear = (
-        _gear_of_sectors(placement, [sector_mesh(placement.gear, settings)] * teeth, condensed)
+        _gear_of_sectors(placement, [sector_mesh(placement.gear, settings)] * teeth, condensed, closed)
         for placement in _placements(pair, pmc)
     )
     return pinion, gear
@@ -212,7 +217,7 @@ def refined_gears(
         others = settings.tooth(placement.gear, settings.far_flank, half_width)
         numbers = placement.sense * (np.arange(count) - count // 2)
         meshes = [_refined_tooth(pair, placement, settings, int(number), pmc, half_width) for number in numbers]
-        gears.append(_gear_of_sectors(placement, meshes, others if closed else None))
+        gears.append(_gear_of_sectors(placement, meshes, others, closed))
     return gears[0], gears[1]
 
 
@@ -307,7 +312,7 @@ def _graded(count: int, first: float) -> Floats:
     return np.asarray(np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum())
 
 
-def _gear_of_sectors(placement: _Placement, meshes: list[SectorMesh], others: MeshSettings | None) -> GearMesh:
+def _gear_of_sectors(placement: _Placement, meshes: list[SectorMesh], others: MeshSettings, closed: bool) -> GearMesh:
     """Join tooth sectors, counted counter-clockwise, with the middle one at the gear's angle, and the other teeth."""
     gear = placement.gear
     numbers = np.arange(len(meshes)) - len(meshes) // 2
@@ -347,7 +352,7 @@ def _gear_of_sectors(placement: _Placement, meshes: list[SectorMesh], others: Me
         axis_x=placement.axis_x,
     )
     count = gear.teeth - len(meshes)
-    if others is None or count == 0:
+    if not closed or count == 0:
         return result
     ends = [meshes[-1].cut_nodes(1) + first_point[len(meshes) - 1], meshes[0].cut_nodes(-1)]
     first_angle = placement.angle + (numbers[-1] + 1) * gear.angular_pitch
@@ -374,7 +379,8 @@ def whole_ring(mesh: GearMesh) -> GearMesh:
         + [_turned(sector.points, others.first_angle + number * pitch) + shift for number in range(others.count)]
     )
     target = np.arange(len(points))
-    behind, ahead = sector.cut_nodes(1), sector.cut_nodes(-1)
+    behind = sector.cut_nodes(1)
+    ahead = sector.cut_nodes(-1)
     target[first_point[0] + ahead], last = np.split(others.nodes, 2)
     for number in range(1, others.count):
         target[first_point[number] + ahead] = first_point[number - 1] + behind

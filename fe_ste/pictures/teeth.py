@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from fe_ste.elasticity.gear_mesh import GearMesh
+from fe_ste.elasticity.gear_mesh import GearMesh, whole_ring
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats, Integers, Pixels
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 #: Colours of the two gears of a pair.
 PINION_COLOUR = "#B9C4D0"
 GEAR_COLOUR = "#D9C9A8"
+CONDENSED_COLOUR = "#F2F2F0"
 _PRESSURE_MAP: Final = "inferno_r"
 
 
@@ -55,6 +56,64 @@ class HexahedraMesh(Displayed, line=": {points!n} nodes, {hexahedra!n} hexahedra
 
         grid = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: self.hexahedra}, self.points)
         return grid.extract_surface(algorithm="geometry")
+
+
+def draw_gear_meshes(
+    gears: Sequence[GearMesh], path: str | Path | None = None, *, title: str = "", size: tuple[int, int] = (1100, 1100)
+) -> Figure:
+    """Draw the meshes of both gears of the non-linear analysis: teeth that are meshed, and those that are condensed.
+
+    Parameters
+    ----------
+    gears : gear 1 and gear 2, whole, see `fe_ste.elasticity.gear_mesh`
+    path : where to write the picture
+    title : name of the pair
+    size : width and height of each of both views, pixels
+
+    Returns
+    -------
+    on the left both gears from the front, on the right the teeth in contact
+
+    Raises
+    ------
+    RenderingError
+        If this machine cannot render off-screen; the message names what to install.
+    ValueError
+        If a gear is an open sector.
+    """
+    from matplotlib.patches import Patch
+
+    parts = []
+    for gear, colour in zip(gears, (PINION_COLOUR, GEAR_COLOUR), strict=True):
+        ring = whole_ring(gear)
+        meshed = ring.brick_tooth <= gear.brick_tooth.max()
+        parts += [(HexahedraMesh(ring.points, ring.hexahedra[meshed]).surface(), colour)]
+        parts += [(HexahedraMesh(ring.points, ring.hexahedra[~meshed]).surface(), CONDENSED_COLOUR)]
+    flanks = gears[0].points[gears[0].facets[gears[0].tooth == 0]].reshape(-1, 3)
+    front = float(gears[0].points[:, 2].max())
+    middle = np.array([*flanks.mean(axis=0)[:2], front])
+    extent = np.concatenate([part.points for part, _ in parts])[:, :2]
+    centre = np.array([*(extent.min(axis=0) + np.ptp(extent, axis=0) / 2), front])
+    height = float(np.ptp(flanks[:, :2], axis=0).max())
+    views = []
+    for focus, scale in ((centre, 0.52 * float(np.ptp(extent, axis=0).max())), (middle, 1.2 * height)):
+        with offscreen_plotter(*size) as plotter:
+            for surface, colour in parts:
+                plotter.add_mesh(surface, color=colour, show_edges=True, edge_color="#555555", line_width=1.0)
+            plotter.camera_position = [focus + np.array([0.0, 0.0, 10.0 * scale]), focus, (0.0, 1.0, 0.0)]
+            plotter.camera.parallel_scale = scale
+            plotter.renderer.ResetCameraClippingRange()
+            views.append(rendered_image(plotter))
+    with drawing_style():
+        figure = new_figure(9.0, 4.9)
+        for axes, (image, pixel), words in zip(
+            figure.subplots(1, 2), views, (f"{title}: whole gears".lstrip(": "), "teeth in contact"), strict=True
+        ):
+            place_picture(axes, image, pixel, words)
+        colours = {"pinion, meshed": PINION_COLOUR, "gear, meshed": GEAR_COLOUR, "condensed": CONDENSED_COLOUR}
+        patches = [Patch(facecolor=shade, edgecolor="#555555", label=label) for label, shade in colours.items()]
+        figure.legend(handles=patches, loc="outside lower center", ncols=3)
+        return finish_figure(figure, path)
 
 
 def draw_tooth_contact(

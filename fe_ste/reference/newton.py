@@ -148,8 +148,8 @@ def convergence_table(iterations: Sequence[Iteration]) -> str:
 _AUGMENTATION = 1000.0
 _MOST_AUGMENTATIONS = 25
 
-#: Pressures still to be added when a Newton step is taken, as part of the largest.
-_PRESSURE_LEFT = 1e-9
+#: Pressures still to be added when a Newton step is taken, as part of the largest and of the tolerances.
+_PRESSURE_LEFT = 0.01
 
 #: Nodes that face the other surface with less than this part of their area carry no pressure.
 _LEAST_FACING = 1e-3
@@ -262,7 +262,8 @@ class _Numbering:
             corner = scipy.sparse.csr_matrix([[1.0 + entries + 3 * size]])
             entry = scipy.sparse.bmat([[entry, column], [column.T, corner]], format="csr")
         self._source = entry.data.astype(np.int64) - 1
-        self._columns, self._starts = entry.indices, entry.indptr
+        self._columns = entry.indices
+        self._starts = entry.indptr
 
     def _whole(self, blocks: Floats) -> SparseMatrix:
         columns, starts = self._pairs
@@ -564,8 +565,9 @@ class _Search:
             overlap = -(gap + rows @ step)
             change = added * overlap
             direction = change
+            left = _PRESSURE_LEFT * min(self.settings.gap_tolerance, self.settings.force_tolerance)
             for _ in range(_MOST_AUGMENTATIONS):
-                if np.abs(change).max() <= _PRESSURE_LEFT * np.abs(pressure).max():
+                if np.abs(change).max() <= left * np.abs(pressure).max():
                     break
                 moved = factor.solve(rows.T @ direction)
                 closed = rows @ moved

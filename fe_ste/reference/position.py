@@ -70,10 +70,20 @@ class NonlinearSettings(Displayed):
             raise ValueError(f"teeth = {self.teeth}: must be an odd number")
 
     def _line(self) -> str:
-        strains = "finite deformation" if self.finite_deformation else "small strains"
-        gears = "whole gears" if self.closed else "open sectors"
-        teeth = "" if self.teeth is None else f" with {self.teeth} teeth meshed"
-        return f": {gears}{teeth}, {self.mesh.layers} layers, {strains}"
+        return f": {self.bodies}, {self.mesh.layers} layers, {self.strains}"
+
+    @property
+    def bodies(self) -> str:
+        """What of the gears is modelled, in words."""
+        bodies = "whole gears" if self.closed else "open sectors"
+        if self.teeth is None:
+            return bodies
+        return f"{bodies} with {self.teeth} teeth meshed"
+
+    @property
+    def strains(self) -> str:
+        """How the bricks deform, in words."""
+        return "finite deformation" if self.finite_deformation else "small strains"
 
 
 @dataclass(frozen=True)
@@ -154,7 +164,7 @@ def nonlinear_position(
     half_width = hertz_half_width(pair, normal_load(pair, torque) / least_contact_length(pair))
     sectors = refined_gears(pair, settings.mesh, pmc, half_width, settings.teeth, settings.closed)
     model = gear_model(pair, torque, sectors, settings.finite_deformation)
-    model = replace(model, clearance=_removed(pair, model, modifications))
+    model = replace(model, clearance=_removed(pair, sectors, model, modifications))
     try:
         equilibrium = solve_contact(model, settings.newton, report)
     except EquilibriumError as error:
@@ -225,13 +235,14 @@ def gear_model(
     )
 
 
-def _removed(pair: GearPair, model: ContactModel, modifications: Modifications) -> Floats:
+def _removed(
+    pair: GearPair, meshes: tuple[GearMesh, GearMesh], model: ContactModel, modifications: Modifications
+) -> Floats:
     """Material removed from both flanks at the nodes of the loaded flanks of gear 1, m."""
     x, y, z = model.bricks.points[model.first.nodes].T
-    axis = -pair.centre_distance if pair.gear.internal else pair.centre_distance
     removed = np.zeros(len(z))
-    for gear, place, modification in zip((pair.pinion, pair.gear), (0.0, axis), modifications, strict=True):
-        radius = np.clip(np.hypot(x - place, y), *flank_radii(gear))
+    for gear, mesh, modification in zip((pair.pinion, pair.gear), meshes, modifications, strict=True):
+        radius = np.clip(np.hypot(x - mesh.axis_x, y), *flank_radii(gear))
         removed = removed + modification.gap(gear, radius, z)
     return removed
 

@@ -143,8 +143,7 @@ class NonlinearTable(Displayed):
         OSError
             If the file cannot be written.
         """
-        table = None if path is None else _stored(wanted, Path(path))
-        table = table or cls(_without_results(wanted))
+        table = _stored(wanted, path) or cls(_without_results(wanted))
         solved = table.dataset["converged"].values[:, 0]
         for number in np.flatnonzero(~solved):
             done = int(solved.sum())
@@ -298,13 +297,12 @@ def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     dataset = xr.Dataset(variables, axes)
     for name, (unit, meaning) in _UNITS.items():
         dataset[name].attrs = {"units": unit, "long_name": meaning}
-    bodies = f"whole gears, {meshed} teeth meshed" if wanted.settings.closed else f"open sectors of {meshed} teeth"
     packages = ("exugear", "numpy", "scipy", "scikit-fem", "numba")
     dataset.attrs = {
         "title": f"static transmission error of gear pair {wanted.pair.name}, reference analysis",
         "pair": wanted.pair.name,
-        "method": f"{METHOD} on {bodies}: 8-node hexahedra with incompatible modes, mortar contact without friction, "
-        "exact multipliers, " + ("finite deformation" if wanted.settings.finite_deformation else "small strains"),
+        "method": f"{METHOD} on {wanted.settings.bodies}: 8-node hexahedra with incompatible modes, mortar contact "
+        f"without friction, exact multipliers, {wanted.settings.strains}",
         "boundary": "pinion hub held; gear hub (or ring's outer rim) rigid and turning about its axis only",
         "input": json.dumps(wanted.resolved(), sort_keys=True),
         "input_hash": wanted.hash,
@@ -316,9 +314,9 @@ def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     return dataset
 
 
-def _stored(wanted: NonlinearInput, path: Path) -> NonlinearTable | None:
-    """Table in a file if it is of the same input."""
-    if not path.exists():
+def _stored(wanted: NonlinearInput, path: str | Path | None) -> NonlinearTable | None:
+    """Table in a file, if there is one of the same input."""
+    if path is None or not Path(path).exists():
         return None
     try:
         return NonlinearTable.open(path, wanted)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
     from exugear.gearbox.parts import LoadCase
     from exugear.project import Project
+    from exugear.results.solver_comparison import SolverComparison
     from exugear.transient.outcome import Run
 
 
@@ -75,6 +76,15 @@ def run(
     duration: Annotated[
         float | None, typer.Option(metavar="S", help="Simulated time, s. (default: the load case's)")
     ] = None,
+    compared: Annotated[
+        float | None,
+        typer.Option(
+            "--compare-exudyn",
+            metavar="S",
+            min=0.0,
+            help="Integrate the first S seconds by Exudyn, too, and say how far both solvers are apart.",
+        ),
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
     out: OutOption = None,
     files_below: FilesBelowOption = None,
@@ -94,6 +104,11 @@ def run(
         _check_extent(project, duration, out or Path("results"))
         _check_solver(project.gearbox, variant, solver)
         _check_mesh_route(mesh_route, variant, solver)
+        if compared is not None and solver is Solver.exudyn:
+            raise BadInputError("--compare-exudyn: the run itself is one of Exudyn; leave --solver out")
+        if compared is not None:
+            _check_extent(project, compared, out or Path("results"))
+            _check_solver(project.gearbox, variant, Solver.compiled)
         if integrator and solver is Solver.exudyn:
             raise BadInputError(f"--integrator {integrator}: is a method of the compiled solver; leave it out")
         if not resume:
@@ -104,7 +119,22 @@ def run(
         with time_noted(project.folder, _label_of(project, solver, mesh_route)):
             how = {"solver": solver.value, "mesh_route": mesh_route.value, "integrator": integrator}
             finished = _simulate(project, resume, duration=duration, **how)
-        _tell_run(case, finished, as_json)
+        comparison = None
+        if compared is not None and finished.complete:
+            with time_noted(project.folder, f"comparison with Exudyn, {choice.variant}"):
+                comparison = _compare(project, compared)
+        _tell_run(case, finished, comparison, as_json)
+
+
+def _compare(project: Project, duration: float) -> SolverComparison:
+    """Integrate the beginning of the run by Exudyn."""
+    from exugear.transient.outcome import LimitError, RunError
+    from fe_ste.tools.files import FileError
+
+    try:
+        return project.compare_with_exudyn(duration)
+    except (RunError, LimitError, FileError) as error:
+        raise FailedError(f"comparison with Exudyn: {error}") from error
 
 
 def _load_case(project: Project) -> LoadCase:
@@ -205,7 +235,7 @@ def _simulate(project: Project, resume: bool, **options: Any) -> Run:
         raise StoppedError(f"kept in {directory}, --resume goes on from there") from None
 
 
-def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
+def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, as_json: bool) -> None:
     """Print what a run reached; end with 130 if the user stopped it, with 1 if it is not to be trusted."""
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
@@ -240,11 +270,15 @@ def _tell_run(case: Path, finished: Run, as_json: bool) -> None:
         "trusted": finished.trusted,
         "reasons": list(finished.reasons),
     }
+    if comparison is not None:
+        summary["apart_from_exudyn"] = comparison.difference
     if as_json:
         unknown = {key for key, value in summary.items() if isinstance(value, float) and not math.isfinite(value)}
         print_json({key: None if key in unknown else value for key, value in summary.items()})
     else:
         _print_run(summary, outside)
+        if comparison is not None:
+            say(comparison.words)
     if not finished.trusted:
         what = "the run is" if finished.complete else f"the run was stopped at {finished.end:.4g} s and is"
         raise FailedError("\n".join([f"{what} not to be trusted:", *finished.reasons, f"It is in {finished.path}"]))

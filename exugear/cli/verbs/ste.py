@@ -188,8 +188,11 @@ def _compute_references(
         say(f"Tables in {folder / 'tables'}")
     failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
     doubts = doubts_of_references(summaries)
-    faults = ["positions that are not solved:", *failures] if failures else []
-    faults += ["both methods do not agree:", *doubts] if doubts else []
+    faults = []
+    if failures:
+        faults += ["positions that are not solved:", *failures]
+    if doubts:
+        faults += ["both methods do not agree:", *doubts]
     if faults:
         raise FailedError("\n".join(faults))
 

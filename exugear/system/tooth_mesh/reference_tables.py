@@ -103,7 +103,9 @@ def summarise_reference(request: ReferenceRequest, table: NonlinearTable) -> dic
         return None
 
     def peak_to_peak(values: xr.DataArray) -> float | None:
-        return figure(1e6 * (values.max() - values.min())) if int(values.notnull().sum()) > 1 else None
+        if int(values.notnull().sum()) < 2:
+            return None
+        return figure(1e6 * (values.max() - values.min()))
 
     ste = data["ste"]
     # Both means are over the positions that the non-linear analysis solved.

@@ -39,7 +39,7 @@ def test_a_table_says_what_it_is_and_names_its_units(path):
     assert table.complete
     assert data.sizes == {"pmc": 2, "torque": 1, "tooth": 3}
     assert all("units" in data[name].attrs for name in data.variables)
-    assert data.attrs["method"].startswith("non-linear finite elements on whole gears, 3 teeth meshed")
+    assert data.attrs["method"].startswith("non-linear finite elements on whole gears with 3 teeth meshed")
     assert np.allclose(data["load_share"].sum("tooth"), 1.0)
     assert (data["mesh_stiffness"] * data["ste"] == data["line_of_action_force"]).all()
     assert (data["max_von_mises"] > 0).all() and (data["wall_time"] > 0).all()

@@ -1,0 +1,95 @@
+"""How far the compiled solver is from Exudyn: the beginning of a run, integrated by both.
+
+A run of Exudyn to compare with lies in the folder ``exudyn`` of the results folder, at the place that the run itself
+has in the results folder. `exugear.project.Project.compare_with_exudyn` makes it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from exugear.results.run_file import load_run
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.display import Displayed
+from fe_ste.tools.files import FileError
+
+EXUDYN_FOLDER = "exudyn"
+COMPARED = {
+    "overall_dte": "overall transmission error",
+    "mesh_force": "mesh forces",
+    "support_force": "bearing forces",
+}
+"""Signals that are compared, and what they are."""
+
+
+@dataclass(frozen=True)
+class SolverComparison(Displayed, line=" of {exudyn}, {duration:.3g} s: {largest:.1e} apart"):
+    """A run beside the same one by Exudyn, over the time that both have."""
+
+    exudyn: str
+    """Version and method of Exudyn."""
+    compiled: str
+    """Method of the compiled solver."""
+    duration: float
+    """s."""
+    difference: dict[str, float]
+    """Signal -> largest difference at any time, over the largest value of that signal anywhere."""
+    time: Floats
+    """(n,) s."""
+    overall: tuple[Floats, Floats]
+    """(n,) overall transmission error by the compiled solver and by Exudyn, m."""
+
+    @property
+    def largest(self) -> float:
+        """Largest of all differences."""
+        return max(self.difference.values())
+
+    @property
+    def words(self) -> str:
+        """One sentence on the comparison."""
+        apart = ", ".join(f"{COMPARED[name]} {value:.0e}" for name, value in self.difference.items())
+        return (
+            f"Over the first {self.duration:.2g} s the compiled solver ({self.compiled}) and {self.exudyn}, whose user "
+            f"functions give the mesh forces, are apart by at most: {apart} of the largest value."
+        )
+
+
+def compare_solvers(path: Path, exudyn_path: Path) -> SolverComparison:
+    """Compare a run of the compiled solver with the same one by Exudyn.
+
+    Parameters
+    ----------
+    path, exudyn_path : the files of both runs
+
+    Raises
+    ------
+    FileError
+        If a file is missing or damaged, or the runs are not of the same input and solver pair.
+    """
+    own = load_run(path)
+    other = load_run(exudyn_path)
+    if own.attrs["input_hash"] != other.attrs["input_hash"]:
+        raise FileError(f"{exudyn_path}: was computed from another input than {path.name}; compare with Exudyn again")
+    if not str(other.attrs["solver"]).startswith("Exudyn") or str(own.attrs["solver"]).startswith("Exudyn"):
+        raise FileError(f"{exudyn_path}: a run of the compiled solver and one of Exudyn are compared")
+    count = min(own.sizes["time"], other.sizes["time"])
+    own = own.isel(time=slice(count))
+    other = other.isel(time=slice(count))
+    if count == 0 or not np.allclose(own["time"], other["time"], rtol=1e-9):
+        raise FileError(f"{exudyn_path}: has other sample times than {path.name}; compare with Exudyn again")
+    difference = {}
+    for name in COMPARED:
+        if name in own and own[name].size:
+            scale = max(float(np.abs(other[name]).max()), np.finfo(float).tiny)
+            difference[name] = float(np.abs(own[name] - other[name]).max()) / scale
+    return SolverComparison(
+        exudyn=str(other.attrs["solver"]),
+        compiled=str(own.attrs["solver"]).removeprefix("compiled, "),
+        duration=float(other["time"][-1]),
+        difference=difference,
+        time=own["time"].to_numpy(),
+        overall=(own["overall_dte"].to_numpy(), other["overall_dte"].to_numpy()),
+    )

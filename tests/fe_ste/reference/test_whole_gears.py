@@ -1,0 +1,146 @@
+"""Whole gears in the non-linear analysis: condensed teeth, agreement with the tables, thin rims, modifications."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import KINDS, template
+from exugear.system.tooth_mesh.reference_tables import requested_references
+from fe_ste.elasticity.gear_mesh import ContactMesh, meshed_teeth, placed_gears, refined_gears, whole_ring
+from fe_ste.elasticity.hexmesh import MeshSettings
+from fe_ste.flanks import FlankModification, Relief
+from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.reference.newton import solve_contact
+from fe_ste.reference.position import NonlinearSettings, gear_model, nonlinear_position
+from fe_ste.transmission_error.compliance import pair_compliance
+from fe_ste.transmission_error.transmission_error import static_transmission_error
+
+HELIX = 0.2
+PINION = Gear(name="pinion", teeth=17, normal_module=3e-3, face_width=12e-3, held_diameter=20e-3, helix_angle=HELIX)
+WHEEL = dataclasses.replace(PINION, name="wheel", teeth=23, helix_angle=-HELIX)
+PAIR = GearPair(name="deep", pinion=PINION, gear=WHEEL, centre_distance=61.25e-3)
+RING = dataclasses.replace(PINION, name="ring", teeth=51, internal=True, held_diameter=175e-3)
+INTERNAL = GearPair(name="internal", pinion=PINION, gear=RING, centre_distance=52.0e-3)
+UNIFORM = MeshSettings(layers=3, flank=6, thickness=4, fillet=2, root=2, rim=4)
+COARSE = ContactMesh(layers=3, contact_elements=3, growth=1.0, thickness=5, fillet=2, root=2, rim=4, far_flank=4)
+
+
+@pytest.mark.parametrize("pair", [PAIR, INTERNAL], ids=["external", "internal"])
+def test_condensed_teeth_do_what_meshed_ones_do(pair):
+    """Small strains: to rounding. A third way to the closed ring, beside that of the tables and an ordinary mesh."""
+    gears = placed_gears(pair, UNIFORM, 3, 0.2)
+    meshed = tuple(whole_ring(gear) for gear in gears)
+    assert [len(gear.hexahedra) for gear in meshed] == [
+        len(gear.hexahedra) * teeth // 3
+        for gear, teeth in zip(gears, (pair.pinion.teeth, pair.gear.teeth), strict=True)
+    ]
+    condensed, ordinary = (solve_contact(gear_model(pair, 50.0, given, False)) for given in (gears, meshed))
+    assert condensed.hub == pytest.approx(ordinary.hub, rel=1e-10)
+
+
+@pytest.mark.validation
+def test_condensed_teeth_turn_with_the_hub():
+    """Finite deformation: they are linear in what they take up beyond the rigid turn of their hub, which is all."""
+    gears = placed_gears(PAIR, UNIFORM, 3, 0.2)
+    meshed = tuple(whole_ring(gear) for gear in gears)
+    condensed, ordinary = (solve_contact(gear_model(PAIR, 50.0, given)) for given in (gears, meshed))
+    assert condensed.hub == pytest.approx(ordinary.hub, rel=2e-6)
+    small = solve_contact(gear_model(PAIR, 50.0, gears, False))
+    assert abs(small.hub / ordinary.hub - 1.0) > 1e-3  # what is told apart here
+
+
+def test_as_many_teeth_are_meshed_as_touch_and_one_on_either_side():
+    assert 1.0 < PAIR.total_contact_ratio < 3.0
+    assert meshed_teeth(PAIR, 0.0) == 5
+    wide = dataclasses.replace(PAIR, pinion=dataclasses.replace(PINION, face_width=60e-3))
+    wide = dataclasses.replace(wide, gear=dataclasses.replace(WHEEL, face_width=60e-3))
+    assert wide.total_contact_ratio > 2.5
+    assert meshed_teeth(wide, 0.5) >= meshed_teeth(wide, 0.0) >= 5
+    half_width = 0.1e-3
+    one, two = refined_gears(PAIR, COARSE, 0.0, half_width)
+    assert one.others is not None and one.others.count == PINION.teeth - 5
+    assert two.others is not None and two.others.count == WHEEL.teeth - 5
+
+
+def mean_and_curve(pair: GearPair, torque: float, positions: int, settings: NonlinearSettings | None = None, **given):
+    """Transmission errors (m) of both methods at equally spaced positions, the tables' method first."""
+    modifications = given.get("modifications", (FlankModification(), FlankModification()))
+    compliance = pair_compliance(pair).with_modifications(*modifications)
+    table = static_transmission_error(compliance, torque, positions=positions).squeeze()
+    found = [nonlinear_position(pair, torque, number / positions, settings, **given) for number in range(positions)]
+    return table, found
+
+
+@pytest.mark.validation
+def test_a_gear_with_a_deep_body_has_the_transmission_error_of_the_tables():
+    """A wheel held at a tenth of its diameter, coarse: an open sector of it is softer by far."""
+    wheel = dataclasses.replace(WHEEL, teeth=60, held_diameter=20e-3, helix_angle=0.0)
+    pinion = dataclasses.replace(PINION, helix_angle=0.0, profile_shift=0.1)
+    pair = GearPair(name="deep", pinion=pinion, gear=wheel, centre_distance=115.9e-3)
+    settings = NonlinearSettings(mesh=ContactMesh(layers=4, thickness=8, rim=8))
+    table, (found,) = mean_and_curve(pair, 60.0, 1, settings)
+    assert found.ste == pytest.approx(float(table["ste"]), rel=0.02)
+    sector = nonlinear_position(pair, 60.0, 0.0, dataclasses.replace(settings, teeth=5, closed=False))
+    assert sector.ste > 2.0 * found.ste
+
+
+@pytest.mark.validation
+def test_relief_takes_as_much_of_the_load_as_by_the_tables():
+    """Tip relief and crowning: their gaps are added to those of the meshes."""
+    relief = Relief(12e-6, 0.97 * PINION.tip_radius)
+    modifications = (FlankModification(tip_relief=relief, lead_crowning=6e-6), FlankModification(helix_slope=8e-6))
+    settings = NonlinearSettings(mesh=dataclasses.replace(COARSE, layers=8, contact_elements=4.0, thickness=8))
+    table, (found,) = mean_and_curve(PAIR, 60.0, 1, settings, modifications=modifications)
+    plain = nonlinear_position(PAIR, 60.0, 0.0, settings)
+    added = found.ste - plain.ste
+    unmodified = static_transmission_error(pair_compliance(PAIR), 60.0, positions=1).squeeze()
+    assert added == pytest.approx(float(table["ste"] - unmodified["ste"]), rel=0.05)
+
+
+def pairs_of_gearboxes(folder: Path) -> dict[str, tuple[GearPair, float]]:
+    """All pairs of the templates and of the reference gearbox, with their static torques (N m)."""
+    files = {"grc": Path("cases/grc750/gearbox.toml")}
+    for kind in KINDS:
+        files[kind] = folder / f"{kind}.toml"
+        files[kind].write_text(template(kind), encoding="utf-8")
+    found = {}
+    for kind, path in files.items():
+        for request in requested_references(Gearbox.from_toml(path), folder):
+            found[f"{kind} {request.name}"] = request.wanted.pair, request.wanted.torque
+    return found
+
+
+PAIRS = [
+    "parallel stage_1",
+    "parallel stage_2",
+    "pair helical",
+    "planetary sun_planet",
+    "planetary ring_planet",
+    "wind sun_planet",
+    "wind ring_planet",
+    "wind intermediate",
+    "wind high_speed",
+    "grc sun_planet",
+    "grc ring_planet",
+    "grc intermediate",
+    "grc high_speed",
+]
+
+
+@pytest.mark.validation
+@pytest.mark.long
+@pytest.mark.parametrize("name", PAIRS)
+def test_both_methods_agree_within_two_per_cent_over_the_mesh_cycle(name, tmp_path):
+    """Five positions of each pair of the templates and the reference gearbox: mean and curve."""
+    pair, torque = pairs_of_gearboxes(tmp_path)[name]
+    table, found = mean_and_curve(pair, torque, 5)
+    ste = np.array([position.ste for position in found])
+    assert ste.mean() == pytest.approx(float(table["ste"].mean()), rel=0.02)
+    assert np.abs(ste / ste.mean() - table["ste"] / table["ste"].mean()).max() < 0.02
+    assert math.isfinite(ste.sum())
