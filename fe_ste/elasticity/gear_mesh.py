@@ -30,6 +30,9 @@ HEXAHEDRON_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6,
 #: Part of a flank's length by which a contact line may lie outside the flank for the flank to be refined still.
 _LINE_MARGIN = 0.1
 
+#: Part of a flank's roll angle by which a contact line may lie outside the flank for the tooth to be meshed.
+_MESHED_BEYOND = 0.2
+
 
 @dataclass(frozen=True)
 class ContactMesh:
@@ -193,8 +196,9 @@ def placed_gears(
     others : of the teeth that are condensed, as `settings` by default; on the cut faces both must agree
     """
     condensed = others or settings
+    pairs = range(-(teeth // 2), teeth // 2 + 1)
     pinion, gear = (
-        _gear_of_sectors(placement, [sector_mesh(placement.gear, settings)] * teeth, condensed, closed)
+        _gear_of_sectors(placement, dict.fromkeys(pairs, sector_mesh(placement.gear, settings)), condensed, closed)
         for placement in _placements(pair, pmc)
     )
     return pinion, gear
@@ -208,23 +212,27 @@ def refined_gears(
     Parameters
     ----------
     half_width : Hertzian half width of the contact, m
-    teeth : odd number of teeth that are meshed; by default as many as `meshed_teeth` says
+    teeth : odd number of teeth that are meshed; by default those of `meshed_teeth`
     closed : False leaves the other teeth away
     """
-    count = teeth or meshed_teeth(pair, pmc)
+    pairs = meshed_teeth(pair, pmc)
+    if teeth is not None:
+        pairs = range(-(teeth // 2), teeth // 2 + 1)
     gears = []
     for placement in _placements(pair, pmc):
         others = settings.tooth(placement.gear, settings.far_flank, half_width)
-        numbers = placement.sense * (np.arange(count) - count // 2)
-        meshes = [_refined_tooth(pair, placement, settings, int(number), pmc, half_width) for number in numbers]
+        meshes = {
+            placement.sense * tooth: _refined_tooth(pair, placement, settings, tooth, pmc, half_width)
+            for tooth in pairs
+        }
         gears.append(_gear_of_sectors(placement, meshes, others, closed))
     return gears[0], gears[1]
 
 
-def meshed_teeth(pair: GearPair, pmc: float) -> int:
-    """Odd number of teeth about tooth pair 0 that holds all pairs that touch at `pmc`, and one more on either side.
+def meshed_teeth(pair: GearPair, pmc: float) -> range:
+    """Tooth pairs that touch at `pmc`, or would if the flanks were longer by a fifth at either end.
 
-    It leaves at least one tooth of either gear.
+    Under load contact begins early and ends late, by far less than that. At least one tooth of either gear is left.
     """
     axial = np.linspace(-pair.face_width / 2, pair.face_width / 2, 101)
     farthest = math.ceil(pair.total_contact_ratio) + 1
@@ -233,11 +241,13 @@ def meshed_teeth(pair: GearPair, pmc: float) -> int:
         on_both = np.ones(len(axial), dtype=np.bool_)
         for gear, roll in zip((pair.pinion, pair.gear), contact_line_rolls(pair, tooth, pmc, axial), strict=True):
             ends = sorted((radius / gear.base_radius) ** 2 - 1.0 for radius in (gear.form_radius, gear.tip_radius))
-            on_both &= (roll >= 0.0) & (roll**2 >= ends[0]) & (roll**2 <= ends[1])
+            low, high = np.sqrt(np.maximum(ends, 0.0))
+            beyond = _MESHED_BEYOND * (high - low)
+            on_both &= (roll >= low - beyond) & (roll <= high + beyond)
         if on_both.any():
-            touching.append(abs(tooth))
+            touching.append(tooth)
     most = min(pair.pinion.teeth, pair.gear.teeth) - 1
-    return min(2 * max(touching) + 3, most - 1 + most % 2)
+    return range(min(touching), min(max(touching) + 1, min(touching) + most))
 
 
 def contact_line_rolls(pair: GearPair, tooth: int, pmc: float, axial: Floats) -> tuple[Floats, Floats]:
@@ -312,10 +322,13 @@ def _graded(count: int, first: float) -> Floats:
     return np.asarray(np.concatenate([[0.0], np.cumsum(sizes)]) / sizes.sum())
 
 
-def _gear_of_sectors(placement: _Placement, meshes: list[SectorMesh], others: MeshSettings, closed: bool) -> GearMesh:
-    """Join tooth sectors, counted counter-clockwise, with the middle one at the gear's angle, and the other teeth."""
+def _gear_of_sectors(
+    placement: _Placement, sectors: dict[int, SectorMesh], others: MeshSettings, closed: bool
+) -> GearMesh:
+    """Join tooth sectors, counted counter-clockwise, number 0 at the gear's angle, and the other teeth."""
     gear = placement.gear
-    numbers = np.arange(len(meshes)) - len(meshes) // 2
+    numbers = np.array(sorted(sectors))
+    meshes = [sectors[number] for number in numbers.tolist()]
     first_point = np.cumsum([0] + [len(mesh.points) for mesh in meshes])
     first_brick = np.cumsum([0] + [len(mesh.hexahedra) for mesh in meshes])
     points = []

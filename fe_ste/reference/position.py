@@ -56,7 +56,7 @@ class NonlinearSettings(Displayed):
     """How a position is analysed."""
 
     teeth: int | None = None
-    """Odd number of teeth of each gear that are meshed; by default those that touch, and one more on either side."""
+    """Odd number of teeth of each gear that are meshed; by default those that `fe_ste.elasticity.gear_mesh` chooses."""
     mesh: ContactMesh = field(default_factory=ContactMesh)
     closed: bool = True
     """False leaves the other teeth away: open sectors with free cut faces, which are too soft where bodies are deep."""

@@ -280,8 +280,10 @@ def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     shape = (wanted.positions, 1)
     counts = ("unknowns", "iterations")
     pmc = np.arange(wanted.positions) / wanted.positions
-    meshed = wanted.settings.teeth or max(meshed_teeth(wanted.pair, at) for at in pmc)
-    teeth = np.arange(meshed) - meshed // 2
+    ranges = [meshed_teeth(wanted.pair, at) for at in pmc]
+    if wanted.settings.teeth is not None:
+        ranges = [range(-(wanted.settings.teeth // 2), wanted.settings.teeth // 2 + 1)]
+    teeth = np.arange(min(meshed.start for meshed in ranges), max(meshed.stop for meshed in ranges))
     beside = _by_superelement(wanted, teeth)
     floats = [name for name in _UNITS if name not in {*names, *counts, "tooth", "converged", *_BY_TOOTH, *beside}]
     variables: dict[str, Any] = {name: (names, np.full(shape, np.nan)) for name in floats}
