@@ -9,9 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -25,6 +23,7 @@ from exugear.system.tooth_mesh.laws.iso6336 import iso6336_stiffness
 from exugear.system.tooth_mesh.placement import loaded_flanks
 
 from ..cases.case_mutations import toml_text
+from ..cases.command import exugear
 from ..cases.ring import ring_content
 from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
@@ -104,10 +103,6 @@ def written(content: dict[str, Any], folder: Path) -> Path:
     path = folder / "gearbox.toml"
     path.write_text(toml_text(content), encoding="utf-8")
     return path
-
-
-def exugear(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 def one_line(text: str) -> str:

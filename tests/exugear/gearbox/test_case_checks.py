@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import summarise_loads
@@ -24,6 +22,7 @@ from exugear.system.tooth_mesh.tables import wanted_table
 from ..cases import gear_trains
 from ..cases.assembled import assembled, modes_with_bodies
 from ..cases.case_mutations import bases, toml_text
+from ..cases.command import exugear
 
 ISO = {"sun_planet": np.array([3.8e9]), "ring_planet": np.array([4.9e9])}
 HELD = {"radial_N_per_m": 1e9, "axial_N_per_m": 1e9, "tilt_N_m_per_rad": 1e7}
@@ -528,7 +527,3 @@ def test_the_method_of_the_file_is_that_of_the_tables(cases: Any, tmp_path: Path
     outcome = exugear("ste", file, "--grid", "--out", tmp_path / "out")
     assert outcome.exit_code == 2
     assert "the method nonlinear computes the static state alone" in outcome.stderr
-
-
-def exugear(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -35,8 +34,10 @@ from exugear.system.bearings.rolling.life import (
 )
 from fe_ste.root_stress import MeshCycleStress
 
-from ..cases.spur import COARSE_INPUT, SPUR_CASE
+from ..cases.spur import SPUR_CASE
 from .test_life import TABLE, content_of, hub_assembly
+
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 GRC = Path("cases/grc750/gearbox.toml")
 TYPE = "cylindrical_roller"
@@ -151,13 +152,6 @@ def test_loads_far_beyond_a_table_are_refused_before_any_work(tmp_path):
         with pytest.raises(CaseError, match=r"0.87 kN m on shaft_1 are 8.7 times .* static_load.torques_N_m"):
             project.life()
         assert not project.folder.exists()
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_tables() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        yield
 
 
 @pytest.fixture(scope="module")

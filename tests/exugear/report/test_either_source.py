@@ -24,19 +24,14 @@ from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.tables import requested_tables
 
 from ..cases.assembled import assembled, simulated
-from ..cases.spur import COARSE_INPUT, SPUR_CASE
+from ..cases.spur import SPUR_CASE
 from .page_view import IN_BROWSER, SIZES, View, opened
+
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 LAW = "line_of_action"
 SETTINGS = SteadySettings(SpeedRange.from_text("50:8000:80"), "parametric")
 VARIANTS = ("rigid", "bushing")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_tables():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        yield
 
 
 @pytest.fixture(scope="module")

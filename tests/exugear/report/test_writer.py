@@ -27,16 +27,11 @@ from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.tables import requested_tables
 
 from ..cases.assembled import assembled, modes_with_bodies, simulated
-from ..cases.spur import COARSE_INPUT, SPUR_CASE
+from ..cases.spur import SPUR_CASE
+
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 LAW = "line_of_action"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_tables():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        yield
 
 
 @pytest.fixture(scope="module")

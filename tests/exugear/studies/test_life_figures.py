@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,9 +27,10 @@ from exugear.studies.study import Study
 from exugear.studies.sweep import sweep
 
 from ..cases.case_mutations import toml_text
-from ..cases.spur import COARSE_INPUT
 from ..life.test_life import TABLE, content_of
 from ..life.test_verdicts import hertzian, planets_with
+
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 CASE = "gearbox.toml"
 FIGURES = {
@@ -60,13 +60,6 @@ def content(folder: Path, **changes):
         "figures": FIGURES,
         **changes,
     }
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_tables() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from typer.testing import CliRunner
 
-from exugear.cli import app as cli
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.run_file import load_run
@@ -23,6 +21,7 @@ from exugear.transient.outcome import Progress
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.table import MeshTable
 
+from ..cases.command import exugear
 from ..cases.spur import SPUR_CASE
 
 ROOT = Path(__file__).parents[3]
@@ -34,10 +33,6 @@ def case(tmp_path: Path) -> Path:
     path = tmp_path / "spur.toml"
     path.write_text(SPUR_CASE, encoding="utf-8")
     return path
-
-
-def exugear(*arguments: object):
-    return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
 def run(case: Path, out: Path, *more: object):

@@ -14,12 +14,9 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.system.tooth_mesh.tables import fitting_table, requested_tables, wandering_loads
 
-from ...cases.spur import COARSE_INPUT, SPUR_CASE
+from ...cases.spur import SPUR_CASE
 
-
-@pytest.fixture(autouse=True)
-def coarse_tables(monkeypatch):
-    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 
 def with_tables(content, folder):
