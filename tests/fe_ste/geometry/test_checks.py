@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -224,12 +225,6 @@ REFUSED_GEARS: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("changes, message", REFUSED_GEARS.values(), ids=REFUSED_GEARS)
-def test_gear_that_cannot_be_made_is_refused(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(GeometryError, match=message):
-        spur(**changes)
-
-
 REFUSED_RINGS: dict[str, tuple[dict[str, Any], str]] = {
     "rim inside the root": (
         {"held_diameter": 0.3},
@@ -256,10 +251,14 @@ REFUSED_RINGS: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("changes, message", REFUSED_RINGS.values(), ids=REFUSED_RINGS)
-def test_internal_gear_that_cannot_be_made_is_refused(changes: dict[str, Any], message: str) -> None:
+@pytest.mark.parametrize(
+    "make, changes, message",
+    [*((spur, *row) for row in REFUSED_GEARS.values()), *((ring, *row) for row in REFUSED_RINGS.values())],
+    ids=[*REFUSED_GEARS, *(f"ring: {name}" for name in REFUSED_RINGS)],
+)
+def test_gear_that_cannot_be_made_is_refused(make: Callable[..., Gear], changes: dict[str, Any], message: str) -> None:
     with pytest.raises(GeometryError, match=message):
-        ring(**changes)
+        make(**changes)
 
 
 LEFT, RIGHT = math.radians(-10.0), math.radians(10.0)

@@ -49,20 +49,24 @@ def shape_of(gearbox, body):
     return gearbox.case.bodies[body].shape
 
 
-def test_a_shaft_whose_axis_points_the_other_way_is_the_same_shaft():
-    length = 59.5
+def turned_round(shaft: int, length: float) -> Model:
+    """The model with the axis of one shaft, which is of this length (mm), pointing the other way."""
     sections = {
         part.number: {
             "u_coordinate_on_shaft": length
             - part.quantity("u_coordinate_on_shaft", "mm")
             - part.quantity("length", "mm")
         }
-        for part in SEW.related("assembly", "assembly", 5, "part")
+        for part in SEW.related("assembly", "assembly", shaft, "part")
         if part.type == "shaft_section"
     }
-    x, y, z = SEW.components[5].vector("support_vector")
-    turned = {5: {"support_vector": (x + length, y, z), "u_axis_vector": (-1.0, 0.0, 0.0)}}
-    plain, other = gearbox_of(SEW), gearbox_of(with_values(SEW, {**sections, **turned}))
+    x, y, z = SEW.components[shaft].vector("support_vector")
+    axis = {shaft: {"support_vector": (x + length, y, z), "u_axis_vector": (-1.0, 0.0, 0.0)}}
+    return with_values(SEW, {**sections, **axis})
+
+
+def test_a_shaft_whose_axis_points_the_other_way_is_the_same_shaft():
+    plain, other = gearbox_of(SEW), gearbox_of(turned_round(5, 59.5))
     first, second = (shape_of(gearbox, "shaft_2") for gearbox in (plain, other))
     assert second.start_z_mm == pytest.approx(first.start_z_mm)
     for one, two in zip(first.sections, second.sections, strict=True):
@@ -73,19 +77,7 @@ def test_a_shaft_whose_axis_points_the_other_way_is_the_same_shaft():
 
 
 def test_speed_and_torque_are_signed_along_the_shaft_that_bears_them():
-    x, y, z = SEW.components[4].vector("support_vector")
-    length = 164.5
-    sections = {
-        part.number: {
-            "u_coordinate_on_shaft": length
-            - part.quantity("u_coordinate_on_shaft", "mm")
-            - part.quantity("length", "mm")
-        }
-        for part in SEW.related("assembly", "assembly", 4, "part")
-        if part.type == "shaft_section"
-    }
-    changes = {4: {"support_vector": (x + length, y, z), "u_axis_vector": (-1.0, 0.0, 0.0)}}
-    gearbox = gearbox_of(with_values(SEW, {**sections, **changes}))
+    gearbox = gearbox_of(turned_round(4, 164.5))
     assert gearbox.load_cases["nominal"].start_speed == pytest.approx(-1400.0 * math.pi / 30.0)
     assert gearbox.case.static_load.torques_N_m["shaft_1"] == pytest.approx(-4.72456, rel=1e-5)
 

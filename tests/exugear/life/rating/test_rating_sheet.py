@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -27,6 +25,7 @@ from fe_ste.standards.pitting import CASE_HARDENED_BENDING, CASE_HARDENED_CONTAC
 
 from ....fe_ste.cases.gears import nrel_stage_3
 from ...cases.case_mutations import toml_text
+from ...cases.command import exugear
 from ...cases.spur import COARSE_INPUT, SPUR_CASE
 
 GRC = Path("cases/grc750/gearbox.toml")
@@ -263,7 +262,7 @@ def written(content: dict[str, Any], folder: Path) -> Path:
 
 
 def run(path: Path, *options: str) -> Any:
-    return CliRunner().invoke(app, ["check", str(path), "--rating", "--out", str(path.parent / "results"), *options])
+    return exugear("check", path, "--rating", "--out", path.parent / "results", *options)
 
 
 def test_the_verb_prints_all_factors_and_ends_with_1_where_a_safety_is_short(tmp_path):
