@@ -101,11 +101,6 @@ def test_exit_codes(error, code, said, capsys):
     assert said in capsys.readouterr().err
 
 
-def test_an_error_of_the_program_itself_keeps_its_traceback():
-    with pytest.raises(ZeroDivisionError), exit_codes():
-        raise ZeroDivisionError
-
-
 def test_every_file_of_a_verb_is_offered_as_one():
     rooms = (case_verbs, verbs)
     files = {

@@ -513,14 +513,6 @@ def test_a_mark_of_byte_order_does_no_harm_and_other_files_are_told(cases: Any, 
     assert "20 MB; at most 10 MB are read" in exugear("check", file).stderr
 
 
-@pytest.mark.parametrize("text", ["[" * 5000, '{"content": ' + "9" * 5000 + "}", '{"content": 3, "source": 3}', "[]"])
-def test_a_damaged_case_of_results_is_told(tmp_path: Path, text: str) -> None:
-    (tmp_path / "case.json").write_text(text, encoding="utf-8")
-    outcome = exugear("report", tmp_path)
-    assert outcome.exit_code == 2, outcome.exception
-    assert "case.json: cannot be used" in outcome.stderr
-
-
 def test_the_method_of_the_file_is_that_of_the_tables(cases: Any, tmp_path: Path) -> None:
     file = tmp_path / "case.toml"
     file.write_text(toml_text(changed(copy.deepcopy(cases[1]["spur"]), {"ste__method": "nonlinear"})), encoding="utf-8")

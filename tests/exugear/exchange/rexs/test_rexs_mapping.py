@@ -266,23 +266,10 @@ def test_a_cone_is_one_with_its_mass_and_its_shape():
 
 
 def test_a_cone_of_a_shaft_that_points_the_other_way_is_turned_round():
-    length = 59.5
-    parts = [p for p in SEW.related("assembly", "assembly", 5, "part") if p.type == "shaft_section"]
-    cone = parts[-1]
-    ends = {"outer_diameter_begin": 20.0, "outer_diameter_end": 16.0}
-    ahead = with_values(SEW, {cone.number: ends})
-    sections = {
-        part.number: {
-            "u_coordinate_on_shaft": length
-            - part.quantity("u_coordinate_on_shaft", "mm")
-            - part.quantity("length", "mm")
-        }
-        for part in parts
-    }
-    sections[cone.number] |= {"outer_diameter_begin": 16.0, "outer_diameter_end": 20.0}
-    x, y, z = SEW.components[5].vector("support_vector")
-    turned = {5: {"support_vector": (x + length, y, z), "u_axis_vector": (-1.0, 0.0, 0.0)}}
-    one, other = (gearbox_of(model).body("shaft_2") for model in (ahead, with_values(SEW, {**sections, **turned})))
+    cone = [p for p in SEW.related("assembly", "assembly", 5, "part") if p.type == "shaft_section"][-1].number
+    ahead = with_values(SEW, {cone: {"outer_diameter_begin": 20.0, "outer_diameter_end": 16.0}})
+    behind = with_values(turned_round(5, 59.5), {cone: {"outer_diameter_begin": 16.0, "outer_diameter_end": 20.0}})
+    one, other = (gearbox_of(model).body("shaft_2") for model in (ahead, behind))
     assert other.mass == pytest.approx(one.mass)
     assert other.centre_of_mass_z == pytest.approx(one.centre_of_mass_z)
     assert one.mass != gearbox_of(SEW).body("shaft_2").mass
