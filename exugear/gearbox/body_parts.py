@@ -85,7 +85,7 @@ def _body(
         orbit_angle=angle if section.carrier else 0.0,
         spin_only=section.spin_only,
         fixed=section.fixed,
-        wheels={gear: z * 1e-3 for gear, z in section.wheels_z_mm.items()},
+        wheels={gear: z * MM for gear, z in section.wheels_z_mm.items()},
         planet_of=section.carrier,
     )
 
@@ -106,9 +106,9 @@ def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
     for name, z in section.wheels_z_mm.items():
         blank = shape.blanks.get(name) if shape is not None else None
         if blank is not None:
-            rings.append(MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, 1e-3 * z))
+            rings.append(MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, MM * z))
         elif name in origin.case.gears:
-            tubes.append(gear_tube(origin.case.gears[name], 1e-3 * z, tubes))
+            tubes.append(gear_tube(origin.case.gears[name], MM * z, tubes))
     total = together([mass_properties(tubes), *rings])
     return InertiaSection.model_construct(
         mass_kg=total.mass,
@@ -121,7 +121,7 @@ def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
 
 def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
     ends = (piece.outer_diameter_end_mm, piece.inner_diameter_end_mm)
-    outer_end, inner_end = (None if end is None else 1e-3 * end for end in ends)
+    outer_end, inner_end = (None if end is None else MM * end for end in ends)
     return Tube(
         start=start,
         length=MM * piece.length_mm,
@@ -149,7 +149,7 @@ def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
     section = origin.case.bodies[family]
     if section.axis_position_mm is not None:
         x, y = section.axis_position_mm
-        return x * 1e-3, y * 1e-3
+        return x * MM, y * MM
     carrier = section.carrier
     radius = section.orbit_radius_mm
     if carrier is None or radius is None:
@@ -159,7 +159,7 @@ def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
     if origin.case.bodies[carrier].axis_position_mm is None:
         raise origin.fault(f"bodies.{family}.carrier = {carrier!r}: a carrier cannot be a planet")
     x, y = _axis(origin, carrier, 0.0)
-    return x + radius * 1e-3 * math.cos(angle), y + radius * 1e-3 * math.sin(angle)
+    return x + radius * MM * math.cos(angle), y + radius * MM * math.sin(angle)
 
 
 def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:
@@ -327,7 +327,7 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
         body = origin.case.bodies[section.body]
         if body.carrier is not None or body.spin_only:
             raise origin.fault(f"{key}.body = {section.body!r}: a planet or a spin-only body cannot be mounted")
-        x, y, z = (1e-3 * value for value in section.position_mm)
+        x, y, z = (MM * value for value in section.position_mm)
         mount = Bearing(
             name=name,
             family=name,

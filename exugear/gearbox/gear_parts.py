@@ -176,7 +176,7 @@ def thinning_range(section: GearSection) -> tuple[float, float]:
     lower = allowances.lower_allowance_um
     if lower is None:
         lower = upper - (allowances.tolerance_um or 0.0)
-    transverse = -1e-6 / math.cos(math.radians(section.helix_angle_deg))
+    transverse = -UM / math.cos(math.radians(section.helix_angle_deg))
     return transverse * upper, transverse * lower
 
 
@@ -248,7 +248,7 @@ def _relief(
     else:
         return None
     shape = ReliefShape(getattr(given, f"{kind}_relief_shape"))
-    return Relief(1e-6 * getattr(given, f"{kind}_relief_um"), radius, shape)
+    return Relief(UM * getattr(given, f"{kind}_relief_um"), radius, shape)
 
 
 def _check_depth(origin: Origin, key: str, amounts: Mapping[str, Any], module_mm: float) -> None:
@@ -489,6 +489,6 @@ def _deviation(origin: Origin, key: str, gear: Gear, section: DeviationSection) 
     return WheelDeviation(
         teeth=gear.teeth,
         pitch=pitch * gear.base_radius / gear.reference_radius,
-        eccentricity=0.5e-6 * section.runout_um,
+        eccentricity=0.5 * UM * section.runout_um,
         eccentricity_angle=math.radians(section.runout_angle_deg),
     )

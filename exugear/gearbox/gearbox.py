@@ -31,6 +31,7 @@ from exugear.gearbox.reading import CaseError, Origin, parse_case, read_toml, re
 from exugear.gearbox.sections.case import CaseFile, SteSection, labels_in_use
 from exugear.gearbox.sections.entries import unusual_values
 from exugear.gearbox.train import Tie, Train
+from exugear.gearbox.units import UM
 from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards import iso6336
@@ -418,7 +419,7 @@ class Gearbox(Displayed):
         """
         static = self.gear_pairs[pair]
         offsets = self.ste.centre_distance_offsets_um or ()
-        distances = tuple(static.centre_distance + 1e-6 * offset for offset in offsets)
+        distances = tuple(static.centre_distance + UM * offset for offset in offsets)
         for offset, distance in zip(offsets, distances, strict=True):
             key = f"ste.centre_distance_offsets_um: {offset:g}"
             self._origin.guarded(key, static.with_centre_distance, distance)

@@ -16,6 +16,7 @@ import filelock
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.units import UM
 from exugear.life.dynamic_factors import factors, source_hash
 from exugear.life.life import UNTRUSTED_REACH, check_reach, checked_loads, compute_life, life_hash, rating_of
 from exugear.life.life_file import to_dataset
@@ -418,7 +419,7 @@ class PointResults:
             prepared_compliance(wanted),
             [factor * wanted.torque[0] for factor in torque_factors],
             positions,
-            misalignment=[1e-6 * opening / width for opening in misalignment_um],
+            misalignment=[UM * opening / width for opening in misalignment_um],
             progress=_between_steps,
         )
 

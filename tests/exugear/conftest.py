@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.element import MeshCurve
 
 from .cases.contact import curves_of
+from .cases.spur import COARSE_INPUT
 
 CASE = Path(__file__).parents[2] / "cases" / "grc750" / "gearbox.toml"
 
@@ -39,3 +41,11 @@ def stiffness() -> dict[str, np.ndarray]:
 def curves(stiffness: dict[str, np.ndarray]) -> dict[str, MeshCurve]:
     """Curves through that stiffness, as bent as teeth with strong relief have them."""
     return curves_of(stiffness)
+
+
+@pytest.fixture(scope="module")
+def coarse_tables() -> Iterator[None]:
+    """Few elements a tooth in all tables that tests of a file have computed; asked for by the whole file."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        yield

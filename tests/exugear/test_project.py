@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from exugear import CaseError, Choice, Gearbox, Modes, Project, Run
-from exugear.cli.app import app
 from exugear.gearbox.variant import VariantError
 from exugear.project import default_folder
 from exugear.results.run_file import load_run
 from exugear.system.build import assemble
 from exugear.system.modes import load_modes
 
+from .cases.command import exugear
 from .cases.spur import SPUR_CASE
 
 SPUR = Choice("bushing", "iso6336", load_case="run_up")
@@ -54,7 +53,7 @@ def test_its_modes_are_those_of_the_command_line(project: Project, case: Path, t
     assert isinstance(modes, Modes)
     out = tmp_path / "by-command"
     options = ["--variant", "bushing", "--mesh-law", "iso6336", "--out", str(out)]
-    assert CliRunner().invoke(app, ["modes", str(case), *options]).exit_code == 0
+    assert exugear("modes", case, *options).exit_code == 0
     theirs = load_modes(out / project.modes_path.relative_to(project.folder))
     ours = load_modes(project.modes_path)
     assert ours.identical(theirs)
@@ -85,7 +84,7 @@ def test_its_run_is_that_of_the_command_line(project: Project, case: Path, tmp_p
     assert isinstance(run, Run) and run.complete and run.path == project.run_path
     out = tmp_path / "by-command"
     options = ["--variant", "bushing", "--mesh-law", "iso6336", "--duration", "0.02", "--out", str(out)]
-    assert CliRunner().invoke(app, ["run", str(case), *options]).exit_code == 0
+    assert exugear("run", case, *options).exit_code == 0
     assert load_run(run.path).identical(load_run(out / run.path.relative_to(project.folder)))
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from exugear.gearbox.parts import Bearing
 from exugear.gearbox.sections.connections import CatalogueSection
+from exugear.gearbox.units import KN
 from exugear.system.bearings import stiffness as matrices
 from exugear.system.bearings.rolling.catalogue import catalogue_rows, estimates, known_rating, margins, with_estimate
 from exugear.system.bearings.rolling.contact import (
@@ -213,7 +214,7 @@ def ratings_of(section: CatalogueSection) -> Ratings:
     elif any(estimate.key in INSIDE for estimate in estimates(section)):
         dynamic_margin, static_margin = margins(section)
         computed = computed[0] / dynamic_margin, computed[1] / static_margin
-    dynamic, static = (own if stated is None else 1e3 * stated for own, stated in zip(computed, given, strict=True))
+    dynamic, static = (own if stated is None else KN * stated for own, stated in zip(computed, given, strict=True))
     if None not in given:
         return Ratings(dynamic, static, estimated=False)
     return Ratings(dynamic, static, estimated=known is None, makers=known.makers if known else ())

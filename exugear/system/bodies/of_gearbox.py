@@ -177,9 +177,9 @@ def _section_of(section: ShaftSectionSection) -> ShaftSection:
     return ShaftSection(
         MM * section.length_mm,
         MM * section.outer_diameter_mm,
-        1e-3 * inner,
-        None if outer_end is None else 1e-3 * outer_end,
-        None if inner_end is None else 1e-3 * inner_end,
+        MM * inner,
+        None if outer_end is None else MM * outer_end,
+        None if inner_end is None else MM * inner_end,
     )
 
 
@@ -385,13 +385,13 @@ def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, secti
     position = None if item is None else item.position
     if section.position_mm is not None:
         x, y, z = section.position_mm
-        position = (1e-3 * x, 1e-3 * y, 1e-3 * z)
+        position = (MM * x, MM * y, MM * z)
     given = (("diameter_mm", diameter), ("width_mm", width), ("position_mm", position))
     missing = [word for word, value in given if value is None]
     if missing or diameter is None or width is None or position is None:
         what = "a seat that no gear, bearing or mount of the body has the name of" if item is None else item.noun
         raise gearbox.fault(f"{key}: {what} {name!r} needs its seat; give {' and '.join(missing)} in [{key}]")
-    return SolidSeat(name, position, diameter / 2.0, width, 0.5e-3 * (section.inner_diameter_mm or 0.0))
+    return SolidSeat(name, position, diameter / 2.0, width, 0.5 * MM * (section.inner_diameter_mm or 0.0))
 
 
 def _parts(seat: SolidSeat, count: int) -> list[SolidSeat]:

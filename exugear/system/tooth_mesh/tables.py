@@ -19,6 +19,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
+from exugear.gearbox.units import UM
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
@@ -265,7 +266,7 @@ def wanted_table(
     ste = gearbox.ste
     pair = spec.pair
     usual = axes or axes_reaching(pair)
-    openings = usual.openings if ste.misalignment_um is None else tuple(1e-6 * um for um in ste.misalignment_um)
+    openings = usual.openings if ste.misalignment_um is None else tuple(UM * um for um in ste.misalignment_um)
     return replace(
         static,
         torque=tuple(torque if factor == 1.0 else _rounded(torque * factor) for factor in ste.torque_factors),

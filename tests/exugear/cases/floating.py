@@ -1,5 +1,11 @@
 """A helical pair whose pinion sits overhung on a slender shaft: the smallest case with an elastic body that spins."""
 
+from __future__ import annotations
+
+from dataclasses import replace
+
+from exugear.system.system import Assembly
+
 FLOATING_CASE = """
 name = "a pinion on a slender shaft"
 default_inertias = "disc"
@@ -63,3 +69,9 @@ pair = { pair = "pair", pinion_body = "shaft", gear_body = "wheel" }
 steady = { torques_N_m = { shaft = 6.0, wheel = 9.0 }, duration_s = 0.005, start_speed_rpm = 4000.0 }
 run_up = { torques_N_m = { shaft = 6.0, wheel = 6.0 }, duration_s = 0.005, start_speed_rpm = 4000.0 }
 """
+
+
+def without_floating_frames(assembly: Assembly) -> Assembly:
+    """The same reduced bodies on their own coordinates, in the frame that does not turn."""
+    bodies = {name: replace(body, floating=None) for name, body in assembly.elastic_bodies.items()}
+    return replace(assembly, elastic_bodies=bodies)

@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from exugear.system.bearings.rolling.contact import bearing_load, row_contacts
 from exugear.system.bearings.rolling.point_contact import ball_constant, rolling_arrays
 from exugear.system.bearings.rolling.rows import BallRow, RollerRow, RollingRow
+from exugear.system.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
 from exugear.system.system import Assembly
 
 CYLINDRICAL = RollerRow(
@@ -94,3 +96,12 @@ def on_rolling(
             ),
         ),
     )
+
+
+def assert_compiled_forces_are_those_of(rows: Sequence[RollingRow], state: Sequence[float]) -> None:
+    """Forces of the compiled law at a displacement (5,), cages turned by 0.1 rad, against the contacts of the rows."""
+    arrays = rolling_arrays([rows], [1.0], [0.0], [0.0], [0.1])
+    out = rolling_memory(arrays)
+    rolling_forces(0, np.array(state), np.zeros(6), 0.0, arrays, out)
+    expected = bearing_load(row_contacts(rows, 0.1), np.append(state, 0.0))[:5]
+    assert np.abs(out[ELASTIC_PART : ELASTIC_PART + 5] - expected).max() < 1e-3 * np.abs(expected).max()

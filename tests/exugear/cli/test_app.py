@@ -17,73 +17,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
-from typer.testing import CliRunner
 
 from exugear.cli import case_verbs, verbs
 from exugear.cli.app import OBJECTS_OF_A_START, VERBS, app, garbage_seldom_looked_for
 from exugear.cli.console import BadInputError, FailedError, exit_codes, interruption
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.tables import requested_tables
-from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.gear_mesh import ContactMesh
-from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.reference.position import NonlinearSettings
 from fe_ste.reference.table import NonlinearInput
-from fe_ste.transmission_error.table import MeshTable, TableInput
+from fe_ste.transmission_error.table import MeshTable
+
+from ..cases.command import exugear
+from ..cases.spur import SPUR_CASE
+
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 CASE = Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml"
-
-
-SPUR_PAIR = """
-name = "one spur pair"
-default_inertias = "disc"
-overall = { input = "shaft_1", output = "shaft_2", output_gear = "wheel" }
-static_load = { torques_N_m = { shaft_1 = 100.0 }, locked = ["shaft_2"] }
-
-[gears]
-pinion = { teeth = 20, normal_module_mm = 3.0, face_width_mm = 15.0, held_diameter_mm = 30.0 }
-wheel = { teeth = 30, normal_module_mm = 3.0, face_width_mm = 15.0, held_diameter_mm = 50.0 }
-
-[pairs]
-spur = { pinion = "pinion", gear = "wheel", centre_distance_mm = 75.0 }
-
-[bodies.shaft_1]
-axis_position_mm = [0.0, 0.0]
-wheels_z_mm = { pinion = 0.0 }
-inertia.disc = { mass_kg = 1.0, axial_kg_m2 = 1e-3, transverse_kg_m2 = 1e-3, centre_of_mass_z_mm = 0.0 }
-
-[bodies.shaft_2]
-axis_position_mm = [75.0, 0.0]
-wheels_z_mm = { wheel = 0.0 }
-inertia.disc = { mass_kg = 2.0, axial_kg_m2 = 3e-3, transverse_kg_m2 = 3e-3, centre_of_mass_z_mm = 0.0 }
-
-[joints]
-bearing_1 = { body = "shaft_1", z_mm = 0.0 }
-bearing_2 = { body = "shaft_2", z_mm = 0.0 }
-
-[meshes]
-spur = { pair = "spur", pinion_body = "shaft_1", gear_body = "shaft_2" }
-
-[load_cases]
-still = { torques_N_m = { shaft_1 = 100.0 } }
-"""
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_meshes():
-    """Few elements a tooth: what the numbers are worth is tested elsewhere."""
-    coarse = functools.partial(
-        TableInput,
-        mesh=MeshSettings(layers=4, flank=8, thickness=6),
-        contact=ContactSettings(slices=8),
-    )
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", coarse)
-        yield
-
-
-def exugear(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def changed_case(tmp_path, old, new):
@@ -151,11 +101,6 @@ def test_exit_codes(error, code, said, capsys):
     assert said in capsys.readouterr().err
 
 
-def test_an_error_of_the_program_itself_keeps_its_traceback():
-    with pytest.raises(ZeroDivisionError), exit_codes():
-        raise ZeroDivisionError
-
-
 def test_every_file_of_a_verb_is_offered_as_one():
     rooms = (case_verbs, verbs)
     files = {
@@ -183,7 +128,7 @@ def test_the_version_is_that_of_the_distribution():
 @pytest.fixture
 def spur_case(tmp_path):
     path = tmp_path / "spur.toml"
-    path.write_text(SPUR_PAIR, encoding="utf-8")
+    path.write_text(SPUR_CASE, encoding="utf-8")
     return path
 
 
@@ -192,7 +137,7 @@ def computed(tmp_path_factory):
     """The spur pair's table and pictures, computed once; nobody changes them."""
     folder = tmp_path_factory.mktemp("computed")
     case = folder / "spur.toml"
-    case.write_text(SPUR_PAIR, encoding="utf-8")
+    case.write_text(SPUR_CASE, encoding="utf-8")
     return case, folder / "out", exugear("ste", case, "--positions", 8, "--out", folder / "out", "--json")
 
 
@@ -298,7 +243,7 @@ def test_a_results_folder_that_is_a_file_is_told_before_the_work(spur_case):
 
 def test_a_pair_without_load_is_bad_input(tmp_path):
     case = tmp_path / "idle.toml"
-    case.write_text(SPUR_PAIR.replace("shaft_1 = 100.0 }, locked", "shaft_1 = 0.0 }, locked"), encoding="utf-8")
+    case.write_text(SPUR_CASE.replace("shaft_1 = 100.0 }, locked", "shaft_1 = 0.0 }, locked"), encoding="utf-8")
     outcome = exugear("ste", case, "--out", tmp_path / "out")
     assert outcome.exit_code == 2
     assert "pairs.spur" in outcome.stderr

@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.results.run_file import load_run
 from exugear.system.modes import load_modes
 from exugear.system.signals import energy_residual
 from exugear.system.statics import BalanceError
 
 from ..cases.bearing import BEARING_CASE, NAMES
+from ..cases.command import exugear
 
 FIGURES = {"radial_load_kN", "radial_stiffness_N_per_m", "contact_pressure_MPa", "L10_Mrev", "L10r_Mrev", "remarks"}
 
@@ -26,10 +25,6 @@ def case(tmp_path: Path) -> Path:
     path = tmp_path / "bearing_case.toml"
     path.write_text(BEARING_CASE, encoding="utf-8")
     return path
-
-
-def exugear(*arguments: object):
-    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 def rewritten(case: Path, *changes: tuple[str, str]) -> Path:

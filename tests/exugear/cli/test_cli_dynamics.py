@@ -10,9 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.cli.case import MeshLaw
 from exugear.cli.verbs.run import Solver
 from exugear.gearbox.choice import Choice
@@ -27,24 +25,11 @@ from exugear.transient.runup import SOLVERS
 from exugear.transient.runup import simulate as real_simulate
 from fe_ste.tools.drawing import RenderingError
 
+from ..cases.command import exugear
 from ..cases.floating import FLOATING_CASE
-from ..cases.spur import COARSE_INPUT, SPUR_CASE
+from ..cases.spur import SPUR_CASE
 
-
-@pytest.fixture(autouse=True)
-def coarse_tables(monkeypatch):
-    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-
-
-@pytest.fixture
-def case(tmp_path):
-    path = tmp_path / "spur.toml"
-    path.write_text(SPUR_CASE, encoding="utf-8")
-    return path
-
-
-def exugear(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 
 def iso(verb, case, *more):

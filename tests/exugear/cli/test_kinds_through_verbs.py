@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import OFFERED
 from exugear.project import Project
 from exugear.system.tooth_mesh import tables
 
 from ..cases.case_mutations import toml_text
+from ..cases.command import exugear
 from ..cases.gear_trains import KINDS
 from ..cases.spur import COARSE_INPUT
 
@@ -27,10 +26,6 @@ IN_EACH_CHANGE = ("planetary, ring held", "rotor without gears")
 Pairs of both kinds with phased planets, and a train without tables.
 """
 HEAD = "| Kind | Tables | Modes | Runs | Steady response | Report |"
-
-
-def exugear(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 def told() -> dict[str, str]:

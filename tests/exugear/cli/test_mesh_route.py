@@ -11,9 +11,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.cli.verbs.run import MeshRoute
 from exugear.gearbox.choice import Choice
 from exugear.project import Project
@@ -21,7 +19,7 @@ from exugear.results.run_file import load_run
 from exugear.transient.exudyn_model import system
 from exugear.transient.runup import simulate
 
-from ..cases.spur import SPUR_CASE
+from ..cases.command import exugear
 from ..cases.table import surfaces
 
 GRC = Path(__file__).parents[3] / "cases" / "grc750"
@@ -32,16 +30,8 @@ SEVEN_DIGITS = 2e-7
 """Two neighbours among the numbers of single precision, as which signals of meshes and supports are stored."""
 
 
-@pytest.fixture
-def case(tmp_path):
-    path = tmp_path / "spur.toml"
-    path.write_text(SPUR_CASE, encoding="utf-8")
-    return path
-
-
 def run(case, out, *options):
-    arguments = ["run", case, "--mesh-law", "iso6336", "--out", out, *options]
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+    return exugear("run", case, "--mesh-law", "iso6336", "--out", out, *options)
 
 
 def assert_same_run(first, second):

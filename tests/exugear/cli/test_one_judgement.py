@@ -9,9 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -25,6 +23,7 @@ from exugear.system.tooth_mesh.laws.iso6336 import iso6336_stiffness
 from exugear.system.tooth_mesh.placement import loaded_flanks
 
 from ..cases.case_mutations import toml_text
+from ..cases.command import exugear
 from ..cases.ring import ring_content
 from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
@@ -106,10 +105,6 @@ def written(content: dict[str, Any], folder: Path) -> Path:
     return path
 
 
-def exugear(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [*map(str, arguments)])
-
-
 def one_line(text: str) -> str:
     return " ".join(text.split())
 
@@ -171,22 +166,24 @@ def test_what_reaches_too_far_across_a_shoulder_every_verb_refuses_alike(tmp_pat
     assert not folder.exists()
 
 
-@pytest.mark.parametrize("verb", ["modes", "bearings", "run", "steady"])
-def test_the_law_of_whole_tables_refuses_an_idle_pair_before_any_work(verb, tmp_path):
+WITH_WHOLE_TABLES = ("--variant", "bushing", "--mesh-law", "table")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        *((verb, *WITH_WHOLE_TABLES) for verb in ("modes", "bearings", "run", "steady")),
+        *(("ste", "--mesh", "idle", "--method", method) for method in ("superelement", "nonlinear")),
+    ],
+    ids=" ".join,
+)
+def test_an_idle_pair_is_refused_before_any_work_where_its_table_is_needed(arguments, tmp_path):
     case, folder = written(content_of(idle), tmp_path), tmp_path / "results"
-    result = exugear(verb, case, "--variant", "bushing", "--mesh-law", "table", "--out", folder)
+    verb, *options = arguments
+    result = exugear(verb, case, *options, "--out", folder)
     assert result.exit_code == 2
     assert "pairs.idle: carries no torque in [static_load]; a table needs one" in one_line(result.stderr)
     assert not folder.exists()
-
-
-def test_a_table_of_an_idle_pair_is_refused_when_it_is_asked_for(tmp_path):
-    case = written(content_of(idle), tmp_path)
-    for method in ("superelement", "nonlinear"):
-        result = exugear("ste", case, "--mesh", "idle", "--method", method, "--out", tmp_path / "results")
-        assert result.exit_code == 2
-        assert "pairs.idle: carries no torque in [static_load]; a table needs one" in one_line(result.stderr)
-    assert not (tmp_path / "results").exists()
 
 
 def test_an_idle_pair_is_as_stiff_as_the_standard_says_and_touches_on_the_flank_that_drags_it():

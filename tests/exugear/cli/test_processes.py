@@ -36,13 +36,6 @@ exugear.system.tooth_mesh.tables.TableInput = spur.COARSE_INPUT
 """
 
 
-@pytest.fixture
-def case(tmp_path):
-    path = tmp_path / "spur.toml"
-    path.write_text(SPUR_CASE, encoding="utf-8")
-    return path
-
-
 def command(*arguments, program=PROGRAM):
     return [sys.executable, "-c", program, *map(str, arguments)]
 

@@ -7,30 +7,18 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.cli.verbs.steady import Level
 from exugear.steady.settings import LEVELS
 
 from ..cases.bearing import BEARING_CASE
-from ..cases.spur import COARSE_INPUT, SPUR_CASE
+from ..cases.command import exugear
 
-
-@pytest.fixture(autouse=True)
-def coarse_tables(monkeypatch):
-    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-
-
-@pytest.fixture
-def case(tmp_path):
-    path = tmp_path / "spur.toml"
-    path.write_text(SPUR_CASE, encoding="utf-8")
-    return path
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 
 def steady(case, *more):
-    return CliRunner().invoke(app, ["steady", str(case), "--out", str(case.parent / "out"), *map(str, more)])
+    return exugear("steady", case, "--out", case.parent / "out", *more)
 
 
 def test_the_levels_offered_are_those_of_the_library():
@@ -51,7 +39,7 @@ def test_steady_writes_a_response_and_sums_it_up(case):
     again = steady(case, "--variant", "bushing", "--speeds", "500:8000:30")
     assert again.exit_code == 0
     assert "speeds up to 8000 rpm" in again.stdout
-    report = CliRunner().invoke(app, ["report", str(case.parent / "out")])
+    report = exugear("report", case.parent / "out")
     assert report.exit_code == 0, report.stderr
     page = (case.parent / "out" / "report.html").read_text(encoding="utf-8")
     for words in ("Steady response", "Modes over speed as seen from the housing", "strongest crossing"):
@@ -74,7 +62,7 @@ def test_bearings_follow_their_elements_at_the_level_nonlinear(tmp_path):
     outcome = steady(case, *options, "--level", "linear")
     assert outcome.exit_code == 0, outcome.stderr
     assert "linear about the static state" in outcome.stderr
-    report = CliRunner().invoke(app, ["report", str(case.parent / "out")])
+    report = exugear("report", case.parent / "out")
     assert report.exit_code == 0, report.stderr
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.studies.dataset import load_study
 
+from ..cases.command import exugear
 from ..cases.spur import COARSE_INPUT
 from ..cases.study import written_case
 
@@ -41,7 +40,7 @@ def study(tmp_path):
 
 
 def sweep(study, *more):
-    return CliRunner().invoke(app, ["sweep", str(study), "--out", str(study.parent / "out"), *map(str, more)])
+    return exugear("sweep", study, "--out", study.parent / "out", *more)
 
 
 def replaced(study, old, new):
@@ -66,7 +65,7 @@ def test_sweep_writes_a_dataset_and_sums_it_up(study):
 
 def test_without_a_folder_results_lie_beside_those_of_the_case(study, monkeypatch):
     monkeypatch.chdir(study.parent)
-    outcome = CliRunner().invoke(app, ["sweep", study.name, "--workers", "1"])
+    outcome = exugear("sweep", study.name, "--workers", "1")
     assert outcome.exit_code == 0, outcome.stderr
     folder = study.parent / "results" / study.parent.name / "studies" / "seats"
     assert (folder / "study.nc").is_file()
@@ -138,16 +137,12 @@ def test_options_that_do_not_go_together_are_refused(study, options, words):
 def test_a_report_shows_the_studies_of_its_folder(study, monkeypatch):
     monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     results = study.parent / "results"
-    swept = CliRunner().invoke(
-        app, ["sweep", str(study), "--workers", "1", "--out", str(results / "studies" / "seats")]
-    )
+    swept = exugear("sweep", study, "--workers", "1", "--out", results / "studies" / "seats")
     assert swept.exit_code == 0, swept.stderr
     case = str(study.parent / "spur.toml")
-    modes = CliRunner().invoke(
-        app, ["modes", case, "--variant", "rigid", "--mesh-law", "iso6336", "--out", str(results)]
-    )
+    modes = exugear("modes", case, "--variant", "rigid", "--mesh-law", "iso6336", "--out", results)
     assert modes.exit_code == 0, modes.stderr
-    outcome = CliRunner().invoke(app, ["report", str(results)])
+    outcome = exugear("report", results)
     assert outcome.exit_code == 0, outcome.stderr
     page = (results / "report.html").read_text(encoding="utf-8")
     assert ">Studies<" in page and ">seats<" in page and 'alt="damping"' in page and "data:image/png;base64" in page

@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import summarise_loads
@@ -24,6 +22,7 @@ from exugear.system.tooth_mesh.tables import wanted_table
 from ..cases import gear_trains
 from ..cases.assembled import assembled, modes_with_bodies
 from ..cases.case_mutations import bases, toml_text
+from ..cases.command import exugear
 
 ISO = {"sun_planet": np.array([3.8e9]), "ring_planet": np.array([4.9e9])}
 HELD = {"radial_N_per_m": 1e9, "axial_N_per_m": 1e9, "tilt_N_m_per_rad": 1e7}
@@ -514,21 +513,9 @@ def test_a_mark_of_byte_order_does_no_harm_and_other_files_are_told(cases: Any, 
     assert "20 MB; at most 10 MB are read" in exugear("check", file).stderr
 
 
-@pytest.mark.parametrize("text", ["[" * 5000, '{"content": ' + "9" * 5000 + "}", '{"content": 3, "source": 3}', "[]"])
-def test_a_damaged_case_of_results_is_told(tmp_path: Path, text: str) -> None:
-    (tmp_path / "case.json").write_text(text, encoding="utf-8")
-    outcome = exugear("report", tmp_path)
-    assert outcome.exit_code == 2, outcome.exception
-    assert "case.json: cannot be used" in outcome.stderr
-
-
 def test_the_method_of_the_file_is_that_of_the_tables(cases: Any, tmp_path: Path) -> None:
     file = tmp_path / "case.toml"
     file.write_text(toml_text(changed(copy.deepcopy(cases[1]["spur"]), {"ste__method": "nonlinear"})), encoding="utf-8")
     outcome = exugear("ste", file, "--grid", "--out", tmp_path / "out")
     assert outcome.exit_code == 2
     assert "the method nonlinear computes the static state alone" in outcome.stderr
-
-
-def exugear(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])

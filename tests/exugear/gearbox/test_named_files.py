@@ -13,29 +13,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import LARGEST_TABLE, Permissions
 from exugear.gearbox.reading import CaseError
 from exugear.system.bodies.solid_elements import SolidError
 from exugear.system.bodies.solid_files import mesh_geometry, read_solid
 
+from ...optional_libraries import needs_gmsh, needs_meshio
+from ..cases.command import exugear
 from ..cases.spur import SPUR_CASE
 
-
-def works(library: str) -> bool:
-    """Tell whether an optional library and what it needs of the system is there."""
-    try:
-        importlib.import_module(library)
-    except (ImportError, OSError):
-        return False
-    return True
-
-
-needs_gmsh = pytest.mark.skipif(not works("gmsh"), reason="gmsh (extra mesh) or its system libraries are missing")
-needs_meshio = pytest.mark.skipif(not works("meshio"), reason="meshio (extra mesh) is missing")
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no such files")
 
 PLATE = 'SetFactory("OpenCASCADE");\nBox(1) = {-25, -25, -12, 125, 50, 12};\n'
@@ -63,10 +51,6 @@ limit_Hz = 12000.0
 """
 TABLE = "time_s,shaft_1_N_m\n0.0,100.0\n1.0,100.0\n"
 FLANK = "radius_mm, -6.0, 6.0\n29.0, 1.0, 1.0\n31.0, 2.0, 2.0\n"
-
-
-def exugear(*arguments: object, **environment: str) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments], env=environment)
 
 
 def said(outcome: Any) -> str:

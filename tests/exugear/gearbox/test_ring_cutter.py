@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.templates.kinds import template
+
+from ..cases.command import exugear
 
 
 def gearbox_of(cutter: dict[str, Any], **changes: Any) -> Gearbox:
@@ -70,5 +70,5 @@ def test_check_passes_a_ring_with_its_cutter(tmp_path: Path):
     path = tmp_path / "case.toml"
     text = template("planetary")
     path.write_text(f"{text}\n[gears.ring.cutter]\nteeth = 30\ntip_radius = 0.2\n", encoding="utf-8")
-    told = CliRunner().invoke(app, ["check", str(path)])
+    told = exugear("check", path)
     assert told.exit_code == 0, told.output

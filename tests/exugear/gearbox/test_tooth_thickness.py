@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.templates.kinds import template
 from exugear.system.plausibility import backlash_range, thickness_range
+
+from ..cases.command import exugear
 
 HELIX = math.radians(12.0)
 ALLOWANCES = {"upper_allowance_um": -70.0, "lower_allowance_um": -110.0}
@@ -90,11 +90,11 @@ def test_check_tells_thickness_span_and_backlash(tmp_path: Path):
     path.write_text(
         f"{head}tooth_thickness = {{ upper_allowance_um = -50, tolerance_um = 30 }} #{tail}", encoding="utf-8"
     )
-    told = CliRunner().invoke(app, ["check", str(path)])
+    told = exugear("check", path)
     assert told.exit_code == 0, told.output
     assert "Tooth thickness within its allowances" in told.output
     assert "base tangent length" in told.output
-    found = json.loads(CliRunner().invoke(app, ["check", str(path), "--json"]).stdout)
+    found = json.loads(exugear("check", path, "--json").stdout)
     least, given, most = found["pairs"][0]["backlash_um"]
     assert 0.0 < least < given < most
     thin, thick = found["tooth_thickness"][0]["normal_tooth_thickness_mm"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,9 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli import app as cli
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -35,8 +32,11 @@ from exugear.system.bearings.rolling.life import (
 )
 from fe_ste.root_stress import MeshCycleStress
 
-from ..cases.spur import COARSE_INPUT, SPUR_CASE
-from .test_life import TABLE, content_of, hub_assembly
+from ..cases.command import exugear
+from ..cases.spur import SPUR_CASE
+from .test_life import OIL, TABLE, content_of, hub_assembly
+
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 GRC = Path("cases/grc750/gearbox.toml")
 TYPE = "cylindrical_roller"
@@ -153,13 +153,6 @@ def test_loads_far_beyond_a_table_are_refused_before_any_work(tmp_path):
         assert not project.folder.exists()
 
 
-@pytest.fixture(scope="module", autouse=True)
-def coarse_tables() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        yield
-
-
 @pytest.fixture(scope="module")
 def broken(tmp_path_factory) -> tuple[Path, Path]:
     """Case and results of a spur pair whose pinion is of lead, and whose bearing is far too small."""
@@ -181,7 +174,7 @@ def broken(tmp_path_factory) -> tuple[Path, Path]:
 def test_infinite_damage_is_the_first_thing_told_with_the_stress_that_causes_it(broken):
     case, out = broken
     arguments = ["life", str(case), "--variant", "rigid", "--mesh-law", "iso6336", "--out", str(out)]
-    shown = CliRunner().invoke(cli.app, arguments)
+    shown = exugear(*arguments)
     assert shown.exit_code == 1, shown.output
     first = shown.stdout.splitlines()[0]
     assert first.startswith("pinion + spur: infinite damage: a contact stress of ")
@@ -189,7 +182,7 @@ def test_infinite_damage_is_the_first_thing_told_with_the_stress_that_causes_it(
     stress = float(data["flank_contact_worn"].sel(flank="pinion + spur"))
     assert f"{1e-6 * stress:.4g} MPa" in first
     assert "the gearbox does not live as long as it shall" in shown.stderr
-    told = CliRunner().invoke(cli.app, [*arguments, "--json"])
+    told = exugear(*arguments, "--json")
     assert told.exit_code == 1
     content = json.loads(told.stdout, parse_constant=lambda token: pytest.fail(f"{token} is no JSON"))
     assert content["failures"][0] == first
@@ -273,9 +266,6 @@ def test_what_a_kill_behind_the_last_file_left_is_removed(broken):
     assert not partial.exists() and path.stat().st_mtime_ns == before
 
 
-OIL = {"viscosity_40_mm2_per_s": 220.0, "viscosity_100_mm2_per_s": 19.0, "temperature_C": 70.0, "cleanliness": "normal"}
-
-
 def rated_bearing(folder: Path, oil: dict[str, Any] | None) -> BearingLife:
     """The bearing of the spur pair under one torque at one speed."""
     content = content_of("torque_N_m,speed_rpm,hours\n150,1500,1\n", folder)
@@ -306,32 +296,6 @@ def test_modified_lives_have_oil_and_cleanliness(tmp_path):
     dirty = rated_bearing(tmp_path, OIL | {"cleanliness": "severe"})
     assert dirty.modified_hours == pytest.approx(0.1 * dirty.basic_hours)
     assert one.minimum_load == pytest.approx(0.02 * 60e3)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (lambda content: content["rating"].pop("viscosity_40_mm2_per_s"), "lubricant.viscosity_40_mm2_per_s: this key"),
-        (lambda content: content.update(lubricant=OIL), "viscosity_40_mm2_per_s: is given twice"),
-        (
-            lambda content: content["rating"]["gears"]["pinion"].update(roughness_um=4.8),
-            "roughness_um = 4.8: is called roughness_Rz_um now; of Ra it is roughness_Ra_um",
-        ),
-        (
-            lambda content: content["rating"]["gears"]["pinion"].update(roughness_Ra_um=0.8),
-            "one of roughness_Rz_um and roughness_Ra_um",
-        ),
-        (
-            lambda content: content.update(lubricant=OIL | {"viscosity_100_mm2_per_s": 300.0}),
-            "must be below viscosity_40_mm2_per_s",
-        ),
-    ],
-)
-def test_oil_and_roughness_are_told_once_and_by_their_names(tmp_path, change, message):
-    content = content_of(TABLE, tmp_path)
-    change(content)
-    with pytest.raises(CaseError, match=message):
-        checked_loads(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")))
 
 
 def test_ra_counts_as_a_sixth_of_rz(tmp_path):

@@ -15,41 +15,27 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.writer import write_report
-from exugear.results.folder import keep_case
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import load_response, steady_path, stored_or_computed
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.system.tooth_mesh.tables import requested_tables
 
-from ..cases.assembled import assembled, simulated
-from ..cases.spur import COARSE_INPUT, SPUR_CASE
+from ..cases.assembled import assembled, simulated, spur_with_tables
 from .page_view import IN_BROWSER, SIZES, View, opened
+
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 LAW = "line_of_action"
 SETTINGS = SteadySettings(SpeedRange.from_text("50:8000:80"), "parametric")
 VARIANTS = ("rigid", "bushing")
 
 
-@pytest.fixture(scope="module", autouse=True)
-def coarse_tables():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        yield
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Steady responses of both variants, and nothing else."""
     folder = tmp_path_factory.mktemp("steady")
-    case = folder / "spur.toml"
-    case.write_text(SPUR_CASE, encoding="utf-8")
-    gearbox = Gearbox.from_toml(case)
-    keep_case(gearbox, folder)
-    for request in requested_tables(gearbox, folder):
-        request.compute()
-    stiffness = mesh_stiffness(gearbox, LAW, folder)
+    gearbox, stiffness = spur_with_tables(folder, LAW)
     for variant in VARIANTS:
         assembly = assembled(gearbox, Choice(variant, LAW), stiffness)
         stored_or_computed(response_path(folder, variant), assembly, SETTINGS)

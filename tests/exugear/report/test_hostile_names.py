@@ -19,16 +19,15 @@ import matplotlib.image
 import numpy as np
 import pytest
 from rich.console import Console
-from typer.testing import CliRunner
 
 from exugear.cli import console
-from exugear.cli.app import app
 from exugear.report.pictures.diagrams import plot_campbell
 from exugear.report.pictures.scene import mode_figure
 from exugear.report.web import html as page
 from exugear.results.spectra.waterfall import OrderLine
 from fe_ste.tools.drawing import RenderingError
 
+from ..cases.command import exugear
 from ..cases.spur import SPUR_CASE
 
 MARKUP = "[/] [bold]:warning:"
@@ -77,10 +76,6 @@ def tame(text: str) -> bool:
     return not any(letter != "\n" and unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in text) and (
         not re.search("[\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069]", text)
     )
-
-
-def exugear(*arguments: object) -> Any:
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -12,15 +12,9 @@ from exugear.project import Project
 from exugear.report.writer import write_report
 
 from ..cases.spur import COARSE_INPUT, SPUR_CASE
+from ..life.test_life import STRENGTH
 
 LOADS = {"body": "shaft_1", "life_years": 10.0, "sources": {"s": {"file": "loads.csv", "hours_per_year": 1000.0}}}
-STRENGTH = {
-    "sigma_H_lim_MPa": 1500.0,
-    "sigma_F_lim_MPa": 500.0,
-    "curve": "case_hardened",
-    "roughness_Rz_um": 4.8,
-    "root_factor": 1.0,
-}
 
 
 @pytest.fixture

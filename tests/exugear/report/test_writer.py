@@ -24,32 +24,20 @@ from exugear.system.modes import eigenmodes
 from exugear.system.signals import energy_residual
 from exugear.system.system import input_hash
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
-from exugear.system.tooth_mesh.tables import requested_tables
 
-from ..cases.assembled import assembled, modes_with_bodies, simulated
-from ..cases.spur import COARSE_INPUT, SPUR_CASE
+from ..cases.assembled import assembled, modes_with_bodies, simulated, spur_with_tables
+from ..cases.spur import SPUR_CASE
+
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 LAW = "line_of_action"
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_tables():
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        yield
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     """Table, run-ups and modes of both variants."""
     folder = tmp_path_factory.mktemp("results")
-    case = folder / "spur.toml"
-    case.write_text(SPUR_CASE, encoding="utf-8")
-    gearbox = Gearbox.from_toml(case)
-    keep_case(gearbox, folder)
-    for request in requested_tables(gearbox, folder):
-        request.compute()
-    stiffness = mesh_stiffness(gearbox, LAW, folder)
+    gearbox, stiffness = spur_with_tables(folder, LAW)
     for variant in ("rigid", "bushing"):
         simulated(gearbox, Choice(variant, load_case="run_up"), stiffness, folder)
         modes_with_bodies(gearbox, Choice(variant, LAW), stiffness).save(

@@ -108,7 +108,18 @@ def test_a_case_that_was_changed_since_is_refused(out: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "content", ["[" * 5000 + "]" * 5000, '{"content": ' + "9" * 5000 + "}", "null", '{"source": 1}', "\udcff", ""]
+    "content",
+    [
+        "[" * 5000,
+        "[" * 5000 + "]" * 5000,
+        '{"content": ' + "9" * 5000 + "}",
+        '{"content": 3, "source": 3}',
+        '{"source": 1}',
+        "null",
+        "[]",
+        "\udcff",
+        "",
+    ],
 )
 def test_a_case_that_somebody_made_up_is_one_message(out: Path, content: str) -> None:
     (out / "case.json").write_bytes(content.encode("utf-8", errors="surrogateescape"))

@@ -5,14 +5,11 @@ from __future__ import annotations
 import json
 import math
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -28,9 +25,11 @@ from exugear.studies.study import Study
 from exugear.studies.sweep import sweep
 
 from ..cases.case_mutations import toml_text
-from ..cases.spur import COARSE_INPUT
+from ..cases.command import exugear
 from ..life.test_life import TABLE, content_of
 from ..life.test_verdicts import hertzian, planets_with
+
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 CASE = "gearbox.toml"
 FIGURES = {
@@ -60,13 +59,6 @@ def content(folder: Path, **changes):
         "figures": FIGURES,
         **changes,
     }
-
-
-@pytest.fixture(scope="module", autouse=True)
-def coarse_tables() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
-        yield
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +205,7 @@ def test_lives_need_loads_and_strengths_before_any_work(tmp_path, without, words
     with pytest.raises(CaseError, match=words):
         Study.from_dict(study)
     (tmp_path / "a.study.toml").write_text(toml_text({**study, "case": CASE}), encoding="utf-8")
-    outcome = CliRunner().invoke(app, ["sweep", str(tmp_path / "a.study.toml"), "--out", str(tmp_path / "out")])
+    outcome = exugear("sweep", tmp_path / "a.study.toml", "--out", tmp_path / "out")
     assert outcome.exit_code == 2 and words in outcome.stderr
     assert not (tmp_path / "out").exists()
 
@@ -267,8 +259,6 @@ def test_points_belong_to_all_that_their_figures_read(tmp_path):
 def test_json_of_the_verb_has_no_number_that_json_has_not(swept):
     folder, _ = swept
     (folder / "a.study.toml").write_text(toml_text({**content(folder), "case": CASE}), encoding="utf-8")
-    outcome = CliRunner().invoke(
-        app, ["sweep", str(folder / "a.study.toml"), "--out", str(folder / "out"), "--workers", "1", "--json"]
-    )
+    outcome = exugear("sweep", folder / "a.study.toml", "--out", folder / "out", "--workers", "1", "--json")
     assert outcome.exit_code == 0, outcome.stderr
     assert json.loads(outcome.stdout, parse_constant=lambda token: pytest.fail(token))["finished"] == 2

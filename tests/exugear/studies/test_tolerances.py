@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.studies.dataset import EVALUATION, beyond, load_study
 from exugear.studies.executors import processes
 from exugear.studies.figures import FIGURES, Figure
@@ -21,6 +19,7 @@ from exugear.studies.study import Study
 from exugear.studies.sweep import optimise
 
 from ..cases.case_mutations import toml_text
+from ..cases.command import exugear
 from ..cases.study import study_content
 
 HERE = processes(1)
@@ -248,9 +247,7 @@ def test_the_example_of_the_guide_can_be_read():
 
 def verb(folder, content):
     (folder / "a.study.toml").write_text(toml_text({**content, "case": "spur.toml"}), encoding="utf-8")
-    return CliRunner().invoke(
-        app, ["sweep", str(folder / "a.study.toml"), "--workers", "1", "--out", str(folder / "out")]
-    )
+    return exugear("sweep", folder / "a.study.toml", "--workers", "1", "--out", folder / "out")
 
 
 def damped(folder, limits, **changes):

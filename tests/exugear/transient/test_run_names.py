@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.project import Project
 from exugear.results.run_file import load_run
 
 from ..cases.case_mutations import toml_text
+from ..cases.command import exugear
 from ..cases.gear_trains import planetary
 
 
@@ -42,7 +41,7 @@ def test_every_variable_of_a_run_has_a_name_for_people_and_forces_name_their_bod
 
 def test_python_and_the_command_line_run_the_same_by_default(case: Path) -> None:
     by_python = Project.from_toml(case, case.parent / "again", Choice("rigid")).run()
-    outcome = CliRunner().invoke(app, ["run", str(case), "--variant", "rigid", "--out", str(case.parent / "line")])
+    outcome = exugear("run", case, "--variant", "rigid", "--out", case.parent / "line")
     assert outcome.exit_code == 0, outcome.output
     by_line = case.parent / "line" / by_python.path.relative_to(case.parent / "again")
     one, other = load_run(by_python.path), load_run(by_line)

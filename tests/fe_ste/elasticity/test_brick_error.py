@@ -12,14 +12,14 @@ from fe_ste.elasticity.flank import flank_near_field
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import Gear
 
-SPUR = Gear(name="spur", teeth=20, normal_module=3e-3, face_width=20e-3, held_diameter=30e-3, profile_shift=0.2)
-HELICAL = dataclasses.replace(SPUR, name="helical", helix_angle=np.radians(-15.0))
+from ..cases.gears import HELICAL_20, SPUR_20
+
 RING = Gear(name="ring", teeth=60, normal_module=3e-3, face_width=20e-3, held_diameter=210e-3, internal=True)
 MESH = MeshSettings(layers=6, flank=12, thickness=8)
 
 
 @pytest.mark.sample
-@pytest.mark.parametrize("gear", [SPUR, HELICAL, RING], ids=lambda gear: gear.name)
+@pytest.mark.parametrize("gear", [SPUR_20, HELICAL_20, RING], ids=lambda gear: gear.name)
 def test_the_error_is_a_small_part_of_the_displacement_and_local(gear: Gear) -> None:
     mesh = sector_mesh(gear, MESH)
     error, shape = brick_error(mesh, 1), (len(mesh.section.flank_roll), len(mesh.axial_positions)) * 2
@@ -30,13 +30,13 @@ def test_the_error_is_a_small_part_of_the_displacement_and_local(gear: Gear) -> 
 
 
 def test_both_flanks_err_alike_seen_from_the_other_end() -> None:
-    mesh = sector_mesh(HELICAL, MESH)
+    mesh = sector_mesh(HELICAL_20, MESH)
     one, other = brick_error(mesh, 1), brick_error(mesh, -1)
     assert np.abs(one - other[:, ::-1]).max() < 1e-8 * np.abs(one).max()
 
 
 def test_layers_of_unequal_thickness_are_refused() -> None:
-    mesh = sector_mesh(SPUR, MESH)
+    mesh = sector_mesh(SPUR_20, MESH)
     graded = dataclasses.replace(mesh, axial_positions=mesh.axial_positions * np.abs(mesh.axial_positions) / 10e-3)
     with pytest.raises(ValueError, match="layers from .* must be equal"):
         brick_error(graded, 1)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import importlib
 import json
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+
+from ..cases.benchmarks import benchmark_module
 
 FOLDER = Path(__file__).parents[3] / "benchmarks" / "truth"
 STORED: dict[str, dict[str, Any]] = json.loads((FOLDER / "results.json").read_text(encoding="utf-8"))
@@ -19,18 +19,9 @@ CASES = [(name, int(gear)) for name, entry in STORED.items() for gear in entry["
 ASKED = 5e-3
 
 
-def benchmark_module(name: str) -> ModuleType:
-    """A module of the benchmark, which is no part of the installed packages."""
-    sys.path.insert(0, str(FOLDER))
-    try:
-        return importlib.import_module(name)
-    finally:
-        sys.path.remove(str(FOLDER))
-
-
 @pytest.fixture(scope="module")
 def agreement() -> ModuleType:
-    return benchmark_module("agreement_with_truth")
+    return benchmark_module("truth", "agreement_with_truth")
 
 
 def close(agreement: ModuleType, name: str, gear: int) -> None:
@@ -67,7 +58,7 @@ def test_the_truth_is_known_to_six_per_mille(name: str, gear: int) -> None:
 @pytest.mark.parametrize(("name", "gear"), CASES)
 def test_the_stored_truth_is_what_its_bricks_give(name: str, gear: int) -> None:
     """The coarsest stored mesh again; digits of the file are 1e-6 of the deflection."""
-    renew, stored = benchmark_module("renew"), STORED[name]["gears"][str(gear)]["meshes"][0]
+    renew, stored = benchmark_module("truth", "renew"), STORED[name]["gears"][str(gear)]["meshes"][0]
     again = renew.mesh_entry(renew.stored_load(name), gear, stored["factor"])
     print(f"{name}, gear {gear + 1}: {again['deflection_um']} um, stored {stored['deflection_um']} um")
     assert again["unknowns"] == stored["unknowns"]

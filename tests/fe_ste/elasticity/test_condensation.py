@@ -14,17 +14,8 @@ from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.elimination import factorise
 from fe_ste.geometry.gears import Gear
 
-SPUR = Gear(name="spur", teeth=20, normal_module=3e-3, face_width=20e-3, held_diameter=30e-3, profile_shift=0.2)
-HELICAL = dataclasses.replace(SPUR, name="helical", helix_angle=np.radians(-15.0))
-RING = Gear(
-    name="ring",
-    teeth=60,
-    normal_module=3e-3,
-    helix_angle=np.radians(12.0),
-    face_width=20e-3,
-    held_diameter=210e-3,
-    internal=True,
-)
+from ..cases.gears import HELICAL_20, RING_60, SPUR_20
+
 EVEN_NUMBERS = MeshSettings(layers=4, flank=8, thickness=6, fillet=2, root=2, rim=5)
 ODD_NUMBERS = MeshSettings(layers=5, flank=7, thickness=5, fillet=1, root=1, rim=4)
 
@@ -109,7 +100,7 @@ def assert_equal_to_one_factorisation(gear: Gear, settings: MeshSettings, side: 
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("settings", [EVEN_NUMBERS, ODD_NUMBERS], ids=["even", "odd"])
-@pytest.mark.parametrize("gear", [SPUR, HELICAL, RING], ids=lambda gear: gear.name)
+@pytest.mark.parametrize("gear", [SPUR_20, HELICAL_20, RING_60], ids=lambda gear: gear.name)
 def test_dissection_equals_one_sparse_factorisation(gear: Gear, settings: MeshSettings, side: int) -> None:
     assert_equal_to_one_factorisation(gear, settings, side)
 
@@ -122,7 +113,7 @@ def test_dissection_equals_one_sparse_factorisation_on_the_default_mesh(any_grc_
 
 def test_layers_of_unequal_height_are_condensed() -> None:
     """Graded to both ends: two heights, with elements of their own each."""
-    mesh = sector_mesh(HELICAL, EVEN_NUMBERS)
+    mesh = sector_mesh(HELICAL_20, EVEN_NUMBERS)
     graded = dataclasses.replace(mesh, axial_positions=np.array([-10.0, -7.0, 0.0, 7.0, 10.0]) * 1e-3)
     own = CondensedSector.from_mesh(graded, 1, True)
     faces, _ = own.open_faces(3)
@@ -132,7 +123,7 @@ def test_layers_of_unequal_height_are_condensed() -> None:
 
 
 def test_a_mesh_that_is_not_its_own_mirror_image_is_refused() -> None:
-    mesh = sector_mesh(HELICAL, EVEN_NUMBERS)
+    mesh = sector_mesh(HELICAL_20, EVEN_NUMBERS)
     lopsided = dataclasses.replace(mesh, axial_positions=np.array([-10.0, -7.0, 0.0, 5.0, 10.0]) * 1e-3)
     with pytest.raises(ValueError, match="turned by 180 deg .* misses itself by 0.002 m"):
         CondensedSector.from_mesh(lopsided, 1, True)

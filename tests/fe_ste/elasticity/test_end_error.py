@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib
-import sys
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -17,19 +14,15 @@ from fe_ste.elasticity.halfspace import tent_means, wedge_images
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.geometry.gears import Gear
 
-FOLDER = Path(__file__).parents[3] / "benchmarks" / "truth"
+from ..cases.benchmarks import benchmark_module
+
 SPUR = Gear(name="spur", teeth=30, normal_module=4e-3, face_width=40e-3, held_diameter=80e-3)
 HELICAL = dataclasses.replace(SPUR, name="helical", helix_angle=np.radians(18.0))
 
 
 @pytest.fixture(scope="module")
 def wedge() -> ModuleType:
-    """The benchmark's own module, which is no part of the installed packages."""
-    sys.path.insert(0, str(FOLDER))
-    try:
-        return importlib.import_module("wedge")
-    finally:
-        sys.path.remove(str(FOLDER))
+    return benchmark_module("truth", "wedge")
 
 
 @pytest.fixture(scope="module")

@@ -18,26 +18,9 @@ from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import Gear, Material
 
+from ..cases.gears import HELICAL_20, RING_60, SPUR_20
+
 STEEL = Material()
-SPUR = Gear(name="spur", teeth=20, normal_module=3e-3, face_width=20e-3, held_diameter=30e-3, profile_shift=0.2)
-HELICAL = Gear(
-    name="helical",
-    teeth=20,
-    normal_module=3e-3,
-    helix_angle=np.radians(-15.0),
-    profile_shift=0.2,
-    face_width=20e-3,
-    held_diameter=30e-3,
-)
-RING = Gear(
-    name="ring",
-    teeth=60,
-    normal_module=3e-3,
-    helix_angle=np.radians(12.0),
-    face_width=20e-3,
-    held_diameter=210e-3,
-    internal=True,
-)
 COARSE = MeshSettings(layers=4, flank=8, thickness=6, fillet=2, root=2, rim=5)
 
 
@@ -63,7 +46,7 @@ def flank_of(gear: Gear) -> FlankCompliance:
     return flank_compliance(gear, -1 if gear.internal else 1, COARSE)
 
 
-@pytest.fixture(scope="module", params=[SPUR, HELICAL, RING], ids=lambda gear: gear.name)
+@pytest.fixture(scope="module", params=[SPUR_20, HELICAL_20, RING_60], ids=lambda gear: gear.name)
 def flank(request: pytest.FixtureRequest) -> FlankCompliance:
     return flank_of(request.param)
 
@@ -93,7 +76,7 @@ def test_patch_test_on_distorted_hexahedra(incompatible_modes: bool) -> None:
 
 @pytest.mark.parametrize("incompatible_modes", [True, False])
 def test_rigid_motions_cost_no_energy(incompatible_modes: bool) -> None:
-    mesh = sector_mesh(HELICAL, COARSE)
+    mesh = sector_mesh(HELICAL_20, COARSE)
     stiffness = stiffness_matrix(mesh.points, mesh.hexahedra, STEEL, incompatible_modes)
     centred = mesh.points - mesh.points.mean(axis=0)
     size = np.abs(centred).max()
@@ -115,7 +98,7 @@ def test_stiffness_is_symmetric_and_has_six_motions_only() -> None:
 
 
 def test_plain_brick_equals_the_elasticity_model_of_scikit_fem() -> None:
-    mesh = sector_mesh(HELICAL, COARSE)
+    mesh = sector_mesh(HELICAL_20, COARSE)
     own = stiffness_matrix(mesh.points, mesh.hexahedra, STEEL, incompatible_modes=False)
     element = skfem.ElementVector(skfem.ElementHex1())
     basis = skfem.Basis(skfem_mesh(mesh.points, mesh.hexahedra), element, intorder=3)
@@ -162,7 +145,7 @@ def test_few_plain_bricks_lock_in_bending_and_incompatible_modes_do_not() -> Non
 
 
 def test_flank_normals_are_unit_and_perpendicular_to_the_flank() -> None:
-    for gear, side in ((HELICAL, 1), (HELICAL, -1), (RING, 1), (RING, -1)):
+    for gear, side in ((HELICAL_20, 1), (HELICAL_20, -1), (RING_60, 1), (RING_60, -1)):
         mesh = sector_mesh(gear, MeshSettings(layers=200, flank=100, thickness=2, fillet=1, root=1, rim=2))
         nodes = mesh.points[mesh.flank_nodes(side)]
         normals = flank_normals(mesh, side)
@@ -180,7 +163,7 @@ def test_flank_normals_are_unit_and_perpendicular_to_the_flank() -> None:
 @pytest.mark.parametrize("teeth", [0, 2, 21])
 def test_open_sectors_of_impossible_tooth_numbers_are_refused(teeth: int) -> None:
     with pytest.raises(ValueError, match="open_teeth"):
-        flank_compliance(SPUR, 1, COARSE, open_teeth=teeth)
+        flank_compliance(SPUR_20, 1, COARSE, open_teeth=teeth)
 
 
 def test_unit_flank_loads_turn_the_hub_with_the_base_lever_arm(flank: FlankCompliance) -> None:
@@ -211,7 +194,7 @@ def test_teeth_further_apart_than_computed_are_refused(flank: FlankCompliance) -
 
 def test_mirrored_hand_has_the_mirrored_compliance() -> None:
     """z -> -z turns a left-hand tooth into a right-hand one: same flank, layers in reverse."""
-    one, other = flank_of(HELICAL), flank_of(HELICAL.mirrored())
+    one, other = flank_of(HELICAL_20), flank_of(HELICAL_20.mirrored())
     shape = (len(one.roll), len(one.axial)) * 2
     for offset in (-1, 0, 2):
         mirrored = other.between(offset, 0).reshape(shape)[:, ::-1, :, ::-1]
@@ -221,7 +204,7 @@ def test_mirrored_hand_has_the_mirrored_compliance() -> None:
 
 def test_other_flank_has_the_mirrored_compliance() -> None:
     """y -> -y turns the counter-clockwise flank into the clockwise flank of the other hand."""
-    one, other = flank_compliance(HELICAL, 1, COARSE), flank_compliance(HELICAL.mirrored(), -1, COARSE)
+    one, other = flank_compliance(HELICAL_20, 1, COARSE), flank_compliance(HELICAL_20.mirrored(), -1, COARSE)
     for offset in (-1, 0, 2):
         difference = np.abs(one.between(offset, 0) - other.between(-offset, 0)).max()
         assert difference < 1e-9 * np.abs(one.between(0, 0)).max()
@@ -230,13 +213,13 @@ def test_other_flank_has_the_mirrored_compliance() -> None:
 def test_compliance_scales_with_size_and_modulus() -> None:
     """A gear twice as large of half the modulus is as compliant: m/N goes with 1 / (E length)."""
     large = dataclasses.replace(
-        HELICAL,
-        normal_module=2 * HELICAL.normal_module,
-        face_width=2 * HELICAL.face_width,
-        held_diameter=2 * HELICAL.held_diameter,
+        HELICAL_20,
+        normal_module=2 * HELICAL_20.normal_module,
+        face_width=2 * HELICAL_20.face_width,
+        held_diameter=2 * HELICAL_20.held_diameter,
         material=Material(youngs_modulus=103e9),
     )
-    one, other = flank_of(HELICAL), flank_of(large)
+    one, other = flank_of(HELICAL_20), flank_of(large)
     assert np.abs(one.between(0, 0) - other.between(0, 0)).max() < 1e-9 * np.abs(one.between(0, 0)).max()
 
 

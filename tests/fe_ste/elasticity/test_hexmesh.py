@@ -14,7 +14,8 @@ from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear
 from fe_ste.geometry.profile import tooth_profile
 
-SPUR = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
+from ..cases.gears import SPUR_50
+
 FEW_LAYERS = MeshSettings(layers=4)
 """The default section; layers repeat it."""
 
@@ -42,7 +43,7 @@ def test_every_grc_gear_has_positive_jacobians_and_well_shaped_elements(mesh: Se
 
 
 def test_a_spur_gear_and_an_undivided_rim_mesh_too() -> None:
-    mesh = sector_mesh(SPUR, MeshSettings(layers=3, flank=4, thickness=2, fillet=1, root=1, rim=1))
+    mesh = sector_mesh(SPUR_50, MeshSettings(layers=3, flank=4, thickness=2, fillet=1, root=1, rim=1))
     assert gauss_determinants(mesh).min() > 0
     assert mesh.scaled_jacobian.min() > 0.3  # seven elements a section: coarse, but no fold
 
@@ -118,20 +119,20 @@ def test_sector_has_no_inner_surface(mesh: SectorMesh) -> None:
 
 def test_volume_is_section_area_times_width() -> None:
     """A spur sector: hexahedra against the shoelace area of the boundary line, itself against the profile."""
-    mesh = sector_mesh(SPUR, MeshSettings().refined(2))
+    mesh = sector_mesh(SPUR_50, MeshSettings().refined(2))
     volume = gauss_determinants(mesh).sum() / 8  # eight Gauss points of weight 1/8 in the unit cube
     quads = mesh.section.points[mesh.section.quads]
     x, y = quads[..., 0], quads[..., 1]
     area = 0.5 * np.sum(x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y)
-    assert volume == pytest.approx(area * SPUR.face_width, rel=1e-12)
+    assert volume == pytest.approx(area * SPUR_50.face_width, rel=1e-12)
 
     # Closed form: sector of the root circle plus, from root to tip, the width of the tooth at each radius.
-    profile = tooth_profile(SPUR)
+    profile = tooth_profile(SPUR_50)
     flank = profile.flank(np.linspace(profile.form_radius, profile.tip_radius, 2001))
     edge = np.concatenate([profile.fillet[::-1], flank])
     radius, angle = np.hypot(*edge.T), np.arctan2(edge[:, 1], edge[:, 0])
     tooth = 2 * np.trapezoid(angle * radius, radius)
-    body = np.pi / SPUR.teeth * (SPUR.root_radius**2 - (SPUR.held_diameter / 2) ** 2)
+    body = np.pi / SPUR_50.teeth * (SPUR_50.root_radius**2 - (SPUR_50.held_diameter / 2) ** 2)
     # Chords instead of arcs: the twice refined mesh misses a few 1e-4 of the area.
     assert area == pytest.approx(tooth + body, rel=5e-4)
 
@@ -148,7 +149,7 @@ def test_helical_sector_has_the_volume_of_its_section(mesh: SectorMesh) -> None:
 
 
 def test_refined_settings_divide_every_element() -> None:
-    coarse, fine = (sector_mesh(SPUR, MeshSettings(layers=3).refined(factor)) for factor in (1, 2))
+    coarse, fine = (sector_mesh(SPUR_50, MeshSettings(layers=3).refined(factor)) for factor in (1, 2))
     assert len(fine.hexahedra) == 8 * len(coarse.hexahedra)
 
 
@@ -165,10 +166,10 @@ def test_grading_that_is_no_number_is_refused() -> None:
 
 def test_folded_section_is_refused() -> None:
     """A held cylinder just under the root leaves no rim below the fillet's split point."""
-    root = 2 * SPUR.root_radius
+    root = 2 * SPUR_50.root_radius
     for held in np.linspace(0.9, 0.9999, 12) * root:
         try:
-            mesh = sector_mesh(dataclasses.replace(SPUR, held_diameter=held), FEW_LAYERS)
+            mesh = sector_mesh(dataclasses.replace(SPUR_50, held_diameter=held), FEW_LAYERS)
         except GeometryError as error:
             assert "held" in str(error)
         else:

@@ -19,25 +19,9 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.stores import FOLDER_VARIABLE
 
+from ..cases.gears import HELICAL_12, RING_60
+
 COARSE = MeshSettings(layers=3, flank=6, thickness=4, fillet=1, root=1, rim=3)
-HELICAL = Gear(
-    name="helical",
-    teeth=12,
-    normal_module=3e-3,
-    helix_angle=np.radians(15.0),
-    profile_shift=0.4,
-    face_width=15e-3,
-    held_diameter=16e-3,
-)
-RING = Gear(
-    name="ring",
-    teeth=60,
-    normal_module=3e-3,
-    helix_angle=np.radians(12.0),
-    face_width=20e-3,
-    held_diameter=210e-3,
-    internal=True,
-)
 
 
 def assert_same(one: FlankCompliance, other: FlankCompliance, tolerance: float) -> None:
@@ -76,7 +60,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 @pytest.mark.sample
 @pytest.mark.parametrize("open_teeth", [None, 5])
-@pytest.mark.parametrize("gear", [HELICAL, RING], ids=lambda gear: gear.name)
+@pytest.mark.parametrize("gear", [HELICAL_12, RING_60], ids=lambda gear: gear.name)
 def test_the_other_flank_is_the_same_one_turned(gear: Gear, open_teeth: int | None) -> None:
     """By 180 degrees about the middle of the tooth; against the finite elements loaded there."""
     one, other = (flank_compliance(gear, side, COARSE, open_teeth=open_teeth) for side in (1, -1))
@@ -86,7 +70,7 @@ def test_the_other_flank_is_the_same_one_turned(gear: Gear, open_teeth: int | No
 
 
 def test_a_kept_flank_is_the_computed_one(kept: Path, calls: list[str]) -> None:
-    wanted = [(HELICAL, 1), (dataclasses.replace(HELICAL, name="same gear"), -1)]
+    wanted = [(HELICAL_12, 1), (dataclasses.replace(HELICAL_12, name="same gear"), -1)]
     first = known_flanks(wanted, COARSE)
     assert calls == ["helical"]
     assert len(list(kept.iterdir())) == 1
@@ -102,7 +86,7 @@ def test_a_kept_flank_is_the_computed_one(kept: Path, calls: list[str]) -> None:
 @pytest.mark.parametrize(
     "other",
     [
-        {"gear": dataclasses.replace(HELICAL, face_width=15.1e-3)},
+        {"gear": dataclasses.replace(HELICAL_12, face_width=15.1e-3)},
         {"settings": dataclasses.replace(COARSE, rim=4)},
         {"open_teeth": 3},
         {"incompatible_modes": False},
@@ -110,24 +94,24 @@ def test_a_kept_flank_is_the_computed_one(kept: Path, calls: list[str]) -> None:
     ids=lambda other: next(iter(other)),
 )
 def test_another_input_is_computed(kept: Path, calls: list[str], other: dict[str, Any]) -> None:
-    known_flanks([(HELICAL, 1)], COARSE)
-    options = {"gear": HELICAL, "settings": COARSE} | other
+    known_flanks([(HELICAL_12, 1)], COARSE)
+    options = {"gear": HELICAL_12, "settings": COARSE} | other
     known_flanks([(options.pop("gear"), 1)], options.pop("settings"), **options)
     assert len(calls) == len(list(kept.iterdir())) == 2
 
 
 def test_another_method_does_not_use_the_files(kept: Path, calls: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    known_flanks([(HELICAL, 1)], COARSE)
+    known_flanks([(HELICAL_12, 1)], COARSE)
     forget_flanks()
     monkeypatch.setattr(fe_ste.elasticity.flank, "_method", lambda: "changed sources")
-    known_flanks([(HELICAL, 1)], COARSE)
+    known_flanks([(HELICAL_12, 1)], COARSE)
     assert len(calls) == 2
 
 
 @pytest.mark.sample
 @pytest.mark.parametrize("damage", ["cut", "flipped", "empty", "other file"])
 def test_a_damaged_file_is_computed_again(kept: Path, calls: list[str], damage: str) -> None:
-    (first,) = known_flanks([(HELICAL, 1)], COARSE)
+    (first,) = known_flanks([(HELICAL_12, 1)], COARSE)
     (path,) = kept.iterdir()
     content = bytearray(path.read_bytes())
     if damage == "flipped":
@@ -135,11 +119,11 @@ def test_a_damaged_file_is_computed_again(kept: Path, calls: list[str], damage: 
     kept_part = {"cut": content[:-100], "flipped": content, "empty": b"", "other file": b"text"}
     path.write_bytes(kept_part[damage])
     forget_flanks()
-    (again,) = known_flanks([(HELICAL, 1)], COARSE)
+    (again,) = known_flanks([(HELICAL_12, 1)], COARSE)
     assert len(calls) == 2
     assert_same(again, first, 0.0)
     forget_flanks()
-    known_flanks([(HELICAL, 1)], COARSE)
+    known_flanks([(HELICAL_12, 1)], COARSE)
     assert len(calls) == 2  # the damaged file was replaced
 
 
@@ -150,7 +134,7 @@ def test_nothing_is_kept_when_switched_off(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
     for _ in range(2):
         forget_flanks()
-        known_flanks([(HELICAL, 1)], COARSE)
+        known_flanks([(HELICAL_12, 1)], COARSE)
     assert len(calls) == 2
     assert list(tmp_path.rglob("flank-*")) == []
 
@@ -159,7 +143,7 @@ def test_nothing_is_kept_when_switched_off(
 def test_flanks_are_kept_in_the_users_cache_folder(kept: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.delenv(FOLDER_VARIABLE)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "user"))
-    known_flanks([(HELICAL, 1)], COARSE)
+    known_flanks([(HELICAL_12, 1)], COARSE)
     assert len(list((tmp_path / "user" / "exugear" / "flanks").glob("flank-*.npz"))) == 1
 
 
@@ -168,13 +152,13 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
 ) -> None:
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "file"))
-    (flank,) = known_flanks([(HELICAL, 1)], COARSE)
-    assert flank.gear == HELICAL
+    (flank,) = known_flanks([(HELICAL_12, 1)], COARSE)
+    assert flank.gear == HELICAL_12
     assert "each flank cannot be kept" in caplog.text
 
 
 def test_files_used_least_lately_are_removed(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    gears = [dataclasses.replace(HELICAL, face_width=width * 1e-3) for width in (14, 15, 16)]
+    gears = [dataclasses.replace(HELICAL_12, face_width=width * 1e-3) for width in (14, 15, 16)]
     paths: list[Path] = []
     for gear in gears[:2]:
         known_flanks([(gear, 1)], COARSE)
@@ -195,12 +179,12 @@ def test_files_used_least_lately_are_removed(kept: Path, monkeypatch: pytest.Mon
 def test_two_processes_may_write_one_file(kept: Path, calls: list[str]) -> None:
     """Both compute the same gear at once; whoever ends last leaves a whole file."""
     program = (
-        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
-        "from test_known_flanks import COARSE, HELICAL, known_flanks\n"
-        "for _ in range(3):\n    known_flanks([(HELICAL, 1)], COARSE)\n"
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parents[3])!r})\n"
+        "from tests.fe_ste.elasticity.test_known_flanks import COARSE, HELICAL_12, known_flanks\n"
+        "for _ in range(3):\n    known_flanks([(HELICAL_12, 1)], COARSE)\n"
     )
     processes = [subprocess.Popen([sys.executable, "-c", program]) for _ in range(2)]
     assert [process.wait(timeout=120) for process in processes] == [0, 0]
     assert len(list(kept.iterdir())) == 1
-    known_flanks([(HELICAL, 1)], COARSE)
+    known_flanks([(HELICAL_12, 1)], COARSE)
     assert calls == []

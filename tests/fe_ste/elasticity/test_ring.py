@@ -19,17 +19,9 @@ from fe_ste.elasticity.flank import FlankCompliance, flank_compliance, flank_ima
 from fe_ste.elasticity.halfspace import tent_weights
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.elimination import factorise
-from fe_ste.geometry.gears import Gear
 
-GEAR = Gear(
-    name="helical",
-    teeth=12,
-    normal_module=3e-3,
-    helix_angle=np.radians(15.0),
-    profile_shift=0.4,
-    face_width=15e-3,
-    held_diameter=16e-3,
-)
+from ..cases.gears import HELICAL_12
+
 COARSE = MeshSettings(layers=3, flank=6, thickness=4, fillet=1, root=1, rim=3)
 
 
@@ -96,12 +88,12 @@ def _held_on_cut(mesh: SectorMesh, side: int) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def mesh() -> SectorMesh:
-    return sector_mesh(GEAR, COARSE)
+    return sector_mesh(HELICAL_12, COARSE)
 
 
 @pytest.fixture(scope="module")
 def closed() -> FlankCompliance:
-    return flank_compliance(GEAR, 1, COARSE)
+    return flank_compliance(HELICAL_12, 1, COARSE)
 
 
 def random_sector(loads: int, seed: int = 0) -> tuple[Chain, Chain, np.ndarray, np.ndarray, np.ndarray]:
@@ -138,10 +130,10 @@ def assembled_ring(sector: np.ndarray, load: np.ndarray, teeth: int) -> np.ndarr
 
 
 def test_ring_closure_equals_the_ring_meshed_as_a_whole(mesh: SectorMesh, closed: FlankCompliance) -> None:
-    whole = meshed_compliance(mesh, GEAR.teeth, closed=True)
+    whole = meshed_compliance(mesh, HELICAL_12.teeth, closed=True)
     scale = np.abs(closed.between(0, 0)).max()
     for offset in range(-4, 5):
-        reference = whole[offset % GEAR.teeth, 0]
+        reference = whole[offset % HELICAL_12.teeth, 0]
         # 1e-10: two eliminations of the same 7000 equations in different orders.
         assert np.abs(closed.between(offset, 0) - reference).max() < 1e-10 * scale
     # Any tooth may be the loaded one.
@@ -150,7 +142,7 @@ def test_ring_closure_equals_the_ring_meshed_as_a_whole(mesh: SectorMesh, closed
 
 def test_open_sector_equals_the_open_sector_meshed_as_a_whole(mesh: SectorMesh) -> None:
     teeth = 5
-    flank = flank_compliance(GEAR, 1, COARSE, open_teeth=teeth)
+    flank = flank_compliance(HELICAL_12, 1, COARSE, open_teeth=teeth)
     whole = meshed_compliance(mesh, teeth, closed=False)
     scale = np.abs(flank.between(0, 0)).max()
     for read in range(-2, 3):
@@ -212,6 +204,6 @@ def test_open_chain_solves_the_assembled_equations() -> None:
 
 def test_open_sector_tends_to_the_ring_from_the_soft_side(closed: FlankCompliance) -> None:
     """Free cut faces take support away: 3, 7 and 11 of 12 teeth come closer and closer to the ring."""
-    middle = [flank_compliance(GEAR, 1, COARSE, open_teeth=teeth).between(0, 0).mean() for teeth in (3, 7, 11)]
+    middle = [flank_compliance(HELICAL_12, 1, COARSE, open_teeth=teeth).between(0, 0).mean() for teeth in (3, 7, 11)]
     ring = closed.between(0, 0).mean()
     assert middle[0] > middle[1] > middle[2] >= ring * (1 - 1e-12)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,27 +16,7 @@ from fe_ste.geometry.involute import inverse_involute, involute
 from fe_ste.geometry.profile import tooth_profile
 from fe_ste.tools.arrays import Floats
 
-
-def spur(**changes: Any) -> Gear:
-    """A spur gear of 50 teeth, module 3 mm, with changes."""
-    values: dict[str, Any] = {
-        "name": "wheel",
-        "teeth": 50,
-        "normal_module": 3e-3,
-        "face_width": 20e-3,
-        "held_diameter": 60e-3,
-    }
-    return Gear(**(values | changes))
-
-
-def ring(**changes: Any) -> Gear:
-    """An internal spur gear of 99 teeth, module 3 mm, with changes."""
-    return spur(**({"name": "ring", "teeth": 99, "internal": True, "held_diameter": 0.36} | changes))
-
-
-def pair(pinion: Gear, gear: Gear, centre_distance: float) -> GearPair:
-    return GearPair(name="pair", pinion=pinion, gear=gear, centre_distance=centre_distance)
-
+from ..cases.gears import pair, ring, spur
 
 # --- interference, by brute force -----------------------------------------------------------------
 
@@ -244,12 +225,6 @@ REFUSED_GEARS: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("changes, message", REFUSED_GEARS.values(), ids=REFUSED_GEARS)
-def test_gear_that_cannot_be_made_is_refused(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(GeometryError, match=message):
-        spur(**changes)
-
-
 REFUSED_RINGS: dict[str, tuple[dict[str, Any], str]] = {
     "rim inside the root": (
         {"held_diameter": 0.3},
@@ -276,10 +251,14 @@ REFUSED_RINGS: dict[str, tuple[dict[str, Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("changes, message", REFUSED_RINGS.values(), ids=REFUSED_RINGS)
-def test_internal_gear_that_cannot_be_made_is_refused(changes: dict[str, Any], message: str) -> None:
+@pytest.mark.parametrize(
+    "make, changes, message",
+    [*((spur, *row) for row in REFUSED_GEARS.values()), *((ring, *row) for row in REFUSED_RINGS.values())],
+    ids=[*REFUSED_GEARS, *(f"ring: {name}" for name in REFUSED_RINGS)],
+)
+def test_gear_that_cannot_be_made_is_refused(make: Callable[..., Gear], changes: dict[str, Any], message: str) -> None:
     with pytest.raises(GeometryError, match=message):
-        ring(**changes)
+        make(**changes)
 
 
 LEFT, RIGHT = math.radians(-10.0), math.radians(10.0)

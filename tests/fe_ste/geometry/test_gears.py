@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,27 +12,7 @@ from fe_ste.geometry.gears import BasicRack, Gear, GearPair
 from fe_ste.geometry.involute import inverse_involute, involute
 from fe_ste.tools.arrays import Floats
 
-
-def spur(**changes: Any) -> Gear:
-    """A spur gear of 50 teeth, module 3 mm, with changes."""
-    values: dict[str, Any] = {
-        "name": "wheel",
-        "teeth": 50,
-        "normal_module": 3e-3,
-        "face_width": 20e-3,
-        "held_diameter": 60e-3,
-    }
-    return Gear(**(values | changes))
-
-
-def ring(**changes: Any) -> Gear:
-    """An internal spur gear of 99 teeth, module 3 mm, with changes."""
-    return spur(**({"name": "ring", "teeth": 99, "internal": True, "held_diameter": 0.36} | changes))
-
-
-def pair(pinion: Gear, gear: Gear, centre_distance: float) -> GearPair:
-    return GearPair(name="pair", pinion=pinion, gear=gear, centre_distance=centre_distance)
-
+from ..cases.gears import pair, ring, spur
 
 # --- closed forms ---------------------------------------------------------------------------------
 

@@ -15,18 +15,9 @@ from fe_ste.pictures.teeth import HexahedraMesh, contact_quads, draw_tooth_conta
 from fe_ste.tools import drawing
 from fe_ste.tools.drawing import RenderingError, nice_length, require_rendering, without_margins
 
+from ...optional_libraries import needs_rendering
+
 COARSE = MeshSettings(layers=6, flank=16, thickness=2)
-
-
-def renders():
-    try:
-        require_rendering()
-    except RenderingError:
-        return False
-    return True
-
-
-needs_rendering = pytest.mark.skipif(not renders(), reason="no pyvista or no OpenGL on this machine")
 
 
 def external_pair():

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from fe_ste.elasticity.gear_mesh import ContactMesh
-from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.geometry.gears import GearPair
 from fe_ste.reference.newton import EquilibriumError, NewtonSettings
 from fe_ste.reference.position import NonlinearSettings, nonlinear_position
 from fe_ste.transmission_error.search import normal_load
 
-SPUR = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
-PAIR = GearPair(name="spur", pinion=SPUR, gear=SPUR, centre_distance=150e-3)
+from ..cases.gears import SPUR_PAIR
+
 TORQUE = 340.0
 COARSE = NonlinearSettings(
     teeth=3,
@@ -25,7 +25,7 @@ COARSE = NonlinearSettings(
 
 @pytest.fixture(scope="module")
 def solved():
-    return nonlinear_position(PAIR, TORQUE, 0.0, COARSE)
+    return nonlinear_position(SPUR_PAIR, TORQUE, 0.0, COARSE)
 
 
 @pytest.mark.validation
@@ -38,10 +38,10 @@ def test_a_coarse_position_of_open_sectors_comes_near_the_finest_mesh():
 def test_contact_forces_balance_the_torque_on_both_gears(solved):
     force, points = solved.equilibrium.contact_force, solved.model.bricks.points + solved.equilibrium.displacement
     moment = np.cross(points, force)[: solved.pinion_nodes, 2].sum()
-    other = np.cross(points - [PAIR.centre_distance, 0, 0], force)[solved.pinion_nodes :, 2].sum()
+    other = np.cross(points - [SPUR_PAIR.centre_distance, 0, 0], force)[solved.pinion_nodes :, 2].sum()
     # Gear 1 is pushed back, gear 2 carries the hub's torque to the tolerance of the equilibrium; the point of contact
     # moves with the deflection on gear 1, whose torque is that of its reaction.
-    assert other == pytest.approx(-TORQUE * PAIR.ratio, rel=1e-6)
+    assert other == pytest.approx(-TORQUE * SPUR_PAIR.ratio, rel=1e-6)
     assert moment == pytest.approx(-TORQUE, rel=1e-3)
     assert np.abs(force.sum(axis=0)).max() < 1e-9 * np.abs(force).sum()
 
@@ -49,13 +49,13 @@ def test_contact_forces_balance_the_torque_on_both_gears(solved):
 def test_pressures_push_and_sum_to_the_normal_force(solved):
     found = solved.equilibrium
     assert found.pressure.min() >= 0
-    assert found.pressure @ found.weight == pytest.approx(normal_load(PAIR, TORQUE), rel=2e-3)
+    assert found.pressure @ found.weight == pytest.approx(normal_load(SPUR_PAIR, TORQUE), rel=2e-3)
     assert sum(solved.load_share.values()) == pytest.approx(1.0)
     assert solved.load_share[0] > 0.99  # single contact at the pitch point
 
 
 def test_geometric_nonlinearity_adds_less_than_a_thousandth(solved):
-    small = nonlinear_position(PAIR, TORQUE, 0.0, dataclasses.replace(COARSE, finite_deformation=False))
+    small = nonlinear_position(SPUR_PAIR, TORQUE, 0.0, dataclasses.replace(COARSE, finite_deformation=False))
     # CalculiX: +0.07 % (benchmarks/calculix).
     assert 0.0002 < solved.ste / small.ste - 1 < 0.0015
 
@@ -81,13 +81,13 @@ def test_a_torque_too_large_names_position_load_step_and_iteration():
     mesh = ContactMesh(layers=3, contact_elements=2, growth=2.0, thickness=3, fillet=1, root=1, rim=3, far_flank=4)
     settings = NonlinearSettings(teeth=3, mesh=mesh, newton=NewtonSettings(most_iterations=3))
     with pytest.raises(EquilibriumError, match=r"position 0.5 .*torque 1e\+07 N m: load step \d+ .*iteration \d+"):
-        nonlinear_position(PAIR, 1e7, 0.5, settings)
+        nonlinear_position(SPUR_PAIR, 1e7, 0.5, settings)
 
 
 @pytest.mark.parametrize("torque", [0.0, -1.0, math.nan])
 def test_a_torque_that_does_not_press_is_refused(torque):
     with pytest.raises(ValueError, match="torque"):
-        nonlinear_position(PAIR, torque, 0.0, COARSE)
+        nonlinear_position(SPUR_PAIR, torque, 0.0, COARSE)
 
 
 @pytest.mark.parametrize("teeth", [0, 2])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 
 import numpy as np
 import pytest
@@ -11,15 +10,14 @@ import pytest
 from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.gear_mesh import ContactMesh
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.pictures.teeth import draw_contact_stress
 from fe_ste.reference.position import NonlinearSettings, nonlinear_position, stress_of_position, stress_of_state
-from fe_ste.tools.drawing import RenderingError, require_rendering
 from fe_ste.transmission_error.compliance import pair_compliance
 from fe_ste.transmission_error.search import contact_state, hertz_half_width, normal_load
 
-SPUR = Gear(name="spur", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
-PAIR = GearPair(name="spur", pinion=SPUR, gear=SPUR, centre_distance=150e-3)
+from ...optional_libraries import needs_rendering
+from ..cases.gears import SPUR_PAIR
+
 TORQUE = 100.0  # little enough for one tooth pair alone to touch at the pitch point
 SETTINGS = NonlinearSettings(
     teeth=3,
@@ -30,9 +28,9 @@ SETTINGS = NonlinearSettings(
 @pytest.fixture(scope="module")
 def fields():
     mesh = MeshSettings(layers=4, flank=14, thickness=8, fillet=3, root=2, rim=6)
-    compliance = pair_compliance(PAIR, mesh, ContactSettings(slices=12), open_teeth=3)
+    compliance = pair_compliance(SPUR_PAIR, mesh, ContactSettings(slices=12), open_teeth=3)
     return {
-        "non-linear": stress_of_position(nonlinear_position(PAIR, TORQUE, 0.0, SETTINGS)),
+        "non-linear": stress_of_position(nonlinear_position(SPUR_PAIR, TORQUE, 0.0, SETTINGS)),
         "superelement": stress_of_state(compliance, contact_state(compliance, TORQUE, 0.0), TORQUE, SETTINGS),
     }
 
@@ -41,8 +39,8 @@ def fields():
 @pytest.mark.parametrize("method", ["non-linear", "superelement"])
 def test_pressure_and_equivalent_stress_are_those_of_hertz(fields, method):
     field = fields[method]
-    line_load = normal_load(PAIR, TORQUE) / PAIR.face_width
-    peak = 2 * line_load / (np.pi * hertz_half_width(PAIR, line_load))
+    line_load = normal_load(SPUR_PAIR, TORQUE) / SPUR_PAIR.face_width
+    peak = 2 * line_load / (np.pi * hertz_half_width(SPUR_PAIR, line_load))
     middle = np.abs(field.sectors[0].points[:, 2]) < 5e-3
     own = field.nodes_of(0)
     # Nodal means over five elements across the contact lower the peak; the slices' pressure varies along the width.
@@ -78,21 +76,11 @@ def test_pressures_of_both_gears_carry_the_same_load(fields):
         corners = sector.points[sector.facets]
         area = np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1) / 2
         totals.append(float((field.pressure[field.nodes_of(number)][sector.facets].mean(axis=1) * area).sum()))
-    assert totals == pytest.approx([normal_load(PAIR, TORQUE)] * 2, rel=0.01)
-
-
-def can_render() -> bool:
-    if importlib.util.find_spec("pyvista") is None:
-        return False
-    try:
-        require_rendering()
-    except RenderingError:
-        return False
-    return True
+    assert totals == pytest.approx([normal_load(SPUR_PAIR, TORQUE)] * 2, rel=0.01)
 
 
 @pytest.mark.sample
-@pytest.mark.skipif(not can_render(), reason="no off-screen rendering here")
+@needs_rendering
 @pytest.mark.parametrize("flank_of", [1, 2])
 def test_the_picture_shows_both_views_and_names_load_and_method(fields, tmp_path, flank_of):
     path = tmp_path / "stress.png"

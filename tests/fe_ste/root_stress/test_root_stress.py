@@ -9,21 +9,14 @@ import pytest
 import xarray as xr
 
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
-from fe_ste.geometry.gears import BasicRack, Gear, GearPair
+from fe_ste.geometry.gears import Gear
 from fe_ste.root_stress import RootGauges, gauge_columns, gauge_places, hertz_stress, mesh_cycle_stress, root_gauges
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.standards.tooth_root import form_and_correction
 
+from ..cases.gears import fzg_c
+
 MODULE, WIDTH = 4.5e-3, 14e-3
-
-
-def fzg_c() -> GearPair:
-    """FZG-C test gears: the spur reference, z 16/24, m 4.5 mm, b 14 mm."""
-    rack = BasicRack(addendum=1.0, dedendum=1.25, tip_radius=0.38)
-    common = {"normal_module": MODULE, "face_width": WIDTH, "held_diameter": 30e-3, "rack": rack}
-    pinion = Gear(name="pinion", teeth=16, profile_shift=0.1817, tip_diameter=82.46e-3, **common)
-    wheel = Gear(name="wheel", teeth=24, profile_shift=0.1715, tip_diameter=118.36e-3, **common)
-    return GearPair(name="FZG-C", pinion=pinion, gear=wheel, centre_distance=91.5001e-3)
 
 
 def middle_stress(gauges: RootGauges, radius: float) -> float:

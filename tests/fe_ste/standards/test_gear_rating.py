@@ -27,6 +27,8 @@ from fe_ste.standards.pitting import (
 )
 from fe_ste.standards.tooth_root import form_and_correction, root_stress_factors
 
+from ..cases.gears import fzg_c
+
 
 def example_1() -> GearPair:
     """ISO/TR 6336-30:2017, example 1, a single helical case-carburised pair; mm and degrees.
@@ -117,15 +119,6 @@ def test_miner_adds_and_safety_scales_the_stress():
     allowed = 1.6e9 * (1e5 / cycles.sum()) ** (1.0 / slope)
     assert factor == pytest.approx(allowed / equivalent, rel=1e-6)
     assert miner_sum(CASE_HARDENED_CONTACT, factor * stress, 1e9, cycles) == pytest.approx(1.0)
-
-
-def fzg_c() -> GearPair:
-    """FZG-C test gears."""
-    rack = BasicRack(addendum=1.0, dedendum=1.25, tip_radius=0.38)
-    common = {"normal_module": 4.5e-3, "face_width": 14e-3, "held_diameter": 30e-3, "rack": rack}
-    pinion = Gear(name="pinion", teeth=16, profile_shift=0.1817, tip_diameter=82.46e-3, **common)
-    wheel = Gear(name="wheel", teeth=24, profile_shift=0.1715, tip_diameter=118.36e-3, **common)
-    return GearPair(name="FZG-C", pinion=pinion, gear=wheel, centre_distance=91.5001e-3)
 
 
 @pytest.mark.parametrize(("member", "form", "correction"), [(0, 2.634, 1.608), (1, 2.418, 1.672)])

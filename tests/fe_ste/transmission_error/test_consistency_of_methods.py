@@ -7,15 +7,15 @@ stored with meshes and settings in benchmarks/nonlinear/results.json; its README
 
 from __future__ import annotations
 
-import importlib
 import json
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
 from scipy.optimize import brentq
+
+from ..cases.benchmarks import benchmark_module
 
 FOLDER = Path(__file__).parents[3] / "benchmarks" / "nonlinear"
 STORED: dict[str, dict[str, Any]] = json.loads((FOLDER / "results.json").read_text(encoding="utf-8"))
@@ -29,12 +29,7 @@ def ste(name: str, method: str = "nonlinear") -> float:
 
 @pytest.fixture(scope="module")
 def agreement() -> ModuleType:
-    """The benchmark's own module, which is no part of the installed packages."""
-    sys.path.insert(0, str(FOLDER))
-    try:
-        return importlib.import_module("agreement")
-    finally:
-        sys.path.remove(str(FOLDER))
+    return benchmark_module("nonlinear", "agreement")
 
 
 def above(name: str) -> float:

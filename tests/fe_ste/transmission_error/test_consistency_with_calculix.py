@@ -10,15 +10,15 @@ README tells how they came about and what parts the two.
 
 from __future__ import annotations
 
-import importlib
 import json
 import shutil
-import sys
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 import pytest
+
+from ..cases.benchmarks import benchmark_module
 
 FOLDER = Path(__file__).parents[3] / "benchmarks" / "calculix"
 STORED: dict[str, dict[str, Any]] = json.loads((FOLDER / "results.json").read_text(encoding="utf-8"))
@@ -26,12 +26,7 @@ STORED: dict[str, dict[str, Any]] = json.loads((FOLDER / "results.json").read_te
 
 @pytest.fixture(scope="module")
 def cross_check() -> ModuleType:
-    """The benchmark's own module, which is no part of the installed packages."""
-    sys.path.insert(0, str(FOLDER))
-    try:
-        return importlib.import_module("cross_check")
-    finally:
-        sys.path.remove(str(FOLDER))
+    return benchmark_module("calculix", "cross_check")
 
 
 #: What the meshes of CalculiX leave open.

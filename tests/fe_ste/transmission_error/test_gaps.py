@@ -7,19 +7,17 @@ import pytest
 
 from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.transmission_error.surface import GapError, complete_cycle, complete_loads
 from fe_ste.transmission_error.table import MeshTable, TableInput
 
-GEAR = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
-PAIR = GearPair(name="pair", pinion=GEAR, gear=GEAR, centre_distance=90e-3)
+from ..cases.gears import PAIR_30
 
 
 @pytest.fixture(scope="module")
 def table() -> MeshTable:
     return MeshTable.compute(
         TableInput(
-            pair=PAIR,
+            pair=PAIR_30,
             torque=(25.0, 50.0, 100.0, 150.0),
             static_torque=100.0,
             positions=20,

@@ -19,7 +19,6 @@ from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.flank import flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks import FlankModification
-from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.threads import Workers
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.grid import Checkpoint, GridError, solve_grid
@@ -28,38 +27,18 @@ from fe_ste.transmission_error.states import StateAxes, StateResults
 from fe_ste.transmission_error.table import MeshTable, TableError
 from fe_ste.transmission_error.transmission_error import solve_positions
 
+from ..cases.gears import HELICAL_PAIR
 from ..damage import damages
 
-PAIR = GearPair(
-    name="helical",
-    pinion=Gear(
-        name="pinion",
-        teeth=22,
-        normal_module=3e-3,
-        helix_angle=math.radians(14.0),
-        profile_shift=0.3,
-        face_width=30e-3,
-        held_diameter=32e-3,
-    ),
-    gear=Gear(
-        name="wheel",
-        teeth=45,
-        normal_module=3e-3,
-        helix_angle=math.radians(-14.0),
-        face_width=28e-3,
-        held_diameter=80e-3,
-    ),
-    centre_distance=104.6e-3,
-)
 #: From a tenth of the load to twice, a wedge of a third of a millimetre per metre either way.
-AXES = StateAxes.checked(PAIR, [25.0, 250.0, 500.0], 3, [104.55e-3, 104.6e-3], [-1.2e-3, 0.0, 1.2e-3])
+AXES = StateAxes.checked(HELICAL_PAIR, [25.0, 250.0, 500.0], 3, [104.55e-3, 104.6e-3], [-1.2e-3, 0.0, 1.2e-3])
 
 
 @pytest.fixture(scope="module")
 def compliance() -> PairCompliance:
     coarse = MeshSettings(layers=6, flank=10, thickness=8, fillet=2, root=2, rim=6)
-    flanks = (flank_compliance(PAIR.pinion, 1, coarse), flank_compliance(PAIR.gear, 1, coarse))
-    return PairCompliance.from_flanks(PAIR, flanks, ContactSettings(slices=16))
+    flanks = (flank_compliance(HELICAL_PAIR.pinion, 1, coarse), flank_compliance(HELICAL_PAIR.gear, 1, coarse))
+    return PairCompliance.from_flanks(HELICAL_PAIR, flanks, ContactSettings(slices=16))
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +49,7 @@ def grid(compliance: PairCompliance) -> xr.Dataset:
 @pytest.mark.validation
 def test_every_state_equals_the_one_solved_alone(compliance: PairCompliance, grid: xr.Dataset) -> None:
     """Same cells and a problem with one solution: rounding is all that differs."""
-    cosine = math.cos(PAIR.pinion.base_helix_angle)
+    cosine = math.cos(HELICAL_PAIR.pinion.base_helix_angle)
     for p, t, c, m in itertools.product(range(3), range(3), range(2), range(3)):
         placed = compliance.at_centre_distance(float(AXES.centre_distance[c]))
         alone = contact_state(placed, float(AXES.torque[t]), p / 3, float(AXES.misalignment[m]))
@@ -93,7 +72,7 @@ def test_transmission_error_falls_to_the_unloaded_one_with_the_load(compliance: 
     """Where the flanks touch first, from the gaps alone; crowned and tilted flanks and one tooth out of place."""
     crowned = FlankModification(lead_crowning=6e-6, profile_crowning=4e-6)
     modified = compliance.with_modifications(crowned, FlankModification()).with_tooth_gaps({0: 3e-6})
-    axes = StateAxes.checked(PAIR, [1e-3, 250.0], 4, misalignment=[0.0, 8e-4])
+    axes = StateAxes.checked(HELICAL_PAIR, [1e-3, 250.0], 4, misalignment=[0.0, 8e-4])
     for one in (compliance, modified):
         results = solve_positions(one, axes, range(4))
         unloaded = unloaded_states(one, axes)["unloaded_ste"].to_numpy()[:, 0]

@@ -23,12 +23,11 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.stores import write_dataset
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
+from ..cases.gears import GEAR_30, PAIR_30
 from ..damage import damages
 
-GEAR = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
-PAIR = GearPair(name="pair", pinion=GEAR, gear=GEAR, centre_distance=90e-3)
 WANTED = TableInput(
-    pair=PAIR,
+    pair=PAIR_30,
     torque=(50.0, 100.0),
     positions=3,
     misalignment=(0.0, 1e-4),
@@ -37,7 +36,7 @@ WANTED = TableInput(
 )
 
 CHANGES: dict[str, Any] = {
-    "pair": dataclasses.replace(PAIR, gear=dataclasses.replace(GEAR, held_diameter=51e-3)),
+    "pair": dataclasses.replace(PAIR_30, gear=dataclasses.replace(GEAR_30, held_diameter=51e-3)),
     "torque": (50.0,),
     "positions": 4,
     "centre_distance": (90.01e-3,),
@@ -67,7 +66,7 @@ def test_table_has_all_axes_and_is_labelled(table: MeshTable) -> None:
     assert bool(data.converged.all()) and table.failures == []
     assert json.loads(data.attrs["input"])["torque"] == [50.0, 100.0]
     # The compliance depends on what holds the gears, so the table says it.
-    assert data.attrs["pinion_held_diameter"] == data.attrs["gear_held_diameter"] == GEAR.held_diameter
+    assert data.attrs["pinion_held_diameter"] == data.attrs["gear_held_diameter"] == GEAR_30.held_diameter
 
 
 def test_static_state_is_chosen_by_value_not_by_place(table: MeshTable) -> None:
@@ -154,7 +153,7 @@ def test_a_gear_that_meshes_twice_is_computed_once(monkeypatch: pytest.MonkeyPat
         return compute(gear, *rest, **options)
 
     monkeypatch.setattr(fe_ste.elasticity.flank, "flank_compliance", counted)
-    gear = dataclasses.replace(GEAR, face_width=1.01 * GEAR.face_width)
+    gear = dataclasses.replace(GEAR_30, face_width=1.01 * GEAR_30.face_width)
     pair = GearPair(name="pair", pinion=gear, gear=dataclasses.replace(gear, name="other"), centre_distance=90e-3)
     compliance = fe_ste.transmission_error.table.prepared_compliance(dataclasses.replace(WANTED, pair=pair))
     assert calls == [gear.face_width]

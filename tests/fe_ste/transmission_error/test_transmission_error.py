@@ -23,31 +23,12 @@ from fe_ste.transmission_error.search import contact_state, hertz_half_width, le
 from fe_ste.transmission_error.states import ContactState
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 
+from ..cases.gears import HELICAL_PAIR
+
 COARSE = MeshSettings(layers=6, flank=10, thickness=8, fillet=2, root=2, rim=6)
 FEW_SLICES = ContactSettings(slices=16)
 SPUR_GEAR = Gear(name="gear", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
 SPUR = GearPair(name="spur", pinion=SPUR_GEAR, gear=SPUR_GEAR, centre_distance=150e-3)
-HELICAL = GearPair(
-    name="helical",
-    pinion=Gear(
-        name="pinion",
-        teeth=22,
-        normal_module=3e-3,
-        helix_angle=math.radians(14.0),
-        profile_shift=0.3,
-        face_width=30e-3,
-        held_diameter=32e-3,
-    ),
-    gear=Gear(
-        name="wheel",
-        teeth=45,
-        normal_module=3e-3,
-        helix_angle=math.radians(-14.0),
-        face_width=28e-3,
-        held_diameter=80e-3,
-    ),
-    centre_distance=104.6e-3,
-)
 INTERNAL = GearPair(
     name="internal",
     pinion=Gear(
@@ -89,7 +70,7 @@ def spur() -> PairCompliance:
 
 @pytest.fixture(scope="module")
 def helical() -> PairCompliance:
-    return prepared(HELICAL)
+    return prepared(HELICAL_PAIR)
 
 
 @pytest.fixture(scope="module")
@@ -135,7 +116,7 @@ def test_spur_pair_of_equal_gears_has_a_symmetric_curve(spur: PairCompliance) ->
 
 def test_mirrored_pair_has_the_same_curve_and_the_opposite_misalignment(helical: PairCompliance) -> None:
     """z -> -z exchanges the hands and the ends."""
-    mirrored = prepared(HELICAL.mirrored())
+    mirrored = prepared(HELICAL_PAIR.mirrored())
     for tilt in (0.0, 2e-4):
         one = static_transmission_error(helical, 250.0, 3, misalignment=tilt)
         other = static_transmission_error(mirrored, 250.0, 3, misalignment=-tilt)
@@ -146,10 +127,10 @@ def test_mirrored_pair_has_the_same_curve_and_the_opposite_misalignment(helical:
 
 def test_result_of_a_position_does_not_depend_on_those_before(helical: PairCompliance) -> None:
     """A window so narrow that contact fills it: it grows, but the cells keep their width."""
-    narrow = PairCompliance.from_flanks(HELICAL, helical.flanks, ContactSettings(slices=16, window=1.0))
+    narrow = PairCompliance.from_flanks(HELICAL_PAIR, helical.flanks, ContactSettings(slices=16, window=1.0))
     curve = static_transmission_error(narrow, 250.0, 10).ste.values.ravel()
     alone = [contact_state(narrow, 250.0, p / 10).solution.approach for p in range(10)]
-    assert curve * math.cos(HELICAL.pinion.base_helix_angle) == pytest.approx(np.array(alone), rel=1e-12)
+    assert curve * math.cos(HELICAL_PAIR.pinion.base_helix_angle) == pytest.approx(np.array(alone), rel=1e-12)
 
 
 def test_forces_balance_the_torques_on_both_gears(compliance: PairCompliance) -> None:
@@ -277,8 +258,8 @@ def test_uniform_removal_shifts_the_curve(helical: PairCompliance) -> None:
     slope = FlankModification(helix_slope=10e-6)
     # Same +z end removed on both gears by slopes over their own face widths.
     tilted = static_transmission_error(helical.with_modifications(slope, FlankModification()), 250.0, 3)
-    face = HELICAL.pinion.face_width
-    cosine = math.cos(HELICAL.pinion.base_helix_angle)
+    face = HELICAL_PAIR.pinion.face_width
+    cosine = math.cos(HELICAL_PAIR.pinion.base_helix_angle)
     angle = 10e-6 / face / cosine
     turned = static_transmission_error(helical, 250.0, 3, misalignment=angle)
     # The slope's gap is 5 um at mid-face where the misalignment's is zero: the rest is the same wedge.
@@ -300,7 +281,7 @@ def test_misalignment_raises_the_load_at_the_end_it_closes(helical: PairComplian
 
 
 def test_larger_centre_distance_makes_an_external_mesh_softer(helical: PairCompliance) -> None:
-    distance = HELICAL.centre_distance
+    distance = HELICAL_PAIR.centre_distance
     curve = static_transmission_error(helical, 250.0, 4, centre_distance=[distance, distance + 0.3e-3])
     means = curve.ste.mean("pmc").values.ravel()
     assert 1.001 < means[1] / means[0] < 1.1
@@ -373,9 +354,9 @@ def test_least_contact_length_of_whole_overlaps() -> None:
     assert least_contact_length(SPUR) == pytest.approx(SPUR.face_width, rel=1e-12)
     width = math.pi * 3e-3 / math.sin(math.radians(14.0))
     wide = dataclasses.replace(
-        HELICAL,
-        pinion=dataclasses.replace(HELICAL.pinion, face_width=width),
-        gear=dataclasses.replace(HELICAL.gear, face_width=width),
+        HELICAL_PAIR,
+        pinion=dataclasses.replace(HELICAL_PAIR.pinion, face_width=width),
+        gear=dataclasses.replace(HELICAL_PAIR.gear, face_width=width),
     )
     assert wide.overlap_ratio == pytest.approx(1.0, rel=1e-12)
     constant = wide.transverse_contact_ratio * width / math.cos(wide.pinion.base_helix_angle)

@@ -13,6 +13,7 @@ from exugear.exchange.rexs.to_case.gear_blocks import Teeth, first_of_planets
 from exugear.exchange.rexs.to_case.notes import Block, Places
 from exugear.exchange.rexs.to_case.supports import BEARINGS, PLACE_TOLERANCE
 from exugear.exchange.rexs.tree import Component, Model
+from exugear.gearbox.units import MM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed
 
@@ -176,7 +177,7 @@ def origins_of(found: Found) -> Origins:
         held,
         bodies,
         {part.number: places.axes(part) for part in placed},
-        {part.number: 1e-3 * _z(places, part) for part in placed},
+        {part.number: MM * _z(places, part) for part in placed},
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from exugear.exchange.rexs.to_case.notes import Notes, Places
 from exugear.exchange.rexs.tree import Component, Model, RexsError
+from exugear.gearbox.units import MM
 from fe_ste.tools.display import Displayed
 
 GEARS = ("cylindrical_gear", "ring_gear")
@@ -107,7 +108,7 @@ def torsional_stiffness(connection: Component) -> float | None:
     value = connection.quantity("rotational_stiffness", "N mm / rad")
     if value is None:
         return None
-    return 1e-3 * value
+    return MM * value
 
 
 def is_rigid_in_torsion(connection: Component) -> bool:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, derived, read, tidy
 from exugear.exchange.rexs.to_case.toothing import EQUAL, Toothing
 from exugear.exchange.rexs.tree import Component, Model, RexsError
+from exugear.gearbox.units import MM
 from fe_ste.geometry import pair_relations
 from fe_ste.geometry.checks import GeometryError, check_gear
 from fe_ste.geometry.gear_relations import BasicRack, UncheckedGear
@@ -92,9 +93,7 @@ def _confirmed(
     if pinion.shift is None or gear.shift is None:
         return "agreeing"
     total = pinion.shift.value + (-gear.shift.value if gear.internal else gear.shift.value)
-    asked = [
-        pair_relations.shift_sum(unchecked("", pinion), unchecked("", gear), 1e-3 * one) for one in (apart, stated)
-    ]
+    asked = [pair_relations.shift_sum(unchecked("", pinion), unchecked("", gear), MM * one) for one in (apart, stated)]
     fits = [one is not None and abs(one - total) <= SHIFT_TOLERANCE for one in asked]
     if fits[0] == fits[1]:
         return "agreeing"
@@ -111,7 +110,7 @@ def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
     RexsError
         No working pressure angle belongs to the distance.
     """
-    total = pair_relations.shift_sum(unchecked("", pinion), unchecked("", gear), 1e-3 * distance)
+    total = pair_relations.shift_sum(unchecked("", pinion), unchecked("", gear), MM * distance)
     if total is None:
         raise RexsError(
             f"{pinion.part}, {gear.part}: no line of action touches both base circles at a distance of {distance:g} mm"
@@ -318,23 +317,23 @@ def unchecked(name: str, gear: Toothing) -> UncheckedGear:
     plain = UncheckedGear(
         name=name,
         teeth=gear.teeth,
-        normal_module=1e-3 * gear.module.value,
+        normal_module=MM * gear.module.value,
         normal_pressure_angle=math.radians(gear.pressure_angle.value),
         helix_angle=math.radians(gear.helix_angle.value),
         profile_shift=gear.shift.value if gear.shift else 0.0,
-        face_width=1e-3 * gear.face_width.value,
+        face_width=MM * gear.face_width.value,
         held_diameter=1e-3,
         internal=gear.internal,
         rack=BasicRack(1.0, gear.dedendum.value, gear.tip_radius.value),
-        tip_diameter=1e-3 * gear.tip.value if gear.tip else None,
-        root_diameter=1e-3 * gear.root.value if gear.root else None,
-        tooth_thinning=1e-3 * gear.thinning.value,
-        root_form_diameter=1e-3 * gear.root_form.value if gear.root_form else None,
+        tip_diameter=MM * gear.tip.value if gear.tip else None,
+        root_diameter=MM * gear.root.value if gear.root else None,
+        tooth_thinning=MM * gear.thinning.value,
+        root_form_diameter=MM * gear.root_form.value if gear.root_form else None,
         cutter=_cutter(gear),
     )
     if not gear.chamfer:
         return plain
-    return dataclasses.replace(plain, tip_form_diameter=2.0 * (plain.tip_radius - 1e-3 * plain.outward * gear.chamfer))
+    return dataclasses.replace(plain, tip_form_diameter=2.0 * (plain.tip_radius - MM * plain.outward * gear.chamfer))
 
 
 def _cutter(gear: Toothing) -> PinionCutter | None:
@@ -346,9 +345,7 @@ def _cutter(gear: Toothing) -> PinionCutter | None:
     if "addendum" in given:
         reference = given["teeth"] / math.cos(math.radians(gear.helix_angle.value))
         tip = gear.module.value * (reference + 2.0 * (given["profile_shift"] + given["addendum"]))
-    return PinionCutter(
-        given["teeth"], given["tip_radius"], given["profile_shift"], None if tip is None else 1e-3 * tip
-    )
+    return PinionCutter(given["teeth"], given["tip_radius"], given["profile_shift"], None if tip is None else MM * tip)
 
 
 @contextmanager
@@ -407,7 +404,7 @@ def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
         )
     if gear.root_form is None:
         return gear
-    beyond = (1e-3 * gear.root_form.value - 2.0 * bare.form_radius) * bare.outward
+    beyond = (MM * gear.root_form.value - 2.0 * bare.form_radius) * bare.outward
     notes.checked.append(
         f"{gear.part}: root form diameter {gear.root_form.value:.6g} mm, its tool's rounding gives "
         f"{2e3 * bare.form_radius:.6g} mm"
@@ -443,7 +440,7 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
     """Tip diameter (mm) at which a gear keeps clear of its mate's form circle; None if it does so already."""
     pinion = unchecked("pinion", gears[stage.pinion])
     gear = unchecked("gear", gears[stage.gear])
-    pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=1e-3 * stage.distance.value)
+    pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=MM * stage.distance.value)
     for one, of in ((pinion, stage.pinion), (gear, stage.gear)):
         if one.tip_radius <= one.base_radius:
             raise RexsError(

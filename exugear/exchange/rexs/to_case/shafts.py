@@ -12,6 +12,7 @@ from exugear.exchange.rexs.to_case.bodies import Body
 from exugear.exchange.rexs.to_case.notes import Notes, Places, needed, tidy
 from exugear.exchange.rexs.to_case.toothing import Toothing, is_rigid, material_of
 from exugear.exchange.rexs.tree import Component, Model, RexsError
+from exugear.gearbox.units import MM
 from fe_ste.geometry.cylinders import Tube, mass_properties
 
 STEEL = 7850.0
@@ -43,16 +44,16 @@ class Cylinder:
     @property
     def tube(self) -> Tube:
         """The same in m."""
-        outer_end, inner_end = (None if end is None else 1e-3 * end for end in (self.outer_end, self.inner_end))
+        outer_end, inner_end = (None if end is None else MM * end for end in (self.outer_end, self.inner_end))
         return Tube(
-            start=1e-3 * self.start,
-            length=1e-3 * self.length,
-            outer=1e-3 * self.outer,
-            inner=1e-3 * self.inner,
+            start=MM * self.start,
+            length=MM * self.length,
+            outer=MM * self.outer,
+            inner=MM * self.inner,
             density=self.density,
             outer_end=outer_end,
             inner_end=inner_end,
-            aside=1e-3 * self.aside,
+            aside=MM * self.aside,
         )
 
     @property

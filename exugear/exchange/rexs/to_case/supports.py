@@ -19,6 +19,7 @@ from exugear.exchange.rexs.to_case.bodies import (
 from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
 from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
 from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS
+from exugear.gearbox.units import MM
 from exugear.system.bearings.rolling.dimensions import boundary_of
 
 BEARINGS = ("concept_bearing", "rolling_bearing_with_catalog_geometry", "rolling_bearing_with_detailed_geometry")
@@ -96,7 +97,7 @@ def _stiff_torsion(*bodies: Body) -> float:
         for body in bodies
         for gear in body.gears
     ]
-    radius = max([0.5e-3 * abs(diameter) for diameter in diameters], default=0.0) or LEAST_RADIUS
+    radius = max([0.5 * MM * abs(diameter) for diameter in diameters], default=0.0) or LEAST_RADIUS
     return float(f"{RIGID['radial_stiffness'] * radius**2:.2g}")
 
 

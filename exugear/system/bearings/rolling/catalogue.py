@@ -28,7 +28,7 @@ from exugear.gearbox.sections.connections import (
     BearingType,
     CatalogueSection,
 )
-from exugear.gearbox.units import MM, UM
+from exugear.gearbox.units import KN, MM, UM
 from exugear.system.bearings.rolling import dimensions
 from exugear.system.bearings.rolling.rows import BallRow, BearingError, RollerRow, RollingRow, moved, pair_rows, rib_row
 
@@ -294,8 +294,8 @@ def _common(section: CatalogueSection) -> dict[str, Any]:
             f"pitch_diameter_mm = {pitch:g}; {most} do"
         )
     return {
-        "element_diameter": 1e-3 * diameter,
-        "pitch_diameter": 1e-3 * pitch,
+        "element_diameter": MM * diameter,
+        "pitch_diameter": MM * pitch,
         "element_count": count,
         "radial_clearance": MM * section.radial_clearance_mm,
         "aligning": section.type in SPHERES,
@@ -305,7 +305,7 @@ def _common(section: CatalogueSection) -> dict[str, Any]:
 def _roller_row(section: CatalogueSection) -> RollerRow:
     """One row in the middle of the bearing, without its contact angle."""
     common = _common(section)
-    length = 1e-3 * _given(section, "element_length_mm")
+    length = MM * _given(section, "element_length_mm")
     profile: dict[str, Any] = {}
     if section.type in SPHERES:
         raceway = _outer_raceway_radius(section)
@@ -316,20 +316,20 @@ def _roller_row(section: CatalogueSection) -> RollerRow:
     elif section.profile == "none":
         profile["profile_factor"] = 0.0
     else:
-        profile["profile_table"] = tuple((share, 1e-6 * drop) for share, drop in section.profile)
+        profile["profile_table"] = tuple((share, UM * drop) for share, drop in section.profile)
     return RollerRow(**common, effective_length=length, **profile)
 
 
 def _outer_raceway_radius(section: CatalogueSection) -> float:
     """Radius (m) of the sphere that the rows of an aligning bearing run in."""
     angle = math.radians(section.contact_angle_deg or 0.0)
-    return 0.5e-3 * (_given(section, "pitch_diameter_mm") / math.cos(angle) + _given(section, "element_diameter_mm"))
+    return 0.5 * MM * (_given(section, "pitch_diameter_mm") / math.cos(angle) + _given(section, "element_diameter_mm"))
 
 
 def _ball_row(section: CatalogueSection) -> BallRow:
     """One row in the middle of the bearing, without its contact angle."""
     if section.type == "self_aligning_ball":
-        outer = _outer_raceway_radius(section) / (1e-3 * _given(section, "element_diameter_mm"))
+        outer = _outer_raceway_radius(section) / (MM * _given(section, "element_diameter_mm"))
     else:
         outer = _given(section, "outer_groove_ratio")
     return BallRow(**_common(section), inner_conformity=_given(section, "inner_groove_ratio"), outer_conformity=outer)
@@ -342,7 +342,7 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
     if section.type == "four_point_ball":
         return tuple(moved(row, each, 0.0) for each in (-angle, angle))
     if section.arrangement != "single":
-        distance = 1e-3 * _given(section, "row_distance_mm")
+        distance = MM * _given(section, "row_distance_mm")
         preload = UM * section.axial_preload_um
         return pair_rows(moved(row, signed, 0.0), section.arrangement, distance, preload)
     if section.type == "thrust_spherical_roller":
@@ -354,7 +354,7 @@ def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[Rollin
         # Both rows point to the middle of the bearing.
         place = 0.5 * row.pitch_diameter * math.tan(angle)
         return moved(row, -angle, -place), moved(row, angle, place)
-    distance = 1e-3 * _given(section, "row_distance_mm") if rows > 1 else 0.0
+    distance = MM * _given(section, "row_distance_mm") if rows > 1 else 0.0
     return tuple(moved(row, signed, (number - 0.5 * (rows - 1)) * distance) for number in range(rows))
 
 
@@ -362,7 +362,7 @@ def _ribs(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollerRo
     """Ribs of cylindrical rollers as rows of their own, first those that hold the inner ring against +z."""
     if section.ribs == "none" or not isinstance(row, RollerRow):
         return ()
-    length = 1e-3 * _given(section, "rib_contact_mm")
+    length = MM * _given(section, "rib_contact_mm")
     senses = {"+z": (1,), "-z": (-1,), "both": (1, -1)}[section.ribs]
     return tuple(rib_row(row, sense, length) for sense in senses)
 
@@ -466,8 +466,8 @@ def _listed() -> dict[tuple[str, str], tuple[float, float, float, float, float, 
     with (Path(__file__).parent / "makers.csv").open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
             bore, outer, width = (float(row[key]) for key in ("bore_mm", "outer_diameter_mm", "width_mm"))
-            dynamic = 1e3 * float(row["dynamic_kN"])
-            static = 1e3 * float(row["static_kN"])
+            dynamic = KN * float(row["dynamic_kN"])
+            static = KN * float(row["static_kN"])
             makers = tuple(row["makers"].split("/"))
             found[row["type"], row["designation"]] = bore, outer, width, dynamic, static, makers
     return found

@@ -103,16 +103,10 @@ def imports_or_is_refused_in_words(text):
 
 
 @pytest.mark.validation
-def test_damaged_files_are_refused_in_words_or_imported():
-    outcomes = [imports_or_is_refused_in_words(damaged(seed)) for seed in range(60)]
+@pytest.mark.parametrize("seeds", [range(60), pytest.param(range(1000, 2000), marks=pytest.mark.long)], ids=str)
+def test_damaged_files_are_refused_in_words_or_imported(seeds):
+    outcomes = [imports_or_is_refused_in_words(damaged(seed)) for seed in seeds]
     assert {True, False} == set(outcomes)  # the damage is neither too small nor too large to tell anything
-
-
-@pytest.mark.validation
-@pytest.mark.long
-def test_a_thousand_damaged_files_are_refused_in_words_or_imported():
-    for seed in range(1000, 2000):
-        imports_or_is_refused_in_words(damaged(seed))
 
 
 def test_a_component_of_the_wrong_type_is_named_with_its_role():

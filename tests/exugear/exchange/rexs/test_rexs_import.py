@@ -11,9 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.exchange.rexs.containers import read_rexs
 from exugear.exchange.rexs.parsing import parse_model
 from exugear.exchange.rexs.to_case.conversion import to_case
@@ -21,6 +19,8 @@ from exugear.exchange.rexs.tree import Attribute, RexsError
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.bearings.rolling.dimensions import boundary_of
 from exugear.system.readiness import lacking
+
+from ...cases.command import exugear
 
 DATA = Path(__file__).parent / "data"
 SEW = "SEW_3-stage_cylindrical_gearbox_1.0.rexs"
@@ -357,21 +357,21 @@ def test_an_axis_across_the_others_is_refused():
 
 def test_the_verb_writes_a_case_that_check_accepts_and_never_over_another(tmp_path):
     out = tmp_path / "sew"
-    outcome = CliRunner().invoke(app, ["import", str(DATA / SEW), "--out", str(out), "--json"])
+    outcome = exugear("import", DATA / SEW, "--out", out, "--json")
     assert outcome.exit_code == 0, outcome.output
     summary = json.loads(outcome.stdout)
     assert summary["ratio"] == pytest.approx(IMPORTED[SEW], rel=1e-12)
     assert sorted(path.name for path in out.iterdir()) == ["gearbox.toml", "load_spectrum.csv"]
     assert Gearbox.from_toml(out / "gearbox.toml").train.ratio == summary["ratio"]
     before = (out / "gearbox.toml").read_bytes()
-    again = CliRunner().invoke(app, ["import", str(DATA / SEW), "--out", str(out)])
+    again = exugear("import", DATA / SEW, "--out", out)
     assert again.exit_code == 2
     assert "is there already" in again.output
     assert (out / "gearbox.toml").read_bytes() == before
 
 
 def test_the_verb_ends_with_2_and_writes_nothing_of_what_it_refuses(tmp_path):
-    outcome = CliRunner().invoke(app, ["import", str(DATA / "FVA_worm_stage_1-4.rexs"), "--out", str(tmp_path / "x")])
+    outcome = exugear("import", DATA / "FVA_worm_stage_1-4.rexs", "--out", tmp_path / "x")
     assert outcome.exit_code == 2
     assert "worm gears cannot be imported" in " ".join(outcome.output.split())
     assert not (tmp_path / "x").exists()

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.gearbox.gearbox import Gearbox
 
+from ...cases.command import exugear
 from ...cases.spur import COARSE_INPUT
 from .own_files import spur_pair
 
@@ -75,10 +74,6 @@ def test_a_file_without_loads_or_speeds_gets_no_sections_on_a_life():
     assert result.gearbox.case.loads is None
     assert result.gearbox.case.rating is None
     assert result.gearbox.case.operation.rated_speed_rpm is None
-
-
-def exugear(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def test_the_verbs_import_and_count_the_loads_and_never_write_over_a_table(tmp_path):

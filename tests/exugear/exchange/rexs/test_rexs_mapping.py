@@ -49,20 +49,24 @@ def shape_of(gearbox, body):
     return gearbox.case.bodies[body].shape
 
 
-def test_a_shaft_whose_axis_points_the_other_way_is_the_same_shaft():
-    length = 59.5
+def turned_round(shaft: int, length: float) -> Model:
+    """The model with the axis of one shaft, which is of this length (mm), pointing the other way."""
     sections = {
         part.number: {
             "u_coordinate_on_shaft": length
             - part.quantity("u_coordinate_on_shaft", "mm")
             - part.quantity("length", "mm")
         }
-        for part in SEW.related("assembly", "assembly", 5, "part")
+        for part in SEW.related("assembly", "assembly", shaft, "part")
         if part.type == "shaft_section"
     }
-    x, y, z = SEW.components[5].vector("support_vector")
-    turned = {5: {"support_vector": (x + length, y, z), "u_axis_vector": (-1.0, 0.0, 0.0)}}
-    plain, other = gearbox_of(SEW), gearbox_of(with_values(SEW, {**sections, **turned}))
+    x, y, z = SEW.components[shaft].vector("support_vector")
+    axis = {shaft: {"support_vector": (x + length, y, z), "u_axis_vector": (-1.0, 0.0, 0.0)}}
+    return with_values(SEW, {**sections, **axis})
+
+
+def test_a_shaft_whose_axis_points_the_other_way_is_the_same_shaft():
+    plain, other = gearbox_of(SEW), gearbox_of(turned_round(5, 59.5))
     first, second = (shape_of(gearbox, "shaft_2") for gearbox in (plain, other))
     assert second.start_z_mm == pytest.approx(first.start_z_mm)
     for one, two in zip(first.sections, second.sections, strict=True):
@@ -73,19 +77,7 @@ def test_a_shaft_whose_axis_points_the_other_way_is_the_same_shaft():
 
 
 def test_speed_and_torque_are_signed_along_the_shaft_that_bears_them():
-    x, y, z = SEW.components[4].vector("support_vector")
-    length = 164.5
-    sections = {
-        part.number: {
-            "u_coordinate_on_shaft": length
-            - part.quantity("u_coordinate_on_shaft", "mm")
-            - part.quantity("length", "mm")
-        }
-        for part in SEW.related("assembly", "assembly", 4, "part")
-        if part.type == "shaft_section"
-    }
-    changes = {4: {"support_vector": (x + length, y, z), "u_axis_vector": (-1.0, 0.0, 0.0)}}
-    gearbox = gearbox_of(with_values(SEW, {**sections, **changes}))
+    gearbox = gearbox_of(turned_round(4, 164.5))
     assert gearbox.load_cases["nominal"].start_speed == pytest.approx(-1400.0 * math.pi / 30.0)
     assert gearbox.case.static_load.torques_N_m["shaft_1"] == pytest.approx(-4.72456, rel=1e-5)
 
@@ -274,23 +266,10 @@ def test_a_cone_is_one_with_its_mass_and_its_shape():
 
 
 def test_a_cone_of_a_shaft_that_points_the_other_way_is_turned_round():
-    length = 59.5
-    parts = [p for p in SEW.related("assembly", "assembly", 5, "part") if p.type == "shaft_section"]
-    cone = parts[-1]
-    ends = {"outer_diameter_begin": 20.0, "outer_diameter_end": 16.0}
-    ahead = with_values(SEW, {cone.number: ends})
-    sections = {
-        part.number: {
-            "u_coordinate_on_shaft": length
-            - part.quantity("u_coordinate_on_shaft", "mm")
-            - part.quantity("length", "mm")
-        }
-        for part in parts
-    }
-    sections[cone.number] |= {"outer_diameter_begin": 16.0, "outer_diameter_end": 20.0}
-    x, y, z = SEW.components[5].vector("support_vector")
-    turned = {5: {"support_vector": (x + length, y, z), "u_axis_vector": (-1.0, 0.0, 0.0)}}
-    one, other = (gearbox_of(model).body("shaft_2") for model in (ahead, with_values(SEW, {**sections, **turned})))
+    cone = [p for p in SEW.related("assembly", "assembly", 5, "part") if p.type == "shaft_section"][-1].number
+    ahead = with_values(SEW, {cone: {"outer_diameter_begin": 20.0, "outer_diameter_end": 16.0}})
+    behind = with_values(turned_round(5, 59.5), {cone: {"outer_diameter_begin": 16.0, "outer_diameter_end": 20.0}})
+    one, other = (gearbox_of(model).body("shaft_2") for model in (ahead, behind))
     assert other.mass == pytest.approx(one.mass)
     assert other.centre_of_mass_z == pytest.approx(one.centre_of_mass_z)
     assert one.mass != gearbox_of(SEW).body("shaft_2").mass

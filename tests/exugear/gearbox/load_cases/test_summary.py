@@ -9,9 +9,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from typer.testing import CliRunner
 
-from exugear.cli import app as cli
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import (
@@ -27,6 +25,7 @@ from exugear.system.build import assemble
 from exugear.system.statics import accelerating_start
 from exugear.transient.runup import simulate
 
+from ...cases.command import exugear
 from ...cases.spur import SPUR_CASE
 
 INERTIA = 1e-2 + 3e-2 / 2.25
@@ -47,7 +46,7 @@ def summed(folder: Path = Path(), **load_case: object) -> LoadSummary:
 def checked(folder: Path, torques: str, *more: str):
     case = folder / "spur.toml"
     case.write_text(SPUR_CASE.replace("{ shaft_1 = 100.0, shaft_2 = 140.0 }", torques), encoding="utf-8")
-    return CliRunner().invoke(cli.app, ["check", str(case), *more])
+    return exugear("check", case, *more)
 
 
 def test_two_gears_accelerate_as_by_hand():
@@ -109,7 +108,7 @@ def test_a_run_reaches_the_speed_that_was_told(tmp_path):
 
 @pytest.mark.validation
 def test_check_prints_torque_speed_and_flanks_of_each_load_case(grc):
-    outcome = CliRunner().invoke(cli.app, ["check", grc.source, "--json"])
+    outcome = exugear("check", grc.source, "--json")
     assert outcome.exit_code == 0 and outcome.stderr == ""
     rows = {row["load_case"]: row for row in json.loads(outcome.stdout)["load_cases"]}
     assert list(rows) == ["reference", "generating", "speed_driven", "rated"]
@@ -119,7 +118,7 @@ def test_check_prints_torque_speed_and_flanks_of_each_load_case(grc):
     assert rows["speed_driven"]["driven"] is True
     flanks = {"sun_planet": "-", "ring_planet": "+", "intermediate": "+", "high_speed": "-"}
     assert all(row["loaded_flanks"] == flanks and row["doubts"] == [] for row in rows.values())
-    table = CliRunner().invoke(cli.app, ["check", grc.source]).stdout
+    table = exugear("check", grc.source).stdout
     assert "-4472.05" in table and "sun_planet -" in table
 
 
@@ -148,7 +147,7 @@ def test_check_reads_the_torque_series_too(tmp_path):
     case.write_text(
         SPUR_CASE.replace("torques_N_m = { shaft_1 = 100.0, shaft_2 = 140.0 }", 'torque_series = "torque.csv"')
     )
-    outcome = CliRunner().invoke(cli.app, ["check", str(case)])
+    outcome = exugear("check", case)
     assert outcome.exit_code == 2 and "is no torque of a body" in " ".join(outcome.stderr.split())
 
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import pytest
 from pydantic import ConfigDict, TypeAdapter
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.sections.schema.keys import json_schema, keys, meanings, page, tables
 from exugear.gearbox.templates.kinds import KINDS, template
+
+from ...cases.command import exugear
 
 ROOT = Path(__file__).parents[4]
 GRC = ROOT / "cases" / "grc750" / "gearbox.toml"
@@ -76,8 +76,8 @@ def test_the_page_of_the_documentation_is_what_the_models_say() -> None:
 
 
 def test_schema_prints_or_writes_the_same(tmp_path: Path) -> None:
-    printed = CliRunner().invoke(app, ["schema"])
+    printed = exugear("schema")
     assert printed.exit_code == 0
     assert json.loads(printed.stdout) == json_schema()
-    assert CliRunner().invoke(app, ["schema", "--out", str(tmp_path / "a" / "s.json")]).exit_code == 0
+    assert exugear("schema", "--out", tmp_path / "a" / "s.json").exit_code == 0
     assert (tmp_path / "a" / "s.json").read_text(encoding="utf-8") == printed.stdout

@@ -10,22 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import KINDS
 
+from ...cases.command import exugear
 from ...cases.spur import COARSE_INPUT
 
 QUICKLY_REPORTED = ("pair", "planetary")
 """Templates whose report is written here as well; those of all are by the verbs with tables below."""
 RUN_IN_EACH_CHANGE = [pytest.param(kind, marks=() if kind == "wind" else pytest.mark.long) for kind in KINDS]
 """The template of planets and of parallel stages; `pair` goes through all verbs in each change."""
-
-
-def exugear(*arguments: object):
-    return CliRunner().invoke(app, [*map(str, arguments)])
 
 
 @pytest.fixture(params=KINDS)

@@ -13,11 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
-
-from exugear.cli.app import app
 
 from ...cases.case_mutations import mutant, toml_text
+from ...cases.command import exugear
 from ...cases.spur import SPUR_CASE
 from ...exchange.load_files.test_load_files import packed
 from ...gearbox.test_case_mutations import at_most, is_refused_in_words
@@ -72,7 +70,7 @@ def case(tmp_path: Path) -> Path:
 
 def loads(case: Path, out: Path) -> Any:
     with at_most(LIMIT):
-        return CliRunner().invoke(app, ["loads", str(case), "--out", str(out), "--json"])
+        return exugear("loads", case, "--out", out, "--json")
 
 
 class Told:
@@ -124,15 +122,10 @@ def test_the_loads_to_start_from_are_counted(case):
 
 
 @pytest.mark.validation
-def test_damaged_keys_of_loads_are_refused_in_words_or_counted(case):
-    found = keys_survive(case, range(24))
-    assert 2 < sum(found) < 20  # else the mutants are no test of anything
-
-
-@pytest.mark.validation
-@pytest.mark.long
-def test_hundreds_of_cases_with_damaged_loads_are_refused_in_words_or_counted(case):
-    keys_survive(case, MANY)
+@pytest.mark.parametrize("seeds", [range(24), pytest.param(MANY, marks=pytest.mark.long)], ids=str)
+def test_damaged_keys_of_loads_are_refused_in_words_or_counted(case, seeds):
+    found = keys_survive(case, seeds)
+    assert 2 / 24 < sum(found) / len(found) < 20 / 24  # else the mutants are no test of anything
 
 
 def damaged(content: bytes, rng: random.Random) -> bytes:
@@ -161,15 +154,10 @@ def files_survive(case: Path, seeds: range) -> list[bool]:
 
 
 @pytest.mark.validation
-def test_damaged_files_of_many_are_refused_in_words_or_counted(case):
-    found = files_survive(case, range(24))
+@pytest.mark.parametrize("seeds", [range(24), pytest.param(MANY, marks=pytest.mark.long)], ids=str)
+def test_damaged_files_of_many_are_refused_in_words_or_counted(case, seeds):
+    found = files_survive(case, seeds)
     assert {True, False} == set(found)
-
-
-@pytest.mark.validation
-@pytest.mark.long
-def test_hundreds_of_damaged_files_of_many_are_refused_in_words_or_counted(case):
-    files_survive(case, MANY)
 
 
 @pytest.mark.parametrize(

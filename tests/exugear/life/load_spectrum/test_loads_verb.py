@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli import app as cli
 from exugear.exchange.rexs.containers import read_rexs
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.life.load_spectrum.counted import count_loads
 from exugear.life.load_spectrum.sources import load_sources
+
+from ...cases.command import exugear
 
 GRC = Path("cases/grc750/gearbox.toml")
 FVA = Path("tests/exugear/exchange/rexs/data/FVA-Industriegetriebe_2stufig_1-4.rexs")
@@ -31,7 +31,7 @@ def loaded(tmp_path: Path, text: str, name: str = "loads.csv", **keys: object) -
 
 
 def test_the_example_tells_what_each_part_sees(tmp_path):
-    result = CliRunner().invoke(cli.app, ["loads", str(GRC), "--out", str(tmp_path), "--json"])
+    result = exugear("loads", GRC, "--out", tmp_path, "--json")
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
     assert told["hours"] == pytest.approx(20.0 * (4410.6 + 2196.4 + 749.8))
@@ -165,7 +165,7 @@ def test_more_hours_than_a_year_has_are_refused(tmp_path):
 
 def test_a_case_without_loads_is_bad_input(tmp_path):
     case = tmp_path / "gearbox.toml"
-    assert CliRunner().invoke(cli.app, ["new", str(case), "--kind", "pair"]).exit_code == 0
-    result = CliRunner().invoke(cli.app, ["loads", str(case)])
+    assert exugear("new", case, "--kind", "pair").exit_code == 0
+    result = exugear("loads", case)
     assert result.exit_code == 2
     assert "loads: this section is missing" in result.stderr

@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli import app as cli
 from exugear.exchange.channels import LoadFileError
 from exugear.exchange.series_files import read_channels
 from exugear.gearbox.gearbox import Gearbox
@@ -24,6 +22,7 @@ from exugear.life.load_spectrum.counting import damage_equivalent_range
 from exugear.life.load_spectrum.series import Samples, condensed
 from exugear.life.load_spectrum.sources import load_sources
 
+from ...cases.command import exugear
 from ...exchange.load_files.test_load_files import packed
 
 GRC = Path("cases/grc750/gearbox.toml")
@@ -184,7 +183,7 @@ def test_the_verb_tells_files_and_loads_of_the_hub(dlc):
         if named.is_file() and named.suffix in (".step", ".geo"):
             (dlc / named.name).write_bytes(named.read_bytes())
     case.write_text(text)
-    result = CliRunner().invoke(cli.app, ["loads", str(case), "--out", str(dlc / "out"), "--json"])
+    result = exugear("loads", case, "--out", dlc / "out", "--json")
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
     assert (told["sources"][0]["files"], told["sources"][0]["file"]) == (3, "dlc/*.outb")

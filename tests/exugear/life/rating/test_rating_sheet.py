@@ -11,9 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
@@ -21,11 +19,13 @@ from exugear.gearbox.sections.loads import StrengthSection
 from exugear.life.life import LEFT_OUT
 from exugear.life.rating.standard import FlankRules, MeshLoads, rate
 from exugear.project import Project
-from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.geometry.gears import Material
 from fe_ste.standards.iso6336 import mesh_stiffness
 from fe_ste.standards.pitting import CASE_HARDENED_BENDING, CASE_HARDENED_CONTACT
 
+from ....fe_ste.cases.gears import nrel_stage_3
 from ...cases.case_mutations import toml_text
+from ...cases.command import exugear
 from ...cases.spur import COARSE_INPUT, SPUR_CASE
 
 GRC = Path("cases/grc750/gearbox.toml")
@@ -40,35 +40,10 @@ STRENGTH: dict[str, Any] = {
 REDUCED = {key: value for key, value in STRENGTH.items() if key != "tolerance_class"}
 
 
-def stage_3() -> GearPair:
-    """Helical stage of the NREL 5 MW gearbox: see tests/fe_ste/standards/test_rating_sheets.py."""
-    common = {"normal_module": 14e-3, "face_width": 0.36}
-    lean = math.radians(10.0)
-    pinion = Gear(
-        name="1",
-        teeth=24,
-        profile_shift=0.48,
-        helix_angle=lean,
-        held_diameter=179.1e-3,
-        tip_diameter=380.747e-3,
-        **common,
-    )
-    wheel = Gear(
-        name="2",
-        teeth=95,
-        profile_shift=0.6691,
-        helix_angle=-lean,
-        held_diameter=1193.32e-3,
-        tip_diameter=1395.376e-3,
-        **common,
-    )
-    return GearPair(name="stage 3", pinion=pinion, gear=wheel, centre_distance=0.861 + 1e-6)
-
-
 def rules(member: int = 1, **strength: Any) -> FlankRules:
     of = StrengthSection(**(STRENGTH | strength))
     return FlankRules(
-        pair=stage_3(),
+        pair=nrel_stage_3(Material()),
         member=member,
         strengths=(of, of),
         application_factor=1.25,
@@ -141,7 +116,7 @@ def test_stresses_and_safeties_are_the_products_of_the_factors_that_are_printed(
 
 def test_k_hbeta_by_hand():
     """A wedge of 20 um and the helix slopes of class 6, less 15 % run in, on 0.85 c_gamma_alpha."""
-    found, pair = rate(rules(), loads()), stage_3()
+    found, pair = rate(rules(), loads()), nrel_stage_3(Material())
     slopes = [
         math.floor(2.0**0.5 * (0.05 * math.sqrt(2e3 * gear.reference_radius) + 0.35 * math.sqrt(360.0) + 4.0) + 0.5)
         for gear in (pair.pinion, pair.gear)
@@ -287,7 +262,7 @@ def written(content: dict[str, Any], folder: Path) -> Path:
 
 
 def run(path: Path, *options: str) -> Any:
-    return CliRunner().invoke(app, ["check", str(path), "--rating", "--out", str(path.parent / "results"), *options])
+    return exugear("check", path, "--rating", "--out", path.parent / "results", *options)
 
 
 def test_the_verb_prints_all_factors_and_ends_with_1_where_a_safety_is_short(tmp_path):

@@ -14,18 +14,8 @@ from exugear.report.pictures.scene import (
 )
 from exugear.report.pictures.shapes import BodyShape, Surface, gear_surface, mode_scene, tube_surface
 from fe_ste.geometry.gears import Gear
-from fe_ste.tools.drawing import RenderingError, require_rendering
 
-
-def renders():
-    try:
-        require_rendering()
-    except RenderingError:
-        return False
-    return True
-
-
-needs_rendering = pytest.mark.skipif(not renders(), reason="no pyvista or no OpenGL on this machine")
+from ....optional_libraries import needs_rendering
 
 
 def bodies():

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 import skfem
 from matplotlib.figure import Figure
 
@@ -9,15 +8,8 @@ from exugear.report.pictures.scene import draw_free_vibration
 from exugear.system.bodies.solid_elements import SolidSeat
 from exugear.system.bodies.solids import SolidModel, reduce_solid
 from fe_ste.geometry.gear_relations import Material
-from fe_ste.tools.drawing import RenderingError, require_rendering
 
-
-def renders():
-    try:
-        require_rendering()
-    except (RenderingError, ImportError):
-        return False
-    return True
+from ....optional_libraries import needs_rendering
 
 
 def drawn(figure: Figure) -> np.ndarray:
@@ -25,7 +17,7 @@ def drawn(figure: Figure) -> np.ndarray:
     return figure.axes[0].images[0].get_array()
 
 
-@pytest.mark.skipif(not renders(), reason="no pyvista or no OpenGL on this machine")
+@needs_rendering
 def test_a_bar_is_drawn_bent_in_its_first_vibration_and_is_hottest_at_its_ends(tmp_path):
     lines = [np.linspace(0.0, length, n) for length, n in ((0.1, 3), (0.1, 3), (1.0, 9))]
     mesh = skfem.MeshHex2.from_mesh(skfem.MeshHex.init_tensor(*lines))

@@ -10,6 +10,7 @@ import scipy.signal
 import xarray as xr
 
 from exugear.gearbox.versions import RUN
+from exugear.results.spectra.run_spectra import VariantRun, read_run
 from exugear.results.spectra.waterfall import OrderLine, waterfall
 from fe_ste.tools.stores import write_dataset
 
@@ -81,3 +82,12 @@ def modes_dataset(frequencies: list[float], overall: list[float]) -> xr.Dataset:
         },
         {"mesh": ["a", "b"], "element": ["a", "bearing"], "body": ["one", "two"]},
     )
+
+
+def two_variants(folder: Path) -> tuple[VariantRun, VariantRun]:
+    """Bushing resonates at 500, 800 and 1150 Hz, rigid at 500 Hz."""
+    # The mode at 802 Hz lies nearer to the resonance, but nothing of it reaches the overall transmission error.
+    modes = modes_dataset([0.0, 497.0, 801.0, 806.0, 1150.0], [0.0, 0.3, 0.0, 0.2, 0.2])
+    bushing = read_run(write_run(folder / "b.nc", "bushing", [500.0, 800.0, 1150.0]), [STORED_LINE], modes)
+    window = bushing.spectra.window_length
+    return bushing, read_run(write_run(folder / "r.nc", "rigid", [500.0]), [STORED_LINE], None, window)

@@ -95,13 +95,6 @@ def state_of(branch, point):
 
 
 @pytest.mark.validation
-def test_a_fold_of_a_pair_with_backlash_is_that_of_shooting_in_time(branch):
-    """Where the primary resonance with contact loss turns back, to 5e-4 of the frequency."""
-    point, frequency = min(branch.folds, key=lambda fold: abs(fold[1] - 0.83))
-    assert frequency == pytest.approx(fold_by_shooting(state_of(branch, point), frequency), rel=5e-4)
-
-
-@pytest.mark.validation
 @pytest.mark.parametrize("near", [0.92249, 0.83043, 0.46904, 0.48055])
 def test_every_fold_of_a_pair_with_backlash_is_that_of_shooting_in_time(branch, near):
     """Both resonances, where teeth first part and where they come together again, to 5e-4 of the frequency."""

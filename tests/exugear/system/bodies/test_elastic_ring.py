@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from pathlib import Path
 
@@ -19,26 +18,17 @@ from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem, Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
+from ....optional_libraries import needs_meshio
 from ...cases.assembled import assembled, simulated
 from ...cases.plain_signals import energies_of, sampled
 from ...cases.ring import ring_content
 from ...cases.rounding import allowed_difference
 from ...cases.stated_loads import STATED_LOADS
 
+pytestmark = needs_meshio
+
 LOAD = {"carrier": 240e3, "lss": -38e3}
 STEP = 5e-6
-
-
-def has_meshio() -> bool:
-    """Tell whether the optional library is there."""
-    try:
-        importlib.import_module("meshio")
-    except ImportError:
-        return False
-    return True
-
-
-pytestmark = pytest.mark.skipif(not has_meshio(), reason="meshio (extra mesh) is missing")
 
 
 @pytest.fixture(scope="module")

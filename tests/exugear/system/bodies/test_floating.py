@@ -38,7 +38,7 @@ from exugear.transient.outcome import RunError
 from fe_ste.geometry.gears import Material
 
 from ...cases.assembled import assembled, simulated
-from ...cases.floating import FLOATING_CASE
+from ...cases.floating import FLOATING_CASE, without_floating_frames
 
 LOAD = {"shaft": 6.0, "wheel": 9.0}
 SPEED = 420.0
@@ -65,12 +65,6 @@ def model(gearbox: Gearbox) -> SolidModel:
 @pytest.fixture(scope="module")
 def floating(gearbox: Gearbox, stiffness: dict) -> Assembly:
     return assembled(gearbox, Choice("flexible"), stiffness)
-
-
-def in_the_frame_that_does_not_turn(assembly: Assembly) -> Assembly:
-    """The same reduced bodies on their own coordinates."""
-    bodies = {name: replace(body, floating=None) for name, body in assembly.elastic_bodies.items()}
-    return replace(assembly, elastic_bodies=bodies)
 
 
 def test_integrals_are_those_that_exudyn_computes_from_the_mesh(model: SolidModel) -> None:
@@ -178,7 +172,7 @@ def trajectories(
 def test_a_gearbox_runs_alike_in_both_frames(floating: Assembly) -> None:
     # 4000 rpm, equal steps. Asked: 0.2 % of the largest motion. What is left is of second order in tilts of 1.5e-4 rad:
     # forces across a tilted shaft push along it, which the frame that does not turn leaves out.
-    expected, wanted_dte = trajectories(in_the_frame_that_does_not_turn(floating), 300, 1e-5)
+    expected, wanted_dte = trajectories(without_floating_frames(floating), 300, 1e-5)
     found, dte = trajectories(floating, 300, 1e-5)
     place = floating.elastic_slices["shaft"]
     seats = len(floating.elastic_bodies["shaft"].reduced.seats)
@@ -206,7 +200,7 @@ def test_the_grc_runs_alike_in_both_frames(grc_shafts: Gearbox) -> None:
     stiffness = {name: value * shape for name, value in mean.items()}
     both = assembled(grc_shafts.varied({"bodies.hss.flexibility": "ffrf"}), Choice("flexible"), stiffness)
     rated = (1000, 1e-5, {"carrier": 240e3, "hss": -3000.0}, 22.5 * math.pi / 30.0)
-    expected, wanted_dte = trajectories(in_the_frame_that_does_not_turn(both), *rated)
+    expected, wanted_dte = trajectories(without_floating_frames(both), *rated)
     found, dte = trajectories(both, *rated)
     place = both.elastic_slices["hss"]
     seats = np.arange(place.start, place.start + 6 * len(both.elastic_bodies["hss"].reduced.seats), 6)
@@ -222,7 +216,7 @@ def test_all_that_acts_on_a_floating_body_acts_as_in_the_other_frame(gearbox: Ge
     # Weight, a coupling to another inertia, a torque that varies and a drive; each of them moves the shaft.
     heavy = gearbox.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0], "bodies.motor.enabled": True})
     floating = assembled(heavy, Choice("flexible"), stiffness)
-    plain = in_the_frame_that_does_not_turn(floating)
+    plain = without_floating_frames(floating)
     start = accelerating_start(floating, LOAD, SPEED)
     angle = float(start.q[floating.spin["shaft"]])
     drive = Drive("shaft", 5e3, 0.5, lambda t: angle + SPEED * t, lambda t: SPEED)
@@ -276,7 +270,7 @@ def test_the_compiled_solver_leaves_floating_frames_to_exudyn(
 ) -> None:
     told = "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
     assert unsupported_reason(floating) == told
-    assert unsupported_reason(in_the_frame_that_does_not_turn(floating)) == ""
+    assert unsupported_reason(without_floating_frames(floating)) == ""
     with pytest.raises(RunError, match="flexibility = 'ffrf' runs in Exudyn only.*use --solver exudyn"):
         simulated(gearbox, Choice("flexible", load_case="steady"), stiffness, tmp_path, solver="compiled")
 

@@ -18,18 +18,23 @@ from exugear.report.pictures.scene import (
 )
 from exugear.system.bodies.of_gearbox import reduced_bodies, shaft_model, solid_body
 from exugear.system.build import assemble
-from exugear.system.loads import Loading, LoadTable
+from exugear.system.loads import LoadTable
 from exugear.system.modes import counterparts, eigenmodes, modes_of
-from exugear.system.signals import signal_layout
 from exugear.system.statics import accelerating_start, linearise, locked_equilibrium
 from exugear.system.system import Assembly
-from exugear.transient.compiled.solver import CompiledSystem, Observer
-from exugear.transient.exudyn_model.system import ExudynSystem
+from exugear.transient.compiled.solver import CompiledSystem
 
 from ...cases.assembled import assembled, modes_with_bodies
+from ...cases.both_ways import (
+    assert_matrices_of_exudyn_are_those_of,
+    assert_signals_are_those_of_the_plain_kernels,
+    compiled_states,
+    errors_and_mesh_forces,
+    exudyn_states,
+    relative_error,
+)
 from ...cases.limit import unchecked
 from ...cases.plain_signals import energies_of, sampled
-from ...cases.rounding import allowed_difference
 from ...cases.stated_loads import STATED_LOADS
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -128,17 +133,8 @@ def test_a_shaft_strains_most_in_modes_that_only_it_has(grc: Gearbox, flexible: 
 
 
 def test_matrices_of_exudyn_are_those_of_the_assembly(flexible: Assembly) -> None:
-    rest = np.zeros(flexible.size)
-    mass, stiff, damping = ExudynSystem(flexible, rest, rest, Loading(), with_meshes=False).linearised()
-    linear = linearise(flexible, rest)
-    others = [name for name in linear.stiffness if name not in flexible.mesh_names]
-    for found, expected in (
-        (mass, linear.mass),
-        (stiff, sum(linear.stiffness[name] for name in others)),
-        (damping, sum(linear.damping[name] for name in others)),
-    ):
-        # The assembly differentiates its bearings numerically.
-        assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
+    # The assembly differentiates its bearings numerically.
+    assert_matrices_of_exudyn_are_those_of(flexible, np.zeros(flexible.size), 1e-9)
 
 
 def test_accelerations_are_those_of_the_plain_kernels(flexible: Assembly, grc: Gearbox, stiffness: dict) -> None:
@@ -170,13 +166,7 @@ def test_gyroscopic_forces_follow_the_actual_speed(flexible: Assembly) -> None:
 
 def test_signals_and_energies_are_those_of_the_plain_kernels(flexible: Assembly) -> None:
     states = [spinning(flexible, angle) for angle in (0.0, 0.7)]
-    q, v = (np.array(values) for values in zip(*states, strict=True))
-    signals, energies, powers = Observer(flexible, LoadTable(LOAD)).observe(np.zeros(2), q, v)
-    expected = sampled(flexible, q, v)
-    assert np.all(np.abs(signals - expected) < allowed_difference(expected, len(flexible.mesh_names)))
-    plain = energies_of(flexible, q, v)
-    scale = np.abs(plain).max(axis=0) + np.abs(plain[:, 2]).max()
-    assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
+    assert_signals_are_those_of_the_plain_kernels(flexible, *map(np.array, zip(*states, strict=True)), LOAD)
 
 
 def test_power_is_balanced_at_every_state(flexible: Assembly) -> None:
@@ -191,30 +181,15 @@ def test_power_is_balanced_at_every_state(flexible: Assembly) -> None:
     assert change == pytest.approx(v @ applied - powers.sum(), rel=1e-4)
 
 
-def trajectories(assembly: Assembly, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Signals by the compiled solver and by Exudyn from the same start at 46 rpm."""
-    start = accelerating_start(assembly, LOAD, -4.8)
-    q, v = np.empty((2, steps + 1, assembly.size))
-    q[0], v[0] = start.q, start.v
-    assert CompiledSystem(assembly, start.q, start.v, LoadTable(LOAD), STEP).advance(0, q[1:], v[1:]) == steps
-    rows: list[np.ndarray] = []
-
-    def keep(t: float, q: np.ndarray, v: np.ndarray) -> bool:
-        rows.append(np.array([q, v]))
-        return True
-
-    ExudynSystem(assembly, start.q, start.v, Loading(LOAD)).run(0.0, steps, STEP, keep)
-    states = np.array(rows)
-    return sampled(assembly, q, v), sampled(assembly, states[:, 0], states[:, 1])
-
-
 def test_the_compiled_solver_follows_exudyn(flexible: Assembly) -> None:
-    found, expected = trajectories(flexible, 500)
-    layout = signal_layout(flexible)
-    columns = slice(layout["overall_dte_angle"].start, layout["mesh_force"].stop)
-    moving = expected[:, columns] - expected[:, columns].mean(axis=0)
-    error = np.sqrt(np.mean((found - expected)[:, columns] ** 2, axis=0) / np.mean(moving**2, axis=0))
-    assert error.max() < 1e-5
+    # From 46 rpm on.
+    start = accelerating_start(flexible, LOAD, -4.8)
+    columns = errors_and_mesh_forces(flexible)
+    found, expected = (
+        sampled(flexible, *states(flexible, start.q, start.v, LOAD, 500, STEP))[:, columns]
+        for states in (compiled_states, exudyn_states)
+    )
+    assert relative_error(found, expected) < 1e-5
 
 
 @pytest.mark.validation

@@ -21,36 +21,26 @@ from exugear.system.bodies.of_gearbox import reduced_bodies, solid_body
 from exugear.system.bodies.solid_elements import assemble as assemble_solid
 from exugear.system.bodies.solid_elements import seat_rows
 from exugear.system.build import assemble
-from exugear.system.loads import Loading, LoadTable
+from exugear.system.loads import LoadTable
 from exugear.system.modes import BODY_MOTIONS, counterparts, eigenmodes, modes_of
 from exugear.system.signals import energy_residual
 from exugear.system.statics import accelerating_start, linearise, locked_equilibrium
 from exugear.system.system import Assembly, input_hash
 from exugear.transient.compiled.solver import CompiledSystem
-from exugear.transient.exudyn_model.system import ExudynSystem
 from fe_ste.elimination import factorise
 
+from ....optional_libraries import needs_gmsh, needs_meshio, works
 from ...cases.assembled import assembled, bodies_of, modes_with_bodies, simulated
+from ...cases.both_ways import assert_matrices_of_exudyn_are_those_of, compiled_states, exudyn_states, relative_error
 from ...cases.box import box_content
 from ...cases.limit import unchecked
 from ...cases.plain_signals import sampled
 
+pytestmark = needs_meshio
+
 STIFFNESS = {"spur": 2e8 * (1.0 + 0.1 * np.cos(2.0 * np.pi * np.arange(16) / 16))}
 LOAD = {"shaft_1": 100.0, "shaft_2": 140.0}
 STEP = 5e-6
-
-
-def works(library: str) -> bool:
-    """Tell whether an optional library and what it needs of the system is there."""
-    try:
-        importlib.import_module(library)
-    except (ImportError, OSError):
-        return False
-    return True
-
-
-pytestmark = pytest.mark.skipif(not works("meshio"), reason="meshio (extra mesh) is missing")
-needs_gmsh = pytest.mark.skipif(not works("gmsh"), reason="gmsh (extra mesh) or its system libraries are missing")
 
 
 @pytest.fixture(scope="module")
@@ -172,13 +162,8 @@ def test_modes_tell_of_the_housing(housed: Assembly) -> None:
 
 
 def test_matrices_of_exudyn_are_those_of_the_assembly(housed: Assembly) -> None:
-    rest = np.zeros(housed.size)
-    found = ExudynSystem(housed, rest, rest, Loading(), with_meshes=False).linearised()
-    linear = linearise(housed, rest)
-    others = [name for name in linear.stiffness if name not in housed.mesh_names]
-    stiff, damping = (sum(elements[name] for name in others) for elements in (linear.stiffness, linear.damping))
-    for one, two in zip(found, (linear.mass, stiff, damping), strict=True):
-        assert np.abs(one - two).max() < 1e-9 * np.abs(two).max()  # the assembly's bearings are difference quotients
+    # The assembly's bearings are difference quotients.
+    assert_matrices_of_exudyn_are_those_of(housed, np.zeros(housed.size), 1e-9)
 
 
 def test_the_compiled_solver_follows_exudyn_and_the_plain_kernels(housed: Assembly) -> None:
@@ -186,20 +171,10 @@ def test_the_compiled_solver_follows_exudyn_and_the_plain_kernels(housed: Assemb
     system = CompiledSystem(housed, q, v, LoadTable(LOAD), STEP)
     plain = housed.accelerations(q, v, housed.torque_vector(LOAD))
     assert np.abs(system.accelerations() - plain).max() < 1e-9 * np.abs(plain).max()
-    steps = 400
-    states = np.empty((2, steps + 1, housed.size))
-    states[:, 0] = q, v
-    assert system.advance(0, states[0, 1:], states[1, 1:]) == steps
-    rows: list[np.ndarray] = []
-
-    def keep(t: float, q: np.ndarray, v: np.ndarray) -> bool:
-        rows.append(np.array([q, v]))
-        return True
-
-    ExudynSystem(housed, q, v, Loading(LOAD)).run(0.0, steps, STEP, keep)
-    found, expected = sampled(housed, *states), sampled(housed, *np.swapaxes(np.array(rows), 0, 1))
-    swing = np.mean((expected - expected.mean(axis=0)) ** 2, axis=0)
-    assert np.sqrt(np.mean((found - expected) ** 2, axis=0) / swing).max() < 1e-5
+    found, expected = (
+        sampled(housed, *states(housed, q, v, LOAD, 400, STEP)) for states in (compiled_states, exudyn_states)
+    )
+    assert relative_error(found, expected) < 1e-5
 
 
 def test_work_of_the_loads_is_accounted_for(box: Gearbox, tmp_path: Path) -> None:

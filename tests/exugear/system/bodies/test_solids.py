@@ -35,6 +35,8 @@ from exugear.system.bodies.turned_shaft import ShaftModel, reduce_shaft
 from fe_ste.elimination import factorise
 from fe_ste.geometry.gears import Material
 
+from ....optional_libraries import needs_gmsh, needs_meshio
+
 STEEL = Material(210e9, 0.3, 7850.0)
 SECTIONS = (ShaftSection(0.2, 0.06), ShaftSection(0.2, 0.1), ShaftSection(0.2, 0.08, 0.04))
 BANDS = (SeatBand("left", 0.0), SeatBand("gear", 0.3, 0.06), SeatBand("right", 0.58, 0.04))
@@ -46,19 +48,6 @@ SEATS = (
 SIZE = MeshSize(0.1, 0.05, 0)
 BLANKS = {"gear": Blank(12.0, 0.08, 0.15)}
 BAND = 3000.0
-
-
-def works(library: str) -> bool:
-    """Tell whether an optional library and what it needs of the system is there."""
-    try:
-        importlib.import_module(library)
-    except (ImportError, OSError):
-        return False
-    return True
-
-
-needs_gmsh = pytest.mark.skipif(not works("gmsh"), reason="gmsh (extra mesh) or its system libraries are missing")
-needs_meshio = pytest.mark.skipif(not works("meshio"), reason="meshio (extra mesh) is missing")
 
 
 @pytest.fixture(scope="module")

@@ -14,15 +14,20 @@ import skfem
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
-from exugear.system.loads import Loading, LoadTable
+from exugear.system.loads import LoadTable
 from exugear.system.modes import modes_of
-from exugear.system.signals import signal_layout
-from exugear.system.statics import accelerating_start, linearise, locked_equilibrium
+from exugear.system.statics import accelerating_start, locked_equilibrium
 from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem, Observer
-from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...cases.assembled import assembled
+from ...cases.both_ways import (
+    assert_matrices_of_exudyn_are_those_of,
+    compiled_states,
+    errors_and_mesh_forces,
+    exudyn_states,
+    relative_error,
+)
 from ...cases.limit import unchecked
 from ...cases.plain_signals import energies_of, sampled
 from ...cases.stated_loads import STATED_LOADS
@@ -136,9 +141,7 @@ def test_the_account_of_energy_of_a_run_closes(carrying: Gearbox, stiffness: dic
     # 20 ms at 46 rpm; powers by Simpson's rule over the steps, whose error is far below.
     assembly = assembled(carrying.varied(keys), Choice("flexible"), stiffness)
     start = accelerating_start(assembly, LOAD, -4.8)
-    q, v = np.empty((2, 2001, assembly.size))
-    q[0], v[0] = start.q, start.v
-    assert CompiledSystem(assembly, start.q, start.v, LoadTable(LOAD), STEP).advance(0, q[1:], v[1:]) == 2000
+    q, v = compiled_states(assembly, start.q, start.v, LOAD, 2000, STEP)
     _, energies, powers = Observer(assembly, LoadTable(LOAD)).observe(STEP * np.arange(2001), q, v)
     weights = np.full(2001, 2.0)
     weights[1::2], weights[[0, -1]] = 4.0, 1.0
@@ -154,42 +157,22 @@ def test_matrices_of_exudyn_are_those_of_the_assembly(flexible: Assembly, loaded
     if loaded:
         load = flexible.gearbox.case.static_load
         q = locked_equilibrium(flexible, load.torques_N_m, load.locked, flexible.mean_meshes)
-    system = ExudynSystem(flexible, q, np.zeros(flexible.size), Loading(), with_meshes=False)
-    mass, stiff, damping = system.linearised()
-    linear = linearise(flexible, q)
-    others = [name for name in linear.stiffness if name not in flexible.mesh_names]
-    for found, expected in (
-        (mass, linear.mass),
-        (stiff, sum(linear.stiffness[name] for name in others)),
-        (damping, sum(linear.damping[name] for name in others)),
-    ):
-        # Both differentiate numerically. Under load Exudyn's rigid bodies and dampers know their tilts of 1e-5 rad in
-        # mass and damping; the assembly's masses do not.
-        assert np.abs(found - expected).max() < (1e-5 if loaded else 1e-7) * np.abs(expected).max()
+    # Both differentiate numerically. Under load Exudyn's rigid bodies and dampers know their tilts of 1e-5 rad in mass
+    # and damping; the assembly's masses do not.
+    assert_matrices_of_exudyn_are_those_of(flexible, q, 1e-5 if loaded else 1e-7)
 
 
 @pytest.mark.validation
 def test_the_compiled_solver_follows_exudyn(flexible: Assembly) -> None:
     start = accelerating_start(flexible, LOAD, -4.8)
-    q, v = np.empty((2, 501, flexible.size))
-    q[0], v[0] = start.q, start.v
-    assert CompiledSystem(flexible, start.q, start.v, LoadTable(LOAD), STEP).advance(0, q[1:], v[1:]) == 500
-    rows: list[np.ndarray] = []
-
-    def keep(t: float, q: np.ndarray, v: np.ndarray) -> bool:
-        rows.append(np.array([q, v]))
-        return True
-
-    ExudynSystem(flexible, start.q, start.v, Loading(LOAD)).run(0.0, 500, STEP, keep)
-    states = np.array(rows)
-    layout = signal_layout(flexible)
-    columns = slice(layout["overall_dte_angle"].start, layout["mesh_force"].stop)
-    found, expected = (sampled(flexible, *both)[:, columns] for both in ((q, v), (states[:, 0], states[:, 1])))
-    error = np.sqrt(np.mean((found - expected) ** 2, axis=0) / np.var(expected, axis=0))
-    assert error.max() < 1e-5
+    q, v = compiled_states(flexible, start.q, start.v, LOAD, 500, STEP)
+    expected = exudyn_states(flexible, start.q, start.v, LOAD, 500, STEP)
+    columns = errors_and_mesh_forces(flexible)
+    signals = (sampled(flexible, *both)[:, columns] for both in ((q, v), expected))
+    assert relative_error(*signals) < 1e-5
     # The carrier's own coordinates, too: by their motion against a steady turning.
     place = flexible.elastic_slices["carrier"]
-    moved = np.abs(states[:, 0, place] - q[:, place]).max()
+    moved = np.abs(expected[0][:, place] - q[:, place]).max()
     assert moved < 1e-5 * np.ptp(q[:, place] - q[0, place] - STEP * np.arange(501)[:, None] * v[0, place])
 
 

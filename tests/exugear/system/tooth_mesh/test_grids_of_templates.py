@@ -8,15 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-import exugear.system.tooth_mesh.tables
-from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.system.tooth_mesh.tables import fitting_table
 from fe_ste.transmission_error.states import CUT_OFF
 
+from ...cases.command import exugear
 from ...cases.spur import COARSE_INPUT
 
 WIDE = (
@@ -37,7 +35,7 @@ def case_of(folder: Path, kind: str, **axes: Any) -> Path:
 def check_verbs(case: Path, out: Path, *ste: object) -> list[dict[str, Any]]:
     """Tables, modes and a run by the law `table`, each with exit code 0; return what is said of the tables."""
     invoked = [
-        CliRunner().invoke(app, [*map(str, arguments), "--json", "--out", str(out)])
+        exugear(*arguments, "--json", "--out", out)
         for arguments in (
             ("ste", case, "--grid", *ste),
             ("modes", case, "--variant", "bushing", "--mesh-law", "table"),
@@ -54,7 +52,7 @@ def test_states_that_come_to_form_circles_are_solved(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Fewer elements and positions; the centre distance goes where tips come nearest to their mates' roots."""
-    monkeypatch.setattr(exugear.system.tooth_mesh.tables, "TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     case = case_of(tmp_path, kind, positions=8, loads=[0.2, 1.0, 3.0], offsets=[-100.0, 0.0, 100.0])
     gearbox = Gearbox.from_toml(case)
     tables = check_verbs(case, tmp_path / "out")

@@ -8,10 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from typer.testing import CliRunner
 
-import exugear.system.tooth_mesh.tables
-from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.report.writer import write_report
@@ -20,6 +17,7 @@ from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import missing_tables, requested_tables, wanted_table
 
+from ...cases.command import exugear
 from ...cases.spur import COARSE_INPUT, SPUR_CASE
 
 AXES = """ste = { positions = 8, torque_factors = [0.2, 1.0], centre_distance_offsets_um = [0.0, 50.0],
@@ -34,8 +32,8 @@ def computed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     case = folder / "spur.toml"
     case.write_text(CASE, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(exugear.system.tooth_mesh.tables, "TableInput", COARSE_INPUT)
-        outcome = CliRunner().invoke(app, ["ste", str(case), "--grid", "--out", str(folder / "out")])
+        patch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
+        outcome = exugear("ste", case, "--grid", "--out", folder / "out")
     assert outcome.exit_code == 0, outcome.stderr
     assert "64/64" in outcome.stdout
     return case, folder / "out"
@@ -43,7 +41,7 @@ def computed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(exugear.system.tooth_mesh.tables, "TableInput", COARSE_INPUT)
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
 
 
 @pytest.mark.validation
@@ -93,7 +91,7 @@ def test_one_state_does_not_serve_where_a_grid_is_needed_nor_a_grid_with_other_a
 def test_law_table_runs_from_the_command_line_on_its_grid(computed: tuple[Path, Path], tmp_path: Path) -> None:
     case, out = computed
     arguments = ["--mesh-law", "table", "--variant", "bushing", "--json", "--out", str(out)]
-    outcome = CliRunner().invoke(app, ["run", str(case), "--duration", "0.05", *arguments])
+    outcome = exugear("run", case, "--duration", "0.05", *arguments)
     assert outcome.exit_code == 0, outcome.stderr
     summary = json.loads(outcome.stdout)
     assert summary["mesh_law"] == "table"
@@ -101,7 +99,7 @@ def test_law_table_runs_from_the_command_line_on_its_grid(computed: tuple[Path, 
     assert {"misalignment", "centre_distance_change"} <= set(data)
     # A grid of one load beside the static one ends there, and the gears tilt both ways.
     assert summary["longest_time_outside_table_s"] > 0.0
-    outcome = CliRunner().invoke(app, ["modes", str(case), *arguments])
+    outcome = exugear("modes", case, *arguments)
     assert outcome.exit_code == 0, outcome.stderr
     write_report(out)
     requested_tables(Gearbox.from_toml(case), tmp_path)[0].compute()
@@ -232,7 +230,7 @@ def test_axes_without_the_static_state_or_out_of_order_are_refused(
 def test_a_centre_distance_at_which_flanks_overlap_is_refused_with_its_key(tmp_path: Path) -> None:
     case = tmp_path / "spur.toml"
     case.write_text(CASE.replace("[0.0, 50.0]", "[-50.0, 0.0]"), encoding="utf-8")
-    outcome = CliRunner().invoke(app, ["ste", str(case), "--grid", "--out", str(tmp_path / "out")])
+    outcome = exugear("ste", case, "--grid", "--out", tmp_path / "out")
     assert outcome.exit_code == 2
     assert "centre_distance_offsets_um: -50" in outcome.stderr
     assert not (tmp_path / "out").exists()

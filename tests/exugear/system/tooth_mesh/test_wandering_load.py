@@ -7,19 +7,15 @@ import tomllib
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from exugear.cli.app import app
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
 from exugear.system.tooth_mesh.tables import fitting_table, requested_tables, wandering_loads
 
-from ...cases.spur import COARSE_INPUT, SPUR_CASE
+from ...cases.command import exugear
+from ...cases.spur import SPUR_CASE
 
-
-@pytest.fixture(autouse=True)
-def coarse_tables(monkeypatch):
-    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
+pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 
 def with_tables(content, folder):
@@ -56,21 +52,21 @@ def test_steady_says_that_the_moment_is_left_out_and_how_much_that_is(tmp_path):
     case.write_text(template("pair"), encoding="utf-8")
     usual = ["steady", str(case), "--out", str(tmp_path / "out"), "--variant", "bushing", "--speeds", "500:1500:4"]
     asked = [*usual, "--mesh-law", "seed"]
-    told = CliRunner().invoke(app, asked)
+    told = exugear(*asked)
     assert told.exit_code == 0, told.stderr
     words = " ".join(told.stderr.split())
     assert "helical: the load moves by +-" in words
     assert "is left out by the law seed: peaks of modes in which gears tilt may be many times higher" in words
-    summary = json.loads(CliRunner().invoke(app, [*asked, "--json"]).stdout)
+    summary = json.loads(exugear(*asked, "--json").stdout)
     (own,) = summary["left_out_moments"]
     assert own["pair"] == "helical"
     assert own["over_transmission_error"] > 1.0
     # The usual law has it.
-    assert "is left out" not in " ".join(CliRunner().invoke(app, usual).stderr.split())
+    assert "is left out" not in " ".join(exugear(*usual).stderr.split())
 
 
 def test_steady_says_nothing_where_the_load_stays(tmp_path):
     case = tmp_path / "spur.toml"
     case.write_text(SPUR_CASE, encoding="utf-8")
     asked = ["steady", str(case), "--out", str(tmp_path / "out"), "--variant", "bushing", "--speeds", "500:1500:4"]
-    assert "the load moves" not in " ".join(CliRunner().invoke(app, asked).stderr.split())
+    assert "the load moves" not in " ".join(exugear(*asked).stderr.split())

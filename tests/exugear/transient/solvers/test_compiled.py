@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.signal
-import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
@@ -23,17 +22,22 @@ from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.transient.compiled.integrator import RUNGE_KUTTA, Method, choose_integration, highest_rate
-from exugear.transient.compiled.solver import CompiledSystem, Observer, unsupported_reason
+from exugear.transient.compiled.solver import CompiledSystem, unsupported_reason
 from exugear.transient.exudyn_model.library import exudyn
 from exugear.transient.exudyn_model.system import ExudynSystem
 from exugear.transient.outcome import RunError
 from exugear.transient.runup import simulate
 
 from ...cases.assembled import assembled, simulated
+from ...cases.both_ways import (
+    assert_signals_are_those_of_the_plain_kernels,
+    compiled_states,
+    errors_and_mesh_forces,
+    exudyn_states,
+)
 from ...cases.contact import contacts, curves_of
-from ...cases.plain_signals import energies_of, sampled
+from ...cases.plain_signals import sampled
 from ...cases.rolling import BALLS, CYLINDRICAL, TAPERED, on_rolling
-from ...cases.rounding import allowed_difference
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 STEP = 2.5e-5
@@ -111,13 +115,7 @@ def test_signals_and_energies_are_those_of_the_plain_kernels(grc: Gearbox, stiff
     for assembly in assemblies(grc, stiffness):
         states = [disturbed(assembly, angle) for angle in (0.0, 0.7)]
         q, v = (np.array(values) for values in zip(*states, strict=True))
-        signals, energies, powers = Observer(assembly, LoadTable(LOAD)).observe(np.zeros(2), q, v)
-        expected = sampled(assembly, q, v)
-        assert np.all(np.abs(signals - expected) < allowed_difference(expected, len(assembly.mesh_names)))
-        plain = energies_of(assembly, q, v)
-        # The non-conservative power is a small difference of large ones: measured by what is dissipated, too.
-        scale = np.abs(plain).max(axis=0) + np.abs(plain[:, 2]).max()
-        assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
+        powers = assert_signals_are_those_of_the_plain_kernels(assembly, q, v, LOAD)
         load = v @ (assembly.torque_vector(LOAD) + assembly.weight)
         assert powers[:, 0] == pytest.approx(load, rel=1e-12)
 
@@ -170,32 +168,6 @@ def test_accelerations_equal_exudyns_body_by_body(grc: Gearbox, stiffness: dict,
             assert np.abs(found[part] - expected[part]).max(initial=0.0) < 1e-9 * scale, body.name
 
 
-def compiled_trajectory(
-    assembly: Assembly, q: np.ndarray, v: np.ndarray, steps: int, step: float = STEP
-) -> tuple[np.ndarray, np.ndarray]:
-    """States at the start and after each step."""
-    out_q, out_v = np.empty((2, steps + 1, assembly.size))
-    out_q[0], out_v[0] = q, v
-    done = CompiledSystem(assembly, q, v, LoadTable(LOAD), step).advance(0, out_q[1:], out_v[1:])
-    assert done == steps
-    return out_q, out_v
-
-
-def exudyn_trajectory(
-    assembly: Assembly, q: np.ndarray, v: np.ndarray, steps: int, step: float = STEP, every: int = 1
-) -> tuple[np.ndarray, np.ndarray]:
-    """The same by Exudyn: RK44, or generalized-alpha for the variant `jointed`."""
-    rows: list[np.ndarray] = []
-
-    def keep(t: float, q: np.ndarray, v: np.ndarray) -> bool:
-        rows.append(np.array([q, v]))
-        return True
-
-    ExudynSystem(assembly, q, v, Loading(LOAD)).run(0.0, steps, step, keep, assembly.variant != "jointed")
-    states = np.array(rows)[::every]
-    return states[:, 0], states[:, 1]
-
-
 def dynamic_error(found: np.ndarray, expected: np.ndarray) -> float:
     """Greatest rms of a difference over the rms of its column without a cubic trend."""
     time = np.linspace(-1.0, 1.0, len(expected))
@@ -204,18 +176,12 @@ def dynamic_error(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.max(np.sqrt(np.mean((found - expected) ** 2, axis=0) / np.mean(dynamic**2, axis=0))))
 
 
-def errors_and_mesh_forces(assembly: Assembly) -> slice:
-    """Columns of the transmission errors, overall and of the meshes, and of the forces of the meshes."""
-    layout = signal_layout(assembly)
-    return slice(layout["overall_dte_angle"].start, layout["mesh_force"].stop)
-
-
 def assert_exudyn_agrees(grc: Gearbox, stiffness: dict, steps: int, limit: float) -> None:
     """Overall DTE, DTE and forces of the meshes from 46 rpm on: high-speed mesh at 1.4 kHz."""
     assembly = assemble(grc, Choice("bushing"), stiffness)
     start = accelerating_start(assembly, LOAD, -4.8)
-    found = sampled(assembly, *compiled_trajectory(assembly, start.q, start.v, steps))
-    expected = sampled(assembly, *exudyn_trajectory(assembly, start.q, start.v, steps))
+    found = sampled(assembly, *compiled_states(assembly, start.q, start.v, LOAD, steps, STEP))
+    expected = sampled(assembly, *exudyn_states(assembly, start.q, start.v, LOAD, steps, STEP))
     columns = errors_and_mesh_forces(assembly)
     assert dynamic_error(found[:, columns], expected[:, columns]) < limit
 
@@ -243,27 +209,23 @@ def test_rigid_variant_follows_the_jointed_model_of_exudyn(grc: Gearbox, stiffne
         q[index] = start.q[minimal.spin[name]]
     v = jointed.rolling_velocity(q, speeds)
     columns = errors_and_mesh_forces(minimal)
-    coarse, fine = (
-        sampled(jointed, *exudyn_trajectory(jointed, q, v, round(duration / step), step, round(interval / step)))[
-            :, columns
-        ]
-        for step in (1e-5, 5e-6)
-    )
+    references = []
+    for step in (1e-5, 5e-6):
+        states = exudyn_states(jointed, q, v, LOAD, round(duration / step), step)
+        stored = (each[:: round(interval / step)] for each in states)
+        references.append(sampled(jointed, *stored)[:, columns])
+    coarse, fine = references
     expected = (4.0 * fine - coarse) / 3.0
-    q, v = compiled_trajectory(minimal, start.q, start.v, round(duration / 5e-6), 5e-6)
+    q, v = compiled_states(minimal, start.q, start.v, LOAD, round(duration / 5e-6), 5e-6)
     found = sampled(minimal, q[::10], v[::10])[:, columns]
     assert dynamic_error(found, expected) < 1e-3
-
-
-def opened(path: Path) -> xr.Dataset:
-    return load_run(path)
 
 
 @pytest.mark.sample
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_repeated_runs_are_bitwise_equal(grc: Gearbox, stiffness: dict, tmp_path: Path, variant: str) -> None:
     one, two = (
-        opened(simulated(grc, Choice(variant), stiffness, tmp_path / name, duration=0.3).path)
+        load_run(simulated(grc, Choice(variant), stiffness, tmp_path / name, duration=0.3).path)
         for name in ("one", "two")
     )
     assert one.identical(two)
@@ -275,7 +237,7 @@ def test_resumed_run_is_bitwise_the_whole_one(
     grc: Gearbox, stiffness: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("exugear.transient.recorder.FLUSH_INTERVAL", 0.01)
-    whole = opened(simulate(grc, Choice("bushing"), stiffness, tmp_path / "whole", duration=0.12).path)
+    whole = load_run(simulate(grc, Choice("bushing"), stiffness, tmp_path / "whole", duration=0.12).path)
     plain, calls = CompiledSystem.advance, []
 
     def interrupted(self: CompiledSystem, first: int, *rows: np.ndarray) -> int:
@@ -290,7 +252,7 @@ def test_resumed_run_is_bitwise_the_whole_one(
     stopped = simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.12)
     assert not stopped.complete
     assert 0.0 < stopped.end < 0.12
-    resumed = opened(simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.12, resume=True).path)
+    resumed = load_run(simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.12, resume=True).path)
     for name in ("time", "overall_dte", "mesh_force", "support_force", "state_q", "state_v"):
         assert np.array_equal(resumed[name], whole[name]), name
 
@@ -310,7 +272,7 @@ def test_not_finite_state_is_named_and_what_was_reached_is_kept(
         simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01)
     partial = tmp_path / "rigid" / "reference-line_of_action-assemblies" / "run.partial"
     # What half the filter needs is not written.
-    assert float(opened(partial).time[-1]) == pytest.approx((160 - 31 * 1.5) / 60e3, abs=2 * STEP)
+    assert float(load_run(partial).time[-1]) == pytest.approx((160 - 31 * 1.5) / 60e3, abs=2 * STEP)
 
 
 def test_step_follows_from_band_and_eigenfrequencies(grc: Gearbox, stiffness: dict) -> None:
@@ -328,7 +290,7 @@ def test_step_follows_from_band_and_eigenfrequencies(grc: Gearbox, stiffness: di
 
 
 def test_file_tells_solver_step_and_what_it_follows_from(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    attributes = opened(simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.01).path).attrs
+    attributes = load_run(simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.01).path).attrs
     assert attributes["solver"] == "compiled, Adams of order 5"
     assert attributes["step"] == pytest.approx(1 / 60e3)
     assert attributes["band"] == 6.4e3
@@ -340,7 +302,7 @@ def test_file_tells_solver_step_and_what_it_follows_from(grc: Gearbox, stiffness
 
 def test_the_reference_method_can_be_asked_for(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     run = simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01, integrator="rk4")
-    assert opened(run.path).attrs["solver"] == "compiled, RK4"
+    assert load_run(run.path).attrs["solver"] == "compiled, RK4"
     with pytest.raises(RunError, match="integrator 'euler' is unknown; integrators are adams, rk4"):
         simulate(grc, Choice("rigid"), stiffness, tmp_path, duration=0.01, integrator="euler")  # type: ignore[arg-type]
 
@@ -358,14 +320,14 @@ def test_what_it_cannot_take_is_refused_with_the_way_out(grc: Gearbox, stiffness
     with pytest.raises(RunError, match="user-function loads exist in Exudyn only.*use --solver exudyn"):
         simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.01, solver="compiled", mesh_route="loads")
     run = simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.002, mesh_route="loads")
-    assert "Exudyn" in opened(run.path).attrs["solver"]
+    assert "Exudyn" in load_run(run.path).attrs["solver"]
 
 
 @pytest.mark.sample
 @pytest.mark.parametrize("case", ["speed_driven", "reference"])
 def test_both_solvers_write_the_same_run(grc: Gearbox, stiffness: dict, tmp_path: Path, case: str) -> None:
     one, two = (
-        opened(simulate(grc, Choice("rigid", load_case=case), stiffness, tmp_path / s, duration=0.02, solver=s).path)
+        load_run(simulate(grc, Choice("rigid", load_case=case), stiffness, tmp_path / s, duration=0.02, solver=s).path)
         for s in ("compiled", "exudyn")
     )
     for name in ("time", "overall_dte", "mesh_force", "support_force", "input_speed", "work_of_loads"):
@@ -418,7 +380,7 @@ def test_order_cuts_of_the_run_up_stay_at_half_the_step(
     chosen = choose_integration(assembled(grc, Choice(variant), stiffness), 20e3, 6.4e3).step
     for step in (chosen, chosen / 2):
         run = simulated(grc, Choice(variant), stiffness, tmp_path / f"{step:g}", step=step)
-        data = opened(run.path)
+        data = load_run(run.path)
         rate = 1.0 / float(data.time[1] - data.time[0])
         signal = scipy.signal.sosfiltfilt(
             scipy.signal.butter(4, 20.0, "highpass", fs=rate, output="sos"), data.overall_dte.to_numpy()

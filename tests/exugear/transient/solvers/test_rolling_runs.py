@@ -14,11 +14,12 @@ from exugear.system.loads import Loading, LoadTable
 from exugear.system.signals import signal_layout
 from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
-from exugear.transient.compiled.solver import CompiledSystem, Observer
+from exugear.transient.compiled.solver import Observer
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...cases.assembled import assembled
-from ...cases.floating import FLOATING_CASE
+from ...cases.both_ways import compiled_states, exudyn_states
+from ...cases.floating import FLOATING_CASE, without_floating_frames
 from ...cases.rolling import BALLS, CYLINDRICAL, TAPERED, on_rolling
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
@@ -39,25 +40,11 @@ def start(linear: Assembly) -> tuple[np.ndarray, np.ndarray]:
     return state.q, state.v
 
 
-def compiled_run(assembly: Assembly, q: np.ndarray, v: np.ndarray, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """States at the start and after each step."""
-    out_q, out_v = np.empty((2, steps + 1, assembly.size))
-    out_q[0], out_v[0] = q, v
-    assert CompiledSystem(assembly, q, v, LoadTable(LOAD), STEP).advance(0, out_q[1:], out_v[1:]) == steps
-    return out_q, out_v
-
-
 def test_both_solvers_agree(linear: Assembly, start: tuple[np.ndarray, np.ndarray]) -> None:
     """Rollers, balls and a pair of taper rollers, on ground and pins, outer rings on either side, turning cages."""
     assembly = on_rolling(linear, [(PRELOADED,), (BALLS,), (), PAIR], stiffness=0.3)
-    rows = []
-
-    def keep(t: float, q: np.ndarray, v: np.ndarray) -> bool:
-        rows.append(np.concatenate([q, v]))
-        return True
-
-    ExudynSystem(assembly, *start, Loading(LOAD)).run(0.0, 100, STEP, keep)
-    expected, found = np.array(rows), np.hstack(compiled_run(assembly, *start, 100))
+    expected = np.hstack(exudyn_states(assembly, *start, LOAD, 100, STEP))
+    found = np.hstack(compiled_states(assembly, *start, LOAD, 100, STEP))
     for part in (slice(0, assembly.size), slice(assembly.size, None)):
         moved = np.abs(expected[:, part] - expected[0, part]).max(axis=0)
         # Round-off of angles of some rad and velocities of some 2e3 rad/s, of 1e9 N/m and short steps.
@@ -68,7 +55,7 @@ def test_both_solvers_agree(linear: Assembly, start: tuple[np.ndarray, np.ndarra
 def test_account_of_energy_closes(linear: Assembly, start: tuple[np.ndarray, np.ndarray], turning: bool) -> None:
     """Change of all energies against the integral of all powers, of bearings that shake as they begin to carry."""
     assembly = on_rolling(linear, [(CYLINDRICAL,), (BALLS,), PAIR], stiffness=0.1, turning=turning)
-    q, v = compiled_run(assembly, *start, 2400)
+    q, v = compiled_states(assembly, *start, LOAD, 2400, STEP)
     time = STEP * np.arange(len(q))
     signals, energies, powers = Observer(assembly, LoadTable(LOAD)).observe(time, q, v)
     net = powers[:, 0] - powers[:, 1:].sum(axis=1)  # of the loads, less what else takes a part
@@ -90,7 +77,7 @@ def test_rows_within_their_clearance_leave_a_run_as_it_is_bit_by_bit(
 ) -> None:
     wide = replace(CYLINDRICAL, radial_clearance=10e-3)
     loose = on_rolling(linear, [(wide,)])
-    one, other = (compiled_run(assembly, *start, 200) for assembly in (linear, loose))
+    one, other = (compiled_states(assembly, *start, LOAD, 200, STEP) for assembly in (linear, loose))
     assert np.array_equal(one[0], other[0])
     assert np.array_equal(one[1], other[1])
 
@@ -119,9 +106,3 @@ def test_a_floating_shaft_feels_its_rollers_as_in_the_frame_that_does_not_turn(
         # As of linear bearings: second order in the tilts is left out in the frame that does not turn.
         assert np.abs(ends[0] - ends[1])[own].max() < 4e-3 * np.abs(moved[own]).max()
         assert np.abs(moved[own]).max() > 1e-7
-
-
-def without_floating_frames(assembly: Assembly) -> Assembly:
-    """The same reduced bodies on their own coordinates."""
-    bodies = {name: replace(body, floating=None) for name, body in assembly.elastic_bodies.items()}
-    return replace(assembly, elastic_bodies=bodies)

@@ -18,7 +18,6 @@ from exugear.system.bearings.rolling.contact import (
     tangent_stiffness,
 )
 from exugear.system.bearings.rolling.life import basic_rating_life, reference_life
-from exugear.system.bearings.rolling.point_contact import rolling_arrays
 from exugear.system.bearings.rolling.ratings import (
     basic_dynamic_rating,
     equivalent_load,
@@ -26,7 +25,8 @@ from exugear.system.bearings.rolling.ratings import (
     thrust_contact_factor,
 )
 from exugear.system.bearings.rolling.rows import BearingError, BearingOfRows
-from exugear.system.kernels.rolling import ELASTIC_PART, rolling_forces, rolling_memory
+
+from ....cases.rolling import assert_compiled_forces_are_those_of
 
 KIND = "thrust_spherical_roller"
 SIZES = {"type": KIND, "bore_mm": 200.0, "outer_diameter_mm": 340.0, "width_mm": 85.0}
@@ -63,13 +63,7 @@ def test_the_load_of_an_axial_displacement_is_that_of_equal_rollers():
 
 
 def test_the_compiled_law_has_the_same_forces():
-    found = rows()
-    arrays = rolling_arrays([found], [1.0], [0.0], [0.0], [0.1])
-    state = np.array([10e-6, -5e-6, 40e-6, 1e-4, -2e-4])
-    out = rolling_memory(arrays)
-    rolling_forces(0, state, np.zeros(6), 0.0, arrays, out)
-    expected = bearing_load(row_contacts(found, 0.1), np.append(state, 0.0))[:5]
-    assert np.abs(out[ELASTIC_PART : ELASTIC_PART + 5] - expected).max() < 1e-3 * np.abs(expected).max()
+    assert_compiled_forces_are_those_of(rows(), (10e-6, -5e-6, 40e-6, 1e-4, -2e-4))
 
 
 @pytest.mark.parametrize(("ratio", "degrees", "table"), [(0.01, 50.0, 109.7), (0.01, 65.0, 107.1), (0.01, 80.0, 105.6)])
