@@ -25,7 +25,7 @@ HELIX = 0.2
 PINION = Gear(name="pinion", teeth=17, normal_module=3e-3, face_width=12e-3, held_diameter=20e-3, helix_angle=HELIX)
 WHEEL = dataclasses.replace(PINION, name="wheel", teeth=23, helix_angle=-HELIX)
 PAIR = GearPair(name="deep", pinion=PINION, gear=WHEEL, centre_distance=61.25e-3)
-RING = dataclasses.replace(PINION, name="ring", teeth=51, internal=True, held_diameter=175e-3)
+RING = dataclasses.replace(PINION, name="ring", teeth=51, internal=True, held_diameter=175e-3, tip_diameter=151.5e-3)
 INTERNAL = GearPair(name="internal", pinion=PINION, gear=RING, centre_distance=52.0e-3)
 UNIFORM = MeshSettings(layers=3, flank=6, thickness=4, fillet=2, root=2, rim=4)
 COARSE = ContactMesh(layers=3, contact_elements=3, growth=1.0, thickness=5, fillet=2, root=2, rim=4, far_flank=4)
