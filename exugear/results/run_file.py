@@ -262,6 +262,14 @@ def has_pieces(folder: Path) -> bool:
     return _piece_path(folder, 1).is_file()
 
 
+def kept_attributes(folder: Path) -> dict[str, Any]:
+    """Attributes of the last piece in a folder that can be read; none without one."""
+    for path in sorted(folder.glob("*.npz"), reverse=True):
+        with suppress(FileError):
+            return dict(Piece.read(path, ())[0].attributes)
+    return {}
+
+
 def discard_pieces(folder: Path, keep: Iterable[Path] = ()) -> None:
     """Remove the pieces of a run, the last first, and what a kill left unfinished; nothing else.
 

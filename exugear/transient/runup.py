@@ -32,7 +32,7 @@ from exugear.transient.compiled.solver import CompiledSystem, compile_loop_ahead
 from exugear.transient.outcome import LimitError, Progress, ProgressMeter, Run, RunError
 from exugear.transient.plan import SAMPLE_RATE, RunPlan, check_disk, check_duration, plan_run, too_fine
 from exugear.transient.recorder import Recorder
-from exugear.transient.start import RunStart, held, prepare_start
+from exugear.transient.start import RunStart, held, kept_duration, prepare_start
 from fe_ste.tools.arrays import Floats
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ def simulate(
         Mesh stiffness over the cycle, see `exugear.system.tooth_mesh.laws.stiffness.mesh_stiffness`.
     out : results directory
     bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
-    duration : simulated time, s; the load case's by default
+    duration : simulated time, s; the load case's by default, that of the stopped run where one is gone on with
     step : integration step, s; chosen from `band` and the fastest eigenfrequency by default
     band, sample_rate : highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps
     solver : {"compiled", "exudyn"}, optional
@@ -234,6 +234,9 @@ def simulate(
     if choice.load_case not in gearbox.load_cases:
         raise gearbox.fault(f"no load case {choice.load_case!r}; load cases are {', '.join(gearbox.load_cases)}")
     case = gearbox.load_cases[choice.load_case]
+    directory = run_directory(out, choice)
+    if resume and duration is None:
+        duration = kept_duration(directory)
     check_duration(gearbox, case, duration, sample_rate)
 
     def begin_to_compile(parts: Assembly) -> None:
@@ -241,7 +244,6 @@ def simulate(
             compile_loop_ahead(parts)
 
     assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles, before_balance=begin_to_compile)
-    directory = run_directory(out, choice)
     total = case.duration if duration is None else duration
     if integrator is not None and integrator not in INTEGRATORS:
         raise RunError(f"integrator {integrator!r} is unknown; integrators are {', '.join(INTEGRATORS)}")

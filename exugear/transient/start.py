@@ -25,6 +25,7 @@ from exugear.results.run_file import (
     Checkpoint,
     RunPieces,
     has_pieces,
+    kept_attributes,
     load_run,
 )
 from exugear.system.loads import DriveLaw, LoadTable
@@ -76,6 +77,21 @@ def refuse_to_resume(directory: Path) -> str:
     return f"{directory}: no run of these choices was stopped here"
 
 
+def kept_duration(directory: Path) -> float | None:
+    """Read how long a stopped run was to be, s; None where that is not kept."""
+    kept = kept_attributes(directory / PARTIAL_NAME).get("duration")
+    return kept and float(kept)
+
+
+def refuse_shorter(directory: Path, duration: float) -> str:
+    """Why a stopped run cannot end at a simulated time (s); empty if it can."""
+    kept = kept_attributes(directory / PARTIAL_NAME)
+    reached = float(kept.get("state_step", 0)) * float(kept.get("step", 0.0))
+    if reached <= duration * (1.0 + 1e-9):
+        return ""
+    return f"{directory / PARTIAL_NAME}: has reached {reached:.4g} s, and a duration of {duration:g} s ends before that"
+
+
 # Where a run starts from and what acts on it, anew or from the last piece of a run that was stopped
 
 
@@ -111,13 +127,15 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     layout = signal_layout(assembly)
     if resume:
         pieces = _pieces_to_resume(plan, layout)
+        pieces.note("duration", plan.duration)
         state = pieces.last_checkpoint()
         _take_over_judgement(plan, judge, state)
     else:
         state = _first_state(assembly, case, series, layout, judge)
         (plan.directory / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
         doubt = doubt_about_bearings(gearbox, summary, assembly.variant)
-        pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), "bearing_doubt": doubt})
+        told = {"bearing_doubt": doubt, "duration": plan.duration}
+        pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), **told})
     return RunStart(_load_table(case, series, state.start_angle, gearbox), state, pieces, judge, resume)
 
 
@@ -125,6 +143,8 @@ def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
     reason = refuse_to_resume(plan.directory)
     if reason:
         raise RunError(f"{reason}; run without resuming")
+    if shorter := refuse_shorter(plan.directory, plan.duration):
+        raise RunError(f"{shorter}; give a longer one")
     pieces = RunPieces(plan.partial_path, layout)
     for key, value in plan.attributes().items():
         kept = pieces.attributes.get(key, "element" if key == "mesh_route" else None)  # earlier runs had no other

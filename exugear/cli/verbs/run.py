@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from exugear.cli.again import resuming
 from exugear.cli.case import (
     USUAL_LAW,
     CaseArgument,
@@ -54,6 +55,7 @@ class MeshRoute(StrEnum):
 
 
 def run(
+    context: typer.Context,
     case: CaseArgument,
     variant: VariantOption,
     mesh_law: LawOption = USUAL_LAW,
@@ -74,7 +76,8 @@ def run(
         ),
     ] = MeshRoute.element,
     duration: Annotated[
-        float | None, typer.Option(metavar="S", help="Simulated time, s. (default: the load case's)")
+        float | None,
+        typer.Option(metavar="S", help="Simulated time, s. (default: the load case's; with --resume that of the call)"),
     ] = None,
     compared: Annotated[
         float | None,
@@ -101,6 +104,8 @@ def run(
 
         choice = Choice(variant.value, mesh_law.value, inertias, load_case)
         project = open_project(case, choice, out, files_below, scripts)
+        if resume:
+            duration = _duration_to_resume(project, duration)
         _check_extent(project, duration, out or Path("results"))
         _check_solver(project.gearbox, variant, solver)
         _check_mesh_route(mesh_route, variant, solver)
@@ -118,12 +123,12 @@ def run(
         project.prepare()
         with time_noted(project.folder, _label_of(project, solver, mesh_route)):
             how = {"solver": solver.value, "mesh_route": mesh_route.value, "integrator": integrator}
-            finished = _simulate(project, resume, duration=duration, **how)
+            finished = _simulate(project, resume, resuming(context), duration=duration, **how)
         comparison = None
         if compared is not None and finished.complete:
             with time_noted(project.folder, f"comparison with Exudyn, {choice.variant}"):
                 comparison = _compare(project, compared)
-        _tell_run(case, finished, comparison, as_json)
+        _tell_run(case, finished, comparison, resuming(context), as_json)
 
 
 def _compare(project: Project, duration: float) -> SolverComparison:
@@ -204,6 +209,18 @@ def _check_run_directory(directory: Path, resume: bool) -> None:
         raise BadInputError(f"--resume: {reason}; run without it")
 
 
+def _duration_to_resume(project: Project, duration: float | None) -> float | None:
+    """Return how long a stopped run is to become: as asked for, or else as it was; refuse what it is beyond."""
+    from exugear.transient.start import kept_duration, refuse_shorter
+
+    directory = project.run_directory
+    if duration is None:
+        return kept_duration(directory)
+    if reason := refuse_shorter(directory, duration):
+        raise BadInputError(f"--duration {duration:g}: {reason}; give a longer one, or leave it out")
+    return duration
+
+
 def _tell_doubts(project: Project, duration: float | None) -> None:
     """Say what looks like the wrong sign of a torque, or leads bearings far from the load that their law is of."""
     from exugear.gearbox.load_cases import doubt_about_bearings, doubts_about, summarise_loads
@@ -215,8 +232,8 @@ def _tell_doubts(project: Project, duration: float | None) -> None:
         note(f"load_cases.{load_case.name}: {doubt}", style="yellow")
 
 
-def _simulate(project: Project, resume: bool, **options: Any) -> Run:
-    """Run the load case; options as those of `exugear.transient.runup.simulate`."""
+def _simulate(project: Project, resume: bool, command: str, **options: Any) -> Run:
+    """Run the load case; options as those of `exugear.transient.runup.simulate`, `command` goes on from a stop."""
     from exugear.results.run_file import PARTIAL_NAME, has_pieces
     from exugear.transient.outcome import LimitError, RunError
 
@@ -232,14 +249,16 @@ def _simulate(project: Project, resume: bool, **options: Any) -> Run:
     except KeyboardInterrupt:
         if not has_pieces(directory / PARTIAL_NAME):
             raise
-        raise StoppedError(f"kept in {directory}, --resume goes on from there") from None
+        raise StoppedError(f"kept in {directory}; go on from there with: {command}") from None
 
 
-def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, as_json: bool) -> None:
+def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, command: str, as_json: bool) -> None:
     """Print what a run reached; end with 130 if the user stopped it, with 1 if it is not to be trusted."""
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
-        raise StoppedError(f"at {finished.end:.3f} s; kept in {finished.path}, --resume goes on from there{so_far}")
+        raise StoppedError(
+            f"at {finished.end:.3f} s; kept in {finished.path}; go on from there with: {command}{so_far}"
+        )
     import numpy as np
 
     from exugear.gearbox.units import RPM

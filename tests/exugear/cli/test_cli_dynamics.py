@@ -201,6 +201,28 @@ def test_ctrl_c_keeps_the_run_and_resume_ends_it_as_if_nothing_had_been(case, mo
         assert np.array_equal(data["overall_dte"].to_numpy(), pieces)
 
 
+@pytest.mark.usefixtures("terminal_signals")
+def test_a_stopped_run_goes_on_to_the_duration_of_its_first_call(case, monkeypatch):
+    def interrupted(*arguments, progress, **options):
+        return real_simulate(*arguments, progress=lambda at: os.kill(os.getpid(), signal.SIGINT), **options)
+
+    monkeypatch.setattr("exugear.transient.recorder.FLUSH_INTERVAL", 0.05)
+    rigid = ("--variant", "rigid")
+    with monkeypatch.context() as patch:
+        patch.setattr("exugear.project.simulate", interrupted)
+        stopped = iso("run", case, *rigid, "--duration", 1.3)  # the load case's is 0.3 s
+    assert stopped.exit_code == 130
+    out = case.parent / "out"
+    again = f"exugear run {case} --variant rigid --mesh-law iso6336 --duration 1.3 --out {out} --resume"
+    assert again in stopped.stderr
+    shorter = iso("run", case, *rigid, "--duration", 0.01, "--resume")
+    assert shorter.exit_code == 2
+    assert "a duration of 0.01 s ends before that; give a longer one" in shorter.stderr
+    resumed = iso("run", case, *rigid, "--resume", "--json")
+    assert resumed.exit_code == 0, resumed.stderr
+    assert json.loads(resumed.stdout)["simulated_s"] == pytest.approx(1.3)
+
+
 def test_view_writes_a_page_where_nothing_can_be_rendered(case, monkeypatch):
     def unable(*arguments, **options):
         raise RenderingError("3-D pictures need pyvista: pip install")
