@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,6 +81,8 @@ of gear steels. The fastest turbo gears run at two thirds of it.
 """
 LEAST_SHARE = 0.25
 """Share of the static load below which the straight line of a linear bearing leads a quarter off its rows."""
+OTHER_LOAD = 0.3
+"""Difference from the static load from which a mesh counts as one under another load than its table is of."""
 INSTANTS = 2001
 """Instants at which a torque that changes is looked at, beside those of its own lines."""
 
@@ -115,6 +117,8 @@ class LoadSummary(Displayed, line=" {name!r}: net torque {net_torque:g} N m, {st
     least_shares: Mapping[str, float]
     """By mesh family, smallest mesh force in the course of the load case over that of the static load; negative
     where it reverses."""
+    greatest_shares: Mapping[str, float]
+    """By mesh family, largest mesh force in the course of the load case over that of the static load."""
 
     def _table(self) -> TitledRows:
         speeds = (self.start_speed, self.end_speed, self.fastest_speed)
@@ -191,7 +195,8 @@ def summarise_loads(
         mesh_forces={mesh.name: float(force) for mesh, force in zip(gearbox.meshes, forces[0], strict=True)},
         flanks=flanks,
         reversed_flanks=reversed_flanks,
-        least_shares=_least_shares(gearbox, forces),
+        least_shares=_shares(gearbox, forces, min),
+        greatest_shares=_shares(gearbox, forces, max),
     )
 
 
@@ -244,6 +249,89 @@ def doubt_about_bearings(gearbox: Gearbox, loads: LoadSummary, variant: str) -> 
         f"linear bearings are of the static load, and the load case {loads.name} {how}: "
         'displacements and loads there want law = "iso16281" on the bearings'
     )
+
+
+def doubt_about_tables(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool = True) -> str:
+    """Say which meshes carry another load than the static one, which tables over the mesh cycle are of; empty if none.
+
+    Parameters
+    ----------
+    of_one_load : whether the mesh law reads tables at the static load alone
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> half = gearbox.varied({"load_cases.reference.torques_N_m": {"carrier": 120e3, "hss": -1500.0}})
+    >>> doubt_about_tables(half, summarise_loads(half, half.load_cases["reference"]))
+    'other load: sun_planet 50 %, ring_planet 50 %, intermediate 50 %, high_speed 50 % of the static load ...
+    """
+    told = []
+    for family, least in loads.least_shares.items():
+        greatest = loads.greatest_shares[family]
+        if least < 1.0 - OTHER_LOAD or greatest > 1.0 + OTHER_LOAD:
+            shares = dict.fromkeys(f"{100.0 * share:.0f}" for share in (least, greatest))
+            told.append(f"{family} {' to '.join(shares)} %")
+    if not told or not of_one_load:
+        return ""
+    return (
+        f"other load: {', '.join(told)} of the static load ({static_load_in_words(gearbox)}), which the tables of "
+        "transmission error and stiffness are of; state this load under [static_load], or take the mesh law table, "
+        "whose tables go over load"
+    )
+
+
+def load_in_words(case: LoadCase) -> str:
+    """Name the torques of a load case, and what a machine drives.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> load_in_words(gearbox.load_cases["speed_driven"])
+    'carrier 240000 N m, hss driven'
+    """
+    parts = [f"{body} {torque:.6g} N m" for body, torque in case.torques.items()]
+    if case.torque_series is not None:
+        parts.append(f"torques of {case.torque_series.name}")
+    if case.driven_body is not None:
+        parts.append(f"{case.driven_body} driven")
+    return ", ".join(parts) or "no torque"
+
+
+def static_load_in_words(gearbox: Gearbox) -> str:
+    """Name the torques of the static load.
+
+    Examples
+    --------
+    >>> static_load_in_words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+    'carrier 240000 N m'
+    """
+    torques = gearbox.case.static_load.torques_N_m
+    return ", ".join(f"{body} {torque:.6g} N m" for body, torque in torques.items()) or "no torque"
+
+
+def at_load_of(gearbox: Gearbox, case: LoadCase) -> Gearbox:
+    """Return the gearbox with the torques at the start of a load case as its static load; what holds it stays.
+
+    Raises
+    ------
+    CaseError
+        The load case has no torque but on bodies that hold the static load, or the torques are none to be held.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> at_load_of(gearbox, gearbox.load_cases["rated"]).case.static_load.torques_N_m
+    {'carrier': 240000.0}
+    """
+    first = {body: float(values[0]) for body, (_, values) in torque_series(gearbox, case).items()}
+    locked = gearbox.case.static_load.locked
+    torques = {body: torque for body, torque in {**case.torques, **first}.items() if torque and body not in locked}
+    if not torques:
+        raise gearbox.fault(
+            f"load_cases.{case.name}.torques_N_m: has no torque at the start but on what holds the static load "
+            f"({', '.join(locked)}), so that nothing is loaded; name another load case"
+        )
+    return gearbox.varied({"static_load.torques_N_m": torques})
 
 
 def rim_radii(gearbox: Gearbox) -> dict[str, float]:
@@ -360,15 +448,18 @@ def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str
     return {family: signs or "0" for family, signs in flanks.items()}, tuple(dict.fromkeys(turned))
 
 
-def _least_shares(gearbox: Gearbox, forces: Floats) -> dict[str, float]:
-    """Find the smallest force (times, meshes) of each family over that of the static load; unloaded ones have none."""
+def _shares(gearbox: Gearbox, forces: Floats, extreme: Callable[..., float]) -> dict[str, float]:
+    """Find an extreme of the forces (times, meshes) of each family over that of the static load.
+
+    Families that the static load leaves unloaded have none.
+    """
     static = gearbox.train.static_mesh_forces()
     largest = max(map(abs, static.values()), default=0.0)
     shares: dict[str, float] = {}
     for m, mesh in enumerate(gearbox.meshes):
         if abs(static[mesh.name]) > UNLOADED * largest:
-            share = float((forces[:, m] / static[mesh.name]).min())
-            shares[mesh.family] = min(share, shares.get(mesh.family, math.inf))
+            share = extreme((forces[:, m] / static[mesh.name]).tolist())
+            shares[mesh.family] = extreme(share, shares.get(mesh.family, share))
     return shares
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from exugear.gearbox.load_cases import summarise_loads
+from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
@@ -72,7 +72,11 @@ def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> s
         context.notes.statements.append(f"Steady response, {label}: {told}")
         note = pieces.paragraph(f"Mind: {told}", "warning")
     growth = float(data.attrs["growth_rate"])
+    others = [_other_load(run) for run in runs if run.attributes.get("table_doubt")]
+    context.notes.statements.extend(f"Steady response, {label}: {other}" for other in others)
     content = [
+        pieces.paragraph(f"At the static load: {static_load_in_words(context.gearbox)}.", "note"),
+        *(pieces.paragraph(f"Mind: {other}", "warning") for other in others),
         pieces.alert("Unstable", [f"disturbances grow by up to {growth:.3g} 1/s"]) if growth > 0.0 else "",
         note,
         _shared_lines(material, data),
@@ -97,6 +101,14 @@ def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> s
         ),
     ]
     return pieces.section(label[0].upper() + label[1:], *content, level=3)
+
+
+def _other_load(run: VariantRun) -> str:
+    """Say that a run-up beside a response is at another load."""
+    return (
+        f"the run-up of the load case {run.attributes['load_case']} is at another load, {run.attributes['load']}: "
+        "levels of both differ for that, too."
+    )
 
 
 def _shared_lines(material: Material, data: xr.Dataset) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.facts import Fact, facts_of, facts_of_response
@@ -32,6 +33,7 @@ def short_section(material: Material) -> Part:
         verdicts = verdicts_of(context, group)
         if group in groups:
             several = f"{group_words(groups, group)}: " if len(groups) > 1 else ""
+            context.notes.statements.append(f"{several}Load: {_load_of(material, group)}.")
             context.notes.statements.extend(f"{several}{fact.line}" for fact in facts)
             context.notes.statements.extend(f"{several}{verdict.line}." for verdict in verdicts)
         content.append(only_for(_group(material, group, facts, verdicts), group.name))
@@ -44,14 +46,23 @@ def short_section(material: Material) -> Part:
 
 def _group(material: Material, group: RunGroup, facts: Sequence[Fact], verdicts: Sequence[Verdict]) -> str:
     scope = (
-        f"{group.title[0].upper()}{group.title[1:]}. Speeds are those of the {material.input_words}, levels those of "
-        "the overall transmission error, 0 dB = 1 µm."
+        f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds are those of the "
+        f"{material.input_words}, levels those of the overall transmission error, 0 dB = 1 µm."
     )
     return (
         pieces.paragraph(scope, "note")
         + pieces.element("div", "".join(map(_card, facts)), class_="cards")
         + verdict_list(verdicts)
     )
+
+
+def _load_of(material: Material, group: RunGroup) -> str:
+    """Name the load of a group: that of its load case, or the static load."""
+    static = static_load_in_words(material.context.gearbox)
+    loads = {str(run.attributes.get("load", "")) for run in group.runs.values()}
+    if group.responses or not any(loads):
+        return f"static load, {static}"
+    return f"{'; '.join(sorted(filter(None, loads)))} (tables and steady responses: static load, {static})"
 
 
 def _without_groups(material: Material) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import choice_of, words_of
 from exugear.report.findings.verdicts import run_figures
@@ -93,8 +94,8 @@ def _assumptions(material: Material) -> str:
         f"{1e6 * case.damping.mesh_time_s:g} µs, couplings {1e6 * case.damping.coupling_time_s:g} µs times the "
         "stiffness.",
         f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
-        "Mesh stiffness is that at the static load of the case; meshes are bilateral, and the time in which teeth "
-        "would have to pull is counted.",
+        f"Mesh stiffness is that at the static load of the case, {static_load_in_words(gearbox)}; meshes are "
+        "bilateral, and the time in which teeth would have to pull is counted.",
         "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
         *_elastic_words(material),
     ]
@@ -127,7 +128,7 @@ def _runs(material: Material) -> str:
     steady = [_response_row(data) for data in material.results.steady]
     tables = []
     if rows:
-        tables.append(pieces.table(rows, ("run", "solver", "analysis"), caption="What was run", name="runs"))
+        tables.append(pieces.table(rows, ("run", "load", "solver", "analysis"), caption="What was run", name="runs"))
     if steady:
         tables.append(pieces.table(steady, ("steady response",), caption="Steady responses", name="responses"))
     return "".join(tables) or pieces.paragraph("Nothing was run.")
@@ -178,6 +179,7 @@ def _run_row(material: Material, run: VariantRun) -> dict[str, object]:
     times = zip(MESH_TIME_LABELS, figures.times, strict=True)
     return {
         "run": str(material.context.name_of(run.path)),
+        "load": str(run.attributes.get("load", "")),
         "to be trusted": "NO, see the top" if verdict_of(run.attributes) else "yes",
         "solver": run.attributes["solver"],
         "step / µs": f"{1e6 * float(run.attributes['step']):g}",

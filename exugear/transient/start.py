@@ -12,8 +12,10 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import (
     doubt_about_bearings,
+    doubt_about_tables,
     drive_rate,
     driven_start_speed,
+    load_in_words,
     summarise_loads,
     torque_series,
 )
@@ -32,6 +34,7 @@ from exugear.system.loads import DriveLaw, LoadTable
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayout, signal_layout
 from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.transient.outcome import Judge, RunError
 from exugear.transient.plan import EXPECTATIONS, RunPlan
 from fe_ste.tools.arrays import Floats
@@ -134,7 +137,9 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         state = _first_state(assembly, case, series, layout, judge)
         (plan.directory / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
         doubt = doubt_about_bearings(gearbox, summary, assembly.variant)
-        told = {"bearing_doubt": doubt, "duration": plan.duration}
+        other = doubt_about_tables(gearbox, summary, LAWS[assembly.mesh_law].of_one_load)
+        load = load_in_words(case)
+        told = {"bearing_doubt": doubt, "table_doubt": other, "load": load, "duration": plan.duration}
         pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), **told})
     return RunStart(_load_table(case, series, state.start_angle, gearbox), state, pieces, judge, resume)
 

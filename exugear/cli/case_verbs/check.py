@@ -317,7 +317,7 @@ def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
 
 def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
-    from exugear.gearbox.load_cases import doubt_about_bearings, doubts_about, summarise_loads
+    from exugear.gearbox.load_cases import doubt_about_bearings, doubt_about_tables, doubts_about, summarise_loads
     from exugear.gearbox.units import RPM
     from exugear.transient.plan import check_duration
     from exugear.transient.runup import BAND
@@ -344,6 +344,7 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                 "doubts": [
                     *doubts_about(loads),
                     *filter(None, [doubt_about_bearings(gearbox, loads, Variant.bushing)]),
+                    *filter(None, [doubt_about_tables(gearbox, loads)]),
                     *_beyond_band(loads.mesh_frequencies, BAND),
                 ],
             }

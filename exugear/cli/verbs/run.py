@@ -222,13 +222,21 @@ def _duration_to_resume(project: Project, duration: float | None) -> float | Non
 
 
 def _tell_doubts(project: Project, duration: float | None) -> None:
-    """Say what looks like the wrong sign of a torque, or leads bearings far from the load that their law is of."""
-    from exugear.gearbox.load_cases import doubt_about_bearings, doubts_about, summarise_loads
+    """Say what looks like the wrong sign of a torque, or leads bearings or meshes far from the load they are of."""
+    from exugear.gearbox.load_cases import (
+        doubt_about_bearings,
+        doubt_about_tables,
+        doubts_about,
+        summarise_loads,
+    )
+    from exugear.system.tooth_mesh.laws.registry import LAWS
 
     load_case = _load_case(project)
+    law = LAWS[project.choice.mesh_law]
     loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
     of_bearings = doubt_about_bearings(project.gearbox, loads, project.choice.variant)
-    for doubt in (*doubts_about(loads), *([of_bearings] if of_bearings else [])):
+    of_tables = doubt_about_tables(project.gearbox, loads, law.of_one_load)
+    for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables)):
         note(f"load_cases.{load_case.name}: {doubt}", style="yellow")
 
 
@@ -280,6 +288,8 @@ def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, co
         **{key: float(attributes[key]) for key in EXPECTATIONS if key in attributes},
         "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
         "energy_not_accounted_for": energy_residual(data),
+        "load": str(attributes.get("load", "")),
+        "table_doubt": str(attributes.get("table_doubt", "")),
         "bearing_doubt": str(attributes.get("bearing_doubt", "")),
         "longest_pull_of_a_mesh_s": longest["pulling_time"],
         "longest_time_apart_s": longest["apart_time"],
@@ -305,7 +315,8 @@ def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, co
 
 def _print_run(summary: dict[str, Any], outside: float) -> None:
     say(
-        f"{summary['variant']}, {summary['load_case']}, law {summary['mesh_law']}, inertias {summary['inertias']}: "
+        f"{summary['variant']}, {summary['load_case']} ({summary['load']}), law {summary['mesh_law']}, "
+        f"inertias {summary['inertias']}: "
         f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.1f} s ({summary['solver']}), "
         f"{summary['input_speed_rpm']:.1f} rpm reached"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from contextlib import suppress
+from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -38,6 +39,8 @@ from exugear.cli.console import (
 if TYPE_CHECKING:
     import xarray as xr
 
+    from exugear.cli.watched import WatchedProject
+    from exugear.gearbox.gearbox import Gearbox
     from exugear.project import Project
     from exugear.report.findings.loudness import Ranking, Resonance
     from exugear.steady.peaks import BearingSwing, Peak, Pull
@@ -73,6 +76,16 @@ def steady(
     variant: VariantOption,
     mesh_law: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
+    load_case: Annotated[
+        str | None,
+        typer.Option(
+            "--load-case",
+            metavar="NAME",
+            help="Respond at the torques of a load case, with tables and results in at-NAME in the results folder. "
+            "(default: at the static load)",
+            show_default=False,
+        ),
+    ] = None,
     level: Annotated[
         Level,
         typer.Option(
@@ -113,12 +126,41 @@ def steady(
     with exit_codes():
         from exugear.gearbox.choice import Choice
 
-        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        choice = Choice(variant.value, mesh_law.value, inertias, load_case)
+        project = open_project(case, choice, out, files_below, scripts)
+        if load_case is not None:
+            project = _at_load_of(project, load_case)
         settings = _settings(project, level, speeds, harmonics, branches)
         _refuse_what_has_none(project)
         project.begin()
         project.prepare()
         _tell(project, settings, project.steady(settings), as_json)
+
+
+def _at_load_of(project: WatchedProject, load_case: str) -> WatchedProject:
+    """Take the torques of a load case as the static load, in a results folder of its own."""
+    from exugear.gearbox.load_cases import at_load_of
+
+    gearbox = project.gearbox
+    return replace(
+        project,
+        gearbox=at_load_of(gearbox, gearbox.load_cases[load_case]),
+        folder=project.folder / f"at-{load_case}",
+    )
+
+
+def _tell_of_other_loads(gearbox: Gearbox) -> None:
+    """Say which load cases load meshes otherwise than the static load does, which the response is at."""
+    from exugear.gearbox.load_cases import doubt_about_tables, load_in_words, static_load_in_words, summarise_loads
+
+    static = static_load_in_words(gearbox)
+    for name, load_case in gearbox.load_cases.items():
+        if doubt_about_tables(gearbox, summarise_loads(gearbox, load_case)):
+            note(
+                f"The response is at the static load ({static}), the load case {name} at another one "
+                f"({load_in_words(load_case)}): --load-case {name} responds there",
+                style="yellow",
+            )
 
 
 def _refuse_what_has_none(project: Project) -> None:
@@ -141,9 +183,11 @@ def _settings(
 
 
 def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
+    from exugear.gearbox.load_cases import static_load_in_words
     from exugear.gearbox.units import RPM
     from exugear.report.findings.loudness import ranking_of
 
+    _tell_of_other_loads(project.gearbox)
     growth = float(data.attrs["growth_rate"])
     ranking = ranking_of(data)
     _tell_of_stability(data, growth)
@@ -171,6 +215,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
         _fail_if_doubtful(data, growth)
         return
     title = f"Loudest resonances, {_speeds_of(ranking)}, {project.choice.variant}, {settings.level}"
+    title += f", at {static_load_in_words(project.gearbox)}"
     if ranking.resonances:
         print_table(title, [_row(resonance) for resonance in ranking.resonances[:SHOWN_RESONANCES]])
         say(
@@ -192,6 +237,7 @@ def _whole_summary(
     pulling: tuple[Pull, ...],
     excited: bool,
 ) -> dict[str, Any]:
+    from exugear.gearbox.load_cases import static_load_in_words
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import peaks
 
@@ -199,6 +245,7 @@ def _whole_summary(
     return {
         "case": project.gearbox.source,
         **{key: str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias", "level")},
+        "static_load": static_load_in_words(project.gearbox),
         "speeds": int(data.sizes["point"]),
         "lines": int(data.sizes["line"]),
         "growth_rate_1_per_s": float(data.attrs["growth_rate"]),

@@ -112,8 +112,9 @@ def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
     doubtful = verdict_of(run.attributes)
     if doubtful:
         verdicts.append(Verdict(False, f"the run is not to be trusted: {doubtful}"))
-    if run.attributes.get("bearing_doubt"):
-        verdicts.append(Verdict(False, str(run.attributes["bearing_doubt"])))
+    for doubt in ("table_doubt", "bearing_doubt"):
+        if run.attributes.get(doubt):
+            verdicts.append(Verdict(False, str(run.attributes[doubt])))
     if pulling > 0.0:
         verdicts.append(Verdict(False, f"teeth had to pull for {figure_text(pulling)} s: they would have parted"))
     if apart > 0.0:

@@ -46,6 +46,30 @@ def test_steady_writes_a_response_and_sums_it_up(case):
         assert words in page, words
 
 
+def test_loads_of_runs_and_responses_are_told_and_a_response_can_be_at_that_of_a_load_case(case):
+    text = case.read_text(encoding="utf-8").replace(
+        "shaft_1 = 100.0, shaft_2 = 140.0", "shaft_1 = 40.0, shaft_2 = 50.0"
+    )
+    case.write_text(text, encoding="utf-8")
+    options = "--variant", "rigid", "--speeds", "1000:1100:3"
+    usual = steady(case, *options)
+    assert "at shaft_1 100 N m" in usual.stdout
+    said = "The response is at the static load (shaft_1 100 N m), the load case run_up at another one (shaft_1 40 N m"
+    assert said in usual.stderr
+    there = steady(case, *options, "--load-case", "run_up", "--json")
+    assert there.exit_code == 0, there.stderr
+    summary = json.loads(there.stdout)
+    assert summary["static_load"] == "shaft_1 40 N m"
+    assert "at another one" not in there.stderr
+    assert Path(summary["file"]).parents[2] == case.parent / "out" / "at-run_up"
+    assert exugear("report", case.parent / "out" / "at-run_up").exit_code == 0
+    run = exugear("run", case, "--variant", "rigid", "--out", case.parent / "out")
+    assert "run_up (shaft_1 40 N m, shaft_2 50 N m), law" in run.stdout
+    assert "load_cases.run_up: other load: spur 37 % of the static load" in run.stderr
+    report = exugear("report", case.parent / "out")
+    assert "the run-up of the load case run_up is at another load, shaft_1 40 N m" in report.stdout
+
+
 @pytest.mark.validation
 def test_bearings_follow_their_elements_at_the_level_nonlinear(tmp_path):
     """The state, its report and what is said of it; other levels say that they do not."""

@@ -36,6 +36,11 @@ class LawProperties:
     moves_load: bool = False
     """Whether the load moves along the face over the mesh cycle as the table has it."""
 
+    @property
+    def of_one_load(self) -> bool:
+        """Whether it reads tables over the mesh cycle at the static load alone."""
+        return self.needs_tables and not self.needs_axes
+
 
 _TABLE_OF_LAWS = (
     LawProperties("rigid", "gears only roll; variant `rigid` alone", has_force=False, needs_tables=False),

@@ -15,7 +15,9 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import (
     BURSTING_RIM_SPEED,
     LoadSummary,
+    at_load_of,
     doubt_about_bearings,
+    doubt_about_tables,
     doubts_about,
     summarise_loads,
 )
@@ -181,3 +183,28 @@ def test_a_load_case_far_from_the_static_load_asks_for_rows(grc, torques, said):
     names = [name for name, one in grc.case.bearings.items() if one.catalogue and one.catalogue.radial_load_kN is None]
     rows = varied.varied({f"bearings.{name}.law": "iso16281" for name in names})
     assert doubt_about_bearings(rows, loads, "bushing") == ""
+
+
+@pytest.mark.parametrize(
+    ("torque", "said"),
+    [
+        (100.0, ""),
+        (75.0, ""),
+        (60.0, "other load: spur 60 % of the static load (shaft_1 100 N m)"),
+        (140.0, "spur 140 %"),
+    ],
+)
+def test_a_load_case_thirty_percent_off_the_load_of_the_tables_is_told(torque, said):
+    gearbox = spur(torques_N_m={"shaft_1": torque, "shaft_2": 1.5 * torque})
+    doubt = doubt_about_tables(gearbox, summarise_loads(gearbox, gearbox.load_cases["run_up"]))
+    assert said in doubt
+    assert bool(said) == bool(doubt)
+
+
+def test_a_load_case_becomes_the_static_load_with_what_holds_it():
+    gearbox = spur(torques_N_m={"shaft_1": 40.0, "shaft_2": 60.0})
+    static = at_load_of(gearbox, gearbox.load_cases["run_up"]).case.static_load
+    assert static.torques_N_m == {"shaft_1": 40.0}
+    assert static.locked == ("shaft_2",)
+    with pytest.raises(CaseError, match=r"no torque at the start but on what holds the static load \(shaft_2\)"):
+        at_load_of(gearbox, spur(torques_N_m={"shaft_2": 60.0}).load_cases["run_up"])
