@@ -17,7 +17,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.reading import CaseError
-from exugear.gearbox.variant import Variant, VariantError
+from exugear.gearbox.variant import OFFERED, Variant, VariantError
 from exugear.results.folder import (
     bearings_path,
     bodies_folder,
@@ -425,19 +425,30 @@ class Project(Displayed):
         return rated(self.gearbox, counted, balance, found, remarks)
 
     def _rated_by_life(self, counted: CountedLoads) -> tuple[Figures, tuple[str, ...]]:
-        """Figures of the life in the folder; none, and why, where there is none that fits."""
+        """Figures of the life in the folder, of the variant chosen or else of another; none, and why, if none fits."""
         from exugear.life.rating.sheet import of_life
 
         missing = "no finite elements beside it: `exugear life` computes them"
+        reasons: list[str] = []
+        for variant in dict.fromkeys((self.choice.variant, *reversed(OFFERED))):
+            other = self.chosen(variant=variant)
+            data, reason = other._fitting_life(counted)
+            if data is not None:
+                return of_life(data), (f"by finite elements, variant {variant}: {other.life_path}",)
+            reasons += [reason] * bool(reason)
+        return {}, ("; ".join([missing, *reasons]),)
+
+    def _fitting_life(self, counted: CountedLoads) -> tuple[xr.Dataset | None, str]:
+        """Life of this choice that is in the folder; None, and why one that is there does not fit."""
         if not self.life_path.is_file() or any(request.stored is None for request in self.life_tables()):
-            return {}, (missing,)
+            return None, ""
         try:
             data = self.stored_life(counted)
         except (BalanceError, MeshError, BearingError, VariantError, CaseError) as error:
-            return {}, (f"{missing}; {error}",)
+            return None, str(error)
         if data is None:
-            return {}, (f"{missing}; {self.life_path} was computed from another input",)
-        return of_life(data), (f"by finite elements: {self.life_path}",)
+            return None, f"{self.life_path} was computed from another input"
+        return data, ""
 
     def _rated_by_tables(
         self, balance: StaticBalance, begin: Callable[[str], None] | None

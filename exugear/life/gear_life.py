@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.loads import RatingSection, StrengthSection
 from exugear.gearbox.units import MPA, UM
 from exugear.gearbox.versions import LIFE
@@ -116,16 +117,19 @@ class FlankLife:
 def check_strengths(
     gearbox: Gearbox, rating: RatingSection, teeth: Sequence[ToothExposure], reversed_too: bool
 ) -> None:
-    """Refuse strengths of unknown gears, and gears that bend both ways without Y_M."""
+    """Refuse strengths of unknown gears, and gears that bend both ways without Y_M, all at once."""
+    faults: list[str] = []
     for name, strength in rating.gears.items():
         flanks = {one.flank for one in teeth if one.gear == name}
         if not flanks:
             known = ", ".join(sorted({one.gear for one in teeth}))
-            raise gearbox.fault(f"rating.gears.{name}: no gear of that name in a mesh; gears are {known}")
-        if (len(flanks) > 1 or reversed_too) and strength.mean_stress_factor is None:
-            raise gearbox.fault(
+            faults += gearbox.fault(f"rating.gears.{name}: no gear of that name in a mesh; gears are {known}").faults
+        elif (len(flanks) > 1 or reversed_too) and strength.mean_stress_factor is None:
+            faults += gearbox.fault(
                 f"rating.gears.{name}.mean_stress_factor: this key is missing; teeth of {name} bend both ways"
-            )
+            ).faults
+    if faults:
+        raise CaseError(*faults)
 
 
 def beyond_tables(
@@ -139,11 +143,14 @@ def beyond_tables(
             continue
         meshes = [number for number, mesh in enumerate(gearbox.meshes) if mesh.pair.name == name]
         width = gearbox.gear_pairs[name].face_width
-        reached = float(np.abs(tilts[..., meshes]).max())
         low, high = stress.misalignment[[0, -1]]
-        if tilts[..., meshes].min() < low or tilts[..., meshes].max() > high:
+        least = float(tilts[..., meshes].min())
+        most = float(tilts[..., meshes].max())
+        reached = [extreme for extreme in (least, most) if not low <= extreme <= high]
+        if reached:
+            told = " and ".join(f"{1e6 * extreme * width:.3g}" for extreme in reached)
             yield (
-                f"{name}: its misalignment reaches {1e6 * reached * width:.3g} um over the face, its table has "
+                f"{name}: its misalignment reaches {told} um over the face, its table has "
                 f"{1e6 * low * width:.3g} to {1e6 * high * width:.3g}: stresses beyond are those at the end; widen "
                 "misalignment_um of [ste]"
             )

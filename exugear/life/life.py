@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.reading import CaseError
 from exugear.gearbox.sections.loads import LubricantSection, RatingSection
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import LIFE
@@ -18,7 +19,7 @@ from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.dynamic_factors import WITHIN, DynamicFactor
 from exugear.life.gear_life import FlankLife, beyond_tables, check_strengths, flank_lives
 from exugear.life.load_spectrum.counted import CountedLoads, count_loads
-from exugear.life.load_spectrum.sources import Progress
+from exugear.life.load_spectrum.sources import Progress, section_of
 from exugear.life.static_balance import ActingLoads, AngleStore, StaticBalance, acting_loads, static_balance
 from exugear.system.system import Assembly, input_hash
 from fe_ste.root_stress import MeshCycleStress
@@ -141,17 +142,29 @@ def reaches(flanks: Iterable[FlankLife]) -> Iterator[str]:
             )
 
 
-def needs_of_relief(flanks: Iterable[FlankLife]) -> Iterator[str]:
+def needs_of_relief(gearbox: Gearbox, flanks: Iterable[FlankLife]) -> Iterator[str]:
     """Tell which pairs need relief of their tips: those that carry more than `LEAST_OUTSIDE` outside their path."""
+    pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
     largest: dict[str, float] = {}
     for flank in flanks:
         largest[flank.family] = max(flank.outside, largest.get(flank.family, 0.0))
     for family, share in largest.items():
         if share > LEAST_OUTSIDE:
+            gears = (pairs[family].pinion.name, pairs[family].gear.name)
+            given = " and ".join(filter(None, (_relief_in_words(gearbox, name) for name in gears)))
+            remedy = given and f"they have {given}, and need more or a longer one"
             yield (
                 f"{family}: up to {100.0 * share:.1f} % of its load lies outside the path of contact, where tip edges "
-                "dig in and no stress is rated: its flanks need tip relief"
+                f"dig in and no stress is rated: {remedy or 'its flanks need tip relief'}"
             )
+
+
+def _relief_in_words(gearbox: Gearbox, name: str) -> str:
+    """Name the tip relief that the file gives a gear; empty without one."""
+    modification = gearbox.case.gears[name].modification
+    if modification is None or not modification.tip_relief_um:
+        return ""
+    return f"{modification.tip_relief_um:g} um of tip relief on {name}"
 
 
 # The life of a gearbox under its loads: gears by flank, bearings, extremes, and what limits it
@@ -218,14 +231,33 @@ def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> Counted
     CaseError
         Loads that cannot be used, or strengths that do not fit the gears.
     """
-    rating = rating_of(gearbox)
-    _ = gearbox.viscosity_40
+    check_keys(gearbox)
     counted = count_loads(gearbox, progress)
-    if rating.dynamic_factor_run is not None and rating.dynamic_factor_run not in gearbox.load_cases:
-        known = ", ".join(gearbox.load_cases) or "none"
-        raise gearbox.fault(f"rating.dynamic_factor_run = {rating.dynamic_factor_run!r}: load cases are {known}")
-    check_strengths(gearbox, rating, counted.teeth, bool(np.any(counted.distribution.torque < 0.0)))
+    check_strengths(gearbox, rating_of(gearbox), counted.teeth, bool(np.any(counted.distribution.torque < 0.0)))
     return counted
+
+
+def check_keys(gearbox: Gearbox) -> None:
+    """Refuse a file without what a life needs, without reading loads; all that is missing is told at once.
+
+    Raises
+    ------
+    CaseError
+        Sections or keys that are missing, or a load case that is none.
+    """
+    faults: list[str] = []
+    for asked in (rating_of, section_of, lambda given: given.viscosity_40):
+        try:
+            asked(gearbox)
+        except CaseError as error:
+            faults += error.faults
+    rating = gearbox.case.rating
+    named = rating and rating.dynamic_factor_run
+    if named and named not in gearbox.load_cases:
+        known = ", ".join(gearbox.load_cases) or "none"
+        faults += gearbox.fault(f"rating.dynamic_factor_run = {named!r}: load cases are {known}").faults
+    if faults:
+        raise CaseError(*faults)
 
 
 def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str], run: str = "") -> str:
@@ -302,7 +334,7 @@ def compute_life(
         unrated=tuple(_unrated(assembly, counted, stresses)),
         failures=tuple(failures(flanks)),
         shortfalls=tuple(shortfalls(rating, flanks, bearings, float(acting.points.hours.sum()))),
-        reliefs=tuple(needs_of_relief(flanks)),
+        reliefs=tuple(needs_of_relief(gearbox, flanks)),
         assumptions=(
             *_assumptions(rating, counted, acting, balance, stresses, dynamic, gearbox.case.lubricant),
             *(f"K_gamma of {family} = {value:.3f}, in the forces of each mesh" for family, value in told.items()),

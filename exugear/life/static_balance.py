@@ -484,7 +484,7 @@ def stress_requests(
         if len(wanted.misalignment) > 1 or far < STRAIGHT:
             found.append(request)
             continue
-        found.append(_wider(request, tilts[request.name], reaches.get(request.name, 1.0), folder))
+        found.append(_wider(request, tilts[request.name], *reaches.get(request.name, (1.0, 0.0)), folder))
     return found
 
 
@@ -498,20 +498,31 @@ def _misalignments(assembly: Assembly) -> dict[str, list[float]]:
     return tilts
 
 
-def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, float]:
-    """Largest torque of the loads over the static one by pair, at least 1."""
+def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, tuple[float, float]]:
+    """Largest torque of the loads over the static one by pair, at least 1, and the largest reversed one over it."""
+    gearbox = assembly.gearbox
     largest = max(float(abs(source.torque).max()) for source in counted.sources)
-    found: dict[str, float] = {}
-    for mesh in assembly.gearbox.meshes:
-        static = assembly.gearbox.pairs[mesh.pair.name].static_torque
+    static_forces = gearbox.train.static_mesh_forces()
+    unit_forces = gearbox.train.static_mesh_forces({counted.body: 1.0})
+    found: dict[str, tuple[float, float]] = {}
+    for mesh in gearbox.meshes:
+        static = gearbox.pairs[mesh.pair.name].static_torque
         if static > 0.0:
-            torque = largest * counted.mesh_forces[mesh.family] * mesh.pair.pinion.base_radius
-            found[mesh.pair.name] = max(1.0, torque / static, found.get(mesh.pair.name, 1.0))
+            sense = -math.copysign(1.0, static_forces[mesh.name] * unit_forces[mesh.name])
+            reversed_most = max(0.0, *(float((sense * source.torque).max()) for source in counted.sources))
+            each = counted.mesh_forces[mesh.family] * mesh.pair.pinion.base_radius / static
+            forward, backward = found.get(mesh.pair.name, (1.0, 0.0))
+            found[mesh.pair.name] = max(forward, largest * each), max(backward, reversed_most * each)
     return found
 
 
-def _wider(request: TableRequest, tilts: Iterable[float], reach: float, folder: Path) -> TableRequest:
-    """Ask for a pair's table over load and misalignment, and find it where it is kept."""
+def _wider(
+    request: TableRequest, tilts: Sequence[float], reach: float, reversed_reach: float, folder: Path
+) -> TableRequest:
+    """Ask for a pair's table over load and misalignment, and find it where it is kept.
+
+    A reversed load tilts gears the other way: nodes for it are added beyond those of the load itself.
+    """
     static = request.wanted
     width = request.wanted.pair.face_width
     highest = math.ceil(reach / REACH_STEP - 1e-6) * REACH_STEP
@@ -521,6 +532,10 @@ def _wider(request: TableRequest, tilts: Iterable[float], reach: float, folder: 
     high = math.ceil(max(0.0, *openings) / ROUNDING) * ROUNDING
     steps = max(1, math.ceil((high - low) / LARGEST_STEP - 1e-6))
     nodes = [low + (high - low) * step / steps for step in range(steps + 1)]
+    back = math.ceil(reversed_reach / REACH_STEP - 1e-6) * REACH_STEP
+    turned = [-ROOM * back * tilt * width for tilt in tilts]
+    below = _nodes(low, math.floor(min(low, *turned) / ROUNDING) * ROUNDING)
+    nodes = [*reversed(below), *nodes, *_nodes(high, math.ceil(max(high, *turned) / ROUNDING) * ROUNDING)]
     wanted = replace(
         static,
         torque=tuple(_rounded(static.torque[0] * share) for share in shares),
@@ -528,6 +543,12 @@ def _wider(request: TableRequest, tilts: Iterable[float], reach: float, folder: 
     )
     path = folder / "stress" / f"{request.name}.states.nc"
     return TableRequest(request.name, wanted, path, _stored(path, wanted))
+
+
+def _nodes(begin: float, end: float) -> list[float]:
+    """Return even nodes after a beginning up to an end, at most `LARGEST_STEP` apart; none if both are one."""
+    steps = math.ceil(abs(end - begin) / LARGEST_STEP - 1e-6)
+    return [begin + (end - begin) * step / steps for step in range(1, steps + 1)]
 
 
 def _stored(path: Path, wanted: TableInput) -> MeshTable | None:

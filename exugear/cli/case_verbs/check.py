@@ -62,6 +62,7 @@ def check(
         if rating:
             _rate(case, out, files_below, as_json)
             return
+        from exugear.life.rating.lacks import lacks_of_life
         from exugear.system.readiness import lacking, remarks
 
         gearbox = _read(case, files_below, as_json)
@@ -74,10 +75,12 @@ def check(
         steady = _steady_lacks(assemblies)
         bearings, doubts = _bearing_summaries(gearbox, assemblies.get(Variant.bushing))
         warnings = [*remarks(gearbox), *doubts]
+        lives = lacks_of_life(gearbox)
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
             summary["tooth_thickness"] = thicknesses
-            found = {"bearings": bearings, "load_cases": loads, "variants": variants, "steady": steady}
+            found: dict[str, Any] = {"bearings": bearings, "load_cases": loads, "variants": variants, "steady": steady}
+            found["life"] = {verb: list(reasons) for verb, reasons in lives.items()}
             found["warnings"] = warnings
             print_json({**summary, **found})
         else:
@@ -104,6 +107,9 @@ def check(
             for reason in dict.fromkeys(filter(None, steady.values())):
                 names = ", ".join(variant for variant in steady if steady[variant] == reason)
                 say(f"steady response ({names}): not possible, {reason}")
+            for verb, reasons in lives.items():
+                for line in [f"not possible, {reason}" for reason in reasons] or ["possible"]:
+                    say(f"{verb}: {line}")
             for line in counted([f"Warning: {line}" for line in warnings]):
                 note(line, style="yellow")
         for one in loads:

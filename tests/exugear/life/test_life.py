@@ -23,9 +23,10 @@ from exugear.gearbox.sections.loads import RatingSection
 from exugear.gearbox.variant import VariantError
 from exugear.life.dynamic_factors import stated_factors
 from exugear.life.gear_life import beyond_tables, flank_lives, pair_stresses
-from exugear.life.life import checked_loads, compute_life, rating_of, shortfalls
+from exugear.life.life import checked_loads, compute_life, needs_of_relief, rating_of, shortfalls
 from exugear.life.life_file import damage_matrix, limits, read_life
 from exugear.life.load_spectrum.counted import count_loads
+from exugear.life.rating.lacks import lacks_of_life
 from exugear.life.static_balance import StaticBalance, acting_loads, static_balance
 from exugear.project import Project
 from exugear.system.bearings.rolling.life import basic_rating_life
@@ -219,6 +220,11 @@ def test_misalignment_beyond_a_table_is_told(grc, balance):
         lines = list(beyond_tables(gearbox, acting, balance, {"high_speed": stress}))
         assert len(lines) == told
         assert all(line.startswith("high_speed: its misalignment reaches") for line in lines)
+        hub = np.concatenate([acting.points.other, acting.worst_hub])
+        number = [mesh.name for mesh in gearbox.meshes].index("high_speed")
+        tilts = 1e6 * pair.face_width * balance.at(balance.misalignment, acting.torques, hub)[..., number]
+        signed = " and ".join(f"{end:.3g}" for end in (tilts.min(), tilts.max()) if abs(end) > 1e6 * opening)
+        assert all(f"reaches {signed} um over the face" in line for line in lines)
 
 
 def test_safeties_below_what_is_asked_for_are_named(tmp_path, stresses):
@@ -315,8 +321,38 @@ def test_bad_sections_are_one_error_each_by_the_names_of_their_keys(tmp_path, ch
 
 def test_gears_that_bend_both_ways_need_their_factor(tmp_path):
     table = "torque_N_m,speed_rpm,hours\n200,1000,3\n-100,1000,1\n"
-    with pytest.raises(CaseError, match=r"rating.gears.pinion.mean_stress_factor: this key is missing"):
-        checked_loads(spur_project(tmp_path, table).gearbox)
+    gearbox = spur_project(tmp_path, table).gearbox
+    with pytest.raises(CaseError, match=r"rating.gears.pinion.mean_stress_factor: this key is missing") as raised:
+        checked_loads(gearbox)
+    missing = [f"rating.gears.{name}.mean_stress_factor: this key is missing" for name in ("pinion", "wheel")]
+    assert len(raised.value.faults) == 2
+    found = lacks_of_life(gearbox)
+    assert found["loads"] == ()
+    for verb in ("life", "check --rating"):
+        assert all(reason.startswith(key) for reason, key in zip(found[verb], missing, strict=True))
+
+
+def test_check_says_for_each_verb_of_a_life_whether_it_is_possible_and_all_that_is_missing(tmp_path):
+    case = tmp_path / "gearbox.toml"
+    case.write_text(SPUR_CASE)
+    said = exugear("check", case).stdout
+    assert "loads: not possible, loads: this section is missing" in said
+    assert "life: not possible, rating: this section is missing" in said
+    assert "life: not possible, lubricant.viscosity_40_mm2_per_s: this key is missing" in said
+    assert "check --rating: not possible, rating: this section is missing" in said
+    assert json.loads(exugear("check", case, "--json").stdout)["life"]["loads"]
+
+
+def test_gears_with_tip_relief_are_told_to_have_too_little_not_none(tmp_path, stresses):
+    project = spur_project(tmp_path, TABLE)
+    (flank, *_) = lives(project, stresses).values()
+    flanks = [replace(flank, outside=0.04)]
+    assert "its flanks need tip relief" in next(needs_of_relief(project.gearbox, flanks))
+    relieved = project.gearbox.varied(
+        {"gears.pinion.modification": {"tip_relief_um": 12.0, "tip_relief_length_mm": 3.0}}
+    )
+    (said,) = needs_of_relief(relieved, flanks)
+    assert said.endswith("they have 12 um of tip relief on pinion, and need more or a longer one")
 
 
 def test_bad_input_writes_nothing(tmp_path):

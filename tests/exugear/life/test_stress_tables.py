@@ -32,12 +32,14 @@ def assembly() -> Assembly:
     return assemble(gearbox, Choice("bushing", "line_of_action"), coarse_curves(gearbox))
 
 
-def loads(share: float) -> Any:
-    """Counted loads up to a share of the static torque."""
+def loads(share: float, back: float = -0.1) -> Any:
+    """Counted loads up to a share of the static torque, and back to another share of that."""
     gearbox = assembly().gearbox
     (torque,) = (abs(torque) for torque in gearbox.case.static_load.torques_N_m.values())
     forces = {mesh.family: abs(gearbox.train.static_mesh_forces()[mesh.name]) / torque for mesh in gearbox.meshes}
-    return SimpleNamespace(sources=[SimpleNamespace(torque=np.array([-0.1, 1.0]) * share * torque)], mesh_forces=forces)
+    (body,) = gearbox.case.static_load.torques_N_m
+    source = SimpleNamespace(torque=np.array([back, 1.0]) * share * torque)
+    return SimpleNamespace(sources=[source], mesh_forces=forces, body=body)
 
 
 def requests(folder: Path) -> list[TableRequest]:
@@ -59,6 +61,18 @@ def test_tables_hold_the_static_misalignment_and_all_loads(tmp_path: Path) -> No
         assert np.diff(nodes).max() * wanted.pair.face_width <= LARGEST_STEP * (1.0 + 1e-9)
         assert max(wanted.torque) >= 1.3 * duty.force * wanted.pair.pinion.base_radius * 0.95
         assert wanted.centre_distance == () and wanted.positions == POSITIONS
+
+
+def test_tables_hold_the_misalignment_of_reversed_loads_and_keep_the_nodes_of_the_others(tmp_path: Path) -> None:
+    turned, alone = (
+        {one.name: one.wanted for one in stress_requests(assembly(), requests(tmp_path), loads(1.0, back), tmp_path)}
+        for back in (-0.6, 0.0)
+    )
+    for element, duty in zip(assembly().elements, mesh_duties(assembly()), strict=True):
+        name = element.mesh.pair.name
+        tilt = element.flank * duty.misalignment
+        assert min(turned[name].misalignment) <= -0.6 * tilt <= max(turned[name].misalignment)
+        assert set(alone[name].misalignment) <= set(turned[name].misalignment)
 
 
 def test_loads_that_change_a_little_leave_tables_as_they_are(tmp_path: Path) -> None:

@@ -239,6 +239,19 @@ def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_li
     assert any("another input" in line for line in other.assumptions)
 
 
+def test_the_life_of_another_variant_stands_beside_a_rating_and_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
+    (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n100,1500,500\n60,1500,500\n")
+    content = spur(tmp_path)
+    content["loads"] = {"body": "shaft_1", "life_years": 1.0, "sources": {"one": {"file": "loads.csv"}}}
+    project = project_of(content, tmp_path).chosen(variant="bushing", mesh_law="iso6336")
+    other = project.chosen(variant="rigid")
+    other.life()
+    sheet = project.rating()
+    assert f"by finite elements, variant rigid: {other.life_path}" in sheet.assumptions
+    assert sheet.flanks[0].finite_elements
+
+
 @pytest.mark.validation
 def test_a_ring_is_rated_by_its_root_and_says_what_is_left_out():
     content = tomllib.loads(GRC.read_text("utf-8"))
