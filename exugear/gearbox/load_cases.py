@@ -83,6 +83,12 @@ LEAST_SHARE = 0.25
 """Share of the static load below which the straight line of a linear bearing leads a quarter off its rows."""
 OTHER_LOAD = 0.3
 """Difference from the static load from which a mesh counts as one under another load than its table is of."""
+BEYOND_BAND = 1.05
+"""Mesh frequencies above this part of the band are told: steps of a run are chosen for the band, and end softly."""
+BAND_STEP = 100.0
+"""What a band that is proposed is rounded up to, Hz."""
+SHOWN_MESHES = 3
+"""Meshes beyond the band that are named."""
 INSTANTS = 2001
 """Instants at which a torque that changes is looked at, beside those of its own lines."""
 
@@ -277,6 +283,29 @@ def doubt_about_tables(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool =
         f"other load: {', '.join(told)} of the static load ({static_load_in_words(gearbox)}), which the tables of "
         "transmission error and stiffness are of; state this load under [static_load], or take the mesh law table, "
         "whose tables go over load"
+    )
+
+
+def doubt_about_band(loads: LoadSummary, band: float) -> str:
+    """Say which mesh frequencies a run does not keep, and which band (Hz) does; empty if all are kept.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> loads = summarise_loads(gearbox, gearbox.load_cases["reference"])
+    >>> doubt_about_band(loads, 6400.0)
+    ''
+    >>> doubt_about_band(loads, 5000.0)
+    'beyond the band: the run keeps frequencies up to 5000 Hz, and meshes reach high_speed 6411 Hz; exugear ...
+    """
+    beyond = {name: found for name, found in loads.mesh_frequencies.items() if found > BEYOND_BAND * band}
+    if not beyond:
+        return ""
+    named = ", ".join(f"{name} {frequency:.0f} Hz" for name, frequency in list(beyond.items())[:SHOWN_MESHES])
+    wanted = math.ceil(max(beyond.values()) / BAND_STEP) * BAND_STEP
+    return (
+        f"beyond the band: the run keeps frequencies up to {band:g} Hz, and meshes reach {named}; exugear run "
+        f"--band {wanted:g} keeps them"
     )
 
 

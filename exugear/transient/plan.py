@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 
 SAMPLE_RATE = 20e3
 """Stored rate, Hz."""
+HIGHEST_BAND = 100e3
+"""Highest frequency that a run can be asked to keep, Hz."""
+STORED_BAND = 0.4
+"""Highest frequency that is stored as it is, over the stored rate: the anti-aliasing filter is flat up to there."""
 LEAST_SAMPLES = 8
 """Stored samples that a spectrum needs at least."""
 MOST_STEPS_PER_SAMPLE = 1000
@@ -36,6 +40,24 @@ The anti-aliasing filter reaches over 31 times as many steps, and a simulated se
 """
 BUFFER_BYTES = 1 << 30
 """Memory of what is kept between two writes at most."""
+
+
+def rate_for(band: float) -> float:
+    """Find the stored rate (Hz) for a band (Hz): the usual one, or the multiple of it that is enough.
+
+    Raises
+    ------
+    CaseError
+        A band that is no frequency, or beyond what any step is chosen for.
+
+    Examples
+    --------
+    >>> rate_for(6.4e3), rate_for(9e3)
+    (20000.0, 40000.0)
+    """
+    if not 0.0 < band <= HIGHEST_BAND:
+        raise CaseError(f"--band {band:g}: must be above 0 and at most {HIGHEST_BAND:g} Hz")
+    return SAMPLE_RATE * max(1, math.ceil(band / (STORED_BAND * SAMPLE_RATE) - 1e-9))
 
 
 def check_duration(

@@ -11,6 +11,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import (
+    doubt_about_band,
     doubt_about_bearings,
     doubt_about_tables,
     drive_rate,
@@ -86,6 +87,12 @@ def kept_duration(directory: Path) -> float | None:
     return kept and float(kept)
 
 
+def kept_band(directory: Path) -> float | None:
+    """Read the band that a stopped run keeps, Hz; None where that is not kept."""
+    kept = kept_attributes(directory / PARTIAL_NAME).get("band")
+    return kept and float(kept)
+
+
 def refuse_shorter(directory: Path, duration: float) -> str:
     """Why a stopped run cannot end at a simulated time (s); empty if it can."""
     kept = kept_attributes(directory / PARTIAL_NAME)
@@ -139,7 +146,9 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         doubt = doubt_about_bearings(gearbox, summary, assembly.variant)
         other = doubt_about_tables(gearbox, summary, LAWS[assembly.mesh_law].of_one_load)
         load = load_in_words(case)
-        told = {"bearing_doubt": doubt, "table_doubt": other, "load": load, "duration": plan.duration}
+        beyond = doubt_about_band(summary, plan.band)
+        doubts = {"bearing_doubt": doubt, "table_doubt": other, "band_doubt": beyond}
+        told = {**doubts, "load": load, "duration": plan.duration}
         pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), **told})
     return RunStart(_load_table(case, series, state.start_angle, gearbox), state, pieces, judge, resume)
 

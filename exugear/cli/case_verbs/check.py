@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -34,10 +34,6 @@ from exugear.gearbox.variant import OFFERED, Variant
 if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
     from exugear.system.system import Assembly
-
-
-BEYOND = 1.05
-"""Mesh frequencies above this part of the band are told: steps of a run are chosen for the band, and end softly."""
 
 
 RatingOption = Annotated[
@@ -323,7 +319,13 @@ def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
 
 def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
-    from exugear.gearbox.load_cases import doubt_about_bearings, doubt_about_tables, doubts_about, summarise_loads
+    from exugear.gearbox.load_cases import (
+        doubt_about_band,
+        doubt_about_bearings,
+        doubt_about_tables,
+        doubts_about,
+        summarise_loads,
+    )
     from exugear.gearbox.units import RPM
     from exugear.transient.plan import check_duration
     from exugear.transient.runup import BAND
@@ -351,21 +353,11 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                     *doubts_about(loads),
                     *filter(None, [doubt_about_bearings(gearbox, loads, Variant.bushing)]),
                     *filter(None, [doubt_about_tables(gearbox, loads)]),
-                    *_beyond_band(loads.mesh_frequencies, BAND),
+                    *filter(None, [doubt_about_band(loads, BAND)]),
                 ],
             }
         )
     return summaries
-
-
-def _beyond_band(frequencies: Mapping[str, float], band: float) -> Iterator[str]:
-    """Tell meshes whose frequency a run does not keep."""
-    beyond = [f"{name} {frequency:.0f} Hz" for name, frequency in frequencies.items() if frequency > BEYOND * band]
-    if beyond:
-        yield (
-            f"beyond the band: runs keep frequencies up to {band:g} Hz, and meshes reach {', '.join(beyond[:3])}; in "
-            "Python simulate(..., band=..., sample_rate=...) keeps more"
-        )
 
 
 def _load_row(summary: dict[str, Any]) -> dict[str, str]:

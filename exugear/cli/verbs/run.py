@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -79,6 +80,15 @@ def run(
         float | None,
         typer.Option(metavar="S", help="Simulated time, s. (default: the load case's; with --resume that of the call)"),
     ] = None,
+    band: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            help="Highest frequency that is kept, Hz; above 8000 the stored rate grows, and the file with it. "
+            "(default: 6400; with --resume that of the call)",
+            show_default=False,
+        ),
+    ] = None,
     compared: Annotated[
         float | None,
         typer.Option(
@@ -106,38 +116,39 @@ def run(
         project = open_project(case, choice, out, files_below, scripts)
         if resume:
             duration = _duration_to_resume(project, duration)
-        _check_extent(project, duration, out or Path("results"))
+        kept = _kept_band(project, band, resume)
+        _check_extent(project, duration, kept["sample_rate"], out or Path("results"))
         _check_solver(project.gearbox, variant, solver)
         _check_mesh_route(mesh_route, variant, solver)
         if compared is not None and solver is Solver.exudyn:
             raise BadInputError("--compare-exudyn: the run itself is one of Exudyn; leave --solver out")
         if compared is not None:
-            _check_extent(project, compared, out or Path("results"))
+            _check_extent(project, compared, kept["sample_rate"], out or Path("results"))
             _check_solver(project.gearbox, variant, Solver.compiled)
         if integrator and solver is Solver.exudyn:
             raise BadInputError(f"--integrator {integrator}: is a method of the compiled solver; leave it out")
         if not resume:
             project.begin()
         _check_run_directory(project.run_directory, resume)
-        _tell_doubts(project, duration)
+        _tell_doubts(project, duration, kept["band"])
         project.prepare()
         with time_noted(project.folder, _label_of(project, solver, mesh_route)):
-            how = {"solver": solver.value, "mesh_route": mesh_route.value, "integrator": integrator}
+            how = {"solver": solver.value, "mesh_route": mesh_route.value, "integrator": integrator, **kept}
             finished = _simulate(project, resume, resuming(context), duration=duration, **how)
         comparison = None
         if compared is not None and finished.complete:
             with time_noted(project.folder, f"comparison with Exudyn, {choice.variant}"):
-                comparison = _compare(project, compared)
+                comparison = _compare(project, compared, kept)
         _tell_run(case, finished, comparison, resuming(context), as_json)
 
 
-def _compare(project: Project, duration: float) -> SolverComparison:
+def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> SolverComparison:
     """Integrate the beginning of the run by Exudyn."""
     from exugear.transient.outcome import LimitError, RunError
     from fe_ste.tools.files import FileError
 
     try:
-        return project.compare_with_exudyn(duration)
+        return project.compare_with_exudyn(duration, **kept)
     except (RunError, LimitError, FileError) as error:
         raise FailedError(f"comparison with Exudyn: {error}") from error
 
@@ -158,7 +169,20 @@ def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
     return label
 
 
-def _check_extent(project: Project, duration: float | None, folder: Path) -> None:
+def _kept_band(project: Project, band: float | None, resume: bool) -> dict[str, float]:
+    """Return the band that is asked for, or that a stopped run has, and the stored rate that it takes, Hz."""
+    from exugear.transient.plan import rate_for
+    from exugear.transient.runup import BAND
+    from exugear.transient.start import kept_band
+
+    if band is None and resume:
+        band = kept_band(project.run_directory)
+    if band is None:
+        band = BAND
+    return {"band": band, "sample_rate": rate_for(band)}
+
+
+def _check_extent(project: Project, duration: float | None, sample_rate: float, folder: Path) -> None:
     """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
     from exugear.system.tooth_mesh.laws.registry import LAWS
     from exugear.transient.plan import check_disk, check_duration, sample_bytes
@@ -169,8 +193,8 @@ def _check_extent(project: Project, duration: float | None, folder: Path) -> Non
     tabled = LAWS[project.choice.mesh_law].signals_positions
     supports = gearbox.joints if jointed else gearbox.bearings
     size = sample_bytes(len(gearbox.meshes), len(supports), tabled, jointed)
-    check_duration(gearbox, load_case, duration)
-    check_disk(gearbox, load_case, folder, duration, sample_bytes=size)
+    check_duration(gearbox, load_case, duration, sample_rate)
+    check_disk(gearbox, load_case, folder, duration, sample_rate, sample_bytes=size)
 
 
 def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
@@ -221,9 +245,10 @@ def _duration_to_resume(project: Project, duration: float | None) -> float | Non
     return duration
 
 
-def _tell_doubts(project: Project, duration: float | None) -> None:
+def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
     """Say what looks like the wrong sign of a torque, or leads bearings or meshes far from the load they are of."""
     from exugear.gearbox.load_cases import (
+        doubt_about_band,
         doubt_about_bearings,
         doubt_about_tables,
         doubts_about,
@@ -236,7 +261,7 @@ def _tell_doubts(project: Project, duration: float | None) -> None:
     loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
     of_bearings = doubt_about_bearings(project.gearbox, loads, project.choice.variant)
     of_tables = doubt_about_tables(project.gearbox, loads, law.of_one_load)
-    for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables)):
+    for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, doubt_about_band(loads, band))):
         note(f"load_cases.{load_case.name}: {doubt}", style="yellow")
 
 
@@ -289,8 +314,7 @@ def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, co
         "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
         "energy_not_accounted_for": energy_residual(data),
         "load": str(attributes.get("load", "")),
-        "table_doubt": str(attributes.get("table_doubt", "")),
-        "bearing_doubt": str(attributes.get("bearing_doubt", "")),
+        **{doubt: str(attributes.get(doubt, "")) for doubt in ("table_doubt", "band_doubt", "bearing_doubt")},
         "longest_pull_of_a_mesh_s": longest["pulling_time"],
         "longest_time_apart_s": longest["apart_time"],
         "longest_time_outside_table_s": outside,

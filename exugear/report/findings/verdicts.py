@@ -112,7 +112,7 @@ def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
     doubtful = verdict_of(run.attributes)
     if doubtful:
         verdicts.append(Verdict(False, f"the run is not to be trusted: {doubtful}"))
-    for doubt in ("table_doubt", "bearing_doubt"):
+    for doubt in ("table_doubt", "band_doubt", "bearing_doubt"):
         if run.attributes.get(doubt):
             verdicts.append(Verdict(False, str(run.attributes[doubt])))
     if pulling > 0.0:

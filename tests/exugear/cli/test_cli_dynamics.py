@@ -223,6 +223,25 @@ def test_a_stopped_run_goes_on_to_the_duration_of_its_first_call(case, monkeypat
     assert json.loads(resumed.stdout)["simulated_s"] == pytest.approx(1.3)
 
 
+def test_a_band_that_is_asked_for_is_kept_and_one_that_misses_a_mesh_is_told(case):
+    """20 teeth beyond 6.4 kHz want 20000 rpm; an overdriven pair reaches it in a moment."""
+    text = case.read_text(encoding="utf-8").replace("duration_s = 1.0", "start_speed_rpm = 25000.0, duration_s = 0.05")
+    case.write_text(text, encoding="utf-8")
+    usual = iso("run", case, "--variant", "rigid", "--json")
+    said = "beyond the band: the run keeps frequencies up to 6400 Hz, and meshes reach spur 83"
+    assert f"load_cases.run_up: {said}" in usual.stderr
+    assert "--band 8400 keeps them" in usual.stderr
+    assert json.loads(usual.stdout)["band_doubt"].startswith(said)
+    wide = iso("run", case, "--variant", "rigid", "--band", 8400, "--json")
+    assert wide.exit_code == 0, wide.stderr
+    assert "beyond the band" not in wide.stderr
+    summary = json.loads(wide.stdout)
+    assert (summary["band_Hz"], summary["band_doubt"]) == (8400.0, "")
+    with xr.open_dataset(summary["file"], engine="h5netcdf") as data:
+        assert 1.0 / float(np.diff(data["time"])[0]) == pytest.approx(40e3)
+    assert iso("run", case, "--variant", "rigid", "--band", 0).exit_code == 2
+
+
 def test_view_writes_a_page_where_nothing_can_be_rendered(case, monkeypatch):
     def unable(*arguments, **options):
         raise RenderingError("3-D pictures need pyvista: pip install")
