@@ -153,13 +153,27 @@ def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
     carrier = section.carrier
     radius = section.orbit_radius_mm
     if carrier is None or radius is None:
-        raise origin.fault(f"bodies.{family}: give axis_position_mm or the keys of a planet")
+        return _axis_of_neighbour(origin, family)
     if not origin.are_enabled(f"bodies.{family}.carrier", carrier):
         raise origin.fault(f"bodies.{family}.carrier = {carrier!r}: that body is not enabled")
     if origin.case.bodies[carrier].axis_position_mm is None:
-        raise origin.fault(f"bodies.{family}.carrier = {carrier!r}: a carrier cannot be a planet")
+        raise origin.fault(
+            f"bodies.{family}.carrier = {carrier!r}: a carrier is no planet and has a place; give "
+            f"bodies.{carrier}.axis_position_mm"
+        )
     x, y = _axis(origin, carrier, 0.0)
     return x + radius * MM * math.cos(angle), y + radius * MM * math.sin(angle)
+
+
+def _axis_of_neighbour(origin: Origin, family: str) -> tuple[float, float]:
+    """Place where a body without one is shown: that of a body that a coupling joins it to, else the origin."""
+    for coupling in origin.case.couplings.values():
+        for other in coupling.bodies:
+            section = origin.case.bodies.get(other)
+            if family in coupling.bodies and section is not None and section.axis_position_mm is not None:
+                x, y = section.axis_position_mm
+                return x * MM, y * MM
+    return 0.0, 0.0
 
 
 def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:

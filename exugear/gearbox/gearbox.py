@@ -7,6 +7,7 @@ numbered from 1 (`planet_1`, `sun_planet_1`).
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -28,7 +29,7 @@ from exugear.gearbox.parts import (
     stiffness_matrix,
 )
 from exugear.gearbox.reading import CaseError, Origin, parse_case, read_toml, readable, shortened
-from exugear.gearbox.sections.case import CaseFile, SteSection, labels_in_use
+from exugear.gearbox.sections.case import NAMED_TABLES, CaseFile, SteSection, labels_in_use
 from exugear.gearbox.sections.entries import unusual_values
 from exugear.gearbox.train import Tie, Train
 from exugear.gearbox.units import UM
@@ -108,7 +109,8 @@ class Gearbox(Displayed):
         Raises
         ------
         CaseError
-            A path through what is no section, or anything wrong with the new gearbox.
+            A path through what is no section, or anything wrong with the new gearbox; where a path made an entry that
+            the file does not have, the nearest path that it has.
 
         Examples
         --------
@@ -117,6 +119,7 @@ class Gearbox(Displayed):
         0.5
         """
         content = _copied(self.content)
+        made = [dotted for dotted in changes if _makes_entry(content, dotted)]
         for dotted, value in changes.items():
             section = content
             *parents, key = dotted.split(".")
@@ -126,7 +129,15 @@ class Gearbox(Displayed):
                     raise self.fault(f"{dotted}: {parent!r} is not a section")
             section[key] = value
         content["labels"] = labels_in_use(content)
-        return Gearbox.from_dict(content, self.source, self.permissions)
+        try:
+            return Gearbox.from_dict(content, self.source, self.permissions)
+        except CaseError as error:
+            if not made:
+                raise
+            near = difflib.get_close_matches(made[0], list(_paths(self.content)), 1, 0.0)
+            raise self.fault(
+                f"{made[0]}: no entry of this name is in the file, and a new one lacks keys; did you mean {near[0]}?"
+            ) from error
 
     def fault(self, text: str) -> CaseError:
         """Error that names the file before `text` (key, value and what would be right)."""
@@ -548,6 +559,21 @@ def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling]
         "mounts": gearbox.mounts,
         "couplings": gearbox.couplings,
     }
+
+
+def _makes_entry(content: Mapping[str, Any], dotted: str) -> bool:
+    """Tell whether a key at a dotted path would stand in a named entry that is not there, such as a gear."""
+    keys = dotted.split(".")
+    return len(keys) > 2 and keys[0] in NAMED_TABLES and keys[1] not in content.get(keys[0], {})
+
+
+def _paths(content: Mapping[str, Any], before: str = "") -> Iterator[str]:
+    """Dotted paths of all keys that hold no section."""
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            yield from _paths(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}"
 
 
 def _copied(value: Any) -> Any:

@@ -175,7 +175,8 @@ class BodySection(Section):
     """
 
     axis_position_mm: Annotated[tuple[q.PlaceMm, q.PlaceMm], Field(strict=False)] | None = None
-    """Place of the axis, x and y; planets have the three keys that follow instead."""
+    """Place of the axis, x and y; planets have the three keys that follow instead, a spin-only body or a fixed one
+    without gears may have none. It is then shown where a body is that a coupling joins it to, else at the origin."""
     carrier: Name | None = None
     """Body that carries the planets."""
     orbit_radius_mm: q.LengthMm | None = None
@@ -214,7 +215,8 @@ class BodySection(Section):
         planet = (self.carrier is not None, self.orbit_radius_mm is not None, bool(self.planet_angles_deg))
         if any(planet) and not all(planet):
             raise ValueError("a planet needs all of carrier, orbit_radius_mm and planet_angles_deg")
-        if all(planet) == (self.axis_position_mm is not None):
+        placeless = self.spin_only or (self.fixed and not self.wheels_z_mm)
+        if all(planet) == (self.axis_position_mm is not None) and (all(planet) or not placeless):
             raise ValueError("give either axis_position_mm = [x, y] or the three keys of a planet")
         if self.fixed and self.inertia:
             raise ValueError("a fixed body has no inertia: leave the section out or set fixed = false")

@@ -202,13 +202,13 @@ class SteSection(Section):
 
 Label = Annotated[Text, Field(min_length=1, max_length=80)]
 """Words for a name: short, since tables and diagrams hold them."""
-_NAMED = ("bodies", "bearings", "joints", "mounts", "couplings", "meshes", "pairs", "gears", "load_cases", "pins")
+NAMED_TABLES = ("bodies", "bearings", "joints", "mounts", "couplings", "meshes", "pairs", "gears", "load_cases", "pins")
 """Tables whose entries may have a label."""
 
 
 def labels_in_use(content: Mapping[str, Any]) -> dict[str, Any]:
     """Labels in the content of a gearbox file whose entries are there."""
-    known = {name for table in _NAMED for name in content.get(table, {})}
+    known = {name for table in NAMED_TABLES for name in content.get(table, {})}
     return {name: words for name, words in content.get("labels", {}).items() if name in known}
 
 
@@ -270,10 +270,10 @@ class CaseFile(Section):
 
     @model_validator(mode="after")
     def _labels_of_entries(self) -> CaseFile:
-        known = {name for table in _NAMED for name in getattr(self, table)}
+        known = {name for table in NAMED_TABLES for name in getattr(self, table)}
         for name in self.labels:
             if name not in known:
-                raise ValueError(f"labels.{name}: no entry of that name; labels are for {', '.join(_NAMED)}")
+                raise ValueError(f"labels.{name}: no entry of that name; labels are for {', '.join(NAMED_TABLES)}")
         return self
 
     def __repr__(self) -> str:

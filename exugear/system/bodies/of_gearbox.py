@@ -519,7 +519,8 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
             f"bodies.{family}.shape: nothing sits on the body; give it a gear, a bearing or torque_z_mm"
         )
     try:
-        check_shaft(model.sections, model.seats)
+        start = MM * _shape_of(gearbox, gearbox.body(name)).start_z_mm
+        check_shaft(model.sections, model.seats, start=start)
     except ShaftError as error:
         raise gearbox.fault(f"bodies.{family}.shape: {error}") from None
 

@@ -106,8 +106,12 @@ class SeatBand:
     """m; 0 for the cross-section."""
 
 
-def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[int, float, float]:
+def locate(sections: Sequence[ShaftSection], seat: SeatBand, start: float = 0.0) -> tuple[int, float, float]:
     """Find the number of the section under a seat, lower and upper edge (m); neighbours of one diameter count as one.
+
+    Parameters
+    ----------
+    start : where the first section begins in the file (m), for messages
 
     Raises
     ------
@@ -117,9 +121,11 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[int, float
     places = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
     low = seat.z - seat.width / 2.0
     high = seat.z + seat.width / 2.0
+    told = f"{1e3 * (start + low):.6g}", f"{1e3 * (start + high):.6g}"
     if low < -SAME or high > places[-1] + SAME:
         raise ShaftError(
-            f"seat {seat.name}: it reaches from {low:g} to {high:g} m, the shaft from 0 to {places[-1]:g} m"
+            f"seat {seat.name}: it reaches from z = {told[0]} to {told[1]} mm, the shaft from "
+            f"{1e3 * start:.6g} to {1e3 * (start + places[-1]):.6g} mm"
         )
     under = [
         number
@@ -128,7 +134,7 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand) -> tuple[int, float
     ]
     ends = {diameter for one in under for diameter in (sections[one].outer_diameter, sections[one].outer_end)}
     if seat.width > 0.0 and len(under) > 1 and len(ends) > 1:
-        raise ShaftError(f"seat {seat.name}: a shoulder lies between {low:g} and {high:g} m; move or narrow it")
+        raise ShaftError(f"seat {seat.name}: a shoulder lies between z = {told[0]} and {told[1]} mm; move or narrow it")
     return max(under, key=lambda one: sections[one].outer_at(seat.z - float(places[one]))), low, high
 
 
@@ -157,8 +163,14 @@ def narrowed(sections: Sequence[ShaftSection], seat: SeatBand) -> SeatBand:
     return replace(seat, width=2.0 * half)
 
 
-def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], size: MeshSize = STANDARD_SIZE) -> None:
+def check_shaft(
+    sections: Sequence[ShaftSection], seats: Sequence[SeatBand], size: MeshSize = STANDARD_SIZE, start: float = 0.0
+) -> None:
     """Refuse a shaft before it is meshed.
+
+    Parameters
+    ----------
+    start : where it begins in the file (m), for messages
 
     Raises
     ------
@@ -167,7 +179,7 @@ def check_shaft(sections: Sequence[ShaftSection], seats: Sequence[SeatBand], siz
     """
     check_sections(tuple(sections))
     for seat in seats:
-        locate(sections, seat)
+        locate(sections, seat, start)
     length = sum(s.length for s in sections)
     radius = max(max(s.outer_diameter, s.outer_end) for s in sections) / 2.0
     elements = length / size.axial * radius / size.radial

@@ -349,7 +349,7 @@ BLANK = {"mass_kg": 1.0, "axial_kg_m2": 1.0, "transverse_kg_m2": 1.0}
         ("modified", {"bearings__bearing_2__catalogue__radial_load_kN": 0.0}, "bearing_2.catalogue: bearing: force"),
         ("shafts", {"bodies__shaft_1__shape__sections": [
             {"length_mm": 60.0, "outer_diameter_mm": 20.0, "inner_diameter_mm": 30.0}]}, "= 30 must be below"),
-        ("shafts", {"bodies__shaft_1__shape__start_z_mm": 0.0}, "shaft_1.shape: seat bearing_1: it reaches from"),
+        ("shafts", {"bodies__shaft_1__shape__start_z_mm": 0.0}, "shaft_1.shape: seat bearing_1: it reaches from z = "),
         ("shafts", {"bodies__shaft_1__shape__blanks__lid": BLANK}, "bodies.shaft_1.shape.blanks.lid: no such seat"),
         ("shafts", {"bodies__shaft_1__shape__sections": [{"length_mm": 1e5, "outer_diameter_mm": 2000.0}]},
          "elements over its section; 50000 are the most"),

@@ -16,6 +16,8 @@ from exugear.system.sensitivity import assumed_parameters
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.geometry.cylinders import Tube, mass_properties
 
+from ..cases.spur import SPUR_CASE
+
 STEEL = 7850.0
 CASE = """
 name = "a pair of which little is said"
@@ -213,3 +215,24 @@ def test_undercut_is_told_as_a_warning() -> None:
         ("outer_diameter_mm = 35.0", "outer_diameter_mm = 26.0"),
     )
     assert any(line.startswith("gears.pinion: undercut by its rack") for line in gearbox.warnings)
+
+
+def test_a_body_that_only_spins_and_a_fixed_one_need_no_place():
+    content = tomllib.loads(SPUR_CASE)
+    content["bodies"]["brake"] = {"spin_only": True, "inertia": {"disc": {"axial_kg_m2": 0.1}}}
+    content["bodies"]["floor"] = {"fixed": True}
+    content["couplings"] = {"shaft": {"bodies": ["brake", "shaft_2"], "stiffness_N_m_per_rad": 1e5}}
+    bodies = Gearbox.from_dict(content, "spur.toml").named_bodies
+    assert bodies["brake"].axis == bodies["shaft_2"].axis
+    assert bodies["floor"].axis == (0.0, 0.0)
+    del content["bodies"]["shaft_1"]["axis_position_mm"]
+    with pytest.raises(CaseError, match=r"bodies.shaft_1: give either axis_position_mm"):
+        Gearbox.from_dict(content, "spur.toml")
+
+
+def test_a_changed_path_with_a_typing_error_names_the_nearest_and_makes_no_entry():
+    gearbox = Gearbox.from_dict(tomllib.loads(SPUR_CASE), "spur.toml")
+    with pytest.raises(CaseError, match=r"gears.pinon.teeth: no entry .* did you mean gears.pinion.teeth\?"):
+        gearbox.varied({"gears.pinon.teeth": 21})
+    case = gearbox.varied({"load_cases.coast.torques_N_m": {"shaft_1": -10.0}, "load_cases.coast.duration_s": 0.5})
+    assert case.load_cases["coast"].duration == 0.5

@@ -180,8 +180,12 @@ def _solid_frequencies(shaft: Shaft, segments: int, count: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("sections", "seat", "message"),
     [
-        ((ShaftSection(0.2, 0.06),), SeatBand("bearing", 0.19, 0.04), "bearing: it reaches from 0.17 to 0.21 m"),
-        (STEPPED, SeatBand("bearing", 0.2, 0.04), "bearing: a shoulder lies between 0.18 and 0.22 m"),
+        (
+            (ShaftSection(0.2, 0.06),),
+            SeatBand("bearing", 0.19, 0.04),
+            "z = 170 to 210 mm, the shaft from 0 to 200 mm",
+        ),
+        (STEPPED, SeatBand("bearing", 0.2, 0.04), "bearing: a shoulder lies between z = 180 and 220 mm"),
         ((ShaftSection(0.2, 0.06), ShaftSection(0.2, 0.1, 0.07)), SeatBand("a", 0.1), "do not touch"),
         ((), SeatBand("a", 0.1), "at least one section"),
     ],
