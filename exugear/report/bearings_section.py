@@ -33,7 +33,8 @@ NOISE_OF_ALL = 1e-5
 """Share of the largest force of all bearings below which a force is told as none."""
 MEANS = (
     "Mean force over the middle third of the run-up, and the largest amplitude along an order (root of the summed "
-    "squares of both transverse directions). Of the copies of a planet set the one that swings most stands for all."
+    "squares of both transverse directions). Of the copies of a planet set the one that swings most stands for all. "
+    "Axial forces are those of the shaft on the bearing or joint, positive along +z."
 )
 """What is told of forces in run-ups."""
 WAVES = (
@@ -194,7 +195,8 @@ def _duties(material: Material, assembly: Assembly) -> str:
     except (BalanceError, BearingError) as error:
         material.context.notes.left_out.append(f"bearings of {name}: {error}")
         return ""
-    remarks = [f"{material.words.of(duty.name)}: {remark}." for duty in duties for remark in duty.remarks]
+    said = ((duty, remark) for duty in duties for remark in (duty.ratings.two_designs, *duty.remarks) if remark)
+    remarks = [f"{material.words.of(duty.name)}: {remark}." for duty, remark in said]
     rows = [_duty_row(material, duty) for duty in duties]
     table = pieces.table(
         rows, ("law",), caption=f"Bearings at the static load, {name}", name=f"duties-{'-'.join(name.split())}"
@@ -203,7 +205,8 @@ def _duties(material: Material, assembly: Assembly) -> str:
         "Rows of rolling elements by ISO/TS 16281 between rigid rings, under the static load of the case. L10 by "
         "ISO 281 and L10r by ISO/TS 16281 in million revolutions, basic: lubricant and cleanliness are left out, and "
         "so are ribs. A rating with a star is estimated on the safe side, one with + is the least that makers print. "
-        "Linear bearings have the tangent at this load."
+        "Linear bearings have the tangent at this load. Axial loads are those of the shaft on the inner ring, positive "
+        "along +z."
     )
     content = pieces.paragraph(words, "note") + table + (pieces.bullets(remarks) if remarks else "")
     content += _meshes(material, assembly)

@@ -13,6 +13,12 @@ from exugear.report.material import Axis, Curve, Material, Part, chart
 from exugear.report.web import html as pieces
 from exugear.report.web.html import Cell
 
+PRESSURE = (
+    "Pressure is the largest of the contact over the mesh cycle, away from tip edges, under this torque, of gears that "
+    "stand straight, without load factors."
+)
+"""What pressures of tables are of."""
+
 
 def gears_section(material: Material) -> Part:
     """Show what excites: each pair's transmission error, its harmonics and stiffness; and the gears' geometry."""
@@ -32,6 +38,7 @@ def gears_section(material: Material) -> Part:
         content = [
             html,
             pieces.table([_row(material, own) for own in found], caption="Static transmission error", name="errors"),
+            pieces.paragraph(PRESSURE, "note"),
             pieces.element("h3", "Harmonics of the transmission error, ± µm"),
             pieces.table([_harmonics_row(material, own) for own in found], caption="Harmonics", name="harmonics"),
         ]

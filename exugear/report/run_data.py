@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, channels_of, loudest_order
@@ -226,6 +227,16 @@ def _constant(material: Material, speed: ConstantSpeed | None) -> dict[str, Any]
     }
 
 
+def axial_of_shaft(gearbox: Gearbox, channel: Channel) -> float:
+    """Mean axial force on the inner ring of a bearing, as `exugear bearings` has it; of a joint that of its body on it.
+
+    A run records the force on the body, which most bearings hold by their inner ring.
+    """
+    if any(bearing.name == channel.name and bearing.carries_outer_ring for bearing in gearbox.bearings):
+        return channel.axial
+    return 0.0 - channel.axial
+
+
 def _loudest(material: Material, channel: Channel) -> dict[str, Any] | None:
     """Figures of a bearing for its table."""
     order = loudest_order(channel.spectra, material.lines)
@@ -233,7 +244,7 @@ def _loudest(material: Material, channel: Channel) -> dict[str, Any] | None:
         "words": channel.words,
         "copies": channel.copies,
         "mean": rounded(channel.mean, 4),
-        "axial": rounded(channel.axial, 4),
+        "axial": rounded(axial_of_shaft(material.context.gearbox, channel), 4),
         "amplitude": rounded(order.amplitude, 4) if order else None,
         "line": material.words.line(order.line) if order else "",
         "speed": rounded(order.speed / RPM, 5) if order else None,

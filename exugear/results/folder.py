@@ -250,6 +250,7 @@ def duty_summary(duty: BearingDuty) -> dict[str, Any]:
         "static_rating_kN": 1e-3 * duty.ratings.static,
         "ratings_estimated": duty.ratings.estimated,
         "ratings_of_makers": list(duty.ratings.makers),
+        "two_designs": duty.ratings.two_designs,
         "L10_Mrev": _finite(duty.basic_life),
         "L10r_Mrev": _finite(duty.reference_life),
         "remarks": list(duty.remarks),

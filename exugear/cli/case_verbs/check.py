@@ -84,6 +84,7 @@ def check(
             if pairs:
                 print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
                 print_table("Margins of gear 1 and 2", [_margin_row(pair) for pair in pairs])
+                say("Pressure: by Hertz at the pitch point under torque 1, load spread evenly, without load factors")
             if thicknesses:
                 print_table(
                     "Tooth thickness within its allowances", [_thickness_row(thickness) for thickness in thicknesses]
@@ -96,6 +97,7 @@ def check(
                 print_table(
                     "Bearings under the static load", [_bearing_row(bearing) for bearing in bearings], ("most by",)
                 )
+                say("Axial loads are those of the shaft on the inner ring, positive along +z")
                 if any(bearing["reaction_kN"] is not None for bearing in bearings):
                     say("* stated by the file, which the stiffness goes by")
             for variant, reason in variants.items():

@@ -25,6 +25,13 @@ if TYPE_CHECKING:
     from exugear.system.tooth_mesh.contact_state import MeshDuty
 
 
+AXIAL_SIGN = "Axial loads are those of the shaft on the inner ring, positive along +z"
+MESH_PRESSURE = (
+    "Pressure of a mesh: largest over ten positions of the mesh cycle, away from tip edges, under the static load "
+    "where the gears stand on their bearings, without load factors"
+)
+
+
 def bearings(
     case: CaseArgument,
     variant: VariantOption = Variant.bushing,
@@ -60,15 +67,20 @@ def bearings(
             return
         title = f"Bearings under the static load, {variant.value}"
         print_table(title, [_load_row(duty) for duty in duties])
+        say(AXIAL_SIGN)
         print_table("Contact, ratings, basic rating life", [*map(_life_row, duties)])
         print_table("Meshes", [*map(_mesh_row, meshes)])
+        if any(not math.isnan(mesh.pressure) for mesh in meshes):
+            say(MESH_PRESSURE)
         if any(duty.ratings.estimated for duty in duties):
             say("* rating estimated on the safe side; dynamic_rating_kN and static_rating_kN of the file replace it")
         if any(duty.ratings.makers for duty in duties):
-            say("+ least rating that makers print for the designation; the same keys replace it")
+            say("+ least rating that makers print for the designation; keys of the file replace it as well")
         say("Lives are basic: lubricant and cleanliness are left out, and so are ribs")
         say(f"Bearings in {path}")
         for duty in duties:
+            if duty.ratings.two_designs:
+                note(f"bearings.{duty.name}: {duty.ratings.two_designs}")
             for remark in duty.remarks:
                 note(f"bearings.{duty.name}: {remark}", style="yellow")
         for mesh in meshes:

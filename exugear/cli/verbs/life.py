@@ -70,6 +70,12 @@ def _fail_if_short(data: xr.Dataset, path: Path) -> None:
         raise FailedError("\n".join(["the gearbox does not live as long as it shall:", *lines, f"It is in {path}"]))
 
 
+CONTACT_STRESSES = (
+    "sigma_H: by Hertz from the line loads of finite elements inside the path of contact, K_v in it, where the gears "
+    "stand under each load; ISO: sigma_H0 of ISO 6336-2 under the largest load, without load factors"
+)
+
+
 def _tell(data: xr.Dataset) -> None:
     from exugear.life.life_file import limits
 
@@ -77,6 +83,7 @@ def _tell(data: xr.Dataset) -> None:
         say(line)
     if data.sizes["flank"]:
         print_table("Flanks: largest contact stress of the life, safety against pitting", _contact_rows(data))
+        say(CONTACT_STRESSES)
         print_table("Roots: largest stress of the life, safety against breakage", _root_rows(data))
     if data.sizes["bearing"]:
         print_table("Bearings: basic rating life, static safety", _bearing_rows(data))

@@ -256,6 +256,12 @@ def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], f
     return pictures
 
 
+PRESSURES = (
+    "Pressure: largest of the contact over the mesh cycle, away from tip edges; pitch point: by Hertz there, the load "
+    "spread evenly. Both under torque 1, of gears that stand straight, without load factors"
+)
+
+
 def _tell_tables(
     case: Path,
     folder: Path,
@@ -271,6 +277,7 @@ def _tell_tables(
         print_json({"case": str(case), "tables": summaries, "pictures": [str(path) for path in pictures]})
     else:
         print_table("Static transmission error", [_ste_row(summary) for summary in summaries])
+        say(PRESSURES)
         say(f"Tables in {folder / 'tables'}, pictures in {folder / 'pictures'}")
     doubts = tell_of_tables(tables)
     if doubts:

@@ -12,7 +12,15 @@ from exugear.gearbox.parts import Bearing
 from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.gearbox.units import KN
 from exugear.system.bearings import stiffness as matrices
-from exugear.system.bearings.rolling.catalogue import catalogue_rows, estimates, known_rating, margins, with_estimate
+from exugear.system.bearings.rolling.catalogue import (
+    KnownRating,
+    catalogue_rows,
+    estimates,
+    known_rating,
+    margins,
+    other_design,
+    with_estimate,
+)
 from exugear.system.bearings.rolling.contact import (
     BearingState,
     bearing_load,
@@ -149,6 +157,8 @@ class Ratings:
     """Whether they follow from the inside of the bearing, by ISO 281 and ISO 76."""
     makers: tuple[str, ...] = ()
     """Whose catalogues they are the least of; empty if they are not."""
+    two_designs: str = ""
+    """Which of two designs of the designation is taken, where makers print both; empty elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +227,23 @@ def ratings_of(section: CatalogueSection) -> Ratings:
     dynamic, static = (own if stated is None else KN * stated for own, stated in zip(computed, given, strict=True))
     if None not in given:
         return Ratings(dynamic, static, estimated=False)
-    return Ratings(dynamic, static, estimated=known is None, makers=known.makers if known else ())
+    if known is None:
+        return Ratings(dynamic, static, estimated=True)
+    designs = _two_designs(section, known) * (section.dynamic_rating_kN is None)
+    return Ratings(dynamic, static, estimated=False, makers=known.makers, two_designs=designs)
+
+
+def _two_designs(section: CatalogueSection, taken: KnownRating) -> str:
+    """Say that makers print a reinforced design, too, and which is taken; empty where there is one design."""
+    other = other_design(section)
+    if other is None:
+        return ""
+    name, rating = other
+    return (
+        f"makers print two designs of {section.designation}: C_r = {1e-3 * taken.dynamic:g} kN "
+        f"({', '.join(taken.makers)}) is taken, the reinforced one, {name}, has {1e-3 * rating.dynamic:g} kN "
+        f"({', '.join(rating.makers)}); write that designation, or dynamic_rating_kN, if it is meant"
+    )
 
 
 def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDuty:

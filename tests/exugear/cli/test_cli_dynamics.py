@@ -25,6 +25,7 @@ from exugear.transient.runup import SOLVERS
 from exugear.transient.runup import simulate as real_simulate
 from fe_ste.tools.drawing import RenderingError
 
+from ..cases.bearing import BEARING_CASE
 from ..cases.command import exugear
 from ..cases.floating import FLOATING_CASE
 from ..cases.spur import SPUR_CASE
@@ -240,6 +241,36 @@ def test_a_band_that_is_asked_for_is_kept_and_one_that_misses_a_mesh_is_told(cas
     with xr.open_dataset(summary["file"], engine="h5netcdf") as data:
         assert 1.0 / float(np.diff(data["time"])[0]) == pytest.approx(40e3)
     assert iso("run", case, "--variant", "rigid", "--band", 0).exit_code == 2
+
+
+@pytest.mark.parametrize("verb", ["check", "ste", "bearings", "life"])
+def test_contact_stresses_are_printed_with_load_factors_and_place(tmp_path, verb):
+    content = (
+        BEARING_CASE
+        + """
+[rating]
+dynamic_factor = 1.1
+viscosity_40_mm2_per_s = 320.0
+[loads]
+body = "shaft_1"
+life_years = 1.0
+[loads.sources.drive]
+file = "duty.csv"
+"""
+    )
+    case = tmp_path / "gearbox.toml"
+    case.write_text(content, encoding="utf-8")
+    (tmp_path / "duty.csv").write_text("torque_N_m,speed_rpm,hours\n100,1000,3\n", encoding="utf-8")
+    options = ("--out", tmp_path / "out")
+    said = exugear(verb, case, *options).stdout
+    assert "without load factors" in said
+    places = {
+        "check": "pitch point",
+        "ste": "stand straight",
+        "bearings": "stand on their bearings",
+        "life": "each load",
+    }
+    assert places[verb] in said
 
 
 def test_view_writes_a_page_where_nothing_can_be_rendered(case, monkeypatch):

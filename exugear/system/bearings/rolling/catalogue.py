@@ -416,8 +416,32 @@ def known_rating(section: CatalogueSection) -> KnownRating | None:
     """
     if section.row_count is not None or section.full_complement:
         return None
-    rows = (_listed().get((section.type, number)) for number in _listed_as(section))
-    row = next((one for one in rows if one is not None), None)
+    number = next((one for one in _listed_as(section) if (section.type, one) in _listed()), "")
+    return _rating_of(section, number)
+
+
+def other_design(section: CatalogueSection) -> tuple[str, KnownRating] | None:
+    """Find name and ratings of the reinforced design, where the designation may mean it and is taken otherwise.
+
+    Examples
+    --------
+    >>> section = CatalogueSection(
+    ...     designation="NU 207", type="cylindrical_roller", bore_mm=35.0, outer_diameter_mm=72.0, width_mm=17.0
+    ... )
+    >>> other_design(section)
+    ('NU207E', KnownRating(dynamic=55300.0, static=48000.0, makers=('NKE', 'SKF')))
+    """
+    taken = known_rating(section)
+    for number in _listed_as(section)[1:]:
+        other = _rating_of(section, number)
+        if taken is not None and other is not None and other != taken:
+            return number, other
+    return None
+
+
+def _rating_of(section: CatalogueSection, number: str) -> KnownRating | None:
+    """Ratings that are listed under a name; None where it is not listed, or of other dimensions."""
+    row = _listed().get((section.type, number))
     if row is None:
         return None
     sizes = zip(("bore_mm", "outer_diameter_mm", "width_mm"), row[:3], strict=True)

@@ -110,3 +110,17 @@ def test_a_bearing_whose_inside_is_given_has_the_rating_of_the_standard():
     inside = {"element_count": 9, "element_diameter_mm": 11.906, "pitch_diameter_mm": 60.0}
     found = ratings_of(section("deep_groove_ball", 40, 80, 18, **inside))
     assert found.dynamic == pytest.approx(29.1e3, rel=3e-3)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"designation": "NU 207"}, "C_r = 35.5 kN (NSK) is taken, the reinforced one, NU207E, has 55.3 kN (NKE, SKF)"),
+        ({"designation": "NU 207 E"}, ""),
+        ({"designation": "NU 207", "dynamic_rating_kN": 55.3}, ""),
+    ],
+)
+def test_a_designation_of_two_designs_says_which_rating_is_taken(given, said):
+    ratings = ratings_of(section("cylindrical_roller", 35, 72, 17, **given))
+    assert said in ratings.two_designs
+    assert bool(said) == bool(ratings.two_designs)
