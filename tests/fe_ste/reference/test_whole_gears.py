@@ -56,7 +56,7 @@ def test_condensed_teeth_turn_with_the_hub():
 
 
 def test_the_teeth_that_touch_are_meshed_and_the_others_condensed():
-    # Contact lasts half the contact ratio on either side of the pitch point; lines within a fifth of a flank count.
+    # Contact lasts half the contact ratio on either side of the pitch point; lines within 15 % of a flank count.
     assert 1.6 < PAIR.total_contact_ratio < 2.0
     assert list(meshed_teeth(PAIR, 0.0)) == [-1, 0, 1]
     assert list(meshed_teeth(PAIR, 0.5)) == [-1, 0]
