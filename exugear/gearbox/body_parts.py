@@ -9,7 +9,7 @@ from exugear.gearbox.named_files import LARGEST_TABLE
 from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
-from exugear.gearbox.sections.case import LoadCaseSection
+from exugear.gearbox.sections.case import CaseFile, LoadCaseSection
 from exugear.gearbox.sections.connections import BearingSection, CouplingSection, JointSection, MountSection
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import GearSection, PinSection
@@ -52,7 +52,7 @@ def _family(origin: Origin, family: str, section: BodySection, inertias: str) ->
     """One body, or the planets of a set."""
     inertia = section.inertia.get(inertias)
     if not section.inertia and not section.fixed:
-        inertia = _computed_inertia(origin, section)
+        inertia = _computed_inertia(origin, family, section)
     elif inertia is None and not section.fixed:
         raise origin.fault(
             f"bodies.{family}.inertia: no set {inertias!r}; every moving body "
@@ -90,10 +90,11 @@ def _body(
     )
 
 
-def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
-    """Inertia of the pieces of a body's shape, and of its gears: their blanks, or tubes up to their reference circles.
+def _computed_inertia(origin: Origin, family: str, section: BodySection) -> InertiaSection:
+    """Inertia of the pieces of a body's shape, of all its blanks, and of gears without one.
 
-    A tube begins at the diameter at which the gear is held, or at the shaft where that is thicker.
+    Such a gear is a tube up to its reference circle that begins at the diameter at which the gear is held, or at the
+    shaft where that is thicker.
     """
     tubes: list[Tube] = []
     rings: list[MassProperties] = []
@@ -103,11 +104,13 @@ def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
         for piece in shape.sections:
             tubes.append(_tube(piece, start, shape.material.density_kg_per_m3))
             start += tubes[-1].length
+        places = blank_places(origin.case, family)
+        for name, blank in shape.blanks.items():
+            if name in places:  # others are refused
+                ring = MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, 1e-3 * places[name])
+                rings.append(ring)
     for name, z in section.wheels_z_mm.items():
-        blank = shape.blanks.get(name) if shape is not None else None
-        if blank is not None:
-            rings.append(MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, 1e-3 * z))
-        elif name in origin.case.gears:
+        if name in origin.case.gears and not (shape is not None and name in shape.blanks):
             tubes.append(gear_tube(origin.case.gears[name], 1e-3 * z, tubes))
     total = together([mass_properties(tubes), *rings])
     return InertiaSection.model_construct(
@@ -117,6 +120,26 @@ def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
         transverse_kg_m2=max(total.transverse, 0.5 * total.axial),
         centre_of_mass_z_mm=1e3 * total.centre,
     )
+
+
+def blank_places(case: CaseFile, family: str) -> dict[str, float]:
+    """Where a blank may sit on the shape of a body, by the name of what holds it, mm along the axis.
+
+    These are the gears, bearings and mounts of the body and the place where torques act, as far as they stand on its
+    axis: the seats of an elastic shaft, whether or not the body is elastic.
+    """
+    section = case.bodies[family]
+    places = dict(section.wheels_z_mm)
+    for name, bearing in case.bearings.items():
+        ends = [case.bodies[end] for end in (bearing.body, bearing.on) if end in case.bodies]
+        if family in (bearing.body, bearing.on) and all(end.carrier is None for end in ends):
+            places[name] = bearing.z_mm
+    for name, mount in case.mounts.items():
+        if mount.body == family:
+            places[name] = mount.position_mm[2]
+    if section.shape is not None and section.shape.torque_z_mm is not None:
+        places["torque"] = section.shape.torque_z_mm
+    return places
 
 
 def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from exugear.gearbox.body_parts import blank_places
 from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, stiffness_matrix
 from exugear.gearbox.reading import CaseError, shortened
 from exugear.gearbox.sections.case import CaseFile, OverallSection
@@ -91,6 +92,12 @@ def faults_of_bodies(case: CaseFile) -> Iterator[str]:
                 yield f"bodies.{family}.wheels_z_mm.{gear}: no such gear; gears are {', '.join(case.gears)}"
         if section.enabled and section.carrier is not None:
             yield from _faults_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
+        if section.shape is not None:
+            seats = blank_places(case, family)
+            for blank in section.shape.blanks:
+                if blank not in seats:
+                    known = ", ".join(seats) or "none yet"
+                    yield f"bodies.{family}.shape.blanks.{blank}: no such seat on the body; seats are {known}"
 
 
 def _faults_of_carrier(case: CaseFile, key: str, name: str) -> Iterator[str]:
