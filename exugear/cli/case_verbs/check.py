@@ -89,6 +89,9 @@ def check(
                 print_table(
                     "Tooth thickness within its allowances", [_thickness_row(thickness) for thickness in thicknesses]
                 )
+                for thickness in thicknesses:
+                    if thickness["span_doubt"]:
+                        note(thickness["span_doubt"], style="yellow")
             if loads:
                 band = 1e-3 * loads[0]["band_Hz"]
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}; runs keep {band:g} kHz"
@@ -241,6 +244,7 @@ def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                     "normal_tooth_thickness_mm": [1e3 * end for end in one.thickness],
                     "span_teeth": one.span_teeth,
                     "base_tangent_length_mm": [1e3 * end for end in one.span] if one.span_teeth else None,
+                    "span_doubt": one.span_doubt or None,
                 }
             )
     return summaries
