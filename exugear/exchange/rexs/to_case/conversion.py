@@ -289,6 +289,7 @@ READ_TYPES = frozenset(
         "planetary_stage",
         "cylindrical_stage",
         "cylindrical_gear_flank",
+        "cylindrical_gear_manufacturing_settings",
         "rack_shaped_tool",
         "cutter_wheel_tool",
         *MODIFICATIONS,

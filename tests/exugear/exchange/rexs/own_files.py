@@ -38,6 +38,10 @@ UNITS = {
     "operating_time": "h",
     "elastic_modulus": "N / mm^2",
     "density": "kg / dm^3",
+    "tip_radius_factor": "none",
+    "machining_allowance": "mm",
+    "protuberance_amount": "mm",
+    "protuberance_angle": "deg",
 }
 """Units of attributes; others are lengths where their name says so."""
 LENGTHS = ("diameter", "radius", "distance", "clearance", "length", "width")
