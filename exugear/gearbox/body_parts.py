@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.gearbox.named_files import LARGEST_TABLE
-from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase
+from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase, PointForce
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
-from exugear.gearbox.sections.case import CaseFile, LoadCaseSection
+from exugear.gearbox.sections.case import CaseFile, ForceSection, LoadCaseSection
 from exugear.gearbox.sections.connections import BearingSection, CouplingSection, JointSection, MountSection
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import GearSection, PinSection
@@ -125,8 +125,8 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
 def blank_places(case: CaseFile, family: str) -> dict[str, float]:
     """Where a blank may sit on the shape of a body, by the name of what holds it, mm along the axis.
 
-    These are the gears, bearings and mounts of the body and the place where torques act, as far as they stand on its
-    axis: the seats of an elastic shaft, whether or not the body is elastic.
+    These are the gears, bearings, mounts and forces of the body and the place where torques act, as far as they stand
+    on its axis: the seats of an elastic shaft, whether or not the body is elastic.
     """
     section = case.bodies[family]
     places = dict(section.wheels_z_mm)
@@ -137,6 +137,7 @@ def blank_places(case: CaseFile, family: str) -> dict[str, float]:
     for name, mount in case.mounts.items():
         if mount.body == family:
             places[name] = mount.position_mm[2]
+    places |= {name: force.z_mm for name, force in case.forces.items() if force.body == family}
     if section.shape is not None and section.shape.torque_z_mm is not None:
         places["torque"] = section.shape.torque_z_mm
     return places
@@ -365,6 +366,33 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
         return (mount,)
 
     return parts_of_each(of_section, origin.case.mounts)
+
+
+def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce, ...]:
+    """Constant forces and moments on bodies that are enabled.
+
+    Raises
+    ------
+    CaseError
+        A force on the ground, a planet, a body without a place, or one that is not there.
+    """
+
+    def of_section(name: str, section: ForceSection) -> tuple[PointForce, ...]:
+        key = f"forces.{name}"
+        if section.body == GROUND:
+            raise origin.fault(f"{key}.body = {GROUND!r}: the ground takes any force; name a body that moves")
+        if not origin.are_enabled(key, section.body):
+            return ()
+        body = origin.case.bodies[section.body]
+        if body.carrier is not None or body.spin_only:
+            raise origin.fault(
+                f"{key}.body = {section.body!r}: a planet or a spin-only body cannot have a constant force; name a body "
+                "on an axis that stands still"
+            )
+        position = _position(bodies[section.body], section.z_mm)
+        return (PointForce(name, section.body, position, (*section.force_N, *section.moment_N_m)),)
+
+    return parts_of_each(of_section, origin.case.forces)
 
 
 def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[str]) -> tuple[Coupling, ...]:

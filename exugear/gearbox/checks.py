@@ -92,12 +92,18 @@ def faults_of_bodies(case: CaseFile) -> Iterator[str]:
                 yield f"bodies.{family}.wheels_z_mm.{gear}: no such gear; gears are {', '.join(case.gears)}"
         if section.enabled and section.carrier is not None:
             yield from _faults_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
-        if section.shape is not None:
-            seats = blank_places(case, family)
-            for blank in section.shape.blanks:
-                if blank not in seats:
-                    known = ", ".join(seats) or "none yet"
-                    yield f"bodies.{family}.shape.blanks.{blank}: no such seat on the body; seats are {known}"
+
+
+def faults_of_blanks(case: CaseFile) -> Iterator[str]:
+    """Tell blanks of stepped shafts that sit nowhere: they would count in no variant."""
+    for family, section in case.bodies.items():
+        if section.shape is None:
+            continue
+        seats = blank_places(case, family)
+        for blank in section.shape.blanks:
+            if blank not in seats:
+                known = ", ".join(seats) or "none yet"
+                yield f"bodies.{family}.shape.blanks.{blank}: no such seat on the body; seats are {known}"
 
 
 def _faults_of_carrier(case: CaseFile, key: str, name: str) -> Iterator[str]:

@@ -24,6 +24,7 @@ from exugear.gearbox.parts import (
     LoadCase,
     Mesh,
     PairSpec,
+    PointForce,
     WheelDeviation,
     stiffness_matrix,
 )
@@ -288,6 +289,11 @@ class Gearbox(Displayed):
         return support_parts.mounts(self._origin)
 
     @cached_property
+    def forces(self) -> tuple[PointForce, ...]:
+        """Constant forces and moments on bodies."""
+        return support_parts.point_forces(self._origin, self.named_bodies)
+
+    @cached_property
     def couplings(self) -> tuple[Coupling, ...]:
         """Torsional springs between spins."""
         return support_parts.couplings(self._origin, self.spinning, [bearing.name for bearing in self.bearings])
@@ -457,10 +463,12 @@ def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
         ("bearings", lambda: gearbox.bearings),
         ("joints", lambda: gearbox.joints),
         ("mounts", lambda: gearbox.mounts),
+        ("forces", lambda: gearbox.forces),
         ("load cases", lambda: gearbox.load_cases),
         ("pins", lambda: gearbox.pin_offsets),
     ):
         yield checks.Check(name, part, ("places",))
+    yield checks.Check("blanks", lambda: refuse(checks.faults_of_blanks(case)), ("bearings", "mounts", "forces"))
     yield checks.Check("meshes", lambda: gearbox.meshes, ("places", "pairs"))
     yield checks.Check("couplings", lambda: gearbox.couplings, ("bearings",))
     yield checks.Check("deviations", lambda: gearbox.deviations, ("places", "gears"))
@@ -468,7 +476,7 @@ def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
 
 def _checks_of_the_whole(gearbox: Gearbox) -> Iterator[checks.Check]:
     case = gearbox.case
-    elements = ("meshes", "bearings", "mounts", "couplings")
+    elements = ("meshes", "bearings", "mounts", "couplings", "forces")
     for name, faults, needs in (
         ("distances", lambda: checks.faults_of_centre_distances(gearbox.meshes, gearbox.named_bodies), ("meshes",)),
         (
@@ -539,13 +547,14 @@ def _check_train(gearbox: Gearbox) -> None:
             raise CaseError(*(f"{fault}; see {key}" for fault in error.faults)) from None
 
 
-def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling]]:
+def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling | PointForce]]:
     """Parts that exert forces, by their table in the file."""
     return {
         "meshes": gearbox.meshes,
         "bearings": gearbox.bearings,
         "mounts": gearbox.mounts,
         "couplings": gearbox.couplings,
+        "forces": gearbox.forces,
     }
 
 

@@ -77,6 +77,7 @@ def check(
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
             summary["tooth_thickness"] = thicknesses
+            summary["forces"] = _force_summaries(gearbox)
             found = {"bearings": bearings, "load_cases": loads, "variants": variants, "steady": steady}
             found["warnings"] = warnings
             print_json({**summary, **found})
@@ -92,6 +93,8 @@ def check(
                 for thickness in thicknesses:
                     if thickness["span_doubt"]:
                         note(thickness["span_doubt"], style="yellow")
+            if gearbox.forces:
+                print_table("Constant forces on bodies", [_force_row(force) for force in _force_summaries(gearbox)])
             if loads:
                 band = 1e-3 * loads[0]["band_Hz"]
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}; runs keep {band:g} kHz"
@@ -248,6 +251,30 @@ def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                 }
             )
     return summaries
+
+
+def _force_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
+    """Sum up the constant forces on bodies."""
+    return [
+        {
+            "force": force.name,
+            "body": force.body,
+            "z_mm": 1e3 * force.position[2],
+            "force_N": list(force.wrench[:3]),
+            "moment_N_m": list(force.wrench[3:]),
+        }
+        for force in gearbox.forces
+    ]
+
+
+def _force_row(force: dict[str, Any]) -> dict[str, str]:
+    return {
+        "force": force["force"],
+        "on": force["body"],
+        "at z\nmm": f"{force['z_mm']:g}",
+        "along x, y, z\nkN": " / ".join(f"{1e-3 * value:.4g}" for value in force["force_N"]),
+        "about x, y\nN m": " / ".join(f"{value:.4g}" for value in force["moment_N_m"]),
+    }
 
 
 def _thickness_row(one: dict[str, Any]) -> dict[str, str]:

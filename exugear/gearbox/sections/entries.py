@@ -135,6 +135,7 @@ SeatFactor = Annotated[float, Range(1e-3, 1.0)]
 
 # Loads, from watches to the largest wind turbines (3e7 N m).
 TorqueNm = Annotated[float, _within(1e9, 1e8)]
+ForceN = Annotated[float, _within(1e9, 1e8)]
 DurationS = Annotated[float, Range(1e-9, 1e6, (1e-2, 3600.0))]
 SpeedRpm = Annotated[float, _within(1e6, 1e5)]
 Acceleration = Annotated[float, _within(1000.0, 20.0, "m/s2")]

@@ -194,6 +194,9 @@ def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBa
     for mount in mounts_at_work(gearbox):
         if mount.body == body.name:
             yield SeatBand(mount.name, mount.position[2] - start, 0.0)
+    for force in gearbox.forces:
+        if force.body == body.name:
+            yield SeatBand(force.name, force.position[2] - start, 0.0)
     if shape.torque_z_mm is not None:
         yield SeatBand(TORQUE_SEAT, shape.torque_z_mm * MM - start, 0.0)
 

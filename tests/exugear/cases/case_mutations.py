@@ -154,6 +154,8 @@ def _with_shapes() -> dict[str, Any]:
         case["bodies"][name]["wheels_z_mm"] = {gear: 20.0}
     for number in (1, 2):
         case["bearings"][f"bearing_{number}"]["z_mm"] = -40.0
+    belt = {"force_N": [0.0, -200.0, 50.0], "moment_N_m": [1.0, 0.0]}
+    case["forces"] = {"belt": {"body": "shaft_1", "z_mm": -30.0, **belt}}
     return case
 
 

@@ -171,7 +171,7 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
         if root in names:
             bodies.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), _is_fixed(parts)))
         elif root not in planets and not _is_fixed(parts):
-            notes.ignored.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
+            notes.lost.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
     by_root = {union.root(part.number): body for body in bodies for part in body.parts}
     carried = [
         one for members in sets for one in _on_one_orbit(places, members, _carrier(model, union, by_root, members))

@@ -26,6 +26,7 @@ from exugear.exchange.rexs.to_case.loads import (
     Ends,
     Loads,
     ends_of,
+    force_blocks,
     life_blocks,
     load_case_blocks,
     loads_of,
@@ -303,6 +304,23 @@ READ_TYPES = frozenset(
 """Types of components of which something is read."""
 
 
+TYPES_WITHOUT_EFFECT = frozenset(
+    (
+        "assembly_group",
+        "cylindrical_stage_gear_data",
+        "element_list",
+        "joint_section",
+        "meshing_contact_stage_data_set",
+        "notch_effect_shaft_hub_connection",
+        "point_list",
+        "reduction_point",
+        "shaft_shoulder",
+        "shaft_shoulder_with_undercut",
+    )
+)
+"""Types of components that group or rate others: none has mass or stiffness, or carries a load."""
+
+
 @dataclass(frozen=True)
 class Found(Displayed, line=" in {model!r}: {bodies!r}"):
     """What an import found in a REXS file, with the names of the gearbox file."""
@@ -325,7 +343,9 @@ class Imported(Displayed, line=" {gearbox!r}: {changed!n} assumptions, {ignored!
     changed: tuple[str, ...]
     """What was replaced or assumed and matters."""
     ignored: tuple[str, ...]
-    """What was left out."""
+    """What was left out, in the order of its effect: `lost`, and then all that changes no number here."""
+    lost: tuple[str, ...]
+    """What acts on the gearbox, moves or holds in it and was left out."""
     checked: tuple[str, ...]
     """What the file says twice, compared."""
     found: Found
@@ -368,8 +388,9 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     _note_ignored(model, notes)
     text = draft.text(source, cases)
     gearbox = draft.checked(text, path)
-    changed, ignored, checked = (tuple(lines) for lines in (notes.changed, notes.ignored, notes.checked))
-    return Imported(text, gearbox, changed, ignored, checked, draft.found, life.spectrum)
+    changed, lost, checked = (tuple(dict.fromkeys(lines)) for lines in (notes.changed, notes.lost, notes.checked))
+    ignored = (*lost, *notes.ignored)
+    return Imported(text, gearbox, changed, ignored, lost, checked, draft.found, life.spectrum)
 
 
 def _refuse_types(model: Model, notes: Notes) -> None:
@@ -415,6 +436,7 @@ class _Draft:
             ("pairs", _named("pairs", pair_blocks(self.teeth))),
             ("bodies", _named("bodies", body_blocks(model, places, bodies, self.teeth, sections, notes))),
             ("meshes", _named("meshes", mesh_blocks(self.teeth))),
+            ("forces on bodies", _named("forces", force_blocks(self.loads, self.ends, notes))),
             ("couplings", _named("couplings", coupling_blocks(model, bodies, bearings))),
             (
                 "variant `rigid`: ideal joints",
@@ -540,7 +562,7 @@ def _head(model: Model, source: str, notes: Notes) -> list[str]:
     for title, found in (
         ("Replaced or assumed", notes.changed),
         ("Said twice, compared", notes.checked),
-        ("Left out", notes.ignored),
+        ("Left out", [*notes.lost, *notes.ignored]),
     ):
         if found:
             lines += ["", f"{title}:", *(f"- {plain(line, 2000)}" for line in dict.fromkeys(found))]
@@ -549,13 +571,16 @@ def _head(model: Model, source: str, notes: Notes) -> list[str]:
 
 def _note_ignored(model: Model, notes: Notes) -> None:
     """List the types of components of which nothing was read, and the attributes of others that nothing asked for."""
-    for kind in sorted({part.type for part in model.components.values()}):
+    kinds = sorted({part.type for part in model.components.values()})
+    for kind in kinds:
+        if kind not in READ_TYPES:
+            lines = notes.ignored if kind in TYPES_WITHOUT_EFFECT else notes.lost
+            lines.append(f"{plain(kind)}, {len(model.of_type(kind))} of them")
+    for kind in kinds:
         parts = model.of_type(kind)
         keys = {key for part in parts for key in part.attributes if not key.startswith(OWN)}
         unread = keys - {key for part in parts for key in part.asked}
-        if kind not in READ_TYPES:
-            notes.ignored.append(f"{plain(kind)}, {len(parts)} of them")
-        elif unread:
+        if kind in READ_TYPES and unread:
             notes.ignored.append(f"{kind}: {', '.join(plain(key) for key in sorted(unread))}")
 
 

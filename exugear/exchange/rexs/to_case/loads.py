@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from exugear.exchange.rexs.to_case.bodies import Bodies, Body
 from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
@@ -12,6 +14,7 @@ from exugear.exchange.rexs.to_case.toothing import material_of
 from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, RexsError
 
 FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
+MOMENTS = ("torque_around_v_axis", "torque_around_w_axis")
 UNKNOWN_TORQUE = 100.0
 """Torque where the file gives none, N m."""
 SPECTRUM = "load_spectrum.csv"
@@ -40,6 +43,20 @@ LEAST_SHARE = 0.1
 
 
 @dataclass(frozen=True)
+class PointForce:
+    """Force (N) and moment (N m) on a body at a place along its axis, in the axes of the gearbox file."""
+
+    part: Component
+    body: str
+    z: float
+    """In mm."""
+    force: tuple[float, ...]
+    """(3,) along x, y, z."""
+    moment: tuple[float, ...]
+    """(2,) about x, y."""
+
+
+@dataclass(frozen=True)
 class Loads:
     """Torques (N m) and speeds (rpm) on bodies, positive about +z."""
 
@@ -49,6 +66,8 @@ class Loads:
     torques: Mapping[str, float]
     speeds: Mapping[str, float]
     """By body name."""
+    forces: Mapping[int, PointForce] = field(default_factory=dict)
+    """By the number of the component."""
     share: float | None = None
     """Of the operating time, %; None where the file gives none."""
 
@@ -64,23 +83,10 @@ class Ends:
 
 def loads_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> list[Loads]:
     """Gather the loads of each load case, or of the file itself if it has none."""
-    forced = [part for part in model.of_type("external_load") if _has_forces(part)]
-    forced += [
-        model.components[number]
-        for case in model.load_cases
-        for number, changes in case.changes.items()
-        if number in model.components and _has_forces(Component(number, "", "", changes))
-    ]
-    for part in dict.fromkeys(forced):
-        notes.ignored.append(f"{part}: point forces, which a gearbox file cannot hold")
-    return [_loads(model, places, bodies, case) for case in model.load_cases or (None,)]
+    return [_loads(model, places, bodies, case, notes) for case in model.load_cases or (None,)]
 
 
-def _has_forces(part: Component) -> bool:
-    return any(part.quantity(key, "N") for key in FORCES)
-
-
-def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None) -> Loads:
+def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, notes: Notes) -> Loads:
     changes = case.changes if case else {}
     speeds: dict[str, float] = {}
     for shaft in _changed(model.of_type("shaft"), changes):
@@ -89,7 +95,11 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None) 
         if body is not None and speed is not None and not body.fixed:
             speeds.setdefault(body.name, tidy(places.sense(shaft) * speed))
     torques: dict[str, float] = {}
+    forces: dict[int, PointForce] = {}
     for load in _changed(model.of_type("external_load"), changes):
+        force = _point_force(model, places, bodies, load, notes)
+        if force is not None:
+            forces[load.number] = force
         body = _owner(model, bodies, load)
         torque = _torque(model, places, load, speeds, bodies)
         if body is not None and torque and load.flag("transmits_torque") is not False:
@@ -98,7 +108,34 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None) 
     for unit in _changed(model.of_type("gear_unit"), changes):
         share = unit.quantity("operating_time_fraction", "%")
     name = f"load_case_{case.number}" if case else "nominal"
-    return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, share)
+    return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, forces, share)
+
+
+def _point_force(model: Model, places: Places, bodies: Bodies, load: Component, notes: Notes) -> PointForce | None:
+    """Force and moment of a load across and along its shaft, in the axes of the gearbox file; None for none.
+
+    What acts on a planet turns with its carrier and is left out; the casing takes any.
+    """
+    force = np.array([load.quantity(key, "N") or 0.0 for key in FORCES])
+    moment = np.array([0.0, *(load.quantity(key, "N m") or 0.0 for key in MOMENTS)])
+    if not force.any() and not moment.any():
+        return None
+    shaft = _shaft(model, load)
+    body = _owner(model, bodies, load)
+    size = " and ".join(f"{np.linalg.norm(one):g} {unit}" for one, unit in ((force, "N"), (moment, "N m")) if one.any())
+    if shaft is None or body is None:
+        why = "no shaft has it" if shaft is None else f"{shaft} stands still, is a planet, or is left out"
+        notes.lost.append(f"{load}: {size}; {why}")
+        return None
+    axes = places.axes(shaft)
+    z = places.position(shaft)[2] + places.sense(shaft) * (load.quantity("u_coordinate_on_shaft", "mm") or 0.0)
+    return PointForce(
+        load,
+        body.name,
+        tidy(round(z, 9)),
+        tuple(tidy(round(value, 6)) for value in (force @ axes).tolist()),
+        tuple(tidy(round(value, 6)) for value in (moment @ axes).tolist()[:2]),
+    )
 
 
 def _changed(parts: Sequence[Component], changes: Mapping[int, Mapping[str, Attribute]]) -> list[Component]:
@@ -182,6 +219,34 @@ def static_load(loads: Sequence[Loads], ends: Ends) -> Entry:
         return assumed({ends.input: UNKNOWN_TORQUE}, "the file gives no torque: SET IT")
     source = "torque_around_u_axis, or power over speed" + ("; the largest of the load cases" if len(loads) > 1 else "")
     return read({ends.input: max(torques, key=abs)}, source)
+
+
+def force_blocks(loads: Sequence[Loads], ends: Ends, notes: Notes) -> dict[str, Block]:
+    """Tables of the constant forces: those of the load case that gives the static load, as weight acts in all others.
+
+    Where load cases have other forces, this is told.
+    """
+    static = max(loads, key=lambda one: abs(one.torques.get(ends.input, 0.0)))
+    blocks = {}
+    for number, one in static.forces.items():
+        key = ", ".join((*FORCES, *MOMENTS))
+        entries = {"body": Entry(one.body), "z_mm": read(one.z, "u_coordinate_on_shaft")}
+        if any(one.force):
+            entries["force_N"] = read(list(one.force), key)
+        if any(one.moment):
+            entries["moment_N_m"] = read(list(one.moment), key)
+        blocks[f"load_{number}"] = Block(str(one.part), entries)
+    for number in sorted({number for one in loads for number in one.forces}):
+        values = {
+            (found.force, found.moment) if (found := one.forces.get(number)) is not None else None for one in loads
+        }
+        if len(values) > 1:
+            part = next(one.forces[number].part for one in loads if number in one.forces)
+            notes.changed.append(
+                f"{part}: its force differs between load cases; that of {static.name}, which has the largest torque, "
+                "acts in all of them"
+            )
+    return blocks
 
 
 def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: float) -> dict[str, Block]:

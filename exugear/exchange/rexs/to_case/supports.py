@@ -139,7 +139,7 @@ def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, note
         return None  # of a planet that is like the first
     inner, outer = (None if body is not None and body.fixed else body for body in (inner, outer))
     if inner is outer:
-        notes.ignored.append(f"{part}: holds nothing that turns, or both of its rings are on one body")
+        notes.lost.append(f"{part}: holds nothing that turns, or both of its rings are on one body")
         return None
     if inner is None or (outer is not None and outer.carrier == inner.name):
         inner, outer = outer, inner

@@ -118,7 +118,7 @@ def test_signals_and_energies_are_those_of_the_plain_kernels(grc: Gearbox, stiff
         # The non-conservative power is a small difference of large ones: measured by what is dissipated, too.
         scale = np.abs(plain).max(axis=0) + np.abs(plain[:, 2]).max()
         assert (np.abs(np.column_stack([energies, powers[:, 1:]]) - plain) / scale).max() < 1e-9
-        load = v @ (assembly.torque_vector(LOAD) + assembly.weight)
+        load = v @ (assembly.torque_vector(LOAD) + assembly.constant_forces)
         assert powers[:, 0] == pytest.approx(load, rel=1e-12)
 
 
