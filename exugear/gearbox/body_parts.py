@@ -386,7 +386,7 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
         body = origin.case.bodies[section.body]
         if body.carrier is not None or body.spin_only:
             raise origin.fault(
-                f"{key}.body = {section.body!r}: a planet or a spin-only body cannot have a constant force; name a body "
+                f"{key}.body = {section.body!r}: a planet or a spin-only body cannot have a constant force; name one "
                 "on an axis that stands still"
             )
         position = _position(bodies[section.body], section.z_mm)

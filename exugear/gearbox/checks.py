@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.body_parts import blank_places
-from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, stiffness_matrix
+from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, PointForce, stiffness_matrix
 from exugear.gearbox.reading import CaseError, shortened
 from exugear.gearbox.sections.case import CaseFile, OverallSection
 from exugear.gearbox.sections.connections import BearingSection, StiffnessSection
@@ -406,7 +406,7 @@ def _faults_of_matrix(key: str, section: StiffnessSection) -> Iterator[str]:
         yield f"{key}.matrix: is indefinite, some displacement would release energy; no eigenvalue may be below zero"
 
 
-def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling]]) -> Iterator[str]:
+def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | PointForce]]) -> Iterator[str]:
     """Tell a name that stands twice among meshes, supports and couplings: they share one list in the results.
 
     `parts` are by their table in the file.

@@ -303,10 +303,15 @@ def _catalogue(
     for key, ours in (
         (f"{sense_of_rating}_dynamic_load_rating", "dynamic_rating_kN"),
         (f"{sense_of_rating}_static_load_rating", "static_rating_kN"),
+        ("fatigue_limit_load", "fatigue_load_limit_kN"),
     ):
         rating = part.quantity(key, "kN")
         if rating:
             entries[ours] = read(tidy(rating), key)
+    limit, static = (entries.get(key) for key in ("fatigue_load_limit_kN", "static_rating_kN"))
+    if limit is not None and static is not None and limit.value >= static.value:
+        notes.changed.append(f"{part}: fatigue_limit_load of {limit.value:g} kN is above its static rating, left out")
+        del entries["fatigue_load_limit_kN"]
     if not arrangement:
         _tell_axial(part, kind, sense, entries, notes)
     return entries

@@ -31,6 +31,7 @@ UNITS = {
     "radial_static_load_rating": "kN",
     "axial_dynamic_load_rating": "kN",
     "axial_static_load_rating": "kN",
+    "fatigue_limit_load": "kN",
     "u_coordinate_on_shaft": "mm",
     "endurance_limit_flank": "N / mm^2",
     "endurance_limit_root": "N / mm^2",

@@ -74,7 +74,7 @@ def test_the_deepest_tool_counts_in_any_order_and_a_single_one_ends_no_flank() -
 def test_a_protuberance_ends_the_flank_where_a_rating_program_has_it(
     teeth: int, module: float, helix: float, shift: float, root: float, form: float
 ) -> None:
-    """Results in fva_wind-turbine_1-3_results.rexsj of github.com/fva-net/rexs-diff; profile shifts without thinning."""
+    """Results in fva_wind-turbine_1-3_results.rexsj of github.com/fva-net/rexs-diff; shifts without thinning."""
     file = OwnFile()
     shaft = file.shaft((0.0, 0.0, 0.0), [(0.0, 100.0, 30.0)])
     values = {"helix_angle_reference_diameter": helix, "shift": shift, "root_diameter": root}
