@@ -310,6 +310,8 @@ LEAST_FORM_MARGIN = 0.02
 Elastic teeth meet a little before and after the path of contact; tables cut off what is beyond the form circle, and
 count it (`fe_ste.contact.kinematics`).
 """
+LARGEST_PRESSURE = 3e9
+"""Pressure at the pitch point that is doubted, Pa: case-hardened flanks bear 1.5 GPa for ever, 2.4 GPa once."""
 PROPOSED_MARGIN = 0.025
 """Part of a flank that a proposed tip diameter leaves."""
 
@@ -443,6 +445,12 @@ def doubts_about_pairs(gearbox: Gearbox) -> Iterator[str]:
                     f"where contact under load ends; the table of {name} counts what it cuts off there; "
                     f"{1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves {100 * PROPOSED_MARGIN:g} %"
                 )
+        if margins.pitch_point_pressure > LARGEST_PRESSURE:
+            yield (
+                f"pairs.{name}: {1e-6 * margins.pitch_point_pressure:.4g} MPa by Hertz at the pitch point under "
+                f"[static_load] ({spec.static_torque:.4g} N m on {spec.pair.pinion.name}): no steel bears more than "
+                f"some {1e-6 * LARGEST_PRESSURE:.0f} MPa; check the unit of torques, module and face widths"
+            )
     for name, gear in gearbox.gears.items():
         thickness = gear.tip_thickness / gear.normal_module
         if thickness < USUAL_TIP_THICKNESS:

@@ -124,8 +124,7 @@ def _point_force(model: Model, places: Places, bodies: Bodies, load: Component, 
     body = _owner(model, bodies, load)
     size = " and ".join(f"{np.linalg.norm(one):g} {unit}" for one, unit in ((force, "N"), (moment, "N m")) if one.any())
     if shaft is None or body is None:
-        why = "no shaft has it" if shaft is None else f"{shaft} stands still, is a planet, or is left out"
-        notes.lost.append(f"{load}: {size}; {why}")
+        notes.lost.append(f"{load}: {size}; what it acts on stands still, is a planet, or is left out")
         return None
     axes = places.axes(shaft)
     z = places.position(shaft)[2] + places.sense(shaft) * (load.quantity("u_coordinate_on_shaft", "mm") or 0.0)
@@ -237,11 +236,9 @@ def force_blocks(loads: Sequence[Loads], ends: Ends, notes: Notes) -> dict[str, 
             entries["moment_N_m"] = read(list(one.moment), key)
         blocks[f"load_{number}"] = Block(str(one.part), entries)
     for number in sorted({number for one in loads for number in one.forces}):
-        values = {
-            (found.force, found.moment) if (found := one.forces.get(number)) is not None else None for one in loads
-        }
-        if len(values) > 1:
-            part = next(one.forces[number].part for one in loads if number in one.forces)
+        found = [one.forces[number] for one in loads if number in one.forces]
+        part = found[0].part
+        if len(found) < len(loads) or len({(one.force, one.moment) for one in found}) > 1:
             notes.changed.append(
                 f"{part}: its force differs between load cases; that of {static.name}, which has the largest torque, "
                 "acts in all of them"
