@@ -96,8 +96,19 @@ def _refuse_pair(pair: UncheckedPair, key: str, value: str, remedy: str) -> Geom
     return GeometryError(f"gear pair '{pair.name}': {key} = {value} {remedy}")
 
 
-def _mm(length: float) -> str:
-    return f"{1e3 * length:.4f} mm"
+def _mm(length: float, beside: float | None = None) -> str:
+    """Length as messages show it, with as many digits more as tell it from another one that stands beside it."""
+    digits = 4
+    while beside is not None and digits < 12 and f"{1e3 * length:.{digits}f}" == f"{1e3 * beside:.{digits}f}":
+        digits += 1
+    return f"{1e3 * length:.{digits}f} mm"
+
+
+def _small(length: float) -> str:
+    """Size of an overlap: in micrometres where four decimals of a millimetre would not show it."""
+    if length >= 5e-6:
+        return _mm(length)
+    return f"{1e6 * length:.3g} um"
 
 
 def _deg(angle: float) -> str:
@@ -384,8 +395,9 @@ def _check_centre_distance(pair: UncheckedPair) -> None:
         raise _refuse_pair(pair, "centre_distance", f"{pair.centre_distance!r}", remedy)
     least = abs(pair.pinion.base_radius + pair.gear.outward * pair.gear.base_radius)
     if pair.centre_distance <= least:
-        remedy = f"is too small: no line of action touches both base circles below {_mm(least)}"
-        raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
+        distance = pair.centre_distance
+        remedy = f"is too small: no line of action touches both base circles below {_mm(least, distance)}"
+        raise _refuse_pair(pair, "centre_distance", _mm(distance, least), remedy)
 
 
 def _check_backlash(pair: UncheckedPair) -> None:
@@ -398,8 +410,9 @@ def _check_backlash(pair: UncheckedPair) -> None:
         value = f"{pair.gear.profile_shift:g}"
         raise _refuse_pair(pair, f"profile_shift of '{pair.gear.name}'", value, remedy)
     word, bound = ("large", "at most") if pair.gear.internal else ("small", "at least")
-    remedy = f"is too {word}: the flanks would overlap by {_mm(-backlash)}; {bound} {_mm(limit)} is needed"
-    raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
+    distance = pair.centre_distance
+    remedy = f"is too {word}: the flanks would overlap by {_small(-backlash)}; {bound} {_mm(limit, distance)} is needed"
+    raise _refuse_pair(pair, "centre_distance", _mm(distance, limit), remedy)
 
 
 def _check_tip_clearances(pair: UncheckedPair) -> None:
@@ -410,8 +423,10 @@ def _check_tip_clearances(pair: UncheckedPair) -> None:
         if clearance <= 0.0:
             bound = tip.tip_radius + tip.outward * clearance
             word = "above" if tip.internal else "below"
-            remedy = f"runs {_mm(-clearance)} into the root of '{root.name}': {word} {_mm(2.0 * bound)} needed"
-            raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
+            given = 2.0 * tip.tip_radius
+            needed = _mm(2.0 * bound, given)
+            remedy = f"runs {_small(-clearance)} into the root of '{root.name}': {word} {needed} needed"
+            raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(given, 2.0 * bound), remedy)
 
 
 def _check_tip_interference(pair: UncheckedPair) -> None:
@@ -431,10 +446,10 @@ def _check_tip_interference(pair: UncheckedPair) -> None:
             word = "at least" if tip.internal else "at most"
             remedy = (
                 f"interferes with the root fillet of '{mate.name}', which begins at the form diameter "
-                f"{_mm(2.0 * mate.form_radius)}: {word} {_mm(bound)} is needed"
+                f"{_mm(2.0 * mate.form_radius)}: {word} {_mm(bound, 2.0 * tip.tip_form_radius)} is needed"
             )
             key = "tip_diameter" if tip.tip_form_diameter is None else "tip_form_diameter"
-            raise _refuse_pair(pair, f"{key} of '{tip.name}'", _mm(2.0 * tip.tip_form_radius), remedy)
+            raise _refuse_pair(pair, f"{key} of '{tip.name}'", _mm(2.0 * tip.tip_form_radius, bound), remedy)
 
 
 def _check_contact(pair: UncheckedPair) -> None:

@@ -559,6 +559,6 @@ def _against_the_speed(source: LoadSource, is_output: bool) -> Iterator[str]:
         signs = ("a negative torque at a positive speed", "a positive torque at a negative speed")[backwards > 0.0]
         hours = f"{100.0 * (backwards or share):.3g} % of its hours"
         yield (
-            f"Warning: {source.name}: {source.file} has {signs} for {hours}, so that power flows back from the loaded body; check the signs of both columns (torque_factor = -1 or "
-            "speed_factor = -1 turns one)"
+            f"Warning: {source.name}: {source.file} has {signs} for {hours}, so that power flows back from the loaded "
+            "body; check the signs of both columns (torque_factor = -1 or speed_factor = -1 turns one)"
         )
