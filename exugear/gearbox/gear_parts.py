@@ -65,6 +65,7 @@ def gears(origin: Origin) -> dict[str, Gear]:
     """
     plain = {name: _unchecked(name, section) for name, section in origin.case.gears.items()}
     shifted = {**plain, **part_of_each(partial(_with_shift, origin, plain), _flagged(origin, "shift"))}
+    shifted = {name: with_usual_rounding(origin.case.gears[name], gear) for name, gear in shifted.items()}
     fitted = {**shifted, **part_of_each(partial(_with_fitted_tip, origin, shifted), _flagged(origin, "tip"))}
 
     fitted |= _without_rounded_overlaps(origin, fitted)
@@ -79,6 +80,36 @@ def gears(origin: Origin) -> dict[str, Gear]:
         )
 
     return part_of_each(of_section, origin.case.gears)
+
+
+def with_usual_rounding(section: GearSection, gear: UncheckedGear) -> UncheckedGear:
+    """Gear with no larger radius at the tip of its tool than fits, where the file leaves the radius to the default.
+
+    At 25 degrees and a dedendum of 1.25 that is 0.318 normal modules; one that the file gives is refused instead.
+    """
+    if "tip_radius" in section.rack.model_fields_set or gear.cutter is not None:
+        return gear
+    fits = gear.largest_rack_rounding
+    if gear.internal:  # an arc that leaves half of the tooth's height to the flank
+        fits = 0.5 * (gear.root_radius - gear.tip_radius) / gear.normal_module
+        if 2.0 * fits > gear.rack.tip_radius:
+            return gear
+    largest = math.floor(1e4 * fits) / 1e4
+    if not 0.0 <= largest < gear.rack.tip_radius:
+        return gear
+    return replace(gear, rack=replace(gear.rack, tip_radius=largest))
+
+
+def smaller_roundings(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str]:
+    """Tell which radii at the tip of a tool are smaller than the usual default, since that does not fit."""
+    for name, section in origin.case.gears.items():
+        usual = section.rack.tip_radius
+        taken = gears[name].rack.tip_radius
+        if taken != usual:
+            yield (
+                f"gears.{name}.rack.tip_radius: the default of {usual:g} does not fit on the tool at "
+                f"{section.normal_pressure_angle_deg:g} deg and its dedendum; {taken:g} is taken, the largest that does"
+            )
 
 
 def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSection]:

@@ -190,6 +190,7 @@ class Gearbox(Displayed):
                 lines.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
         lines += gear_parts.margins_of_roots(self.gear_pairs.values())
         lines += gear_parts.rounded_overlaps(self._origin, self.gears)
+        lines += gear_parts.smaller_roundings(self._origin, self.gears)
         for name, gear in self.gears.items():
             if gear.is_undercut:
                 start = 2e3 * gear.form_radius

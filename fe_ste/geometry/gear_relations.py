@@ -380,6 +380,13 @@ class UncheckedGear:
         widening = 0.5 * self.tooth_thinning * math.cos(self.helix_angle)
         return self.normal_module * (0.25 * math.pi - taper) + widening
 
+    @property
+    def largest_rack_rounding(self) -> float:
+        """Largest radius that fits on the tip of the generating rack, in normal modules; negative on a pointed one."""
+        angle = self.normal_pressure_angle
+        growth = 1.0 / math.cos(angle) - math.tan(angle)
+        return self.rack.tip_radius + self.rack_tip_half_land / self.normal_module / growth
+
     @overload
     def half_angle(self, radius: float) -> float: ...
 

@@ -49,7 +49,7 @@ def test_published_pairs_without_backlash_are_taken_and_told(
     """Working pressure angles of the tables; the overlaps are 65 nm (FZG), 1 nm (helical) and 39 nm (internal)."""
     gearbox = Gearbox.from_dict(content(gears, distance), "case.toml")
     pair = gearbox.gear_pairs["spur"]
-    assert math.degrees(pair.working_pressure_angle) == pytest.approx(angle, abs=1e-4)
+    assert math.degrees(pair.working_pressure_angle) == pytest.approx(angle, abs=2e-4)
     assert 0.0 <= pair.circumferential_backlash < 1e-11
     (line,) = (line for line in remarks(gearbox) if "within the rounding of the digits" in line)
     assert line.startswith("gears.wheel: ")

@@ -574,7 +574,7 @@ def _note_ignored(model: Model, notes: Notes) -> None:
     kinds = sorted({part.type for part in model.components.values()})
     for kind in kinds:
         if kind not in READ_TYPES:
-            lines = notes.ignored if kind in TYPES_WITHOUT_EFFECT else notes.lost
+            lines = (notes.lost, notes.ignored)[kind in TYPES_WITHOUT_EFFECT]
             lines.append(f"{plain(kind)}, {len(model.of_type(kind))} of them")
     for kind in kinds:
         parts = model.of_type(kind)

@@ -389,9 +389,7 @@ def with_fitting_tool(gear: Toothing, notes: Notes) -> Toothing:
     made = unchecked("", gear)
     if gear.internal or made.rack_tip_half_land >= 0.0:
         return gear
-    # As in `fe_ste.geometry.checks`: a smaller radius leaves more of the tool's tip flat.
-    growth = 1.0 / math.cos(made.normal_pressure_angle) - math.tan(made.normal_pressure_angle)
-    most = gear.tip_radius.value + made.rack_tip_half_land / made.normal_module / growth
+    most = made.largest_rack_rounding
     if most <= 0.0:
         return gear
     radius = math.floor(1e4 * most) / 1e4
