@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import tomllib
@@ -309,6 +310,8 @@ TYPES_WITHOUT_EFFECT = frozenset(
         "assembly_group",
         "cylindrical_stage_gear_data",
         "element_list",
+        "involute_spline_gear_hub",
+        "involute_spline_gear_shaft",
         "joint_section",
         "meshing_contact_stage_data_set",
         "notch_effect_shaft_hub_connection",
@@ -370,6 +373,7 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
         Why the model cannot be imported, a sentence each.
     """
     notes = Notes(rules or Rules())
+    model = _without_splines_as_stages(model)
     _refuse_types(model, notes)
     _refuse_misplaced(model, notes)
     notes.faults.tell()
@@ -391,6 +395,16 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     changed, lost, checked = (tuple(dict.fromkeys(lines)) for lines in (notes.changed, notes.lost, notes.checked))
     ignored = (*lost, *notes.ignored)
     return Imported(text, gearbox, changed, ignored, lost, checked, draft.found, life.spectrum)
+
+
+def _without_splines_as_stages(model: Model) -> Model:
+    """Leave out relations that pair shaft and hub of a spline as the gears of a stage are paired.
+
+    The connection itself has two sides, and joins what they name.
+    """
+    splines = {part.number for part in model.of_type(*JOINING)}
+    relations = tuple(one for one in model.relations if one.type != "stage" or one.roles.get("stage") not in splines)
+    return dataclasses.replace(model, relations=relations)
 
 
 def _refuse_types(model: Model, notes: Notes) -> None:

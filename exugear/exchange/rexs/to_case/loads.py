@@ -29,6 +29,33 @@ USUAL_YEARS, USUAL_VISCOSITY, USUAL_DYNAMIC_FACTOR, USUAL_ROUGHNESS, USUAL_ROOT_
     0.7,
 )
 """What is assumed for a life: years, viscosity at 40 degrees (mm2/s), K_v, Rz (um), Y_drelT Y_RrelT Y_X, Y_M."""
+ROUGHNESSES = (
+    (
+        "roughness_Rz_um",
+        ("averaged_peak_to_valley_height_flank", "mean_peak_to_valley_roughness_flank_iso_4287_1997"),
+        1.0,
+    ),
+    (
+        "roughness_Ra_um",
+        ("arithmetic_average_roughness_flank", "arithmetic_mean_roughness_flank_iso_4287_1997"),
+        1.0,
+    ),
+    (
+        "root_roughness_Rz_um",
+        ("averaged_peak_to_valley_height_root", "mean_peak_to_valley_roughness_root_iso_4287_1997"),
+        1.0,
+    ),
+    (
+        "root_roughness_Rz_um",
+        ("arithmetic_average_roughness_root", "arithmetic_mean_roughness_root_iso_4287_1997"),
+        6.0,
+    ),
+)
+"""Keys of the gearbox file, attributes that give them, and factors: Rz is six times Ra (ISO 6336-2)."""
+ROUGHNESS_RANGE = (0.1, 100.0)
+"""Roughnesses of a gear, um."""
+TOLERANCE_CLASSES = (1, 11)
+"""Flank tolerance classes of ISO 1328-1:2013."""
 HARD_FLANK = 1100.0
 """Endurance limit of flanks (MPa) from which on they are case hardened, if nothing else is said (ISO 6336-5)."""
 _NITRIDED = (((1e5, 1.3), (2e6, 1.0), (1e10, 0.85)), ((1e3, 1.6), (3e6, 1.0), (1e10, 0.85)))
@@ -340,6 +367,10 @@ def life_blocks(
     source_block = Block("", {"file": file, "hours_per_year": assumed(HOURS_PER_YEAR, "always at work")})
     blocks["loads"] = Block("", of_life, {"sources.load_spectrum": source_block})
     blocks["rating"] = _rating(model, gears)
+    lubricant = _lubricant(model)
+    if lubricant is not None:
+        blocks["lubricant"] = lubricant
+        del blocks["rating"].entries["viscosity_40_mm2_per_s"]
     return LifeLoads("torque_N_m,speed_rpm,hours\n" + "".join(lines), blocks)
 
 
@@ -362,6 +393,23 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
     return body, life, lines
 
 
+def _lubricant(model: Model) -> Block | None:
+    """Section on the oil where the file gives its viscosity at both temperatures: of several the thinnest."""
+    oils = {}
+    for oil in model.of_type("lubricant"):
+        cold, hot = (oil.quantity(f"viscosity_at_{t}_degree_celsius", "mm^2 / s") for t in (40, 100))
+        if cold and hot and hot < cold:
+            oils[cold] = hot
+    if not oils:
+        return None
+    cold = min(oils)
+    entries = {
+        "viscosity_40_mm2_per_s": read(tidy(cold), "viscosity_at_40_degree_celsius of the lubricant"),
+        "viscosity_100_mm2_per_s": read(tidy(oils[cold]), "viscosity_at_100_degree_celsius"),
+    }
+    return Block("", entries)
+
+
 def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
     """Tell what gears withstand by their materials, and the oil; gears without both endurance limits are not rated."""
     viscosities = [
@@ -381,14 +429,15 @@ def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
     )
     block = Block("", {"dynamic_factor": dynamic, "viscosity_40_mm2_per_s": viscosity})
     for name, (gear, both_ways) in gears.items():
-        strength = _strength(material_of(model, gear), gear, both_ways)
+        flanks = model.related("flank", "gear", gear.number, "left")
+        strength = _strength(material_of(model, gear), (gear, *flanks), both_ways)
         if strength is not None:
             block.blocks[f"gears.{name}"] = strength
     return block
 
 
-def _strength(material: Component | None, gear: Component, both_ways: bool) -> Block | None:
-    """Tell what a gear withstands; None without both of its endurance limits."""
+def _strength(material: Component | None, parts: Sequence[Component], both_ways: bool) -> Block | None:
+    """Tell what a gear withstands; None without both of its endurance limits. `parts` are the gear and its flank."""
     limits = {
         ours: material.quantity(key, "MPa") if material else None
         for ours, key in (("sigma_H_lim_MPa", "endurance_limit_flank"), ("sigma_F_lim_MPa", "endurance_limit_root"))
@@ -400,15 +449,30 @@ def _strength(material: Component | None, gear: Component, both_ways: bool) -> B
         for ours, value in limits.items()
     }
     entries |= _curves(material.text("heat_treated_material_type_iso_6336_2006"), limits["sigma_H_lim_MPa"] or 0.0)
-    roughness = gear.quantity("arithmetic_average_roughness_flank", "mum")
-    if roughness:
-        entries["roughness_Ra_um"] = read(tidy(roughness), "arithmetic_average_roughness_flank")
-    else:
-        entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "the file gives none")
-    entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 by ISO 6336-3")
+    entries |= _roughnesses(parts)
+    for key in ("tolerance_class_according_to_iso_1328_2013", "global_tolerance_class_iso_1328_2013"):
+        stated = next((one for part in parts if (one := part.whole(key)) is not None), None)
+        if stated is not None and TOLERANCE_CLASSES[0] <= stated <= TOLERANCE_CLASSES[1]:
+            entries.setdefault("tolerance_class", read(stated, key))
     if both_ways:
         entries["mean_stress_factor"] = assumed(BOTH_WAYS, "Y_M of ISO 6336-3, annex B, for teeth that bend both ways")
     return Block(str(material), entries)
+
+
+def _roughnesses(parts: Sequence[Component]) -> dict[str, Entry]:
+    """Roughness of flanks and roots: Rz where the file gives it, else from Ra; of roots six times as much."""
+    entries: dict[str, Entry] = {}
+    for ours, keys, factor in ROUGHNESSES:
+        stated = next(((key, one) for key in keys for part in parts if (one := part.quantity(key, "mum"))), None)
+        if stated is not None and ROUGHNESS_RANGE[0] <= factor * stated[1] <= ROUGHNESS_RANGE[1]:
+            entries.setdefault(ours, read(tidy(factor * stated[1]), stated[0]))
+    if "roughness_Ra_um" in entries:  # as before; a file that gives both means the same by them
+        entries.pop("roughness_Rz_um", None)
+    elif "roughness_Rz_um" not in entries:
+        entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "the file gives none")
+    if "root_roughness_Rz_um" not in entries:
+        entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 by ISO 6336-3")
+    return entries
 
 
 def _curves(kind: str, flank_limit: float) -> dict[str, Entry]:

@@ -133,18 +133,46 @@ def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: N
     """
     solved = _solved(gears, stages)
     wrong = [stage for stage in stages if _beyond(solved, stage)]
-    replaced = _replaceable(gears, stages, wrong, notes)
-    if replaced:
-        open_shifts = {number: dataclasses.replace(gears[number], shift=None) for number in replaced}
-        again = _solved({**gears, **open_shifts}, stages)
-        if not any(_beyond(again, stage) for stage in stages):
+    for replaced in (_zeros_with_followers(gears, stages, wrong, notes), _replaceable(gears, stages, wrong, notes)):
+        again = _reopened(gears, stages, replaced)
+        if replaced and not any(_beyond(again, stage) for stage in stages):
             solved = again
             notes.changed += [_replacement(gears[number], again[number]) for number in replaced]
+            break
     for stage in stages:
         with notes.faults.gathered():
             _check_shifts(solved, stage, notes)
     notes.faults.tell()
     return solved
+
+
+def _reopened(gears: Mapping[int, Toothing], stages: Sequence[Stage], numbers: Sequence[int]) -> dict[int, Toothing]:
+    """Give every gear a profile shift, some gears one that follows from their stages."""
+    open_shifts = {number: dataclasses.replace(gears[number], shift=None) for number in numbers}
+    return _solved({**gears, **open_shifts}, stages)
+
+
+def _zeros_with_followers(
+    gears: Mapping[int, Toothing], stages: Sequence[Stage], wrong: Sequence[Stage], notes: Notes
+) -> list[int]:
+    """Gears with a shift of zero in stages that contradict it, and mates that follow, where the file leaves the choice.
+
+    A planet of shift zero may agree with its ring and contradict its sun: its shift then follows from the sun, and that
+    of the ring from the planet.
+    """
+    if notes.rules.shifts != "centre-distance":
+        return []
+    found: list[int] = []
+    for stage in wrong:
+        both = (stage.pinion, stage.gear)
+        zeros = [number for number in both if (shift := gears[number].shift) is not None and shift.value == 0.0]
+        if len(zeros) == 1:
+            found += zeros
+    again = _reopened(gears, stages, found)
+    for stage in stages:
+        if found and stage not in wrong and _beyond(again, stage):
+            found += [number for number in (stage.pinion, stage.gear) if number not in found]
+    return list(dict.fromkeys(found))
 
 
 def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int, Toothing]:
@@ -227,13 +255,13 @@ def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> 
     stated, total = _shift_sums(gears, stage)
     notes.checked.append(f"{stage.part}: sum of profile shifts {stated:.6f}, centre distance asks for {total:.6f}")
     if abs(stated - total) > SHIFT_TOLERANCE:
-        pinion = gears[stage.pinion]
-        assert pinion.shift is not None
+        option = ""
+        if notes.rules.shifts == "file":
+            option = ", or import with --shifts centre-distance, which replaces a shift of 0, or else one of the two"
         raise RexsError(
             f"{stage.part}: the profile shifts sum to {stated:.5f}, but its centre distance of "
             f"{stage.distance.value:g} mm asks for {total:.5f}; correct addendum_modification_coefficient "
-            f"or center_distance, or import with --shifts centre-distance, which gives {pinion.part} "
-            f"{pinion.shift.value + total - stated:.5f} where the other gear keeps its own"
+            f"or center_distance{option}"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.exchange.rexs.to_case.bodies import (
@@ -293,7 +294,7 @@ def _catalogue(
     if not arrangement and (rows > 1 or part.text("bearing_type") == "radial_spherical_roller_bearing"):
         entries["row_count"] = read(rows, "number_of_bearing_rows")
     if row is not None:
-        entries |= _elements(model, row, kind)
+        entries |= _elements(model, row, kind, notes)
         entries |= _grooves(model, row, kind, notes)
     entries |= arrangement
     clearance = part.quantity("operating_radial_bearing_clearance", "mm")
@@ -333,8 +334,8 @@ def _tell_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry
         notes.changed.append(f"{part}: axial_force_absorption {absorbed}, but the law of a {kind} holds both ways")
 
 
-def _elements(model: Model, row: Component, kind: str) -> dict[str, Entry]:
-    """Count and sizes of the rolling elements, as far as the file gives them."""
+def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
+    """Count and sizes of the rolling elements, as far as the file gives them; no more of them than fit."""
     entries = {}
     count = row.whole("number_of_rolling_elements")
     if count:
@@ -348,6 +349,13 @@ def _elements(model: Model, row: Component, kind: str) -> dict[str, Entry]:
         value = part.quantity(key, "mm") if part else None
         if value:
             entries[ours] = read(tidy(value), key)
+    diameter, pitch = (entries.get(key) for key in ("element_diameter_mm", "pitch_diameter_mm"))
+    if count and diameter is not None and pitch is not None and 0.0 < diameter.value < pitch.value:
+        most = int(math.pi / math.asin(diameter.value / pitch.value))
+        if count > most:
+            fitting = f"{count} of {diameter.value:g} mm do not fit on {pitch.value:g} mm"
+            notes.changed.append(f"{row}: {fitting}, {most} rolling elements taken; ratings of the file stay")
+            entries["element_count"] = assumed(most, fitting)
     return entries
 
 

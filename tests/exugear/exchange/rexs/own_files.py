@@ -36,6 +36,8 @@ UNITS = {
     "endurance_limit_flank": "N / mm^2",
     "endurance_limit_root": "N / mm^2",
     "viscosity_at_40_degree_celsius": "mm^2 / s",
+    "viscosity_at_100_degree_celsius": "mm^2 / s",
+    "averaged_peak_to_valley_height_root": "mm",
     "operating_time": "h",
     "elastic_modulus": "N / mm^2",
     "density": "kg / dm^3",

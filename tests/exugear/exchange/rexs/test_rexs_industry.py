@@ -462,7 +462,7 @@ def test_one_shift_of_zero_that_cannot_be_is_that_of_the_centre_distance():
 
 
 def test_two_shifts_that_cannot_be_are_refused_with_what_the_centre_distance_offers():
-    with pytest.raises(RexsError, match=rf"asks for {asked_for(91.5):.5f}; .*--shifts centre-distance, which gives"):
+    with pytest.raises(RexsError, match=rf"asks for {asked_for(91.5):.5f}; .*--shifts centre-distance, which replaces"):
         imported(shifted_pair((0.0, 0.0)))
     with pytest.raises(RexsError, match="--shifts centre-distance"):
         imported(shifted_pair((0.2, 0.1)))
