@@ -394,7 +394,7 @@ class _Draft:
                 f"{path}: headings {shortened(','.join(headings), 80)}; a series begins with time_s, a table of "
                 f"counted loads has {','.join(SPECTRUM_HEADINGS)}"
             )
-        values = table_rows(path, len(headings))
+        values = table_rows(path, headings)
         bad = np.flatnonzero(~(np.isfinite(values).all(axis=1) & (values[:, 2] >= 0.0)))
         if bad.size:
             told = ",".join(f"{value:g}" for value in values[bad[0]])
