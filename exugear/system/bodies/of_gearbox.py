@@ -514,7 +514,12 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
     """
     family = gearbox.body(name).family
     if gearbox.case.bodies[family].solid is not None:
-        solid_body(gearbox, name)
+        mesh = solid_body(gearbox, name).model.mesh
+        if isinstance(mesh, SolidFile) and mesh.is_mesh:
+            try:
+                _ = mesh.mesh
+            except SolidError as error:
+                raise gearbox.fault(f"bodies.{family}.solid.file = {mesh.path.name!r}: {error}") from None
         return
     model = shaft_model(gearbox, name)
     if not model.seats:
