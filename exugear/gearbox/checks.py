@@ -95,9 +95,12 @@ def faults_of_bodies(case: CaseFile) -> Iterator[str]:
 
 
 def faults_of_blanks(case: CaseFile) -> Iterator[str]:
-    """Tell blanks of stepped shafts that sit nowhere: they would count in no variant."""
+    """Tell blanks of stepped shafts that sit nowhere, where the inertia follows from the shape and would lack them.
+
+    Beside an inertia that is stated they matter to the elastic shaft alone, which refuses them.
+    """
     for family, section in case.bodies.items():
-        if section.shape is None:
+        if section.shape is None or section.inertia:
             continue
         seats = blank_places(case, family)
         for blank in section.shape.blanks:

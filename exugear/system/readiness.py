@@ -69,7 +69,12 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     amount = np.linalg.norm(beyond, axis=1)
     if not amount.size or amount.max() < ROLLING_TOLERANCE:
         return ""
-    body, direction = divmod(int(np.argmax(np.abs(beyond[np.argmax(amount)]))), BODY_SIZE)
+    motion = np.abs(beyond[np.argmax(amount)])
+    # A body that moves along helical teeth turns others: what nothing holds is the one that moves, not those that turn.
+    other = np.where(np.arange(motion.size) % BODY_SIZE == SPIN, 0.0, motion)
+    if other.max() > ROLLING_TOLERANCE:
+        motion = other
+    body, direction = divmod(int(np.argmax(motion)), BODY_SIZE)
     return f"body {moving[body].name} can {DIRECTIONS[direction]} without resistance; add or stiffen a bearing"
 
 

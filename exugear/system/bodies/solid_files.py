@@ -180,7 +180,7 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
     try:
         content = getattr(meshio, kind).read(str(path))
     except Exception as error:  # its readers let out whatever damaged content makes them stumble on
-        content = _rewritten_by_gmsh(path, meshio) if kind == "gmsh" else None
+        content = _rewritten_by_gmsh(path, meshio)
         if content is None:
             raise SolidError(f"{path}: meshio cannot read it as {kind} ({error or type(error).__name__})") from None
     solid: dict[str, list[Any]] = {}
@@ -205,7 +205,7 @@ def _rewritten_by_gmsh(path: Path, meshio: Any) -> Any:
     4; written anew in format 2.2 it does.
     """
     with path.open("rb") as file:
-        if file.read(len(MESH_HEAD)) != MESH_HEAD:
+        if path.suffix.lower() != ".msh" or file.read(len(MESH_HEAD)) != MESH_HEAD:
             return None
     gmsh = _library("gmsh")
     handlers = _signal_handlers()
