@@ -10,7 +10,13 @@ from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase, Poin
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
 from exugear.gearbox.sections.case import CaseFile, ForceSection, LoadCaseSection
-from exugear.gearbox.sections.connections import BearingSection, CouplingSection, JointSection, MountSection
+from exugear.gearbox.sections.connections import (
+    BearingSection,
+    CouplingSection,
+    JointSection,
+    MountSection,
+    StiffnessSection,
+)
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import GearSection, PinSection
 from exugear.gearbox.units import MM, RPM, UM
@@ -321,7 +327,42 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
             for suffix, body, on in origin.instances(key, section.body, section.on)
         )
 
-    return parts_of_each(of_section, origin.case.bearings)
+    return (*parts_of_each(of_section, origin.case.bearings), *_couplings_on_fixed_bodies(origin, bodies))
+
+
+def _holds_on_a_fixed_body(origin: Origin, section: CouplingSection) -> bool:
+    """Tell whether one of the two bodies of a coupling stands still: it then holds the other against turning."""
+    known = [origin.case.bodies[name] for name in section.bodies if name in origin.case.bodies]
+    return len(known) == 2 and [body.fixed for body in known].count(True) == 1
+
+
+def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> Iterator[Bearing]:
+    """Give couplings to fixed bodies as what they are: supports that hold nothing but the spin."""
+    for name, section in origin.case.couplings.items():
+        key = f"couplings.{name}"
+        if _stands_aside(origin, key, section) or not origin.are_enabled(key, *section.bodies):
+            continue
+        if not _holds_on_a_fixed_body(origin, section):
+            continue
+        on, body = sorted(section.bodies, key=lambda one: not origin.case.bodies[one].fixed)
+        seat = origin.case.bearings.get(section.seat or "")
+        place = bodies[body].centre_of_mass_z
+        if seat is not None:
+            place = MM * seat.z_mm
+        damping = section.damping_N_m_s_per_rad
+        if damping is None:
+            damping = origin.case.damping.coupling_time_s * section.stiffness_N_m_per_rad
+        yield Bearing(
+            name=name,
+            family=name,
+            body=body,
+            on=on,
+            position=(*bodies[body].axis, place),
+            stiffness=StiffnessSection(torsion_N_m_per_rad=section.stiffness_N_m_per_rad),
+            catalogue=None,
+            damping=StiffnessSection(torsion_N_m_per_rad=damping),
+            factor=1.0,
+        )
 
 
 def unknown_bearings(origin: Origin) -> dict[str, str]:
@@ -407,6 +448,8 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
     def of_section(name: str, section: CouplingSection) -> tuple[Coupling, ...]:
         key = f"couplings.{name}"
         if _stands_aside(origin, key, section) or not origin.are_enabled(key, *section.bodies):
+            return ()
+        if _holds_on_a_fixed_body(origin, section):
             return ()
         for body in section.bodies:
             if body not in spinning:

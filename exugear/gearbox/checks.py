@@ -304,9 +304,36 @@ def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
 
 
 def faults_of_connection(
-    case: CaseFile, bodies: Iterable[Body], meshes: Iterable[Mesh], couplings: Iterable[Coupling]
+    case: CaseFile,
+    bodies: Iterable[Body],
+    meshes: Iterable[Mesh],
+    couplings: Iterable[Coupling],
+    held: Collection[str],
 ) -> Iterator[str]:
-    """Tell bodies that no mesh, coupling or carrier joins to the overall input."""
+    """Tell bodies that no mesh, coupling or carrier joins to the overall input, nor torsion holds on what stands.
+
+    Parameters
+    ----------
+    held : bodies that bearings or mounts hold against turning, such as a bearing pedestal
+    """
+    lost = [name for name in bodies_apart(case, bodies, meshes, couplings) if name not in held]
+    if lost:
+        aside = [
+            f"; couplings.{name} stands aside while bodies.{section.instead_of} is enabled"
+            for name, section in case.couplings.items()
+            if section.instead_of is not None and set(section.bodies) & set(lost)
+        ]
+        yield (
+            f"bodies {', '.join(lost)} are joined to {case.overall.input} by no "
+            f"mesh, coupling or carrier{''.join(aside)}; the gear train must be one connected whole. What only "
+            "bearings and mounts hold, as a bearing pedestal, needs torsion_N_m_per_rad in one of those on what stands"
+        )
+
+
+def bodies_apart(
+    case: CaseFile, bodies: Iterable[Body], meshes: Iterable[Mesh], couplings: Iterable[Coupling]
+) -> tuple[str, ...]:
+    """Bodies that can move and that no mesh, coupling or carrier joins to the overall input."""
     bodies = tuple(bodies)
     links = [(mesh.pinion, mesh.gear) for mesh in meshes]
     links += [(coupling.first, coupling.second) for coupling in couplings]
@@ -317,17 +344,7 @@ def faults_of_connection(
         if not more:
             break
         reached |= more
-    lost = [body.name for body in bodies if not body.fixed and body.name not in reached]
-    if lost:
-        aside = [
-            f"; couplings.{name} stands aside while bodies.{section.instead_of} is enabled"
-            for name, section in case.couplings.items()
-            if section.instead_of is not None and set(section.bodies) & set(lost)
-        ]
-        yield (
-            f"bodies {', '.join(lost)} are joined to {case.overall.input} by no "
-            f"mesh, coupling or carrier{''.join(aside)}; the gear train must be one connected whole"
-        )
+    return tuple(body.name for body in bodies if not body.fixed and body.name not in reached)
 
 
 def faults_of_torsion(

@@ -355,14 +355,20 @@ class Gearbox(Displayed):
         The train rolls without them. One that holds the input or the output of the train is no part of how it rolls.
         """
         ends = (self.case.overall.input, self.case.overall.output)
+        mounts = tuple(mount for mount in self.mounts if mount.body in self.apart)
         return {
             bearing.body: Tie(bearing.on, bearing.body)
-            for bearing in self.bearings
+            for bearing in (*self.bearings, *mounts)
             if stiffness_matrix(bearing.stiffness)[5, 5]
             and bearing.body in self.spinning
             and bearing.body not in ends
             and bearing.on not in self.spinning
         }
+
+    @cached_property
+    def apart(self) -> tuple[str, ...]:
+        """Bodies that can move and belong to no train, such as a pedestal between a bearing and the ground."""
+        return checks.bodies_apart(self.case, self.named_bodies.values(), self.meshes, self.couplings)
 
     @property
     def locked(self) -> tuple[str, ...]:
@@ -493,8 +499,10 @@ def _checks_of_the_whole(gearbox: Gearbox) -> Iterator[checks.Check]:
         ),
         (
             "connection",
-            lambda: checks.faults_of_connection(case, gearbox.bodies(), gearbox.meshes, gearbox.couplings),
-            ("ends", "meshes", "couplings"),
+            lambda: checks.faults_of_connection(
+                case, gearbox.bodies(), gearbox.meshes, gearbox.couplings, gearbox.held_by_torsion
+            ),
+            ("ends", "meshes", "couplings", "mounts"),
         ),
         (
             "torsion",

@@ -82,7 +82,7 @@ def _held_directions(gearbox: Gearbox, variant: Variant, starts: Mapping[str, in
     """Rows over all coordinates, rotations times `TILT_LENGTH`, of what supports, meshes and couplings hold."""
     bodies = {body.name: body for body in gearbox.bodies()}
     size = 6 * len(starts)
-    for support in (*gearbox.bearings, *(mounts_at_work(gearbox) if variant.is_elastic else ())):
+    for support in (*gearbox.bearings, *mounts_at_work(gearbox, variant.is_elastic)):
         motion = np.zeros((6, size))
         for name, sense in ((support.body, 1.0), (support.on, -1.0)):
             if name in starts:

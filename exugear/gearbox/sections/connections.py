@@ -324,6 +324,9 @@ class BearingSection(Section):
 class MountSection(Section):
     """Elastic support of the gearbox on the ground; there where a fixed body is elastic, which else is the ground.
 
+    A body that only bearings and mounts hold, such as a bearing pedestal, is held by its mounts in every variant on
+    bearings; one of them, or of its bearings on what stands, has torsion.
+
     One that stands for a body (`instead_of`) steps aside when that body is enabled.
     """
 
@@ -340,7 +343,7 @@ class MountSection(Section):
 
 
 class CouplingSection(Section):
-    """Torsional spring between the spins of two bodies on one axis.
+    """Torsional spring between the spins of two bodies on one axis; one that stands still holds the other.
 
     It acts at the `seat` of elastic bodies, a bearing's name, and where torques act on those without such a seat. One
     that stands for a body (`instead_of`) steps aside when that body is enabled.
