@@ -77,6 +77,7 @@ def check(
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
             summary["tooth_thickness"] = thicknesses
+            summary["forces"] = _force_summaries(gearbox)
             found = {"bearings": bearings, "load_cases": loads, "variants": variants, "steady": steady}
             found["warnings"] = warnings
             print_json({**summary, **found})
@@ -89,6 +90,11 @@ def check(
                 print_table(
                     "Tooth thickness within its allowances", [_thickness_row(thickness) for thickness in thicknesses]
                 )
+                for thickness in thicknesses:
+                    if thickness["span_doubt"]:
+                        note(thickness["span_doubt"], style="yellow")
+            if gearbox.forces:
+                print_table("Constant forces on bodies", [_force_row(force) for force in _force_summaries(gearbox)])
             if loads:
                 band = 1e-3 * loads[0]["band_Hz"]
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}; runs keep {band:g} kHz"
@@ -241,9 +247,34 @@ def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                     "normal_tooth_thickness_mm": [1e3 * end for end in one.thickness],
                     "span_teeth": one.span_teeth,
                     "base_tangent_length_mm": [1e3 * end for end in one.span] if one.span_teeth else None,
+                    "span_doubt": one.span_doubt or None,
                 }
             )
     return summaries
+
+
+def _force_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
+    """Sum up the constant forces on bodies."""
+    return [
+        {
+            "force": force.name,
+            "body": force.body,
+            "z_mm": 1e3 * force.position[2],
+            "force_N": list(force.wrench[:3]),
+            "moment_N_m": list(force.wrench[3:]),
+        }
+        for force in gearbox.forces
+    ]
+
+
+def _force_row(force: dict[str, Any]) -> dict[str, str]:
+    return {
+        "force": force["force"],
+        "on": force["body"],
+        "at z\nmm": f"{force['z_mm']:g}",
+        "along x, y, z\nkN": " / ".join(f"{1e-3 * value:.4g}" for value in force["force_N"]),
+        "about x, y\nN m": " / ".join(f"{value:.4g}" for value in force["moment_N_m"]),
+    }
 
 
 def _thickness_row(one: dict[str, Any]) -> dict[str, str]:
