@@ -12,8 +12,9 @@ from __future__ import annotations
 import csv
 import hashlib
 import os
+import re
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -80,29 +81,34 @@ def decoded(content: bytes) -> str:
         return content.decode("latin-1")
 
 
-def numbers(path: Path, columns: int, skipped: int, separator: str | None) -> Iterator[Floats]:
+def numbers(
+    path: Path, headings: Sequence[str], skipped: int, separator: str | None, wanted: Collection[int] | None = None
+) -> Iterator[Floats]:
     """Rows of numbers behind some lines, in blocks (n, columns).
 
-    Words for missing numbers become NaN, so that a channel that is asked for tells.
+    Words for missing numbers become NaN, so that a channel that is asked for tells; so does whatever stands in columns
+    that nobody asks for.
 
     Parameters
     ----------
-    columns, skipped : of each line; lines of headings
+    headings : names of the columns
+    skipped : lines of headings
     separator : between numbers; blanks where it is None
+    wanted : places of the columns that are asked for; all by default
 
     Raises
     ------
     LoadFileError
-        A line with another number of columns or with words; no line at all.
+        A line with another number of columns, or with words in a column that is asked for; no line at all.
     """
+    table = _Table(path, tuple(headings), separator, tuple(sorted(wanted or range(len(headings)))))
     number = 0
     some = False
     for lines in blocks_of_lines(path):
         first = number + 1
         number += len(lines)
         begin = max(0, skipped + 1 - first)
-        texts = [line.decode("latin-1") for line in lines[begin:]]
-        rows = _parsed(path, texts, columns, first + begin, separator)
+        rows = table.parsed([line.decode("latin-1") for line in lines[begin:]], first + begin)
         some = some or bool(len(rows))
         if len(rows):
             yield rows
@@ -110,33 +116,73 @@ def numbers(path: Path, columns: int, skipped: int, separator: str | None) -> It
         raise LoadFileError(f"{path}: no lines of numbers under its headings")
 
 
-def _parsed(path: Path, texts: list[str], columns: int, first: int, separator: str | None) -> Floats:
-    kept = [text for text in texts if text.strip()]
-    if not kept:
-        return np.zeros((0, columns))
-    try:
-        found = np.loadtxt(kept, delimiter=separator, comments=None, ndmin=2, quotechar='"')
-        if found.shape[1] == columns:
-            return found
-    except ValueError:
-        pass
-    return _told(path, texts, columns, first, separator)
+FORTRAN_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[dDqQ]?)([+-]\d{1,3})")
+"""A number as Fortran writes it where its exponent has three digits, without E, or with D for E."""
 
 
-def _told(path: Path, texts: list[str], columns: int, first: int, separator: str | None) -> Floats:
-    """Read line by line, slowly, to tell which line is wrong."""
-    rows = []
-    for number, text in enumerate(texts, start=first):
-        if not text.strip():
-            continue
-        words = [word.strip().strip('"') for word in text.split(separator)]
-        if len(words) != columns:
-            raise LoadFileError(f"{path}: line {number} has {len(words)} columns; the headings have {columns}")
+def fortran_number(word: str) -> float:
+    """Return the number of a word, also as Fortran writes it.
+
+    Raises
+    ------
+    ValueError
+        It is none.
+
+    Examples
+    --------
+    >>> fortran_number("1.2345-101"), fortran_number("-4.5D+02"), fortran_number("7")
+    (1.2345e-101, -450.0, 7.0)
+    """
+    found = FORTRAN_NUMBER.fullmatch(word)
+    if found is not None:
+        return float(f"{found[1]}e{found[2]}")
+    return float(word)
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Lines of numbers under headings."""
+
+    path: Path
+    headings: tuple[str, ...]
+    separator: str | None
+    wanted: tuple[int, ...]
+
+    def parsed(self, texts: list[str], first: int) -> Floats:
+        """Numbers of lines, the first of them of a number; NaN in columns that nobody asks for and that hold words."""
+        kept = [text for text in texts if text.strip()]
+        if not kept:
+            return np.zeros((0, len(self.headings)))
         try:
-            rows.append([float(word) for word in words])
+            found = np.loadtxt(kept, delimiter=self.separator, comments=None, ndmin=2, quotechar='"')
+            if found.shape[1] == len(self.headings):
+                return found
         except ValueError:
-            raise LoadFileError(f"{path}: line {number} holds words; expected {columns} numbers") from None
-    return np.array(rows)
+            pass
+        return self._line_by_line(texts, first)
+
+    def _line_by_line(self, texts: list[str], first: int) -> Floats:
+        """Read slowly, to tell which line and column is wrong."""
+        rows = []
+        for number, text in enumerate(texts, start=first):
+            if not text.strip():
+                continue
+            words = [word.strip().strip('"') for word in text.split(self.separator)]
+            if len(words) != len(self.headings):
+                raise LoadFileError(
+                    f"{self.path}: line {number} has {len(words)} columns; the headings have {len(self.headings)}"
+                )
+            row = np.full(len(words), np.nan)
+            for place in self.wanted:
+                try:
+                    row[place] = fortran_number(words[place])
+                except ValueError:
+                    raise LoadFileError(
+                        f"{self.path}: line {number} holds words where {self.headings[place]!r} has a number: "
+                        f"{words[place][:40]!r}; expected {len(words)} numbers"
+                    ) from None
+            rows.append(row)
+        return np.array(rows)
 
 
 # Tables of numbers as text: OpenFAST's text output, and tables with commas whose headings carry units
@@ -170,7 +216,7 @@ def open_openfast_text(path: Path) -> Channels:
         raise LoadFileError(
             f"{path}: {len(names)} names and {len(units)} units in lines {number + 1} and {number + 2}; a unit for each"
         )
-    return Channels(path, tuple(names[1:]), tuple(units[1:]), units[0], _reader(path, len(names), number + 2, None))
+    return Channels(path, tuple(names[1:]), tuple(units[1:]), units[0], _reader(path, names, number + 2, None))
 
 
 def open_headed_series(path: Path) -> Channels:
@@ -185,7 +231,7 @@ def open_headed_series(path: Path) -> Channels:
     if not is_series(headings):
         raise LoadFileError(f"{path}: its first heading is {headings[0]!r}; a series begins with time_s")
     time, *units = (_unit_of_heading(path, heading) for heading in headings)
-    return Channels(path, headings[1:], tuple(units), time, _reader(path, len(headings), 1, ","))
+    return Channels(path, headings[1:], tuple(units), time, _reader(path, headings, 1, ","))
 
 
 def is_series(headings: tuple[str, ...]) -> bool:
@@ -218,7 +264,7 @@ def headings_of(path: Path) -> tuple[str, ...]:
     return headings
 
 
-def table_rows(path: Path, columns: int) -> Floats:
+def table_rows(path: Path, headings: Sequence[str]) -> Floats:
     """Numbers under the headings of a table with commas that is no series, (lines, columns).
 
     Raises
@@ -227,17 +273,17 @@ def table_rows(path: Path, columns: int) -> Floats:
         As `exugear.exchange.series_files.numbers`, or more than `MOST_ROWS` lines.
     """
     parts: list[Floats] = []
-    for block in numbers(path, columns, 1, ","):
+    for block in numbers(path, headings, 1, ","):
         parts.append(block)
         if sum(map(len, parts)) > MOST_ROWS:
             raise LoadFileError(f"{path}: more than {MOST_ROWS} lines; counted loads have a line for each bin")
     return np.concatenate(parts)
 
 
-def _reader(path: Path, columns: int, skipped: int, separator: str | None) -> Read:
+def _reader(path: Path, headings: Sequence[str], skipped: int, separator: str | None) -> Read:
     def read(places: tuple[int, ...]) -> Iterator[tuple[Floats, Floats]]:
         chosen = [place + 1 for place in places]
-        for rows in numbers(path, columns, skipped, separator):
+        for rows in numbers(path, headings, skipped, separator, {0, *chosen}):
             yield rows[:, 0], rows[:, chosen]
 
     return read
@@ -359,8 +405,6 @@ def _layout(reader: _Reader) -> _Layout:
     times = reader.file.tell()
     rows = times + (4 * steps if kind == WITH_TIME else 0)
     reader.demand(rows - times, "times")
-    if np.any(scales == 0.0):
-        raise LoadFileError(f"{path}: channel {names[1 + int(np.argmin(scales != 0.0))]} has the scale 0; damaged")
     layout = _Layout(int(kind), steps, first, second, scales, offsets, names, units, times, rows)
     reader.demand(rows - times + steps * channels * layout.value.itemsize, "values")
     return layout
@@ -369,6 +413,9 @@ def _layout(reader: _Reader) -> _Layout:
 def _blocks(path: Path, layout: _Layout, places: tuple[int, ...]) -> Iterator[tuple[Floats, Floats]]:
     """Give time and the values of some channels, in the units of the file, by blocks of steps."""
     chosen = list(places)
+    for place in chosen:
+        if layout.scales[place] == 0.0:
+            raise LoadFileError(f"{path}: channel {layout.names[1 + place]} has the scale 0; damaged")
     width = len(layout.scales) * layout.value.itemsize
     each = max(1, BINARY_BLOCK // width)
     with open_regular(path) as file:

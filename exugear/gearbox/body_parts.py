@@ -6,11 +6,17 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.gearbox.named_files import LARGEST_TABLE
-from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase
+from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase, PointForce
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
-from exugear.gearbox.sections.case import LoadCaseSection
-from exugear.gearbox.sections.connections import BearingSection, CouplingSection, JointSection, MountSection
+from exugear.gearbox.sections.case import CaseFile, ForceSection, LoadCaseSection
+from exugear.gearbox.sections.connections import (
+    BearingSection,
+    CouplingSection,
+    JointSection,
+    MountSection,
+    StiffnessSection,
+)
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import GearSection, PinSection
 from exugear.gearbox.units import MM, RPM, UM
@@ -52,7 +58,7 @@ def _family(origin: Origin, family: str, section: BodySection, inertias: str) ->
     """One body, or the planets of a set."""
     inertia = section.inertia.get(inertias)
     if not section.inertia and not section.fixed:
-        inertia = _computed_inertia(origin, section)
+        inertia = _computed_inertia(origin, family, section)
     elif inertia is None and not section.fixed:
         raise origin.fault(
             f"bodies.{family}.inertia: no set {inertias!r}; every moving body "
@@ -90,10 +96,11 @@ def _body(
     )
 
 
-def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
-    """Inertia of the pieces of a body's shape, and of its gears: their blanks, or tubes up to their reference circles.
+def _computed_inertia(origin: Origin, family: str, section: BodySection) -> InertiaSection:
+    """Inertia of the pieces of a body's shape, of all its blanks, and of gears without one.
 
-    A tube begins at the diameter at which the gear is held, or at the shaft where that is thicker.
+    Such a gear is a tube up to its reference circle that begins at the diameter at which the gear is held, or at the
+    shaft where that is thicker.
     """
     tubes: list[Tube] = []
     rings: list[MassProperties] = []
@@ -103,11 +110,13 @@ def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
         for piece in shape.sections:
             tubes.append(_tube(piece, start, shape.material.density_kg_per_m3))
             start += tubes[-1].length
+        places = blank_places(origin.case, family)
+        for name, blank in shape.blanks.items():
+            if name in places:  # others are refused
+                ring = MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, MM * places[name])
+                rings.append(ring)
     for name, z in section.wheels_z_mm.items():
-        blank = shape.blanks.get(name) if shape is not None else None
-        if blank is not None:
-            rings.append(MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, MM * z))
-        elif name in origin.case.gears:
+        if name in origin.case.gears and not (shape is not None and name in shape.blanks):
             tubes.append(gear_tube(origin.case.gears[name], MM * z, tubes))
     total = together([mass_properties(tubes), *rings])
     return InertiaSection.model_construct(
@@ -117,6 +126,27 @@ def _computed_inertia(origin: Origin, section: BodySection) -> InertiaSection:
         transverse_kg_m2=max(total.transverse, 0.5 * total.axial),
         centre_of_mass_z_mm=1e3 * total.centre,
     )
+
+
+def blank_places(case: CaseFile, family: str) -> dict[str, float]:
+    """Where a blank may sit on the shape of a body, by the name of what holds it, mm along the axis.
+
+    These are the gears, bearings, mounts and forces of the body and the place where torques act, as far as they stand
+    on its axis: the seats of an elastic shaft, whether or not the body is elastic.
+    """
+    section = case.bodies[family]
+    places = dict(section.wheels_z_mm)
+    for name, bearing in case.bearings.items():
+        ends = [case.bodies[end] for end in (bearing.body, bearing.on) if end in case.bodies]
+        if family in (bearing.body, bearing.on) and all(end.carrier is None for end in ends):
+            places[name] = bearing.z_mm
+    for name, mount in case.mounts.items():
+        if mount.body == family:
+            places[name] = mount.position_mm[2]
+    places |= {name: force.z_mm for name, force in case.forces.items() if force.body == family}
+    if section.shape is not None and section.shape.torque_z_mm is not None:
+        places["torque"] = section.shape.torque_z_mm
+    return places
 
 
 def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
@@ -311,7 +341,42 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
             for suffix, body, on in origin.instances(key, section.body, section.on)
         )
 
-    return parts_of_each(of_section, origin.case.bearings)
+    return (*parts_of_each(of_section, origin.case.bearings), *_couplings_on_fixed_bodies(origin, bodies))
+
+
+def _holds_on_a_fixed_body(origin: Origin, section: CouplingSection) -> bool:
+    """Tell whether one of the two bodies of a coupling stands still: it then holds the other against turning."""
+    known = [origin.case.bodies[name] for name in section.bodies if name in origin.case.bodies]
+    return len(known) == 2 and [body.fixed for body in known].count(True) == 1
+
+
+def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> Iterator[Bearing]:
+    """Give couplings to fixed bodies as what they are: supports that hold nothing but the spin."""
+    for name, section in origin.case.couplings.items():
+        key = f"couplings.{name}"
+        if _stands_aside(origin, key, section) or not origin.are_enabled(key, *section.bodies):
+            continue
+        if not _holds_on_a_fixed_body(origin, section):
+            continue
+        on, body = sorted(section.bodies, key=lambda one: not origin.case.bodies[one].fixed)
+        seat = origin.case.bearings.get(section.seat or "")
+        place = bodies[body].centre_of_mass_z
+        if seat is not None:
+            place = MM * seat.z_mm
+        damping = section.damping_N_m_s_per_rad
+        if damping is None:
+            damping = origin.case.damping.coupling_time_s * section.stiffness_N_m_per_rad
+        yield Bearing(
+            name=name,
+            family=name,
+            body=body,
+            on=on,
+            position=(*bodies[body].axis, place),
+            stiffness=StiffnessSection(torsion_N_m_per_rad=section.stiffness_N_m_per_rad),
+            catalogue=None,
+            damping=StiffnessSection(torsion_N_m_per_rad=damping),
+            factor=1.0,
+        )
 
 
 def unknown_bearings(origin: Origin) -> dict[str, str]:
@@ -358,6 +423,33 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
     return parts_of_each(of_section, origin.case.mounts)
 
 
+def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce, ...]:
+    """Constant forces and moments on bodies that are enabled.
+
+    Raises
+    ------
+    CaseError
+        A force on the ground, a planet, a body without a place, or one that is not there.
+    """
+
+    def of_section(name: str, section: ForceSection) -> tuple[PointForce, ...]:
+        key = f"forces.{name}"
+        if section.body == GROUND:
+            raise origin.fault(f"{key}.body = {GROUND!r}: the ground takes any force; name a body that moves")
+        if not origin.are_enabled(key, section.body):
+            return ()
+        body = origin.case.bodies[section.body]
+        if body.carrier is not None or body.spin_only:
+            raise origin.fault(
+                f"{key}.body = {section.body!r}: a planet or a spin-only body cannot have a constant force; name one "
+                "on an axis that stands still"
+            )
+        position = _position(bodies[section.body], section.z_mm)
+        return (PointForce(name, section.body, position, (*section.force_N, *section.moment_N_m)),)
+
+    return parts_of_each(of_section, origin.case.forces)
+
+
 def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[str]) -> tuple[Coupling, ...]:
     """Torsional springs between spins; `spinning` are the bodies that can turn.
 
@@ -370,6 +462,8 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
     def of_section(name: str, section: CouplingSection) -> tuple[Coupling, ...]:
         key = f"couplings.{name}"
         if _stands_aside(origin, key, section) or not origin.are_enabled(key, *section.bodies):
+            return ()
+        if _holds_on_a_fixed_body(origin, section):
             return ()
         for body in section.bodies:
             if body not in spinning:

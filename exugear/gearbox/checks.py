@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, stiffness_matrix
+from exugear.gearbox.body_parts import blank_places
+from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, PointForce, stiffness_matrix
 from exugear.gearbox.reading import CaseError, shortened
 from exugear.gearbox.sections.case import CaseFile, OverallSection
 from exugear.gearbox.sections.connections import BearingSection, StiffnessSection
@@ -91,6 +92,21 @@ def faults_of_bodies(case: CaseFile) -> Iterator[str]:
                 yield f"bodies.{family}.wheels_z_mm.{gear}: no such gear; gears are {', '.join(case.gears)}"
         if section.enabled and section.carrier is not None:
             yield from _faults_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
+
+
+def faults_of_blanks(case: CaseFile) -> Iterator[str]:
+    """Tell blanks of stepped shafts that sit nowhere, where the inertia follows from the shape and would lack them.
+
+    Beside an inertia that is stated they matter to the elastic shaft alone, which refuses them.
+    """
+    for family, section in case.bodies.items():
+        if section.shape is None or section.inertia:
+            continue
+        seats = blank_places(case, family)
+        for blank in section.shape.blanks:
+            if blank not in seats:
+                known = ", ".join(seats) or "none yet"
+                yield f"bodies.{family}.shape.blanks.{blank}: no such seat on the body; seats are {known}"
 
 
 def _faults_of_carrier(case: CaseFile, key: str, name: str) -> Iterator[str]:
@@ -288,9 +304,36 @@ def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
 
 
 def faults_of_connection(
-    case: CaseFile, bodies: Iterable[Body], meshes: Iterable[Mesh], couplings: Iterable[Coupling]
+    case: CaseFile,
+    bodies: Iterable[Body],
+    meshes: Iterable[Mesh],
+    couplings: Iterable[Coupling],
+    held: Collection[str],
 ) -> Iterator[str]:
-    """Tell bodies that no mesh, coupling or carrier joins to the overall input."""
+    """Tell bodies that no mesh, coupling or carrier joins to the overall input, nor torsion holds on what stands.
+
+    Parameters
+    ----------
+    held : bodies that bearings or mounts hold against turning, such as a bearing pedestal
+    """
+    lost = [name for name in bodies_apart(case, bodies, meshes, couplings) if name not in held]
+    if lost:
+        aside = [
+            f"; couplings.{name} stands aside while bodies.{section.instead_of} is enabled"
+            for name, section in case.couplings.items()
+            if section.instead_of is not None and set(section.bodies) & set(lost)
+        ]
+        yield (
+            f"bodies {', '.join(lost)} are joined to {case.overall.input} by no "
+            f"mesh, coupling or carrier{''.join(aside)}; the gear train must be one connected whole. What only "
+            "bearings and mounts hold, as a bearing pedestal, needs torsion_N_m_per_rad in one of those on what stands"
+        )
+
+
+def bodies_apart(
+    case: CaseFile, bodies: Iterable[Body], meshes: Iterable[Mesh], couplings: Iterable[Coupling]
+) -> tuple[str, ...]:
+    """Bodies that can move and that no mesh, coupling or carrier joins to the overall input."""
     bodies = tuple(bodies)
     links = [(mesh.pinion, mesh.gear) for mesh in meshes]
     links += [(coupling.first, coupling.second) for coupling in couplings]
@@ -301,17 +344,7 @@ def faults_of_connection(
         if not more:
             break
         reached |= more
-    lost = [body.name for body in bodies if not body.fixed and body.name not in reached]
-    if lost:
-        aside = [
-            f"; couplings.{name} stands aside while bodies.{section.instead_of} is enabled"
-            for name, section in case.couplings.items()
-            if section.instead_of is not None and set(section.bodies) & set(lost)
-        ]
-        yield (
-            f"bodies {', '.join(lost)} are joined to {case.overall.input} by no "
-            f"mesh, coupling or carrier{''.join(aside)}; the gear train must be one connected whole"
-        )
+    return tuple(body.name for body in bodies if not body.fixed and body.name not in reached)
 
 
 def faults_of_torsion(
@@ -393,7 +426,7 @@ def _faults_of_matrix(key: str, section: StiffnessSection) -> Iterator[str]:
         yield f"{key}.matrix: is indefinite, some displacement would release energy; no eigenvalue may be below zero"
 
 
-def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling]]) -> Iterator[str]:
+def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | PointForce]]) -> Iterator[str]:
     """Tell a name that stands twice among meshes, supports and couplings: they share one list in the results.
 
     `parts` are by their table in the file.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
+from decimal import Decimal
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -32,7 +33,7 @@ from fe_ste.flanks import (
     radius_at_roll_length_from_root,
     radius_at_roll_length_from_tip,
 )
-from fe_ste.geometry.gear_relations import UncheckedGear
+from fe_ste.geometry.gear_relations import ROUNDING, UncheckedGear
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
 from fe_ste.geometry.involute import PinionCutter
 from fe_ste.geometry.pair_relations import (
@@ -64,7 +65,10 @@ def gears(origin: Origin) -> dict[str, Gear]:
     """
     plain = {name: _unchecked(name, section) for name, section in origin.case.gears.items()}
     shifted = {**plain, **part_of_each(partial(_with_shift, origin, plain), _flagged(origin, "shift"))}
+    shifted = {name: with_usual_rounding(origin.case.gears[name], gear) for name, gear in shifted.items()}
     fitted = {**shifted, **part_of_each(partial(_with_fitted_tip, origin, shifted), _flagged(origin, "tip"))}
+
+    fitted |= _without_rounded_overlaps(origin, fitted)
 
     def of_section(name: str, section: GearSection) -> Gear:
         gear = fitted[name]
@@ -76,6 +80,36 @@ def gears(origin: Origin) -> dict[str, Gear]:
         )
 
     return part_of_each(of_section, origin.case.gears)
+
+
+def with_usual_rounding(section: GearSection, gear: UncheckedGear) -> UncheckedGear:
+    """Gear with no larger radius at the tip of its tool than fits, where the file leaves the radius to the default.
+
+    At 25 degrees and a dedendum of 1.25 that is 0.318 normal modules; one that the file gives is refused instead.
+    """
+    if "tip_radius" in section.rack.model_fields_set or gear.cutter is not None:
+        return gear
+    fits = gear.largest_rack_rounding
+    if gear.internal:  # an arc that leaves half of the tooth's height to the flank
+        fits = 0.5 * (gear.root_radius - gear.tip_radius) / gear.normal_module
+        if 2.0 * fits > gear.rack.tip_radius:
+            return gear
+    largest = math.floor(1e4 * fits) / 1e4
+    if not 0.0 <= largest < gear.rack.tip_radius:
+        return gear
+    return replace(gear, rack=replace(gear.rack, tip_radius=largest))
+
+
+def smaller_roundings(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str]:
+    """Tell which radii at the tip of a tool are smaller than the usual default, since that does not fit."""
+    for name, section in origin.case.gears.items():
+        usual = section.rack.tip_radius
+        taken = gears[name].rack.tip_radius
+        if taken != usual:
+            yield (
+                f"gears.{name}.rack.tip_radius: the default of {usual:g} does not fit on the tool at "
+                f"{section.normal_pressure_angle_deg:g} deg and its dedendum; {taken:g} is taken, the largest that does"
+            )
 
 
 def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSection]:
@@ -109,6 +143,62 @@ def _with_shift(origin: Origin, gears: Mapping[str, UncheckedGear], name: str, s
             )
         return replace(gears[name], profile_shift=shift)
     raise origin.fault(f"{key}: the gear is in no pair, whose centre distance would give it; give profile_shift")
+
+
+LEAST_PLAY = 1e-12
+"""Backlash that is left where teeth are thinned to have none, m."""
+FEWEST_DECIMALS = 3
+"""Decimals that profile shifts and centre distances (mm) have at least, as tables print them: 0.5 stands for 0.500."""
+
+
+def _rounding(value: float) -> float:
+    """Half a unit of the last digit of a value of the file.
+
+    Examples
+    --------
+    >>> _rounding(0.8532), _rounding(91.5)
+    (5e-05, 0.0005)
+    """
+    exponent = Decimal(repr(value)).as_tuple().exponent
+    return 0.5 * 10.0 ** min(int(exponent), -FEWEST_DECIMALS)
+
+
+def _without_rounded_overlaps(origin: Origin, gears: Mapping[str, UncheckedGear]) -> dict[str, UncheckedGear]:
+    """Gears whose teeth are thinned by what profile shifts and centre distances as printed let flanks overlap.
+
+    Published values are rounded in their last digit: two that leave no backlash may then overlap by some nanometres.
+    The pair gets a backlash of zero; a larger overlap is left for the checks.
+    """
+    changed = dict(gears)
+    for pair_name, section in origin.case.pairs.items():
+        for name, pair in _pairs_of(origin, changed, section.gear):
+            if name != pair_name:
+                continue
+            try:
+                overlap = -pair.circumferential_backlash
+                across = math.cos(pair.working_pressure_angle) / math.cos(pair.gear.transverse_pressure_angle)
+            except ValueError:
+                continue  # what makes the pair impossible is told when it is built
+            shifts = sum(_rounding(origin.case.gears[gear.name].profile_shift) for gear in (pair.pinion, pair.gear))
+            shifts *= 2.0 * math.tan(pair.gear.normal_pressure_angle) * pair.gear.normal_module
+            distance = 2.0 * math.tan(pair.working_pressure_angle) * MM * _rounding(section.centre_distance_mm)
+            least = ROUNDING * pair.gear.normal_module  # what the checks allow for
+            if least < overlap <= shifts / (math.cos(pair.gear.helix_angle) * across) + distance:
+                thinning = pair.gear.tooth_thinning + overlap * across + LEAST_PLAY
+                changed[pair.gear.name] = replace(changed[pair.gear.name], tooth_thinning=thinning)
+    return {name: gear for name, gear in changed.items() if gear is not gears[name]}
+
+
+def rounded_overlaps(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str]:
+    """Tell which teeth were thinned since published values are rounded."""
+    for name, section in origin.case.gears.items():
+        thinned = gears[name].tooth_thinning - sum(thinning_range(section)) / 2.0
+        if thinned > LEAST_PLAY / 2.0:
+            yield (
+                f"gears.{name}: profile shifts and centre distance let the flanks overlap by {1e6 * thinned:.3g} um, "
+                "which lies within the rounding of the digits given; taken with a backlash of zero, the teeth thinner "
+                "by that"
+            )
 
 
 def _with_fitted_tip(

@@ -25,6 +25,7 @@ from exugear.gearbox.parts import (
     LoadCase,
     Mesh,
     PairSpec,
+    PointForce,
     WheelDeviation,
     stiffness_matrix,
 )
@@ -200,6 +201,8 @@ class Gearbox(Displayed):
                 key = f"bearings.{bearing.family}.stiffness"
                 lines.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
         lines += gear_parts.margins_of_roots(self.gear_pairs.values())
+        lines += gear_parts.rounded_overlaps(self._origin, self.gears)
+        lines += gear_parts.smaller_roundings(self._origin, self.gears)
         for name, gear in self.gears.items():
             if gear.is_undercut:
                 start = 2e3 * gear.form_radius
@@ -300,6 +303,11 @@ class Gearbox(Displayed):
         return support_parts.mounts(self._origin)
 
     @cached_property
+    def forces(self) -> tuple[PointForce, ...]:
+        """Constant forces and moments on bodies."""
+        return support_parts.point_forces(self._origin, self.named_bodies)
+
+    @cached_property
     def couplings(self) -> tuple[Coupling, ...]:
         """Torsional springs between spins."""
         return support_parts.couplings(self._origin, self.spinning, [bearing.name for bearing in self.bearings])
@@ -359,14 +367,20 @@ class Gearbox(Displayed):
         The train rolls without them. One that holds the input or the output of the train is no part of how it rolls.
         """
         ends = (self.case.overall.input, self.case.overall.output)
+        mounts = tuple(mount for mount in self.mounts if mount.body in self.apart)
         return {
             bearing.body: Tie(bearing.on, bearing.body)
-            for bearing in self.bearings
+            for bearing in (*self.bearings, *mounts)
             if stiffness_matrix(bearing.stiffness)[5, 5]
             and bearing.body in self.spinning
             and bearing.body not in ends
             and bearing.on not in self.spinning
         }
+
+    @cached_property
+    def apart(self) -> tuple[str, ...]:
+        """Bodies that can move and belong to no train, such as a pedestal between a bearing and the ground."""
+        return checks.bodies_apart(self.case, self.named_bodies.values(), self.meshes, self.couplings)
 
     @property
     def locked(self) -> tuple[str, ...]:
@@ -469,10 +483,12 @@ def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
         ("bearings", lambda: gearbox.bearings),
         ("joints", lambda: gearbox.joints),
         ("mounts", lambda: gearbox.mounts),
+        ("forces", lambda: gearbox.forces),
         ("load cases", lambda: gearbox.load_cases),
         ("pins", lambda: gearbox.pin_offsets),
     ):
         yield checks.Check(name, part, ("places",))
+    yield checks.Check("blanks", lambda: refuse(checks.faults_of_blanks(case)), ("bearings", "mounts", "forces"))
     yield checks.Check("meshes", lambda: gearbox.meshes, ("places", "pairs"))
     yield checks.Check("couplings", lambda: gearbox.couplings, ("bearings",))
     yield checks.Check("deviations", lambda: gearbox.deviations, ("places", "gears"))
@@ -480,7 +496,7 @@ def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
 
 def _checks_of_the_whole(gearbox: Gearbox) -> Iterator[checks.Check]:
     case = gearbox.case
-    elements = ("meshes", "bearings", "mounts", "couplings")
+    elements = ("meshes", "bearings", "mounts", "couplings", "forces")
     for name, faults, needs in (
         ("distances", lambda: checks.faults_of_centre_distances(gearbox.meshes, gearbox.named_bodies), ("meshes",)),
         (
@@ -495,8 +511,10 @@ def _checks_of_the_whole(gearbox: Gearbox) -> Iterator[checks.Check]:
         ),
         (
             "connection",
-            lambda: checks.faults_of_connection(case, gearbox.bodies(), gearbox.meshes, gearbox.couplings),
-            ("ends", "meshes", "couplings"),
+            lambda: checks.faults_of_connection(
+                case, gearbox.bodies(), gearbox.meshes, gearbox.couplings, gearbox.held_by_torsion
+            ),
+            ("ends", "meshes", "couplings", "mounts"),
         ),
         (
             "torsion",
@@ -551,13 +569,14 @@ def _check_train(gearbox: Gearbox) -> None:
             raise CaseError(*(f"{fault}; see {key}" for fault in error.faults)) from None
 
 
-def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling]]:
+def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling | PointForce]]:
     """Parts that exert forces, by their table in the file."""
     return {
         "meshes": gearbox.meshes,
         "bearings": gearbox.bearings,
         "mounts": gearbox.mounts,
         "couplings": gearbox.couplings,
+        "forces": gearbox.forces,
     }
 
 

@@ -133,6 +133,18 @@ class Bearing(Displayed):
 
 
 @dataclass(frozen=True)
+class PointForce:
+    """Constant force and moment on a body, in the axes of the gearbox."""
+
+    name: str
+    body: str
+    position: tuple[float, float, float]
+    """(3,) at zero angles, m."""
+    wrench: tuple[float, float, float, float, float]
+    """Force along x, y, z (N), moment about x, y (N m)."""
+
+
+@dataclass(frozen=True)
 class Coupling:
     """Torsional spring and damper between two spins."""
 

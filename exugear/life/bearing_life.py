@@ -14,6 +14,7 @@ import numpy as np
 
 from exugear.gearbox.parts import Bearing
 from exugear.gearbox.sections.loads import LubricantSection
+from exugear.gearbox.units import KN
 from exugear.life.static_balance import ActingLoads, StaticBalance
 from exugear.system.bearings.duty import Ratings, cage_angles, loads_of_rows, ratings_of
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
@@ -187,7 +188,7 @@ class _Case:
             return np.full(loads.shape, math.nan), math.nan
         viscosity = viscosity_at(oil.temperature_C, oil.viscosity_40_mm2_per_s, oil.viscosity_100_mm2_per_s)
         pitch = rows[0].pitch_diameter
-        limit = fatigue_limit(ratings.static, pitch, section.type)
+        limit = KN * (section.fatigue_load_limit_kN or 0.0) or fatigue_limit(ratings.static, pitch, section.type)
         clean = contamination_factor(oil.cleanliness, pitch)
         ratios = np.array([viscosity_ratio(viscosity, float(one), pitch) for one in speed])
         factors = [

@@ -285,12 +285,15 @@ def _response(parts: Sequence[Floats], sizes: Floats) -> Response:
 
 
 def is_linear(assembly: Assembly) -> bool:
-    """Tell whether forces are proportional to torque: teeth and bearings linear and through the origin, no weight."""
-    weight = any(assembly.gearbox.case.gravity.acceleration_m_per_s2)
+    """Tell whether forces are proportional to torque: teeth and bearings linear and through the origin, no weight.
+
+    Constant forces on bodies are as much in the way as weight is.
+    """
+    constant = any(assembly.gearbox.case.gravity.acceleration_m_per_s2) or bool(assembly.gearbox.forces)
     through_points = bool(assembly.connectors.point_load.any())
     curved = any(element.is_curved or element.bears_beside for element in assembly.elements)
     not_linear = assembly.at_rest.has_rows or through_points or curved or LAWS[assembly.mesh_law].loses_contact
-    return not (not_linear or weight)
+    return not (not_linear or constant)
 
 
 def _torques(torques: Floats, linear: bool) -> Floats:

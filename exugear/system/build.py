@@ -298,7 +298,7 @@ def _supports(gearbox: Gearbox, flexible: Mapping[str, ElasticBody]) -> tuple[Be
     bearings = [
         replace(bearing, factor=1.0) if fixed & {bearing.on, bearing.body} else bearing for bearing in gearbox.bearings
     ]
-    return (*bearings, *(mounts_at_work(gearbox) if flexible else ()))
+    return (*bearings, *mounts_at_work(gearbox, bool(flexible)))
 
 
 def _connectors(

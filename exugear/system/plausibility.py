@@ -310,6 +310,8 @@ LEAST_FORM_MARGIN = 0.02
 Elastic teeth meet a little before and after the path of contact; tables cut off what is beyond the form circle, and
 count it (`fe_ste.contact.kinematics`).
 """
+LARGEST_PRESSURE = 3e9
+"""Pressure at the pitch point that is doubted, Pa: case-hardened flanks bear 1.5 GPa for ever, 2.4 GPa once."""
 PROPOSED_MARGIN = 0.025
 """Part of a flank that a proposed tip diameter leaves."""
 
@@ -357,15 +359,38 @@ class ThicknessRange:
     """Number of teeth of the base tangent; None for internal gears."""
     span: tuple[float, float]
     """Base tangent length over them, m; zero for internal gears."""
+    span_doubt: str = ""
+    """Why an inspector cannot measure over this number of teeth; empty where nothing is in the way."""
 
 
 def thickness_range(gearbox: Gearbox, name: str) -> ThicknessRange:
     """Tooth thickness of a gear within its allowances, and the base tangent length that an inspector finds."""
     gear = gearbox.gears[name]
     thick, thin = (replace(gear, tooth_thinning=thinning) for thinning in thinning_range(gearbox.case.gears[name]))
-    count = None if gear.internal else gear.usual_span
-    spans = (0.0, 0.0) if count is None else (thin.span_measurement(count), thick.span_measurement(count))
-    return ThicknessRange((thin.normal_tooth_thickness, thick.normal_tooth_thickness), count, spans)
+    thickness = (thin.normal_tooth_thickness, thick.normal_tooth_thickness)
+    if gear.internal:
+        return ThicknessRange(thickness, None, (0.0, 0.0))
+    count = gear.usual_span
+    spans = (thin.span_measurement(count), thick.span_measurement(count))
+    return ThicknessRange(thickness, count, spans, _span_doubt(thick, count))
+
+
+def _span_doubt(gear: Gear, count: int) -> str:
+    """Say why the base tangent length over a number of teeth cannot be measured; empty where it can."""
+    needed = gear.span_face_width(count)
+    if gear.face_width <= needed:
+        return (
+            f"gears.{gear.name}.face_width_mm = {1e3 * gear.face_width:g}: too narrow for the base tangent length over "
+            f"{count} teeth, which needs more than {1e3 * needed:.2f} mm (W_k sin beta_b); measure over balls"
+        )
+    touched = gear.span_contact_radius(count)
+    if not gear.root_form_radius <= touched <= gear.tip_form_radius:
+        return (
+            f"gears.{gear.name}: the base tangent length over {count} teeth touches at a diameter of "
+            f"{2e3 * touched:.2f} mm, beyond the flank of {2e3 * gear.root_form_radius:.2f} to "
+            f"{2e3 * gear.tip_form_radius:.2f} mm; measure over balls"
+        )
+    return ""
 
 
 def backlash_range(gearbox: Gearbox, pair: GearPair) -> tuple[float, float, float]:
@@ -420,6 +445,12 @@ def doubts_about_pairs(gearbox: Gearbox) -> Iterator[str]:
                     f"where contact under load ends; the table of {name} counts what it cuts off there; "
                     f"{1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves {100 * PROPOSED_MARGIN:g} %"
                 )
+        if margins.pitch_point_pressure > LARGEST_PRESSURE:
+            yield (
+                f"pairs.{name}: {1e-6 * margins.pitch_point_pressure:.4g} MPa by Hertz at the pitch point under "
+                f"[static_load] ({spec.static_torque:.4g} N m on {spec.pair.pinion.name}): no steel bears more than "
+                f"some {1e-6 * LARGEST_PRESSURE:.0f} MPa; check the unit of torques, module and face widths"
+            )
     for name, gear in gearbox.gears.items():
         thickness = gear.tip_thickness / gear.normal_module
         if thickness < USUAL_TIP_THICKNESS:

@@ -69,7 +69,12 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     amount = np.linalg.norm(beyond, axis=1)
     if not amount.size or amount.max() < ROLLING_TOLERANCE:
         return ""
-    body, direction = divmod(int(np.argmax(np.abs(beyond[np.argmax(amount)]))), BODY_SIZE)
+    motion = np.abs(beyond[np.argmax(amount)])
+    # A body that moves along helical teeth turns others: what nothing holds is the one that moves, not those that turn.
+    other = np.where(np.arange(motion.size) % BODY_SIZE == SPIN, 0.0, motion)
+    if other.max() > ROLLING_TOLERANCE:
+        motion = other
+    body, direction = divmod(int(np.argmax(motion)), BODY_SIZE)
     return f"body {moving[body].name} can {DIRECTIONS[direction]} without resistance; add or stiffen a bearing"
 
 
@@ -77,7 +82,7 @@ def _held_directions(gearbox: Gearbox, variant: Variant, starts: Mapping[str, in
     """Rows over all coordinates, rotations times `TILT_LENGTH`, of what supports, meshes and couplings hold."""
     bodies = {body.name: body for body in gearbox.bodies()}
     size = 6 * len(starts)
-    for support in (*gearbox.bearings, *(mounts_at_work(gearbox) if variant.is_elastic else ())):
+    for support in (*gearbox.bearings, *mounts_at_work(gearbox, variant.is_elastic)):
         motion = np.zeros((6, size))
         for name, sense in ((support.body, 1.0), (support.on, -1.0)):
             if name in starts:

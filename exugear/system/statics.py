@@ -300,7 +300,7 @@ def locked_equilibrium(
     free = assembly.motions @ scipy.linalg.null_space(assembly.motions[held])
     applied = assembly.torque_vector(torques) + (0.0 if other_loads is None else other_loads)
     rest = np.zeros(assembly.size)
-    loads = np.append(applied, assembly.weight)
+    loads = np.append(applied, assembly.constant_forces)
     origin = rest if about is None else about
 
     def solve(assembly: Assembly, start: Floats, meshes: MeshArrays | None, beside: _Beside | None = None) -> Floats:

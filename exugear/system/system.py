@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import Bearing, Body
+from exugear.gearbox.parts import Bearing, Body, PointForce, node_position, seat_key
 from exugear.gearbox.variant import Variant, VariantError
 from exugear.gearbox.versions import MODES, REDUCTION, RUN
 from exugear.system.bearings.duty import OperatingPoint
@@ -297,7 +297,7 @@ class Assembly(Displayed):
         else:
             f = np.array([self._forces_but_of_connectors(x, u, meshes) for x, u in zip(q, v, strict=True)])
         add_connector_forces(q, v, self.connectors, f)
-        return f + self.weight
+        return f + self.constant_forces
 
     def _forces_but_of_connectors(self, q: Floats, v: Floats, meshes: MeshArrays) -> Floats:
         f = self.mesh_forces(q, v, meshes)
@@ -310,8 +310,11 @@ class Assembly(Displayed):
         return f
 
     @cached_property
-    def weight(self) -> Floats:
-        """Generalized forces of gravity, shape (size,); those on bodies in turning frames turn with them."""
+    def constant_forces(self) -> Floats:
+        """Generalized forces that never change, shape (size,): of gravity, and of forces on bodies.
+
+        Gravity of bodies in turning frames is not among them: it turns with them.
+        """
         f = np.zeros(self.size)
         acceleration = np.array(self.gearbox.case.gravity.acceleration_m_per_s2)
         for body in self.bodies:
@@ -322,7 +325,26 @@ class Assembly(Displayed):
                 continue
             reduced = self.elastic_bodies[name].reduced
             f[elastic_slice] = reduced.mass @ reduced.rigid_motions(reduced.seats[0].position)[:, :3] @ acceleration
+        for force in self.gearbox.forces:
+            first, node = self._node_under(force)
+            if first >= 0:
+                x, y, z = np.subtract(force.position, node)
+                f_x, f_y, f_z, m_x, m_y = force.wrench
+                moments = (m_x + y * f_z - z * f_y, m_y + z * f_x - x * f_z)
+                f[first : first + 5] += (f_x, f_y, f_z, *moments)
         return f
+
+    def _node_under(self, force: PointForce) -> tuple[int, Floats]:
+        """First coordinate and place (m) of what a force acts on: its seat, or the body; -1 for what cannot move."""
+        elastic = self.elastic_bodies.get(force.body)
+        if elastic is None:
+            body = next(body for body in self.gearbox.bodies(self.inertias) if body.name == force.body)
+            return self.coordinates.get(force.body, (-1,))[0], node_position(body)
+        places = {seat.name: np.array(seat.position) for seat in elastic.reduced.seats}
+        seat = elastic.shared_seats.get(force.name, force.name)
+        if seat not in places:
+            seat = elastic.main_seat
+        return self.coordinates[seat_key(force.body, seat)][0], places[seat]
 
     def torque_vector(self, torques: Mapping[str, float]) -> Floats:
         """Generalized forces of torques about the bodies' spin axes (N m), shape (size,)."""

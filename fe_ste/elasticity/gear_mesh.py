@@ -31,7 +31,7 @@ HEXAHEDRON_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6,
 _LINE_MARGIN = 0.1
 
 #: Part of a flank's roll angle by which a contact line may lie outside the flank for the tooth to be meshed.
-_MESHED_BEYOND = 0.2
+_MESHED_BEYOND = 0.15
 
 
 @dataclass(frozen=True)
@@ -230,7 +230,7 @@ def refined_gears(
 
 
 def meshed_teeth(pair: GearPair, pmc: float) -> range:
-    """Tooth pairs that touch at `pmc`, or would if the flanks were longer by a fifth at either end.
+    """Tooth pairs that touch at `pmc`, or would if the flanks were longer by 15 % at either end.
 
     Under load contact begins early and ends late, by far less than that. At least one tooth of either gear is left.
     """

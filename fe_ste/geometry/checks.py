@@ -12,7 +12,12 @@ import numpy as np
 
 from fe_ste.geometry.gear_relations import ROUNDING, UncheckedGear, root_fillet
 from fe_ste.geometry.involute import PinionCutter, involute
-from fe_ste.geometry.pair_relations import UncheckedPair
+from fe_ste.geometry.pair_relations import (
+    FILLET_TOLERANCE,
+    UncheckedPair,
+    corner_clear_tip_diameter,
+    corner_to_fillet_gap,
+)
 
 LEAST_TEETH = 5
 """Fewest teeth; below lie worms and pump rotors."""
@@ -28,8 +33,6 @@ LARGEST_HELIX_ANGLE = math.radians(50.0)
 """Largest magnitude of the helix angle at the reference circle, rad."""
 LENGTH_TOLERANCE = ROUNDING
 """Rounding allowed for when lengths are compared, in normal modules."""
-FILLET_TOLERANCE = 1e-5
-"""Error of the fillet as a polygon when a tip corner is led past it, in normal modules."""
 
 
 class GeometryError(ValueError):
@@ -96,8 +99,19 @@ def _refuse_pair(pair: UncheckedPair, key: str, value: str, remedy: str) -> Geom
     return GeometryError(f"gear pair '{pair.name}': {key} = {value} {remedy}")
 
 
-def _mm(length: float) -> str:
-    return f"{1e3 * length:.4f} mm"
+def _mm(length: float, beside: float | None = None) -> str:
+    """Length as messages show it, with as many digits more as tell it from another one that stands beside it."""
+    digits = 4
+    while beside is not None and digits < 12 and f"{1e3 * length:.{digits}f}" == f"{1e3 * beside:.{digits}f}":
+        digits += 1
+    return f"{1e3 * length:.{digits}f} mm"
+
+
+def _small(length: float) -> str:
+    """Size of an overlap: in micrometres where four decimals of a millimetre would not show it."""
+    if length >= 5e-6:
+        return _mm(length)
+    return f"{1e6 * length:.3g} um"
 
 
 def _deg(angle: float) -> str:
@@ -173,10 +187,8 @@ def _check_generating_rack(gear: UncheckedGear) -> None:
     """Refuse a rounding that does not fit on the rack's tooth."""
     if gear.rack_tip_half_land >= -LENGTH_TOLERANCE * gear.normal_module:
         return
-    angle = gear.normal_pressure_angle
     radius = gear.rack.tip_radius
-    growth = 1.0 / math.cos(angle) - math.tan(angle)
-    largest = radius + gear.rack_tip_half_land / gear.normal_module / growth
+    largest = gear.largest_rack_rounding
     if largest < 0.0:
         remedy = "makes the generating rack pointed: a smaller one is needed"
         raise _refuse_gear(gear, "rack.dedendum", f"{gear.dedendum_factor:.4f}", remedy)
@@ -384,8 +396,9 @@ def _check_centre_distance(pair: UncheckedPair) -> None:
         raise _refuse_pair(pair, "centre_distance", f"{pair.centre_distance!r}", remedy)
     least = abs(pair.pinion.base_radius + pair.gear.outward * pair.gear.base_radius)
     if pair.centre_distance <= least:
-        remedy = f"is too small: no line of action touches both base circles below {_mm(least)}"
-        raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
+        distance = pair.centre_distance
+        remedy = f"is too small: no line of action touches both base circles below {_mm(least, distance)}"
+        raise _refuse_pair(pair, "centre_distance", _mm(distance, least), remedy)
 
 
 def _check_backlash(pair: UncheckedPair) -> None:
@@ -398,8 +411,9 @@ def _check_backlash(pair: UncheckedPair) -> None:
         value = f"{pair.gear.profile_shift:g}"
         raise _refuse_pair(pair, f"profile_shift of '{pair.gear.name}'", value, remedy)
     word, bound = ("large", "at most") if pair.gear.internal else ("small", "at least")
-    remedy = f"is too {word}: the flanks would overlap by {_mm(-backlash)}; {bound} {_mm(limit)} is needed"
-    raise _refuse_pair(pair, "centre_distance", _mm(pair.centre_distance), remedy)
+    distance = pair.centre_distance
+    remedy = f"is too {word}: the flanks would overlap by {_small(-backlash)}; {bound} {_mm(limit, distance)} is needed"
+    raise _refuse_pair(pair, "centre_distance", _mm(distance, limit), remedy)
 
 
 def _check_tip_clearances(pair: UncheckedPair) -> None:
@@ -410,8 +424,10 @@ def _check_tip_clearances(pair: UncheckedPair) -> None:
         if clearance <= 0.0:
             bound = tip.tip_radius + tip.outward * clearance
             word = "above" if tip.internal else "below"
-            remedy = f"runs {_mm(-clearance)} into the root of '{root.name}': {word} {_mm(2.0 * bound)} needed"
-            raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
+            given = 2.0 * tip.tip_radius
+            needed = _mm(2.0 * bound, given)
+            remedy = f"runs {_small(-clearance)} into the root of '{root.name}': {word} {needed} needed"
+            raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(given, 2.0 * bound), remedy)
 
 
 def _check_tip_interference(pair: UncheckedPair) -> None:
@@ -431,10 +447,10 @@ def _check_tip_interference(pair: UncheckedPair) -> None:
             word = "at least" if tip.internal else "at most"
             remedy = (
                 f"interferes with the root fillet of '{mate.name}', which begins at the form diameter "
-                f"{_mm(2.0 * mate.form_radius)}: {word} {_mm(bound)} is needed"
+                f"{_mm(2.0 * mate.form_radius)}: {word} {_mm(bound, 2.0 * tip.tip_form_radius)} is needed"
             )
             key = "tip_diameter" if tip.tip_form_diameter is None else "tip_form_diameter"
-            raise _refuse_pair(pair, f"{key} of '{tip.name}'", _mm(2.0 * tip.tip_form_radius), remedy)
+            raise _refuse_pair(pair, f"{key} of '{tip.name}'", _mm(2.0 * tip.tip_form_radius, bound), remedy)
 
 
 def _check_contact(pair: UncheckedPair) -> None:
@@ -451,60 +467,15 @@ def _check_fillet_clearance(pair: UncheckedPair) -> None:
         if gap < -FILLET_TOLERANCE * tip.normal_module:
             word = "larger" if tip.internal else "smaller"
             tool = "rack" if mate.cutter is None else "cutter"
+            clear = corner_clear_tip_diameter(pair, tip)
+            would_do = ""
+            if clear is not None:
+                would_do = f", such as {_mm(clear)} (fitted_tip = true takes it)"
             remedy = (
-                f"interferes with the root fillet of '{mate.name}', its corner cuts {_mm(-gap)} into it: "
-                f"a {word} one, or a smaller {tool}.tip_radius of '{mate.name}', is needed"
+                f"interferes with the root fillet of '{mate.name}', its corner cuts {_small(-gap)} into it: "
+                f"a {word} one{would_do}, or a smaller {tool}.tip_radius of '{mate.name}', is needed"
             )
             raise _refuse_pair(pair, f"tip_diameter of '{tip.name}'", _mm(2.0 * tip.tip_radius), remedy)
-
-
-def corner_to_fillet_gap(pair: UncheckedPair, tip: UncheckedGear, mate: UncheckedGear) -> float:
-    """Least gap between the way of a tip's corners and the mate's root fillet.
-
-    The corner leaves the line of action at the end of the path of contact and goes deeper than there. The
-    flanks are taken in contact, as on the path of contact. A chamfer makes two corners, at the tip form circle and,
-    as far from the flank as it is high, at the tip circle.
-
-    Parameters
-    ----------
-    pair : the pair
-    tip, mate : the gear whose tip corner moves and the gear whose fillet it passes
-
-    Returns
-    -------
-    float
-        Arc about the mate's axis, m; negative if the corner cuts into the fillet, infinite if it does not get
-        below the form circle.
-    """
-    corners = [(tip.tip_form_radius, tip.half_angle(tip.tip_form_radius))]
-    chamfer = abs(tip.tip_radius - tip.tip_form_radius)
-    if chamfer > 0.0:
-        corners.append((tip.tip_radius, corners[0][1] - chamfer / tip.tip_radius))
-    return min(_corner_gap(pair, tip, mate, *corner) for corner in corners)
-
-
-def _corner_gap(
-    pair: UncheckedPair, tip: UncheckedGear, mate: UncheckedGear, radius: float, half_angle_of_corner: float
-) -> float:
-    distance = pair.centre_distance
-    # Origin on the tip's axis, x along the line of centres to the pitch point; x as the mate sees it is
-    # to_mate * distance + turn * x.
-    to_mate = -1.0 if tip.internal else 1.0
-    turn = -float(pair.gear.outward)
-    cosine = to_mate * turn * (mate.form_radius**2 - distance**2 - radius**2) / (2.0 * distance * radius)
-    if cosine >= 1.0:
-        return math.inf
-    corner = np.linspace(-1.0, 1.0, 1001) * math.acos(max(cosine, -1.0))
-    x = to_mate * distance + turn * radius * np.cos(corner)
-    y = radius * np.sin(corner)
-    seen_radius = np.hypot(x, y)
-    seen_angle = np.arctan2(y, x)
-    # The flanks touch at the pitch point at rotation zero.
-    rotation = corner - half_angle_of_corner + tip.half_angle(pair.working_radius(tip))
-    mate_tooth = mate.half_angle(pair.working_radius(mate)) + rotation * tip.teeth / mate.teeth
-    fillet = root_fillet(mate, np.linspace(0.0, 1.0, 2001))[:: -mate.outward]
-    half_angle = np.interp(seen_radius, np.hypot(*fillet.T), np.arctan2(fillet[:, 1], fillet[:, 0]))
-    return float(np.min(seen_radius * (mate_tooth - half_angle - seen_angle)))
 
 
 def _check_tips_pass(pair: UncheckedPair) -> None:

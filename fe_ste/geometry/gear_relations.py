@@ -174,7 +174,9 @@ class UncheckedGear:
     def usual_span(self) -> int:
         """Number of teeth over which `span_measurement` touches external flanks nearest to their middle."""
         middle = self.reference_radius + self.normal_module * self.profile_shift
-        half_length = math.sqrt(max(middle**2 - self.base_radius**2, 0.0)) * math.cos(self.base_helix_angle)
+        # The planes touch the flanks half a span away from the axis, along normals at the base helix angle: seen along
+        # the axis that is W_k cos(beta_b) / 2 on the tangent of the base circle.
+        half_length = math.sqrt(max(middle**2 - self.base_radius**2, 0.0)) / math.cos(self.base_helix_angle)
         pitch = self.transverse_base_pitch * math.cos(self.base_helix_angle)
         return max(2, round((2.0 * half_length - self.span_measurement(0)) / pitch))
 
@@ -189,6 +191,19 @@ class UncheckedGear:
         """
         thickness = 2.0 * self.base_radius * self.half_angle(self.base_radius)
         return ((teeth - 1) * self.transverse_base_pitch + thickness) * math.cos(self.base_helix_angle)
+
+    def span_contact_radius(self, teeth: int) -> float:
+        """Radius at which the planes of `span_measurement` touch the flanks, m (DIN 3960: d_M / 2)."""
+        tangent = 0.5 * self.span_measurement(teeth) * math.cos(self.base_helix_angle)
+        return math.hypot(self.base_radius, tangent)
+
+    def span_face_width(self, teeth: int) -> float:
+        """Face width above which both planes of `span_measurement` find the flanks of a helical gear, m.
+
+        The normals of the flanks lean by the base helix angle, so that one plane touches that far along the axis
+        from the other.
+        """
+        return self.span_measurement(teeth) * abs(math.sin(self.base_helix_angle))
 
     @property
     def tip_thickness(self) -> float:
@@ -364,6 +379,13 @@ class UncheckedGear:
         taper = (self.dedendum_factor - rack.tip_radius) * math.tan(angle) + rack.tip_radius / math.cos(angle)
         widening = 0.5 * self.tooth_thinning * math.cos(self.helix_angle)
         return self.normal_module * (0.25 * math.pi - taper) + widening
+
+    @property
+    def largest_rack_rounding(self) -> float:
+        """Largest radius that fits on the tip of the generating rack, in normal modules; negative on a pointed one."""
+        angle = self.normal_pressure_angle
+        growth = 1.0 / math.cos(angle) - math.tan(angle)
+        return self.rack.tip_radius + self.rack_tip_half_land / self.normal_module / growth
 
     @overload
     def half_angle(self, radius: float) -> float: ...

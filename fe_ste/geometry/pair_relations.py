@@ -6,9 +6,11 @@ Nothing is refused here, as in `fe_ste.geometry.gear_relations`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
-from fe_ste.geometry.gear_relations import UncheckedGear
+import numpy as np
+
+from fe_ste.geometry.gear_relations import UncheckedGear, root_fillet
 from fe_ste.geometry.involute import inverse_involute, involute
 
 
@@ -162,6 +164,61 @@ class UncheckedPair:
         return self.pinion.angular_pitch * r_1 - thickness
 
 
+# Way of a tip's corners past the root fillet of its mate
+
+FILLET_TOLERANCE = 1e-5
+"""Error of the fillet as a polygon when a tip corner is led past it, in normal modules."""
+
+
+def corner_to_fillet_gap(pair: UncheckedPair, tip: UncheckedGear, mate: UncheckedGear) -> float:
+    """Least gap between the way of a tip's corners and the mate's root fillet.
+
+    The corner leaves the line of action at the end of the path of contact and goes deeper than there. The
+    flanks are taken in contact, as on the path of contact. A chamfer makes two corners, at the tip form circle and,
+    as far from the flank as it is high, at the tip circle.
+
+    Parameters
+    ----------
+    pair : the pair
+    tip, mate : the gear whose tip corner moves and the gear whose fillet it passes
+
+    Returns
+    -------
+    float
+        Arc about the mate's axis, m; negative if the corner cuts into the fillet, infinite if it does not get
+        below the form circle.
+    """
+    corners = [(tip.tip_form_radius, tip.half_angle(tip.tip_form_radius))]
+    chamfer = abs(tip.tip_radius - tip.tip_form_radius)
+    if chamfer > 0.0:
+        corners.append((tip.tip_radius, corners[0][1] - chamfer / tip.tip_radius))
+    return min(_corner_gap(pair, tip, mate, *corner) for corner in corners)
+
+
+def _corner_gap(
+    pair: UncheckedPair, tip: UncheckedGear, mate: UncheckedGear, radius: float, half_angle_of_corner: float
+) -> float:
+    distance = pair.centre_distance
+    # Origin on the tip's axis, x along the line of centres to the pitch point; x as the mate sees it is
+    # to_mate * distance + turn * x.
+    to_mate = -1.0 if tip.internal else 1.0
+    turn = -float(pair.gear.outward)
+    cosine = to_mate * turn * (mate.form_radius**2 - distance**2 - radius**2) / (2.0 * distance * radius)
+    if cosine >= 1.0:
+        return math.inf
+    corner = np.linspace(-1.0, 1.0, 1001) * math.acos(max(cosine, -1.0))
+    x = to_mate * distance + turn * radius * np.cos(corner)
+    y = radius * np.sin(corner)
+    seen_radius = np.hypot(x, y)
+    seen_angle = np.arctan2(y, x)
+    # The flanks touch at the pitch point at rotation zero.
+    rotation = corner - half_angle_of_corner + tip.half_angle(pair.working_radius(tip))
+    mate_tooth = mate.half_angle(pair.working_radius(mate)) + rotation * tip.teeth / mate.teeth
+    fillet = root_fillet(mate, np.linspace(0.0, 1.0, 2001))[:: -mate.outward]
+    half_angle = np.interp(seen_radius, np.hypot(*fillet.T), np.arctan2(fillet[:, 1], fillet[:, 0]))
+    return float(np.min(seen_radius * (mate_tooth - half_angle - seen_angle)))
+
+
 # Inputs of gears that follow from their mates: profile shifts from centre distances, tips that keep clear
 
 ROOT_MARGIN = 0.1
@@ -253,4 +310,54 @@ def fitted_tip_diameter(pair: UncheckedPair, tip: UncheckedGear) -> float:
         bound = mate.root_radius - pair.centre_distance - clearance
     clear = 0.5 * clear_tip_diameter(pair, tip, ROOT_MARGIN * module)
     pick = max if tip.internal else min
-    return 2.0 * pick(tip.tip_radius, bound, clear)
+    fitted = 2.0 * pick(tip.tip_radius, bound, clear)
+    shorter = with_tip_diameter(tip, fitted)
+    beside = _with_gear(pair, tip, shorter)
+    if corner_to_fillet_gap(beside, shorter, mate) >= -FILLET_TOLERANCE * module:
+        return fitted
+    return corner_clear_tip_diameter(beside, shorter) or fitted
+
+
+def with_tip_diameter(gear: UncheckedGear, diameter: float) -> UncheckedGear:
+    """Return a gear with another tip diameter (m), unchecked; a chamfer keeps its height."""
+    inputs = {field.name: getattr(gear, field.name) for field in fields(UncheckedGear)}
+    if gear.tip_form_diameter is not None:
+        inputs["tip_form_diameter"] = gear.tip_form_diameter + diameter - 2.0 * gear.tip_radius
+    return UncheckedGear(**inputs | {"tip_diameter": diameter})
+
+
+def _with_gear(pair: UncheckedPair, before: UncheckedGear, after: UncheckedGear) -> UncheckedPair:
+    """Return the pair with one of its gears replaced; unchecked, whatever the pair was."""
+    first, second = (after if gear is before else gear for gear in (pair.pinion, pair.gear))
+    return UncheckedPair(
+        name=pair.name,
+        pinion=first,
+        gear=second,
+        centre_distance=pair.centre_distance,
+        common_face_width=pair.common_face_width,
+    )
+
+
+def corner_clear_tip_diameter(pair: UncheckedPair, tip: UncheckedGear) -> float | None:
+    """Tip diameter, m, at which the corners of a gear pass the fillet of its mate.
+
+    The least change of the tip does, rounded to hundredths of a millimetre on the side that clears; None where the
+    tooth would have to end at its working circle.
+    """
+    mate = pair.pinion if tip is pair.gear else pair.gear
+
+    def is_clear(diameter: float) -> bool:
+        changed = with_tip_diameter(tip, diameter)
+        return corner_to_fillet_gap(_with_gear(pair, tip, changed), changed, mate) >= 0.0
+
+    cutting = 2.0 * tip.tip_radius
+    clear = 2.0 * pair.working_radius(tip)
+    if (cutting - clear) * tip.outward <= 0.0 or not is_clear(clear):
+        return None
+    while abs(clear - cutting) > 1e-7:
+        middle = 0.5 * (cutting + clear)
+        if is_clear(middle):
+            clear = middle
+        else:
+            cutting = middle
+    return 1e-5 * tip.outward * math.floor(1e5 * tip.outward * clear)

@@ -324,8 +324,8 @@ def stress_of_state(
 ) -> StressField:
     """Stresses under the contact pressures that the superelement gives, by linear finite elements.
 
-    Both gears are open sectors, whose cut faces are free: stress near the contact is right, that at roots is too high
-    (a pinion of the GRC: by 16 % with five teeth, 4 % with nine). `fe_ste.root_stress` has roots of the closed ring.
+    Both gears are whole unless `settings` says otherwise; of an open sector stress near the contact is right, that at
+    the roots is not.
 
     Parameters
     ----------

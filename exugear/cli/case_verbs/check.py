@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -75,6 +75,7 @@ def check(
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
             summary["tooth_thickness"] = thicknesses
+            summary["forces"] = _force_summaries(gearbox)
             found: dict[str, Any] = {"bearings": bearings, "load_cases": loads, "variants": variants, "steady": steady}
             found["life"] = {verb: list(reasons) for verb, reasons in lives.items()}
             found["warnings"] = warnings
@@ -89,6 +90,11 @@ def check(
                 print_table(
                     "Tooth thickness within its allowances", [_thickness_row(thickness) for thickness in thicknesses]
                 )
+                for thickness in thicknesses:
+                    if thickness["span_doubt"]:
+                        note(thickness["span_doubt"], style="yellow")
+            if gearbox.forces:
+                print_table("Constant forces on bodies", [_force_row(force) for force in _force_summaries(gearbox)])
             if loads:
                 band = 1e-3 * loads[0]["band_Hz"]
                 title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}; runs keep {band:g} kHz"
@@ -100,19 +106,26 @@ def check(
                 say("Axial loads are those of the shaft on the inner ring, positive along +z")
                 if any(bearing["reaction_kN"] is not None for bearing in bearings):
                     say("* stated by the file, which the stiffness goes by")
-            for variant, reason in variants.items():
-                say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
-            for reason in dict.fromkeys(filter(None, steady.values())):
-                names = ", ".join(variant for variant in steady if steady[variant] == reason)
-                say(f"steady response ({names}): not possible, {reason}")
-            for verb, reasons in lives.items():
-                for line in [f"not possible, {reason}" for reason in reasons] or ["possible"]:
-                    say(f"{verb}: {line}")
+            _tell_possibilities(variants, steady, lives)
             for line in counted([f"Warning: {line}" for line in warnings]):
                 note(line, style="yellow")
         for one in loads:
             for doubt in one["doubts"]:
                 note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")
+
+
+def _tell_possibilities(
+    variants: Mapping[str, str], steady: Mapping[str, str], lives: Mapping[str, Sequence[str]]
+) -> None:
+    """Print which variants and which verbs are possible, and why others are not."""
+    for variant, reason in variants.items():
+        say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
+    for reason in dict.fromkeys(filter(None, steady.values())):
+        names = ", ".join(variant for variant in steady if steady[variant] == reason)
+        say(f"steady response ({names}): not possible, {reason}")
+    for verb, reasons in lives.items():
+        for line in [f"not possible, {reason}" for reason in reasons] or ["possible"]:
+            say(f"{verb}: {line}")
 
 
 def _rate(case: Path, out: Path | None, files_below: Path | None, as_json: bool) -> None:
@@ -245,9 +258,34 @@ def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                     "normal_tooth_thickness_mm": [1e3 * end for end in one.thickness],
                     "span_teeth": one.span_teeth,
                     "base_tangent_length_mm": [1e3 * end for end in one.span] if one.span_teeth else None,
+                    "span_doubt": one.span_doubt or None,
                 }
             )
     return summaries
+
+
+def _force_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
+    """Sum up the constant forces on bodies."""
+    return [
+        {
+            "force": force.name,
+            "body": force.body,
+            "z_mm": 1e3 * force.position[2],
+            "force_N": list(force.wrench[:3]),
+            "moment_N_m": list(force.wrench[3:]),
+        }
+        for force in gearbox.forces
+    ]
+
+
+def _force_row(force: dict[str, Any]) -> dict[str, str]:
+    return {
+        "force": force["force"],
+        "on": force["body"],
+        "at z\nmm": f"{force['z_mm']:g}",
+        "along x, y, z\nkN": " / ".join(f"{1e-3 * value:.4g}" for value in force["force_N"]),
+        "about x, y\nN m": " / ".join(f"{value:.4g}" for value in force["moment_N_m"]),
+    }
 
 
 def _thickness_row(one: dict[str, Any]) -> dict[str, str]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from exugear.cli.case import DistanceRule, DistancesOption, JsonOption, ShiftRule, ShiftsOption
-from exugear.cli.console import BadInputError, exit_codes, note, print_json, say
+from exugear.cli.console import BadInputError, counted, exit_codes, note, print_json, say
 
 if TYPE_CHECKING:
     from exugear.exchange.rexs.to_case.conversion import Imported
@@ -54,12 +54,18 @@ def import_(
                     "ratio": imported.gearbox.train.ratio,
                     "changed": list(imported.changed),
                     "checked": list(imported.checked),
+                    "left_out": list(imported.lost),
                     "ignored": list(imported.ignored),
                 }
             )
             return
+        for line in counted([f"left out: {line}" for line in imported.lost]):
+            note(line, style="yellow")
         for line in imported.changed:
             note(line, style="yellow")
+        besides = len(imported.ignored) - len(imported.lost)
+        if besides:
+            note(f"left out besides, without effect on numbers here: {besides} lines in the head of {target.name}")
         say(
             f"{target}: ratio {imported.gearbox.train.ratio:.6f}, {len(imported.gearbox.pairs)} gear pairs, "
             f"{len(imported.gearbox.bearings)} bearings"

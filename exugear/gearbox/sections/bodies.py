@@ -87,7 +87,8 @@ class BlankSection(Section):
 class ShapeSection(Section):
     """A stepped shaft, from `start_z_mm` on; its gears and bearings, and where torques act, become its seats.
 
-    `blanks` are by the name of the gear or bearing.
+    `blanks` are by the name of the gear, bearing or mount that they sit with, or `torque`. They count in the inertia
+    that follows from the shape, in every variant.
     """
 
     start_z_mm: q.PlaceMm
@@ -99,7 +100,7 @@ class ShapeSection(Section):
     material: MaterialSection = MaterialSection()
     """Elastic material, steel by default."""
     blanks: dict[Name, BlankSection] = {}
-    """Rigid rings on its seats, by gear or bearing; `torque` for the place where torques act."""
+    """Rigid rings on its seats, by gear, bearing or mount; `torque` for the place where torques act."""
 
 
 class SolidSeatSection(Section):

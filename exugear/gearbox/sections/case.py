@@ -70,6 +70,32 @@ class LoadCaseSection(Section):
         return self
 
 
+class ForceSection(Section):
+    """Constant force and moment on a body, in the axes of the gearbox: the thrust of a propeller, a belt, a rotor.
+
+    It acts in static states, runs, steady responses and lives alike, whatever the torques are, as weight does; in the
+    variant `rigid` ideal joints take it. Where an elastic shaft has it, a seat is made there; on a solid it acts at
+    the seat of its name if there is one, else at the main seat with its moment about that.
+    """
+
+    body: Name
+    """Body that it acts on; no planet, and none that only spins."""
+    z_mm: q.PlaceMm
+    """Place along the axis of the body where it acts."""
+    force_N: Annotated[tuple[q.ForceN, q.ForceN, q.ForceN], Field(strict=False)] = (0.0, 0.0, 0.0)
+    """Force along x, y and z."""
+    moment_N_m: Annotated[tuple[q.TorqueNm, q.TorqueNm], Field(strict=False)] = (0.0, 0.0)
+    """Moment about x and y; torques about z stand in `[static_load]` and `[load_cases]`."""
+    description: Text = ""
+    """Words for people."""
+
+    @model_validator(mode="after")
+    def _acts(self) -> ForceSection:
+        if not any((*self.force_N, *self.moment_N_m)):
+            raise ValueError("give a force_N = [x, y, z] or a moment_N_m = [x, y] that is not zero")
+        return self
+
+
 class OverallSection(Section):
     """Which spins the overall transmission error compares, and where its length is taken."""
 
@@ -202,7 +228,19 @@ class SteSection(Section):
 
 Label = Annotated[Text, Field(min_length=1, max_length=80)]
 """Words for a name: short, since tables and diagrams hold them."""
-NAMED_TABLES = ("bodies", "bearings", "joints", "mounts", "couplings", "meshes", "pairs", "gears", "load_cases", "pins")
+NAMED_TABLES = (
+    "bodies",
+    "bearings",
+    "joints",
+    "mounts",
+    "couplings",
+    "meshes",
+    "pairs",
+    "gears",
+    "load_cases",
+    "forces",
+    "pins",
+)
 """Tables whose entries may have a label."""
 
 
@@ -233,6 +271,8 @@ class CaseFile(Section):
     """Pairs at work between bodies, by name."""
     load_cases: Entries[LoadCaseSection]
     """Load cases in time, by name; the first is the default."""
+    forces: Entries[ForceSection] = {}
+    """Constant forces and moments on bodies, by name."""
     joints: Entries[JointSection] = {}
     """Ideal joints of the variant `rigid`, by name."""
     bearings: Entries[BearingSection] = {}

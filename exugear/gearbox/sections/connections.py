@@ -173,6 +173,8 @@ class CatalogueSection(Section):
     """Dynamic load rating as the catalogue prints it, of a pair that of both; by ISO 281 by default."""
     static_rating_kN: q.RatingKN | None = None
     """Static load rating as the catalogue prints it, of a pair that of both; by ISO 76 by default."""
+    fatigue_load_limit_kN: q.RatingKN | None = None
+    """Fatigue load limit C_u (P_u) as the catalogue prints it, of a pair that of both; by ISO 281 by default."""
     radial_load_kN: q.RadialLoadKN | None = None
     """Load that the stiffness belongs to; that of the statics by default."""
     axial_load_kN: q.AxialLoadKN | None = None
@@ -193,6 +195,11 @@ class CatalogueSection(Section):
             raise ValueError("rib_contact_mm needs ribs = '+z', '-z' or 'both'")
         if self.axial_preload_um != 0.0 and self.arrangement not in ("X", "O"):
             raise ValueError("axial_preload_um needs arrangement = 'X' or 'O': one bearing alone has none")
+        if self.static_rating_kN and (self.fatigue_load_limit_kN or 0.0) >= self.static_rating_kN:
+            raise ValueError(
+                f"fatigue_load_limit_kN = {self.fatigue_load_limit_kN:g} must be below static_rating_kN = "
+                f"{self.static_rating_kN:g}: it is some 1/22 of it for ball bearings, 1/8 for roller bearings"
+            )
         if self.axial_load_kN is not None and self.radial_load_kN is None:
             raise ValueError(
                 "axial_load_kN stands beside radial_load_kN: give both, or none to take the load of the statics"
@@ -317,6 +324,9 @@ class BearingSection(Section):
 class MountSection(Section):
     """Elastic support of the gearbox on the ground; there where a fixed body is elastic, which else is the ground.
 
+    A body that only bearings and mounts hold, such as a bearing pedestal, is held by its mounts in every variant on
+    bearings; one of them, or of its bearings on what stands, has torsion.
+
     One that stands for a body (`instead_of`) steps aside when that body is enabled.
     """
 
@@ -333,7 +343,7 @@ class MountSection(Section):
 
 
 class CouplingSection(Section):
-    """Torsional spring between the spins of two bodies on one axis.
+    """Torsional spring between the spins of two bodies on one axis; one that stands still holds the other.
 
     It acts at the `seat` of elastic bodies, a bearing's name, and where torques act on those without such a seat. One
     that stands for a body (`instead_of`) steps aside when that body is enabled.

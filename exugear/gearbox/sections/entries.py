@@ -135,6 +135,7 @@ SeatFactor = Annotated[float, Range(1e-3, 1.0)]
 
 # Loads, from watches to the largest wind turbines (3e7 N m).
 TorqueNm = Annotated[float, _within(1e9, 1e8)]
+ForceN = Annotated[float, _within(1e9, 1e8)]
 DurationS = Annotated[float, Range(1e-9, 1e6, (1e-2, 3600.0))]
 SpeedRpm = Annotated[float, _within(1e6, 1e5)]
 Acceleration = Annotated[float, _within(1000.0, 20.0, "m/s2")]
@@ -157,7 +158,8 @@ MeanRoughnessUm = Annotated[float, Range(0.02, 20.0, (0.1, 3.0), "Ra, a sixth of
 OilTemperature = Annotated[float, Range(-50.0, 250.0, (0.0, 120.0))]
 StrengthFactor = Annotated[float, Range(0.1, 2.0, (0.5, 1.3))]
 LoadFactorK = Annotated[float, Range(1.0, 10.0, (1.0, 2.0))]
-Viscosity = Annotated[float, Range(1.0, 5000.0, (15.0, 1000.0))]
+Viscosity = Annotated[float, Range(1.0, 5000.0, (15.0, 1000.0), "mm2/s at 40 degrees Celsius")]
+HotViscosity = Annotated[float, Range(0.5, 1000.0, (2.0, 100.0), "mm2/s at 100 degrees Celsius")]
 CarrierAngles = Annotated[int, Range(1, 360, (4, 72))]
 ToleranceClass = Annotated[int, Range(1, 11)]
 NominalHours = Annotated[float, Range(0.01, 1e7, (100.0, 3e5))]

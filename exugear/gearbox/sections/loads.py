@@ -232,7 +232,7 @@ class LubricantSection(Section):
 
     viscosity_40_mm2_per_s: q.Viscosity
     """Kinematic viscosity at 40 degrees Celsius."""
-    viscosity_100_mm2_per_s: q.Viscosity | None = None
+    viscosity_100_mm2_per_s: q.HotViscosity | None = None
     """Kinematic viscosity at 100 degrees Celsius; modified lives of bearings need it."""
     temperature_C: q.OilTemperature | None = None
     """Of the oil in service; modified lives of bearings need it."""

@@ -6,7 +6,7 @@ import csv
 import hashlib
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -199,6 +199,10 @@ class LoadSource(Displayed):
         return np.zeros((len(self.torque), HUB_LOADS))
 
 
+LEAST_SHARE_BACKWARDS = 0.05
+"""Share of the time of a series from which on a positive torque at a negative speed is told."""
+
+
 def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[LoadSource, ...]:
     """Read all sources of a gearbox file.
 
@@ -231,7 +235,10 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
     yearly = sum(float(source.hours.sum()) for source in sources) / loads.life_years
     if yearly > HOURS_PER_YEAR * (1.0 + 1e-9):
         raise gearbox.fault(f"loads.sources: {yearly:.6g} hours a year in all; a year has {HOURS_PER_YEAR:g}")
-    return sources
+    is_output = loads.body == gearbox.case.overall.output
+    return tuple(
+        replace(source, remarks=(*source.remarks, *_against_the_speed(source, is_output))) for source in sources
+    )
 
 
 def section_of(gearbox: Gearbox) -> LoadsSection:
@@ -387,7 +394,7 @@ class _Draft:
                 f"{path}: headings {shortened(','.join(headings), 80)}; a series begins with time_s, a table of "
                 f"counted loads has {','.join(SPECTRUM_HEADINGS)}"
             )
-        values = table_rows(path, len(headings))
+        values = table_rows(path, headings)
         bad = np.flatnonzero(~(np.isfinite(values).all(axis=1) & (values[:, 2] >= 0.0)))
         if bad.size:
             told = ",".join(f"{value:g}" for value in values[bad[0]])
@@ -534,3 +541,24 @@ def told(sources: tuple[LoadSource, ...]) -> Iterator[str]:
         if (torque, speed) != (1.0, 1.0):
             yield f"{source.name}: torque times {torque:g}, speed times {speed:g}, not as in {source.file}"
         yield from source.remarks
+
+
+def _against_the_speed(source: LoadSource, is_output: bool) -> Iterator[str]:
+    """Doubt torques against the speed of a body that drives: most often a sign that the other channel does not have.
+
+    A drive that brakes or coasts has some; a speed below zero under a torque above it has hardly one on purpose. At the
+    output torque and speed have other signs as a rule.
+    """
+    if is_output:
+        return
+    reversed_power = source.torque * source.speed < 0.0
+    weights = source.hours + (source.hours.sum() == 0.0)  # of an extreme source each sample counts alike
+    share = float(np.average(reversed_power, weights=weights))
+    backwards = float(np.average(reversed_power & (source.speed < 0.0), weights=weights))
+    if backwards > (LEAST_SHARE_BACKWARDS if source.series else 0.0) or share > 0.5:
+        signs = ("a negative torque at a positive speed", "a positive torque at a negative speed")[backwards > 0.0]
+        hours = f"{100.0 * (backwards or share):.3g} % of its hours"
+        yield (
+            f"Warning: {source.name}: {source.file} has {signs} for {hours}, so that power flows back from the loaded "
+            "body; check the signs of both columns (torque_factor = -1 or speed_factor = -1 turns one)"
+        )

@@ -14,8 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from exugear.gearbox.body_parts import blank_places
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, Mesh
+from exugear.gearbox.sections.bodies import ShapeSection
+from exugear.gearbox.units import MM
 from fe_ste.geometry.gears import Gear
 from fe_ste.geometry.profile import tooth_profile
 from fe_ste.tools.arrays import Floats, Integers
@@ -123,6 +126,9 @@ def tube_surface(
 
 # What the bodies of a gearbox look like: gears whose teeth mesh, plain shafts and carriers
 
+THINNEST_DISC = 0.02
+"""Width of a disc without width, as it is drawn, over its diameter."""
+
 
 @dataclass(frozen=True)
 class BodyShape:
@@ -140,7 +146,7 @@ class BodyShape:
 
 
 def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
-    """Shapes of all bodies of a gearbox that have wheels or carry planets.
+    """Shapes of all bodies of a gearbox that have wheels or a stepped shaft, or carry planets.
 
     Parameters
     ----------
@@ -167,6 +173,7 @@ def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
             for name, z in body.wheels.items()
         ]
         parts += _shaft(gearbox, body) + _carrier(gearbox, body, planets)
+        parts += [disc for _, disc in blank_discs(gearbox, body).values()]
         if parts:
             reference = np.array([*body.axis, body.centre_of_mass_z])
             shapes.append(BodyShape(body.name, body.family, Surface.joined(parts), reference, body.fixed))
@@ -235,13 +242,51 @@ def _rim(gearbox: Gearbox, body: Body, gear: str) -> float | None:
 
 
 def _shaft(gearbox: Gearbox, body: Body) -> list[Surface]:
+    """Plain cylinder through the wheels of a body; the pieces of its shape where it has none."""
     if not _has_shaft(body):
-        return []
+        shape = gearbox.case.bodies[body.family].shape
+        if shape is None or body.wheels:
+            return []
+        return _pieces(shape, body)
     ends = [z + side * 0.5 * gearbox.gears[name].face_width for name, z in body.wheels.items() for side in (-1.0, 1.0)]
     ends += [bearing.position[2] for bearing in gearbox.bearings if bearing.body == body.name]
     margin = 0.02
     shaft = tube_surface(_shaft_diameter(gearbox, body), min(ends) - margin, max(ends) + margin, centre=body.axis)
     return [shaft]
+
+
+def _pieces(shape: ShapeSection, body: Body) -> list[Surface]:
+    """Pieces of a stepped shaft, a cone as the cylinder of its mean diameter."""
+    pieces = []
+    start = MM * shape.start_z_mm
+    for piece in shape.sections:
+        end_diameter = piece.outer_diameter_end_mm or piece.outer_diameter_mm
+        end = start + MM * piece.length_mm
+        diameter = 0.5 * MM * (piece.outer_diameter_mm + end_diameter)
+        pieces.append(tube_surface(diameter, start, end, MM * min(piece.inner_diameter_mm, 1e3 * diameter), body.axis))
+        start = end
+    return pieces
+
+
+def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, Surface]]:
+    """Blanks on a stepped shaft other than those of its gears: place (m) and surface, by the name of the seat.
+
+    Drawn is the solid disc that has the mass and both moments of inertia of the blank.
+    """
+    shape = gearbox.case.bodies[body.family].shape
+    if shape is None:
+        return {}
+    places = blank_places(gearbox.case, body.family)
+    discs = {}
+    for name, blank in shape.blanks.items():
+        if name in body.wheels:
+            continue
+        z = MM * places[name]
+        diameter = math.sqrt(8.0 * blank.axial_kg_m2 / blank.mass_kg)
+        width = math.sqrt(max(12.0 * blank.transverse_kg_m2 - 6.0 * blank.axial_kg_m2, 0.0) / blank.mass_kg)
+        half = 0.5 * max(width, THINNEST_DISC * diameter)
+        discs[name] = (z, tube_surface(diameter, z - half, z + half, centre=body.axis))
+    return discs
 
 
 def _carrier(gearbox: Gearbox, body: Body, planets: Sequence[Body]) -> list[Surface]:

@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from exugear.gearbox.parts import seat_key
 from exugear.report.pictures.scene import DISPLACEMENT_COLOURS, body_colours
-from exugear.report.pictures.shapes import BodyShape, Surface, bodies_of, displacement_of, gear_surface, motions_of
+from exugear.report.pictures.shapes import (
+    BodyShape,
+    Surface,
+    blank_discs,
+    bodies_of,
+    displacement_of,
+    gear_surface,
+    motions_of,
+)
 from exugear.report.web import html
 from exugear.report.web.document import ArrayStore, rounded, rounded_list, whole_page
 from exugear.report.web.html import Cell
@@ -95,6 +103,9 @@ def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
             place = np.array([*body.axis, z])
             teeth = gear_surface(assembly.gearbox.gears[gear]).moved(place)
             drawn.append(DrawnBody(BodyShape(gear, gear, teeth, place), colour, body.name))
+        for seat, (z, disc) in blank_discs(assembly.gearbox, body).items():
+            place = np.array([*body.axis, z])
+            drawn.append(DrawnBody(BodyShape(seat, seat, disc, place), colour, body.name))
     return drawn
 
 

@@ -460,15 +460,21 @@ def unsupported(gearbox: Gearbox, variant: str) -> str:
     chosen = Variant.of(variant)
     elastic = elastic_names(gearbox)
     if not chosen.on_bearings:
-        held = {joint.body for joint in gearbox.joints}
+        held = {*gearbox.apart, *(joint.body for joint in gearbox.joints)}
         missing = [b.name for b in gearbox.bodies() if not (b.fixed or b.spin_only or b.name in held)]
         if missing:
             return f"no joint holds {', '.join(missing)}; add one under [joints]"
+        coupled = [bearing.name for bearing in gearbox.bearings if bearing.family in gearbox.case.couplings]
+        if coupled:
+            return (
+                f"couplings.{coupled[0]} holds a body that turns on one that stands, which this variant does not have; "
+                "take the variant bushing"
+            )
         sprung = list(gearbox.held_by_torsion)
         if sprung:
             return (
-                f"{', '.join(sprung)}: held against turning by the torsion of a bearing, which this variant does not "
-                f"have; take the variant bushing, or let the body stand (bodies.{sprung[0]}.fixed = true)"
+                f"{', '.join(sprung)}: held against turning by the torsion of a bearing or mount, which this variant "
+                f"does not have; take the variant bushing, or let the body stand (bodies.{sprung[0]}.fixed = true)"
             )
         return ""
     if gearbox.unknown_bearings:
@@ -490,13 +496,18 @@ def elastic_names(gearbox: Gearbox) -> tuple[str, ...]:
     return tuple(body.name for body in gearbox.bodies() if gearbox.case.bodies[body.family].flexibility != "none")
 
 
-def mounts_at_work(gearbox: Gearbox) -> tuple[Bearing, ...]:
-    """Mounts that hold the gearbox in the variant `flexible`: none where no fixed body is elastic.
+def mounts_at_work(gearbox: Gearbox, with_elastic: bool = True) -> tuple[Bearing, ...]:
+    """Mounts that hold the gearbox where a fixed body is elastic, and those of what belongs to no train.
 
-    A fixed body that is rigid is the ground itself, and so needs no mount.
+    A fixed body that is rigid is the ground itself, and so needs no mount; a pedestal between a bearing and the ground
+    needs it in every variant.
+
+    Parameters
+    ----------
+    with_elastic : whether elastic bodies are so, as in the variant `flexible`
     """
     elastic = elastic_names(gearbox)
     bodies = {body.name: body for body in gearbox.bodies()}
-    if not any(bodies[name].fixed for name in elastic):
-        return ()
+    if not with_elastic or not any(bodies[name].fixed for name in elastic):
+        return tuple(mount for mount in gearbox.mounts if mount.body in gearbox.apart)
     return tuple(mount for mount in gearbox.mounts if mount.body in elastic or not bodies[mount.body].fixed)

@@ -194,6 +194,9 @@ def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBa
     for mount in mounts_at_work(gearbox):
         if mount.body == body.name:
             yield SeatBand(mount.name, mount.position[2] - start, 0.0)
+    for force in gearbox.forces:
+        if force.body == body.name:
+            yield SeatBand(force.name, force.position[2] - start, 0.0)
     if shape.torque_z_mm is not None:
         yield SeatBand(TORQUE_SEAT, shape.torque_z_mm * MM - start, 0.0)
 
@@ -511,7 +514,12 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
     """
     family = gearbox.body(name).family
     if gearbox.case.bodies[family].solid is not None:
-        solid_body(gearbox, name)
+        mesh = solid_body(gearbox, name).model.mesh
+        if isinstance(mesh, SolidFile) and mesh.is_mesh:
+            try:
+                _ = mesh.mesh
+            except SolidError as error:
+                raise gearbox.fault(f"bodies.{family}.solid.file = {mesh.path.name!r}: {error}") from None
         return
     model = shaft_model(gearbox, name)
     if not model.seats:

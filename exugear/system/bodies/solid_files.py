@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import importlib
 import signal
+import tempfile
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -179,7 +180,9 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
     try:
         content = getattr(meshio, kind).read(str(path))
     except Exception as error:  # its readers let out whatever damaged content makes them stumble on
-        raise SolidError(f"{path}: meshio cannot read it as {kind} ({error or type(error).__name__})") from None
+        content = _rewritten_by_gmsh(path, meshio)
+        if content is None:
+            raise SolidError(f"{path}: meshio cannot read it as {kind} ({error or type(error).__name__})") from None
     solid: dict[str, list[Any]] = {}
     for block in content.cells:
         if block.type in CORNERS:
@@ -189,6 +192,40 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
         raise SolidError(f"{path}: found {found}; a solid needs elements of one kind among {', '.join(CORNERS)}")
     kind, blocks = solid.popitem()
     return second_order(unit * np.asarray(content.points), np.concatenate(blocks).astype(np.int64), kind)
+
+
+MESH_HEAD = b"$MeshFormat"
+"""Beginning of a mesh of gmsh: what begins otherwise, gmsh would run as a script."""
+
+
+def _rewritten_by_gmsh(path: Path, meshio: Any) -> Any:
+    """Content of a mesh that meshio stumbles on, by way of gmsh; None where that cannot read it either.
+
+    With `Mesh.SaveAll` a file holds elements with and without a physical group, which meshio does not take in format
+    4; written anew in format 2.2 it does.
+    """
+    with path.open("rb") as file:
+        if path.suffix.lower() != ".msh" or file.read(len(MESH_HEAD)) != MESH_HEAD:
+            return None
+    gmsh = _library("gmsh")
+    handlers = _signal_handlers()
+    gmsh.initialize(["exugear", "-nopopup"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.merge(str(path))
+        gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
+        gmsh.option.setNumber("Mesh.Binary", 0)
+        gmsh.option.setNumber("Mesh.SaveAll", 1)
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / "mesh.msh"
+            gmsh.write(str(copy))
+            return meshio.gmsh.read(str(copy))
+    except Exception:  # gmsh raises nothing narrower; the first error is told
+        return None
+    finally:
+        gmsh.finalize()
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
 
 
 def _includes(path: Path) -> bool:

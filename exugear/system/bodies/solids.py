@@ -280,7 +280,7 @@ def _check_revolution(model: SolidModel, component: ReducedComponent) -> None:
         if change > ASYMMETRY_TOLERANCE or off_axis:
             raise ReductionError(
                 f"body {model.name}: a quarter turn changes its {name} by {change:.1e}, but the frame 'nonrotating' "
-                "is for bodies of revolution; take 'carrier', or a finer mesh"
+                "is for bodies of revolution; take a finer mesh, or describe the shaft by a [.shape] table"
             )
 
 

@@ -462,7 +462,7 @@ def _loads(assembly: Assembly, loads: LoadTable) -> Loads:
     drive = () if loads.drive is None else (loads.drive,)
     following = np.zeros(extended_size(assembly) - assembly.size)
     return Loads(
-        steady=np.append(assembly.torque_vector(loads.constant) + assembly.weight, following),
+        steady=np.append(assembly.torque_vector(loads.constant) + assembly.constant_forces, following),
         coordinate=np.array([assembly.spin[name] for name in loads.series], dtype=np.int64),
         first=np.cumsum([0] + [len(times) for times, _ in series]).astype(np.int64),
         time=np.concatenate([np.zeros(0)] + [times for times, _ in series]),

@@ -187,7 +187,7 @@ class FloatingBodies:
         matrices = {name: assembly.elastic_bodies[name].reduced for name in self._coordinates}
 
         def supports(t: float, q: Floats, v: Floats) -> Floats:
-            f = np.where(self._is_floating, applied(t, q, v) + assembly.weight, 0.0)
+            f = np.where(self._is_floating, applied(t, q, v) + assembly.constant_forces, 0.0)
             add_connector_forces(q, v, connectors, f)
             add_spring_forces(q, v, springs, f)
             for name, body in matrices.items():
@@ -402,6 +402,13 @@ def _add_rigid_body(parts: Parts, body: Body, q: Floats, v: Floats) -> None:
     if any(acceleration):
         marker = parts.mbs.AddMarker(items.MarkerBodyMass(bodyNumber=parts.bodies[body.name]))
         parts.mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=list(acceleration)))
+    for force in parts.assembly.gearbox.forces:
+        if force.body == body.name:
+            local = np.subtract(force.position, node_position(body)).tolist()
+            marker = parts.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=parts.bodies[body.name], localPosition=local))
+            parts.mbs.AddLoad(items.LoadForceVector(markerNumber=marker, loadVector=list(force.wrench[:3])))
+            moment = [*force.wrench[3:], 0.0]
+            parts.mbs.AddLoad(items.LoadTorqueVector(markerNumber=marker, loadVector=moment))
 
 
 def _add_rigid_node(parts: Parts, position: Floats, first: int, q: Floats, v: Floats) -> Any:
@@ -445,7 +452,7 @@ def _add_elastic_body(parts: Parts, name: str, q: Floats, v: Floats) -> None:
         shared = seat_key(name, seat_name)
         parts.nodes[key], parts.seat_positions[key] = parts.nodes[shared], parts.seat_positions[shared]
     if name in assembly.turning:
-        _add_turning_laws(parts, assembly.turning[name], nodes)
+        _add_turning_laws(parts, assembly.turning[name], assembly.constant_forces[coordinates], nodes)
         return
     parts.mbs.AddObject(
         items.ObjectGenericODE2(
@@ -453,13 +460,13 @@ def _add_elastic_body(parts: Parts, name: str, q: Floats, v: Floats) -> None:
             massMatrix=reduced.mass,
             stiffnessMatrix=reduced.stiffness,
             dampingMatrix=assembly.gearbox.case.damping.body_time_s * reduced.stiffness,
-            forceVector=assembly.weight[coordinates],
+            forceVector=assembly.constant_forces[coordinates],
             forceUserFunction=_gyroscopic_function(reduced) if reduced.gyroscopic.any() else 0,
         )
     )
 
 
-def _add_turning_laws(parts: Parts, body: TurningBody, nodes: list[Any]) -> None:
+def _add_turning_laws(parts: Parts, body: TurningBody, constant: Floats, nodes: list[Any]) -> None:
     """Add the laws of a body in its own turning frame; forces without accelerations are on the right-hand side."""
 
     def mass(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
@@ -468,7 +475,7 @@ def _add_turning_laws(parts: Parts, body: TurningBody, nodes: list[Any]) -> None
     def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
         q = np.array(q)
         v = np.array(v)
-        return np.asarray(body.forces(q, v) - body.inertia_forces(q, v, np.zeros_like(q)))
+        return np.asarray(body.forces(q, v) + constant - body.inertia_forces(q, v, np.zeros_like(q)))
 
     parts.mbs.AddObject(
         items.ObjectGenericODE2(

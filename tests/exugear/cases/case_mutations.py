@@ -19,6 +19,7 @@ from pydantic import BaseModel
 from exugear.gearbox.sections.case import CaseFile
 from exugear.gearbox.sections.entries import Range
 
+from .box import write_plate
 from .spur import SPUR_CASE
 
 GRC = Path(__file__).parents[3] / "cases" / "grc750"
@@ -37,7 +38,7 @@ def bases(folder: Path) -> dict[str, dict[str, Any]]:
     for file in GRC.iterdir():
         if file.is_file() and file.suffix not in (".toml", ".py", ".md"):
             shutil.copy(file, folder)
-    (folder / "plate.vtu").write_text("never read by check", encoding="utf-8")
+    write_plate(folder / "plate.vtu")
     (folder / "series.csv").write_text("time_s,shaft_1_N_m\n0.0,100.0\n1.0,120.0\n", encoding="utf-8")
     (folder / "flank.csv").write_text("radius_mm,-7.0,7.0\n29.0,1.0,0.0\n31.0,0.0,2.0\n", encoding="utf-8")
     grc = tomllib.loads((GRC / "gearbox.toml").read_text(encoding="utf-8"))
@@ -154,6 +155,8 @@ def _with_shapes() -> dict[str, Any]:
         case["bodies"][name]["wheels_z_mm"] = {gear: 20.0}
     for number in (1, 2):
         case["bearings"][f"bearing_{number}"]["z_mm"] = -40.0
+    belt = {"force_N": [0.0, -200.0, 50.0], "moment_N_m": [1.0, 0.0]}
+    case["forces"] = {"belt": {"body": "shaft_1", "z_mm": -30.0, **belt}}
     return case
 
 

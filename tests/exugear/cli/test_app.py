@@ -215,8 +215,8 @@ def test_ste_with_bad_options_writes_nothing(spur_case, tmp_path, options, said)
 
 @pytest.mark.validation
 def test_the_nonlinear_method_writes_a_table_of_its_own_and_goes_on_from_it(spur_case, tmp_path, monkeypatch):
-    mesh = ContactMesh(layers=3, contact_elements=2, growth=2.0, thickness=3, fillet=1, root=1, rim=3, far_flank=4)
-    coarse = functools.partial(NonlinearInput, settings=NonlinearSettings(teeth=3, mesh=mesh))
+    mesh = ContactMesh(layers=3, contact_elements=4, growth=0.8, thickness=8, fillet=3, root=2, rim=6, far_flank=4)
+    coarse = functools.partial(NonlinearInput, settings=NonlinearSettings(mesh=mesh))
     monkeypatch.setattr("exugear.system.tooth_mesh.reference_tables.NonlinearInput", coarse)
     command = ("ste", spur_case, "--method", "nonlinear", "--positions", 1, "--out", tmp_path)
     outcome = exugear(*command, "--json")
@@ -226,13 +226,27 @@ def test_the_nonlinear_method_writes_a_table_of_its_own_and_goes_on_from_it(spur
     path = tmp_path / "tables" / "spur-nonlinear.nc"
     assert Path(summary["table"]) == path and path.exists()
     assert not (tmp_path / "tables" / "spur.nc").exists()
-    # Steel teeth: 14 to 20 N/(mm um) by ISO 6336, softer on an open sector.
+    # The tables' method stands beside it; one position has no peak-to-peak value.
+    assert summary["ste_mean_um"] == pytest.approx(summary["superelement_mean_um"], rel=0.05)
+    assert summary["ste_peak_to_peak_um"] is None
+    # Steel teeth: 14 to 20 N/(mm um) by ISO 6336.
     assert 5e9 < summary["mesh_stiffness_mean_N_per_m"] / 15e-3 < 25e9
     before = path.stat().st_mtime_ns
     again = exugear(*command)
     assert again.exit_code == 0 and "1/1" in again.stdout
     assert path.stat().st_mtime_ns == before
     assert not requested_tables(Gearbox.from_toml(spur_case), tmp_path)[0].stored
+
+
+@pytest.mark.validation
+def test_methods_that_do_not_agree_end_with_code_1(spur_case, tmp_path, monkeypatch):
+    mesh = ContactMesh(layers=3, contact_elements=2, growth=2.0, thickness=3, fillet=1, root=1, rim=3, far_flank=4)
+    crude = functools.partial(NonlinearInput, settings=NonlinearSettings(teeth=3, mesh=mesh))
+    monkeypatch.setattr("exugear.system.tooth_mesh.reference_tables.NonlinearInput", crude)
+    outcome = exugear("ste", spur_case, "--method", "nonlinear", "--positions", 1, "--out", tmp_path)
+    assert outcome.exit_code == 1
+    assert "spur: the mean is -" in outcome.stderr and "% off that of the tables" in outcome.stderr
+    assert (tmp_path / "tables" / "spur-nonlinear.nc").exists()
 
 
 def test_a_results_folder_that_is_a_file_is_told_before_the_work(spur_case):

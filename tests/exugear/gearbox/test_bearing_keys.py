@@ -97,6 +97,7 @@ def test_keys_that_make_no_sense_are_refused(content: Content, keys: dict[str, A
         ({"profile": "convex"}, "profile"),
         ({"type": "thrust_ball"}, "type"),
         ({"dynamic_rating_kN": 0.0}, "dynamic_rating_kN"),
+        ({"fatigue_load_limit_kN": 60.0, "static_rating_kN": 60.0}, "fatigue_load_limit_kN = 60 must be below"),
     ],
 )
 def test_dimensions_that_cannot_be_are_refused(content: Content, keys: dict[str, Any], said: str) -> None:

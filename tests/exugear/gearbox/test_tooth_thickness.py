@@ -82,6 +82,19 @@ def test_an_inspector_finds_the_allowances_in_the_base_tangent_length():
     assert found.span[1] - found.span[0] == pytest.approx(40e-6 * cosine, rel=1e-9)
 
 
+def test_a_span_that_needs_a_wider_face_is_told():
+    """One plane touches W_k sin(beta_b) along the axis from the other; a face as wide as that is not enough."""
+    found = content()
+    pinion = gearbox_of().gears["pinion"]
+    full = replace(pinion, tooth_thinning=70e-6 / math.cos(HELIX))
+    needed = 1e3 * full.span_measurement(3) * math.sin(full.base_helix_angle)
+    assert thickness_range(gearbox_of(), "pinion").span_teeth == 3
+    for width, doubt in ((needed + 0.01, ""), (needed - 0.01, "too narrow for the base tangent length over 3 teeth")):
+        found["gears"]["pinion"]["face_width_mm"] = width
+        told = thickness_range(Gearbox.from_dict(found, "case.toml"), "pinion").span_doubt
+        assert doubt in told and bool(doubt) == bool(told)
+
+
 def test_check_tells_thickness_span_and_backlash(tmp_path: Path):
     path = tmp_path / "case.toml"
     text = template("pair")

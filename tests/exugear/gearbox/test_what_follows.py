@@ -11,11 +11,15 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.gearbox.templates.kinds import template
-from exugear.system.bodies.of_gearbox import shaft_model
+from exugear.report.pictures.shapes import bodies_of
+from exugear.report.web.stage import drawn_bodies
+from exugear.system.bodies.of_gearbox import reduced_bodies, shaft_model
+from exugear.system.modes import eigenmodes
 from exugear.system.sensitivity import assumed_parameters
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from fe_ste.geometry.cylinders import Tube, mass_properties
 
+from ..cases.assembled import assembled
 from ..cases.spur import SPUR_CASE
 
 STEEL = 7850.0
@@ -236,3 +240,81 @@ def test_a_changed_path_with_a_typing_error_names_the_nearest_and_makes_no_entry
         gearbox.varied({"gears.pinon.teeth": 21})
     case = gearbox.varied({"load_cases.coast.torques_N_m": {"shaft_1": -10.0}, "load_cases.coast.duration_s": 0.5})
     assert case.load_cases["coast"].duration == 0.5
+
+
+def test_blanks_at_bearings_and_where_torques_act_count_in_the_inertia() -> None:
+    """Two rings beside the 0.5 kg one of the wheel: masses and axial moments add up, places give the centre."""
+    rings = """
+blanks.two = { mass_kg = 3.0, axial_kg_m2 = 4e-3, transverse_kg_m2 = 3e-3 }
+blanks.torque = { mass_kg = 2.0, axial_kg_m2 = 2e-3, transverse_kg_m2 = 1e-3 }
+torque_z_mm = 90.0
+"""
+    place = "sections = [{ length_mm = 80.0, outer_diameter_mm = 50.0 }]"
+    plain = gearbox_of().body("two")
+    body = gearbox_of((place, place + rings)).body("two")
+    assert body.mass == pytest.approx(plain.mass + 5.0, rel=1e-12)
+    assert body.axial == pytest.approx(plain.axial + 6e-3, rel=1e-12)
+    moment = plain.mass * plain.centre_of_mass_z + 3.0 * 0.030 + 2.0 * 0.090
+    assert body.centre_of_mass_z == pytest.approx(moment / body.mass, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["pinion", "one_left", "torque", "tow"])
+def test_a_blank_on_a_seat_that_the_body_does_not_have_is_refused(name: str) -> None:
+    with pytest.raises(CaseError, match=f"bodies.two.shape.blanks.{name}: no such seat .* seats are wheel, two"):
+        gearbox_of(("blanks.wheel", f"blanks.{name}"))
+
+
+ROTOR = """
+name = "shaft with a disc at a bearing"
+default_inertias = "usual"
+overall = { input = "motor", output = "shaft" }
+static_load = { torques_N_m = { motor = 1.0 }, locked = ["shaft"] }
+elasticity = { band_Hz = 600.0, limit_Hz = 1200.0 }
+couplings.shaft = { bodies = ["motor", "shaft"], stiffness_N_m_per_rad = 1e-2 }
+[bodies.motor]
+axis_position_mm = [0.0, 0.0]
+spin_only = true
+inertia.usual = { axial_kg_m2 = 1.0 }
+[bodies.shaft]
+axis_position_mm = [0.0, 0.0]
+[bodies.shaft.shape]
+start_z_mm = 0.0
+sections = [{ length_mm = 4340.0, outer_diameter_mm = 300.0 }, { length_mm = 1460.0, outer_diameter_mm = 220.0 }]
+material = { youngs_modulus_GPa = 207.0, poissons_ratio = 0.301887, density_kg_per_m3 = 7800.0 }
+blanks.generator = { mass_kg = 525.7, axial_kg_m2 = 32.2, transverse_kg_m2 = 16.1 }
+[bearings]
+left = { body = "shaft", z_mm = 5.0, stiffness = { radial_N_per_m = 183.9e6, axial_N_per_m = 1e3 } }
+right = { body = "shaft", z_mm = 5500.0, stiffness = { radial_N_per_m = 183.9e6, axial_N_per_m = 1e3 } }
+generator = { body = "shaft", z_mm = 100.0, stiffness = { radial_N_per_m = 1.0 } }
+[load_cases.run]
+torques_N_m = { motor = 1.0, shaft = -1.0 }
+duration_s = 0.1
+"""
+
+
+def test_a_disc_at_a_bearing_lowers_the_frequencies_of_a_rigid_rotor_on_two_springs() -> None:
+    """51.233 and 87.409 Hz by the closed form for heave and pitch; without the disc 57.31 and 100.92 Hz."""
+    gearbox = Gearbox.from_dict(tomllib.loads(ROTOR), "rotor.toml")
+    found = eigenmodes(gearbox, Choice("bushing"), {}).frequency
+    assert [round(f, 3) for f in found if f > 1.0] == pytest.approx([51.233, 51.233, 87.409, 87.409], abs=0.03)
+
+
+def test_an_elastic_shaft_has_the_mass_of_a_disc_at_a_bearing() -> None:
+    """The inertia set is what the shape and its blanks have by themselves, so nothing is taken away again."""
+    gearbox = Gearbox.from_dict(tomllib.loads(ROTOR), "rotor.toml").varied({"bodies.shaft.flexibility": "elastic"})
+    body = gearbox.body("shaft")
+    of_shape = reduced_bodies(gearbox, "usual")["shaft"].shape_inertia
+    assert of_shape.mass == pytest.approx(body.mass, rel=1e-3)
+    assert of_shape.axial == pytest.approx(body.axial, rel=1e-3)
+    assert of_shape.transverse == pytest.approx(body.transverse, rel=1e-3)
+
+
+def test_pictures_show_a_disc_at_a_bearing_and_the_shaft_that_carries_it() -> None:
+    """A thin disc of 525.7 kg and 32.2 kg m2 has a diameter of 0.7 m; the shaft is 5.8 m long."""
+    gearbox = Gearbox.from_dict(tomllib.loads(ROTOR), "rotor.toml")
+    (shape,) = bodies_of(gearbox)
+    low, high = shape.surface.points.min(axis=0), shape.surface.points.max(axis=0)
+    assert high[0] - low[0] == pytest.approx(0.700, abs=0.001)
+    assert high[2] - low[2] == pytest.approx(5.8, abs=1e-9)
+    elastic = assembled(gearbox.varied({"bodies.shaft.flexibility": "elastic"}), Choice("flexible"), {})
+    assert [body.shape.name for body in drawn_bodies(elastic)] == ["shaft", "generator"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
 from dataclasses import replace
@@ -266,9 +267,13 @@ def test_what_a_kill_behind_the_last_file_left_is_removed(broken):
     assert not partial.exists() and path.stat().st_mtime_ns == before
 
 
-def rated_bearing(folder: Path, oil: dict[str, Any] | None) -> BearingLife:
+def rated_bearing(folder: Path, oil: dict[str, Any] | None, **catalogue: float) -> BearingLife:
     """The bearing of the spur pair under one torque at one speed."""
     content = content_of("torque_N_m,speed_rpm,hours\n150,1500,1\n", folder)
+    content["bearings"] = copy.deepcopy(content["bearings"])
+    for bearing in content["bearings"].values():
+        if "catalogue" in bearing:
+            bearing["catalogue"] |= catalogue
     if oil is not None:
         content["rating"].pop("viscosity_40_mm2_per_s")
         content["lubricant"] = oil
@@ -279,6 +284,15 @@ def rated_bearing(folder: Path, oil: dict[str, Any] | None) -> BearingLife:
     balance = static_balance(project.assembly(), counted.body, acting.torques, 1)
     (one,) = bearing_lives(project.assembly().supports, counted.bearings, acting, balance, gearbox.case.lubricant)
     return one
+
+
+def test_a_modified_life_takes_the_fatigue_load_limit_that_the_catalogue_prints(tmp_path: Path) -> None:
+    """a_ISO of e_C C_u / P with the stated C_u; 3.137 for the 6309 of SKF: P_u 1.34 kN, 10 kN, kappa 2.07, e_C 0.6."""
+    assert life_factor(2.07, 0.6 * 1.34 / 10.0, "deep_groove_ball") == pytest.approx(3.137, abs=0.01)
+    one = rated_bearing(tmp_path, OIL, fatigue_load_limit_kN=1.0)
+    factor = life_factor(one.viscosity_ratio, 0.5 * 1.0e3 / one.equivalent, TYPE)
+    assert one.modified_hours == pytest.approx(factor * one.basic_hours, rel=0.01)
+    assert one.modified_hours < 0.99 * rated_bearing(tmp_path, OIL).modified_hours
 
 
 @pytest.mark.validation

@@ -135,7 +135,7 @@ def account_of(assembly: Assembly, start_speed: float, duration: float) -> Accou
     meshes = [assembly.meshes.one(m) for m in range(len(assembly.elements))]
     bearings = [assembly.connectors.one(n) for n in range(len(assembly.connector_names))]
     system = CompiledSystem(assembly, start.q, start.v, LoadTable(LOAD), step)
-    load = assembly.torque_vector(LOAD) + assembly.weight
+    load = assembly.torque_vector(LOAD) + assembly.constant_forces
     count, done, last = len(meshes), 0, (start.q, start.v)
     total, energies = np.zeros(5 * count + len(bearings) + 2), []
     while done < round(duration / step):

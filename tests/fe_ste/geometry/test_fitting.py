@@ -89,6 +89,22 @@ def test_a_ring_whose_tips_touch_fillets_runs_with_its_fitted_tip() -> None:
     assert root_margin(pair, fitted) == pytest.approx(ROOT_MARGIN * MODULE, rel=1e-9)
 
 
+def test_a_fitted_ring_clears_the_fillet_of_an_undercut_planet() -> None:
+    """KHK, Gear Technical Reference, planetary set 16/16/48: 92.7 mm clears by trial at a module of 2 mm, 92.6 not."""
+    thin = {"tooth_thinning": 0.03 * MODULE}
+    planet, ring = wheel(16, **thin), wheel(48, internal=True, **thin)
+    assert planet.is_undercut
+    distance = 16.0 * MODULE
+    loose = UncheckedPair(name="pair", pinion=planet, gear=ring, centre_distance=distance)
+    diameter = fitted_tip_diameter(loose, ring)
+    assert 46.3 < diameter / MODULE < 46.35
+    fitted = dataclasses.replace(ring, tip_diameter=diameter)
+    GearPair(name="pair", pinion=planet, gear=fitted, centre_distance=distance)
+    with pytest.raises(GeometryError, match="its corner cuts") as caught:
+        GearPair(name="pair", pinion=planet, gear=ring, centre_distance=distance)
+    assert f"such as {1e3 * diameter:.4f} mm" in str(caught.value)
+
+
 def test_nothing_is_to_clear_above_a_relieved_root() -> None:
     pinion, gear = wheel(14), wheel(60)
     pair = GearPair(name="pair", pinion=pinion, gear=gear, centre_distance=37.0 * MODULE)

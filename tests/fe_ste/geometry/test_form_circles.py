@@ -9,9 +9,10 @@ import math
 import numpy as np
 import pytest
 
-from fe_ste.geometry.checks import GeometryError, corner_to_fillet_gap
+from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gear_relations import BasicRack, inputs_that_are_given
 from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.geometry.pair_relations import corner_to_fillet_gap
 from fe_ste.geometry.profile import tooth_profile
 
 WHEEL = {"normal_module": 4e-3, "face_width": 50e-3}

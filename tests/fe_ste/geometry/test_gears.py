@@ -385,14 +385,53 @@ def test_base_tangent_length_is_the_formula_of_the_standard(
     assert gear.normal_tooth_thickness == pytest.approx(thickness, rel=1e-13)
 
 
+@pytest.mark.parametrize("degrees", [0.0, 15.0, -30.0, 45.0])
 @pytest.mark.parametrize(("teeth", "shift"), [(21, 0.35), (50, 0.0), (99, -0.4)])
-def test_the_usual_span_touches_the_flanks_on_their_involute(teeth: int, shift: float) -> None:
-    gear = spur(teeth=teeth, profile_shift=shift, held_diameter=30e-3)
-    touched = math.hypot(gear.base_radius, 0.5 * gear.span_measurement(gear.usual_span))
+def test_the_usual_span_touches_the_flanks_on_their_involute(teeth: int, shift: float, degrees: float) -> None:
+    """DIN 3960: d_M^2 = d_b^2 + (W_k cos(beta_b))^2."""
+    gear = spur(teeth=teeth, profile_shift=shift, held_diameter=30e-3, helix_angle=math.radians(degrees))
+
+    def touched_radius(span: int) -> float:
+        along = gear.span_measurement(span) * math.cos(gear.base_helix_angle)
+        return math.sqrt(gear.base_radius**2 + 0.25 * along**2)
+
+    touched = touched_radius(gear.usual_span)
+    assert gear.span_contact_radius(gear.usual_span) == pytest.approx(touched, rel=1e-13)
     assert gear.form_radius < touched < gear.tip_radius
     middle = gear.reference_radius + 3e-3 * shift
-    others = [abs(math.hypot(gear.base_radius, 0.5 * gear.span_measurement(k)) - middle) for k in range(2, 20)]
-    assert abs(touched - middle) == pytest.approx(min(others), abs=1e-5)  # counted along the tangent, not the radius
+    others = [abs(touched_radius(k) - middle) for k in range(2, 60)]
+    assert abs(touched - middle) == pytest.approx(min(others), abs=2e-5)  # counted along the tangent, not the radius
+
+
+@pytest.mark.parametrize(
+    ("module", "teeth", "degrees", "pressure_angle", "shift", "count", "length"),
+    [
+        # KHK, Gear Technical Reference, span measurement of spur and of helical gears (normal system).
+        (3.0, 24, 0.0, 20.0, 0.4, 4, 32.8266),
+        (3.0, 24, 25.0, 20.0, 0.4, 5, 42.0085),  # from 4.63009 teeth
+        # By d_M^2 = d_b^2 + (W_k cos(beta_b))^2 at the V circle: k = 16.95.
+        (3.0, 100, 30.0, 20.0, 0.0, 17, 152.449),
+    ],
+)
+def test_teeth_and_length_of_the_span_are_the_published_ones(
+    module: float, teeth: int, degrees: float, pressure_angle: float, shift: float, count: int, length: float
+) -> None:
+    gear = spur(
+        teeth=teeth,
+        normal_module=1e-3 * module,
+        normal_pressure_angle=math.radians(pressure_angle),
+        helix_angle=math.radians(degrees),
+        profile_shift=shift,
+        held_diameter=30e-3,
+    )
+    assert gear.usual_span == count
+    assert 1e3 * gear.span_measurement(count) == pytest.approx(length, abs=6e-4)
+
+
+def test_a_narrow_helical_face_is_too_short_for_its_span() -> None:
+    """W_k sin(beta_b) = 152.449 mm sin(28.024 deg) = 71.63 mm for z 100, m_n 3 mm, beta 30 deg."""
+    gear = spur(teeth=100, normal_module=3e-3, helix_angle=math.radians(30.0), held_diameter=30e-3)
+    assert 1e3 * gear.span_face_width(17) == pytest.approx(71.63, abs=0.01)
 
 
 @pytest.mark.parametrize("internal", [False, True])

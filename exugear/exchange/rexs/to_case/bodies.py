@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from exugear.exchange.rexs.to_case.notes import Notes, Places
@@ -157,6 +157,7 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
         Planets that are not equal, or whose carrier cannot be told.
     """
     union = _joined(model, notes)
+    held = held_by_speed(model)
     groups: dict[int, list[Component]] = {}
     for part in model.of_type("shaft", "side_plate", "gear_casing", *GEARS):
         groups.setdefault(union.root(part.number), []).append(part)
@@ -170,9 +171,13 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
     bodies: list[Body] = []
     for root, parts in groups.items():
         if root in names:
-            bodies.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), _is_fixed(parts)))
-        elif root not in planets and not _is_fixed(parts):
-            notes.ignored.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
+            fixed = _is_fixed(parts, held)
+            bodies.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), fixed))
+            stopped = [str(part) for part in parts if part.number in held]
+            if stopped and not _is_fixed(parts, ()):
+                notes.changed.append(f"{', '.join(stopped)}: held, since the file defines its speed as 0")
+        elif root not in planets and not _is_fixed(parts, held):
+            notes.lost.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
     by_root = {union.root(part.number): body for body in bodies for part in body.parts}
     carried = [
         one for members in sets for one in _on_one_orbit(places, members, _carrier(model, union, by_root, members))
@@ -235,8 +240,28 @@ def _working(model: Model, union: _Union) -> set[int]:
     return working
 
 
-def _is_fixed(parts: Iterable[Component]) -> bool:
-    return any(part.type == "gear_casing" for part in parts)
+def held_by_speed(model: Model) -> set[int]:
+    """Numbers of the shafts whose speed the file defines as zero, in all load cases, while others turn.
+
+    Some programs leave a speed of zero out where they say that a shaft defines its speed.
+    """
+    speeds: dict[int, set[float]] = {}
+    for changes in [case.changes for case in model.load_cases] or [{}]:
+        for shaft in model.of_type("shaft"):
+            here = shaft.with_attributes(changes.get(shaft.number, {}))
+            speed = here.quantity("rotational_speed", "1 / min")
+            defined = here.flag("defines_speed")
+            if defined or (speed is not None and defined is None):
+                speeds.setdefault(shaft.number, set()).add(speed or 0.0)
+            elif speed:
+                speeds.setdefault(shaft.number, set()).add(speed)
+    if not any(any(found) for found in speeds.values()):
+        return set()
+    return {number for number, found in speeds.items() if not any(found)}
+
+
+def _is_fixed(parts: Iterable[Component], held: Collection[int]) -> bool:
+    return any(part.type == "gear_casing" or part.number in held for part in parts)
 
 
 def _carriers(model: Model, union: _Union) -> set[int]:
@@ -375,7 +400,7 @@ def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[in
     """Names of the bodies that are no planets, by role, numbered in the order of the file."""
     roles: dict[str, list[int]] = {}
     for root, parts in groups.items():
-        if _is_fixed(parts):
+        if _is_fixed(parts, ()):
             role = "housing"
         elif root in carriers:
             role = "carrier"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 import tomllib
@@ -26,6 +27,7 @@ from exugear.exchange.rexs.to_case.loads import (
     Ends,
     Loads,
     ends_of,
+    force_blocks,
     life_blocks,
     load_case_blocks,
     loads_of,
@@ -289,6 +291,7 @@ READ_TYPES = frozenset(
         "planetary_stage",
         "cylindrical_stage",
         "cylindrical_gear_flank",
+        "cylindrical_gear_manufacturing_settings",
         "rack_shaped_tool",
         "cutter_wheel_tool",
         *MODIFICATIONS,
@@ -300,6 +303,25 @@ READ_TYPES = frozenset(
     )
 )
 """Types of components of which something is read."""
+
+
+TYPES_WITHOUT_EFFECT = frozenset(
+    (
+        "assembly_group",
+        "cylindrical_stage_gear_data",
+        "element_list",
+        "involute_spline_gear_hub",
+        "involute_spline_gear_shaft",
+        "joint_section",
+        "meshing_contact_stage_data_set",
+        "notch_effect_shaft_hub_connection",
+        "point_list",
+        "reduction_point",
+        "shaft_shoulder",
+        "shaft_shoulder_with_undercut",
+    )
+)
+"""Types of components that group or rate others: none has mass or stiffness, or carries a load."""
 
 
 @dataclass(frozen=True)
@@ -324,7 +346,9 @@ class Imported(Displayed, line=" {gearbox!r}: {changed!n} assumptions, {ignored!
     changed: tuple[str, ...]
     """What was replaced or assumed and matters."""
     ignored: tuple[str, ...]
-    """What was left out."""
+    """What was left out, in the order of its effect: `lost`, and then all that changes no number here."""
+    lost: tuple[str, ...]
+    """What acts on the gearbox, moves or holds in it and was left out."""
     checked: tuple[str, ...]
     """What the file says twice, compared."""
     found: Found
@@ -349,6 +373,7 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
         Why the model cannot be imported, a sentence each.
     """
     notes = Notes(rules or Rules())
+    model = _without_splines_as_stages(model)
     _refuse_types(model, notes)
     _refuse_misplaced(model, notes)
     notes.faults.tell()
@@ -367,8 +392,19 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     _note_ignored(model, notes)
     text = draft.text(source, cases)
     gearbox = draft.checked(text, path)
-    changed, ignored, checked = (tuple(lines) for lines in (notes.changed, notes.ignored, notes.checked))
-    return Imported(text, gearbox, changed, ignored, checked, draft.found, life.spectrum)
+    changed, lost, checked = (tuple(dict.fromkeys(lines)) for lines in (notes.changed, notes.lost, notes.checked))
+    ignored = (*lost, *notes.ignored)
+    return Imported(text, gearbox, changed, ignored, lost, checked, draft.found, life.spectrum)
+
+
+def _without_splines_as_stages(model: Model) -> Model:
+    """Leave out relations that pair shaft and hub of a spline as the gears of a stage are paired.
+
+    The connection itself has two sides, and joins what they name.
+    """
+    splines = {part.number for part in model.of_type(*JOINING)}
+    relations = tuple(one for one in model.relations if one.type != "stage" or one.roles.get("stage") not in splines)
+    return dataclasses.replace(model, relations=relations)
 
 
 def _refuse_types(model: Model, notes: Notes) -> None:
@@ -414,6 +450,7 @@ class _Draft:
             ("pairs", _named("pairs", pair_blocks(self.teeth))),
             ("bodies", _named("bodies", body_blocks(model, places, bodies, self.teeth, sections, notes))),
             ("meshes", _named("meshes", mesh_blocks(self.teeth))),
+            ("forces on bodies", _named("forces", force_blocks(self.loads, self.ends, notes))),
             ("couplings", _named("couplings", coupling_blocks(model, bodies, bearings))),
             (
                 "variant `rigid`: ideal joints",
@@ -539,7 +576,7 @@ def _head(model: Model, source: str, notes: Notes) -> list[str]:
     for title, found in (
         ("Replaced or assumed", notes.changed),
         ("Said twice, compared", notes.checked),
-        ("Left out", notes.ignored),
+        ("Left out", [*notes.lost, *notes.ignored]),
     ):
         if found:
             lines += ["", f"{title}:", *(f"- {plain(line, 2000)}" for line in dict.fromkeys(found))]
@@ -548,13 +585,16 @@ def _head(model: Model, source: str, notes: Notes) -> list[str]:
 
 def _note_ignored(model: Model, notes: Notes) -> None:
     """List the types of components of which nothing was read, and the attributes of others that nothing asked for."""
-    for kind in sorted({part.type for part in model.components.values()}):
+    kinds = sorted({part.type for part in model.components.values()})
+    for kind in kinds:
+        if kind not in READ_TYPES:
+            lines = (notes.lost, notes.ignored)[kind in TYPES_WITHOUT_EFFECT]
+            lines.append(f"{plain(kind)}, {len(model.of_type(kind))} of them")
+    for kind in kinds:
         parts = model.of_type(kind)
         keys = {key for part in parts for key in part.attributes if not key.startswith(OWN)}
         unread = keys - {key for part in parts for key in part.asked}
-        if kind not in READ_TYPES:
-            notes.ignored.append(f"{plain(kind)}, {len(parts)} of them")
-        elif unread:
+        if kind in READ_TYPES and unread:
             notes.ignored.append(f"{kind}: {', '.join(plain(key) for key in sorted(unread))}")
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from exugear.exchange.rexs.to_case.bodies import Bodies, Body
 from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
@@ -12,6 +14,7 @@ from exugear.exchange.rexs.to_case.toothing import material_of
 from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, RexsError
 
 FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
+MOMENTS = ("torque_around_v_axis", "torque_around_w_axis")
 UNKNOWN_TORQUE = 100.0
 """Torque where the file gives none, N m."""
 SPECTRUM = "load_spectrum.csv"
@@ -26,6 +29,33 @@ USUAL_YEARS, USUAL_VISCOSITY, USUAL_DYNAMIC_FACTOR, USUAL_ROUGHNESS, USUAL_ROOT_
     0.7,
 )
 """What is assumed for a life: years, viscosity at 40 degrees (mm2/s), K_v, Rz (um), Y_drelT Y_RrelT Y_X, Y_M."""
+ROUGHNESSES = (
+    (
+        "roughness_Rz_um",
+        ("averaged_peak_to_valley_height_flank", "mean_peak_to_valley_roughness_flank_iso_4287_1997"),
+        1.0,
+    ),
+    (
+        "roughness_Ra_um",
+        ("arithmetic_average_roughness_flank", "arithmetic_mean_roughness_flank_iso_4287_1997"),
+        1.0,
+    ),
+    (
+        "root_roughness_Rz_um",
+        ("averaged_peak_to_valley_height_root", "mean_peak_to_valley_roughness_root_iso_4287_1997"),
+        1.0,
+    ),
+    (
+        "root_roughness_Rz_um",
+        ("arithmetic_average_roughness_root", "arithmetic_mean_roughness_root_iso_4287_1997"),
+        6.0,
+    ),
+)
+"""Keys of the gearbox file, attributes that give them, and factors: Rz is six times Ra (ISO 6336-2)."""
+ROUGHNESS_RANGE = (0.1, 100.0)
+"""Roughnesses of a gear, um."""
+TOLERANCE_CLASSES = (1, 11)
+"""Flank tolerance classes of ISO 1328-1:2013."""
 HARD_FLANK = 1100.0
 """Endurance limit of flanks (MPa) from which on they are case hardened, if nothing else is said (ISO 6336-5)."""
 _NITRIDED = (((1e5, 1.3), (2e6, 1.0), (1e10, 0.85)), ((1e3, 1.6), (3e6, 1.0), (1e10, 0.85)))
@@ -40,6 +70,20 @@ LEAST_SHARE = 0.1
 
 
 @dataclass(frozen=True)
+class PointForce:
+    """Force (N) and moment (N m) on a body at a place along its axis, in the axes of the gearbox file."""
+
+    part: Component
+    body: str
+    z: float
+    """In mm."""
+    force: tuple[float, ...]
+    """(3,) along x, y, z."""
+    moment: tuple[float, ...]
+    """(2,) about x, y."""
+
+
+@dataclass(frozen=True)
 class Loads:
     """Torques (N m) and speeds (rpm) on bodies, positive about +z."""
 
@@ -49,6 +93,8 @@ class Loads:
     torques: Mapping[str, float]
     speeds: Mapping[str, float]
     """By body name."""
+    forces: Mapping[int, PointForce] = field(default_factory=dict)
+    """By the number of the component."""
     share: float | None = None
     """Of the operating time, %; None where the file gives none."""
 
@@ -64,23 +110,10 @@ class Ends:
 
 def loads_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> list[Loads]:
     """Gather the loads of each load case, or of the file itself if it has none."""
-    forced = [part for part in model.of_type("external_load") if _has_forces(part)]
-    forced += [
-        model.components[number]
-        for case in model.load_cases
-        for number, changes in case.changes.items()
-        if number in model.components and _has_forces(Component(number, "", "", changes))
-    ]
-    for part in dict.fromkeys(forced):
-        notes.ignored.append(f"{part}: point forces, which a gearbox file cannot hold")
-    return [_loads(model, places, bodies, case) for case in model.load_cases or (None,)]
+    return [_loads(model, places, bodies, case, notes) for case in model.load_cases or (None,)]
 
 
-def _has_forces(part: Component) -> bool:
-    return any(part.quantity(key, "N") for key in FORCES)
-
-
-def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None) -> Loads:
+def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, notes: Notes) -> Loads:
     changes = case.changes if case else {}
     speeds: dict[str, float] = {}
     for shaft in _changed(model.of_type("shaft"), changes):
@@ -89,7 +122,11 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None) 
         if body is not None and speed is not None and not body.fixed:
             speeds.setdefault(body.name, tidy(places.sense(shaft) * speed))
     torques: dict[str, float] = {}
+    forces: dict[int, PointForce] = {}
     for load in _changed(model.of_type("external_load"), changes):
+        force = _point_force(model, places, bodies, load, notes)
+        if force is not None:
+            forces[load.number] = force
         body = _owner(model, bodies, load)
         torque = _torque(model, places, load, speeds, bodies)
         if body is not None and torque and load.flag("transmits_torque") is not False:
@@ -98,7 +135,33 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None) 
     for unit in _changed(model.of_type("gear_unit"), changes):
         share = unit.quantity("operating_time_fraction", "%")
     name = f"load_case_{case.number}" if case else "nominal"
-    return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, share)
+    return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, forces, share)
+
+
+def _point_force(model: Model, places: Places, bodies: Bodies, load: Component, notes: Notes) -> PointForce | None:
+    """Force and moment of a load across and along its shaft, in the axes of the gearbox file; None for none.
+
+    What acts on a planet turns with its carrier and is left out; the casing takes any.
+    """
+    force = np.array([load.quantity(key, "N") or 0.0 for key in FORCES])
+    moment = np.array([0.0, *(load.quantity(key, "N m") or 0.0 for key in MOMENTS)])
+    if not force.any() and not moment.any():
+        return None
+    shaft = _shaft(model, load)
+    body = _owner(model, bodies, load)
+    size = " and ".join(f"{np.linalg.norm(one):g} {unit}" for one, unit in ((force, "N"), (moment, "N m")) if one.any())
+    if shaft is None or body is None:
+        notes.lost.append(f"{load}: {size}; what it acts on stands still, is a planet, or is left out")
+        return None
+    axes = places.axes(shaft)
+    z = places.position(shaft)[2] + places.sense(shaft) * (load.quantity("u_coordinate_on_shaft", "mm") or 0.0)
+    return PointForce(
+        load,
+        body.name,
+        tidy(round(z, 9)),
+        tuple(tidy(round(value, 6)) for value in (force @ axes).tolist()),
+        tuple(tidy(round(value, 6)) for value in (moment @ axes).tolist()[:2]),
+    )
 
 
 def _changed(parts: Sequence[Component], changes: Mapping[int, Mapping[str, Attribute]]) -> list[Component]:
@@ -182,6 +245,32 @@ def static_load(loads: Sequence[Loads], ends: Ends) -> Entry:
         return assumed({ends.input: UNKNOWN_TORQUE}, "the file gives no torque: SET IT")
     source = "torque_around_u_axis, or power over speed" + ("; the largest of the load cases" if len(loads) > 1 else "")
     return read({ends.input: max(torques, key=abs)}, source)
+
+
+def force_blocks(loads: Sequence[Loads], ends: Ends, notes: Notes) -> dict[str, Block]:
+    """Tables of the constant forces: those of the load case that gives the static load, as weight acts in all others.
+
+    Where load cases have other forces, this is told.
+    """
+    static = max(loads, key=lambda one: abs(one.torques.get(ends.input, 0.0)))
+    blocks = {}
+    for number, one in static.forces.items():
+        key = ", ".join((*FORCES, *MOMENTS))
+        entries = {"body": Entry(one.body), "z_mm": read(one.z, "u_coordinate_on_shaft")}
+        if any(one.force):
+            entries["force_N"] = read(list(one.force), key)
+        if any(one.moment):
+            entries["moment_N_m"] = read(list(one.moment), key)
+        blocks[f"load_{number}"] = Block(str(one.part), entries)
+    for number in sorted({number for one in loads for number in one.forces}):
+        found = [one.forces[number] for one in loads if number in one.forces]
+        part = found[0].part
+        if len(found) < len(loads) or len({(one.force, one.moment) for one in found}) > 1:
+            notes.changed.append(
+                f"{part}: its force differs between load cases; that of {static.name}, which has the largest torque, "
+                "acts in all of them"
+            )
+    return blocks
 
 
 def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: float) -> dict[str, Block]:
@@ -278,6 +367,10 @@ def life_blocks(
     source_block = Block("", {"file": file, "hours_per_year": assumed(HOURS_PER_YEAR, "always at work")})
     blocks["loads"] = Block("", of_life, {"sources.load_spectrum": source_block})
     blocks["rating"] = _rating(model, gears)
+    lubricant = _lubricant(model)
+    if lubricant is not None:
+        blocks["lubricant"] = lubricant
+        del blocks["rating"].entries["viscosity_40_mm2_per_s"]
     return LifeLoads("torque_N_m,speed_rpm,hours\n" + "".join(lines), blocks)
 
 
@@ -300,6 +393,23 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
     return body, life, lines
 
 
+def _lubricant(model: Model) -> Block | None:
+    """Section on the oil where the file gives its viscosity at both temperatures: of several the thinnest."""
+    oils = {}
+    for oil in model.of_type("lubricant"):
+        cold, hot = (oil.quantity(f"viscosity_at_{t}_degree_celsius", "mm^2 / s") for t in (40, 100))
+        if cold and hot and hot < cold:
+            oils[cold] = hot
+    if not oils:
+        return None
+    cold = min(oils)
+    entries = {
+        "viscosity_40_mm2_per_s": read(tidy(cold), "viscosity_at_40_degree_celsius of the lubricant"),
+        "viscosity_100_mm2_per_s": read(tidy(oils[cold]), "viscosity_at_100_degree_celsius"),
+    }
+    return Block("", entries)
+
+
 def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
     """Tell what gears withstand by their materials, and the oil; gears without both endurance limits are not rated."""
     viscosities = [
@@ -319,14 +429,15 @@ def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
     )
     block = Block("", {"dynamic_factor": dynamic, "viscosity_40_mm2_per_s": viscosity})
     for name, (gear, both_ways) in gears.items():
-        strength = _strength(material_of(model, gear), gear, both_ways)
+        flanks = model.related("flank", "gear", gear.number, "left")
+        strength = _strength(material_of(model, gear), (gear, *flanks), both_ways)
         if strength is not None:
             block.blocks[f"gears.{name}"] = strength
     return block
 
 
-def _strength(material: Component | None, gear: Component, both_ways: bool) -> Block | None:
-    """Tell what a gear withstands; None without both of its endurance limits."""
+def _strength(material: Component | None, parts: Sequence[Component], both_ways: bool) -> Block | None:
+    """Tell what a gear withstands; None without both of its endurance limits. `parts` are the gear and its flank."""
     limits = {
         ours: material.quantity(key, "MPa") if material else None
         for ours, key in (("sigma_H_lim_MPa", "endurance_limit_flank"), ("sigma_F_lim_MPa", "endurance_limit_root"))
@@ -338,15 +449,30 @@ def _strength(material: Component | None, gear: Component, both_ways: bool) -> B
         for ours, value in limits.items()
     }
     entries |= _curves(material.text("heat_treated_material_type_iso_6336_2006"), limits["sigma_H_lim_MPa"] or 0.0)
-    roughness = gear.quantity("arithmetic_average_roughness_flank", "mum")
-    if roughness:
-        entries["roughness_Ra_um"] = read(tidy(roughness), "arithmetic_average_roughness_flank")
-    else:
-        entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "the file gives none")
-    entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 by ISO 6336-3")
+    entries |= _roughnesses(parts)
+    for key in ("tolerance_class_according_to_iso_1328_2013", "global_tolerance_class_iso_1328_2013"):
+        stated = next((one for part in parts if (one := part.whole(key)) is not None), None)
+        if stated is not None and TOLERANCE_CLASSES[0] <= stated <= TOLERANCE_CLASSES[1]:
+            entries.setdefault("tolerance_class", read(stated, key))
     if both_ways:
         entries["mean_stress_factor"] = assumed(BOTH_WAYS, "Y_M of ISO 6336-3, annex B, for teeth that bend both ways")
     return Block(str(material), entries)
+
+
+def _roughnesses(parts: Sequence[Component]) -> dict[str, Entry]:
+    """Roughness of flanks and roots: Rz where the file gives it, else from Ra; of roots six times as much."""
+    entries: dict[str, Entry] = {}
+    for ours, keys, factor in ROUGHNESSES:
+        stated = next(((key, one) for key in keys for part in parts if (one := part.quantity(key, "mum"))), None)
+        if stated is not None and ROUGHNESS_RANGE[0] <= factor * stated[1] <= ROUGHNESS_RANGE[1]:
+            entries.setdefault(ours, read(tidy(factor * stated[1]), stated[0]))
+    if "roughness_Ra_um" in entries:  # as before; a file that gives both means the same by them
+        entries.pop("roughness_Rz_um", None)
+    elif "roughness_Rz_um" not in entries:
+        entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "the file gives none")
+    if "root_roughness_Rz_um" not in entries:
+        entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 by ISO 6336-3")
+    return entries
 
 
 def _curves(kind: str, flank_limit: float) -> dict[str, Entry]:

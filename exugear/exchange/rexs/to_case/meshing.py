@@ -9,8 +9,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
 from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, derived, read, tidy
-from exugear.exchange.rexs.to_case.toothing import EQUAL, Toothing
+from exugear.exchange.rexs.to_case.toothing import EQUAL, Tool, Toothing
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 from exugear.gearbox.units import MM
 from fe_ste.geometry import pair_relations
@@ -31,6 +33,8 @@ MARGIN = 1e-4
 """Rounding allowed for where a tool or a tip is replaced, in normal modules."""
 FORM_TOLERANCE = 1e-3
 """Difference of form diameters that says nothing, in normal modules."""
+CURVE_SAMPLES = 2001
+"""Points of the curve that the rounded tip of a tool cuts."""
 
 
 @dataclass(frozen=True)
@@ -128,18 +132,46 @@ def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: N
     """
     solved = _solved(gears, stages)
     wrong = [stage for stage in stages if _beyond(solved, stage)]
-    replaced = _replaceable(gears, stages, wrong, notes)
-    if replaced:
-        open_shifts = {number: dataclasses.replace(gears[number], shift=None) for number in replaced}
-        again = _solved({**gears, **open_shifts}, stages)
-        if not any(_beyond(again, stage) for stage in stages):
+    for replaced in (_zeros_with_followers(gears, stages, wrong, notes), _replaceable(gears, stages, wrong, notes)):
+        again = _reopened(gears, stages, replaced)
+        if replaced and not any(_beyond(again, stage) for stage in stages):
             solved = again
             notes.changed += [_replacement(gears[number], again[number]) for number in replaced]
+            break
     for stage in stages:
         with notes.faults.gathered():
             _check_shifts(solved, stage, notes)
     notes.faults.tell()
     return solved
+
+
+def _reopened(gears: Mapping[int, Toothing], stages: Sequence[Stage], numbers: Sequence[int]) -> dict[int, Toothing]:
+    """Give every gear a profile shift, some gears one that follows from their stages."""
+    open_shifts = {number: dataclasses.replace(gears[number], shift=None) for number in numbers}
+    return _solved({**gears, **open_shifts}, stages)
+
+
+def _zeros_with_followers(
+    gears: Mapping[int, Toothing], stages: Sequence[Stage], wrong: Sequence[Stage], notes: Notes
+) -> list[int]:
+    """Gears with a shift of zero in stages that contradict it, and mates that follow, where the file leaves the choice.
+
+    A planet of shift zero may agree with its ring and contradict its sun: its shift then follows from the sun, and that
+    of the ring from the planet.
+    """
+    if notes.rules.shifts != "centre-distance":
+        return []
+    found: list[int] = []
+    for stage in wrong:
+        both = (stage.pinion, stage.gear)
+        zeros = [number for number in both if (shift := gears[number].shift) is not None and shift.value == 0.0]
+        if len(zeros) == 1:
+            found += zeros
+    again = _reopened(gears, stages, found)
+    for stage in stages:
+        if found and stage not in wrong and _beyond(again, stage):
+            found += [number for number in (stage.pinion, stage.gear) if number not in found]
+    return list(dict.fromkeys(found))
 
 
 def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int, Toothing]:
@@ -222,13 +254,13 @@ def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> 
     stated, total = _shift_sums(gears, stage)
     notes.checked.append(f"{stage.part}: sum of profile shifts {stated:.6f}, centre distance asks for {total:.6f}")
     if abs(stated - total) > SHIFT_TOLERANCE:
-        pinion = gears[stage.pinion]
-        assert pinion.shift is not None
+        option = ""
+        if notes.rules.shifts == "file":
+            option = ", or import with --shifts centre-distance, which replaces a shift of 0, or else one of the two"
         raise RexsError(
             f"{stage.part}: the profile shifts sum to {stated:.5f}, but its centre distance of "
             f"{stage.distance.value:g} mm asks for {total:.5f}; correct addendum_modification_coefficient "
-            f"or center_distance, or import with --shifts centre-distance, which gives {pinion.part} "
-            f"{pinion.shift.value + total - stated:.5f} where the other gear keeps its own"
+            f"or center_distance{option}"
         )
 
 
@@ -308,6 +340,7 @@ def _in_rack_of(mate: Toothing, gear: Toothing) -> Toothing:
             tidy(round(gear.tip_radius.value * gear.module.value / mate.module.value, 9)), "the same length"
         ),
         "cutter": None,
+        "tools": (),
     }
     return dataclasses.replace(gear, **changes)
 
@@ -381,9 +414,7 @@ def with_fitting_tool(gear: Toothing, notes: Notes) -> Toothing:
     made = unchecked("", gear)
     if gear.internal or made.rack_tip_half_land >= 0.0:
         return gear
-    # As in `fe_ste.geometry.checks`: a smaller radius leaves more of the tool's tip flat.
-    growth = 1.0 / math.cos(made.normal_pressure_angle) - math.tan(made.normal_pressure_angle)
-    most = gear.tip_radius.value + made.rack_tip_half_land / made.normal_module / growth
+    most = made.largest_rack_rounding
     if most <= 0.0:
         return gear
     radius = math.floor(1e4 * most) / 1e4
@@ -403,6 +434,8 @@ def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
             f"{gear.part}: undercut by its tool; its flank begins at a diameter of {2e3 * bare.form_radius:.4f} mm"
         )
     if gear.root_form is None:
+        gear = dataclasses.replace(gear, root_form=_flank_end(gear, bare))
+    if gear.root_form is None:
         return gear
     beyond = (MM * gear.root_form.value - 2.0 * bare.form_radius) * bare.outward
     notes.checked.append(
@@ -412,6 +445,68 @@ def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
     if beyond > FORM_TOLERANCE * bare.normal_module:
         return gear
     return dataclasses.replace(gear, root_form=None)
+
+
+def _flank_end(gear: Toothing, bare: UncheckedGear) -> Entry | None:
+    """Root form diameter (mm) that the tools leave: none where one tool without protuberance makes flank and root.
+
+    The tool that comes last finishes the flank as far as its straight part reaches. A tool before it that reaches
+    deeper ends the flank where its protuberance, less what it leaves for finishing, cuts into it.
+    """
+    if not gear.tools:
+        return None
+    last = gear.tools[-1]
+    deepest = max(gear.tools, key=lambda tool: tool.depth)
+    relief = deepest.protuberance
+    ends: dict[str, float] = {}
+    sine = math.sin(bare.normal_pressure_angle)
+    if deepest is not last:
+        relief -= deepest.allowance
+        straight = last.depth - last.tip_radius * (1.0 - sine)
+        ends[f"the straight flank of {last.part} ends there"] = _generated_radius(bare, straight)
+    if relief > 0.0 and math.degrees(deepest.protuberance_angle) < gear.pressure_angle.value:
+        ends[f"the protuberance of {deepest.part} cuts in there"] = _cut_by_protuberance(bare, deepest, relief)
+    if not ends:
+        return None
+    source, radius = max(ends.items(), key=lambda one: one[1])
+    return derived(tidy(round(2e3 * radius, 4)), source)
+
+
+def _generated_radius(gear: UncheckedGear, depth: float) -> float:
+    """Radius down to which a rack that is straight to a depth in normal modules generates the flank, m."""
+    angle = gear.transverse_pressure_angle
+    below = (depth - gear.profile_shift) * gear.normal_module
+    roll = gear.base_radius * math.tan(angle) - below / math.sin(angle)
+    return math.hypot(gear.base_radius, max(roll, 0.0))
+
+
+def _cut_by_protuberance(gear: UncheckedGear, tool: Tool, relief: float) -> float:
+    """Largest radius at which protuberance and rounded tip of a tool cut into the finished flank, m; 0 for nowhere.
+
+    `relief` is how far the protuberance reaches beyond the line of the finished flank, in normal modules. A point of
+    the tool cuts where its normal passes through the pitch point, as in `fe_ste.geometry.involute.RackTipCut`.
+    """
+    module = gear.normal_module
+    angle = tool.protuberance_angle
+    rounding = tool.tip_radius * module
+    middle = gear.rack_tip_half_land + relief * module / math.cos(gear.normal_pressure_angle)
+    # The straight part, from the rounding to where it meets the line of the flank.
+    beyond = (rounding - relief * module) / math.cos(gear.normal_pressure_angle) - rounding / math.cos(angle)
+    height = beyond / (math.tan(angle) - math.tan(gear.normal_pressure_angle)) + rounding * math.sin(angle)
+    along = np.linspace(max(height, 0.0) / math.cos(angle), 0.0, CURVE_SAMPLES)
+    around = np.linspace(angle, 0.5 * math.pi, CURVE_SAMPLES)
+    slope = -np.append(np.full(CURVE_SAMPLES, angle), around)
+    along = np.append(along, np.zeros(CURVE_SAMPLES))
+    stretch = 1.0 / math.cos(gear.helix_angle)
+    x = stretch * (middle + rounding * np.cos(slope) + along * math.sin(angle))
+    y = gear.root_radius - gear.reference_radius + rounding * (1.0 + np.sin(slope)) + along * math.cos(angle)
+    travel = y * np.cos(slope) / (stretch * np.sin(slope)) - x
+    radius = np.hypot(x + travel, gear.reference_radius + y)
+    polar = 0.5 * gear.angular_pitch + travel / gear.reference_radius
+    polar = polar - np.arctan2(x + travel, gear.reference_radius + y)
+    above = radius > gear.base_radius
+    cut = radius[above & (polar < gear.half_angle(np.where(above, radius, gear.base_radius)))]
+    return float(np.max(cut, initial=0.0))
 
 
 def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:

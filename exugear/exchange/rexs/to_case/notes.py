@@ -75,8 +75,10 @@ class Notes:
     """Values of the file that were replaced, and assumptions that matter."""
     checked: list[str] = field(default_factory=list)
     """Comparisons of what the file says twice."""
+    lost: list[str] = field(default_factory=list)
+    """What acts on the gearbox, moves or holds in it and is left out: the first thing to tell."""
     ignored: list[str] = field(default_factory=list)
-    """What the file holds and the gearbox file does not."""
+    """Other things that the file holds and the gearbox file does not."""
 
 
 def tidy(value: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.exchange.rexs.to_case.bodies import (
@@ -140,7 +141,7 @@ def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, note
         return None  # of a planet that is like the first
     inner, outer = (None if body is not None and body.fixed else body for body in (inner, outer))
     if inner is outer:
-        notes.ignored.append(f"{part}: holds nothing that turns, or both of its rings are on one body")
+        notes.lost.append(f"{part}: holds nothing that turns, or both of its rings are on one body")
         return None
     if inner is None or (outer is not None and outer.carrier == inner.name):
         inner, outer = outer, inner
@@ -294,7 +295,7 @@ def _catalogue(
     if not arrangement and (rows > 1 or part.text("bearing_type") == "radial_spherical_roller_bearing"):
         entries["row_count"] = read(rows, "number_of_bearing_rows")
     if row is not None:
-        entries |= _elements(model, row, kind)
+        entries |= _elements(model, row, kind, notes)
         entries |= _grooves(model, row, kind, notes)
     entries |= arrangement
     clearance = part.quantity("operating_radial_bearing_clearance", "mm")
@@ -304,10 +305,15 @@ def _catalogue(
     for key, ours in (
         (f"{sense_of_rating}_dynamic_load_rating", "dynamic_rating_kN"),
         (f"{sense_of_rating}_static_load_rating", "static_rating_kN"),
+        ("fatigue_limit_load", "fatigue_load_limit_kN"),
     ):
         rating = part.quantity(key, "kN")
         if rating:
             entries[ours] = read(tidy(rating), key)
+    limit, static = (entries.get(key) for key in ("fatigue_load_limit_kN", "static_rating_kN"))
+    if limit is not None and static is not None and limit.value >= static.value:
+        notes.changed.append(f"{part}: fatigue_limit_load of {limit.value:g} kN is above its static rating, left out")
+        del entries["fatigue_load_limit_kN"]
     if not arrangement:
         _tell_axial(part, kind, sense, entries, notes)
     return entries
@@ -329,8 +335,8 @@ def _tell_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry
         notes.changed.append(f"{part}: axial_force_absorption {absorbed}, but the law of a {kind} holds both ways")
 
 
-def _elements(model: Model, row: Component, kind: str) -> dict[str, Entry]:
-    """Count and sizes of the rolling elements, as far as the file gives them."""
+def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
+    """Count and sizes of the rolling elements, as far as the file gives them; no more of them than fit."""
     entries = {}
     count = row.whole("number_of_rolling_elements")
     if count:
@@ -344,6 +350,13 @@ def _elements(model: Model, row: Component, kind: str) -> dict[str, Entry]:
         value = part.quantity(key, "mm") if part else None
         if value:
             entries[ours] = read(tidy(value), key)
+    diameter, pitch = (entries.get(key) for key in ("element_diameter_mm", "pitch_diameter_mm"))
+    if count and diameter is not None and pitch is not None and 0.0 < diameter.value < pitch.value:
+        most = int(math.pi / math.asin(diameter.value / pitch.value))
+        if count > most:
+            fitting = f"{count} of {diameter.value:g} mm do not fit on {pitch.value:g} mm"
+            notes.changed.append(f"{row}: {fitting}, {most} rolling elements taken; ratings of the file stay")
+            entries["element_count"] = assumed(most, fitting)
     return entries
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, needed, read, tidy, within
@@ -19,8 +19,26 @@ EQUAL = 1e-6
 """Largest difference of numbers on equal flanks or planets."""
 LEAST_RADIUS = 0.2
 """Least radius of a tool's corner that the tooth model can have in all cases, in normal modules."""
+USUAL_PROTUBERANCE_ANGLE = 10.0
+"""Angle of a protuberance where the file gives none, deg."""
 RIGID_MODULUS = 1e6
 """Young's modulus (MPa) above which a material stands for 'rigid'; the stiffest there are have less."""
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A tool of a gear in the order of manufacture; lengths in normal modules."""
+
+    part: Component
+    depth: float
+    """From its reference line to its tip: the dedendum of a gear whose root it cuts."""
+    tip_radius: float
+    protuberance: float
+    """Distance of a line parallel to its flank that touches its tip rounding from its flank, 0 for none."""
+    protuberance_angle: float
+    """Pressure angle of the protuberance, rad."""
+    allowance: float
+    """Material that it leaves on each flank for the tools after it, along the normal."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +67,8 @@ class Toothing:
     """Radial, mm."""
     root_form: Entry | None
     """Diameter at which the flank ends towards the root, as far as it is given."""
+    tools: tuple[Tool, ...]
+    """Racks that make an external gear, one after the other."""
     internal: bool
 
 
@@ -63,7 +83,8 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
     internal = gear.type == "ring_gear"
     module = _length(gear, "normal_module")
     flank = _flank(model, gear)
-    tool = _tool(model, gear)
+    steps = _steps(model, gear)
+    tool = _root_tool(steps, internal)
     chamfer = (flank.quantity("tooth_tip_chamfer", "mm") if flank else None) or 0.0
     angle = _pressure_angle(gear, flank)
     helix = _helix_angle(gear, mates)
@@ -88,6 +109,7 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         cutter=_cutter(gear, tool, module) if internal else None,
         chamfer=_chamfer(gear, chamfer),
         root_form=_diameter(gear, "root_form_diameter"),
+        tools=() if internal else tuple(_racks(steps, module)),
         internal=internal,
     )
 
@@ -126,17 +148,58 @@ def _flank(model: Model, gear: Component) -> Component | None:
     return left[0]
 
 
-def _tool(model: Model, gear: Component) -> Component | None:
-    """Last tool of a gear: by a manufacturing step of the gear or its flank (1.3 on), or by a reference."""
-    workpieces = [gear, *model.related("flank", "gear", gear.number, "left")]
-    for part in workpieces:
-        tools = model.related("manufacturing_step", "workpiece", part.number, "tool")
-        tools = tools or model.related("ordered_reference", "origin", part.number, "referenced")
-        tools = tools or model.related("reference", "origin", part.number, "referenced")
-        tools = tuple(tool for tool in tools if tool.type in ("rack_shaped_tool", "cutter_wheel_tool"))
-        if tools:
-            return tools[-1]
-    return None
+def _steps(model: Model, gear: Component) -> list[tuple[Component, Component | None]]:
+    """Tools of a gear in their order with their settings: by the steps of its manufacture (1.3 on), or by references.
+
+    A flank may have them in the place of its gear.
+    """
+    for part in (gear, *model.related("flank", "gear", gear.number, "left")):
+        relations = [
+            one for one in model.relations_of("manufacturing_step") if one.roles.get("workpiece") == part.number
+        ]
+        steps: list[tuple[Component, Component | None]] = []
+        for relation in sorted(relations, key=lambda one: one.order):
+            settings = model.components.get(relation.roles.get("manufacturing_settings", -1))
+            if relation.roles.get("tool") in model.components:
+                steps.append((model.components[relation.roles["tool"]], settings))
+        for kind in ("ordered_reference", "reference"):
+            steps = steps or [(tool, None) for tool in model.related(kind, "origin", part.number, "referenced")]
+        steps = [step for step in steps if step[0].type in ("rack_shaped_tool", "cutter_wheel_tool")]
+        if steps:
+            return steps
+    return []
+
+
+def _root_tool(steps: Sequence[tuple[Component, Component | None]], internal: bool) -> Component | None:
+    """Tool that makes the root: the one that reaches deepest, the first of equal ones; of a ring its cutter."""
+    tools = [tool for tool, _ in steps]
+    if internal:
+        tools = [tool for tool in tools if tool.type == "cutter_wheel_tool"] or tools
+    return max(tools, key=lambda tool: tool.quantity("addendum_coefficient_reference_profile") or 0.0, default=None)
+
+
+def _racks(steps: Sequence[tuple[Component, Component | None]], module: float) -> Iterator[Tool]:
+    """Racks of known depth among the tools of an external gear."""
+    for tool, settings in steps:
+        depth = tool.quantity("addendum_coefficient_reference_profile")
+        if tool.type != "rack_shaped_tool" or not depth or depth < 0.0:
+            continue
+        amount = (tool.quantity("protuberance_amount", "mm") or 0.0) / module
+        yield Tool(
+            part=tool,
+            depth=depth,
+            tip_radius=max(tool.quantity("tip_corner_radius_factor_reference_profile") or 0.0, 0.0),
+            protuberance=amount or tool.quantity("protuberance_amount_factor") or 0.0,
+            protuberance_angle=math.radians(tool.quantity("protuberance_angle", "deg") or USUAL_PROTUBERANCE_ANGLE),
+            allowance=_allowance(settings) / module,
+        )
+
+
+def _allowance(settings: Component | None) -> float:
+    """Material that a tool leaves on each flank, mm."""
+    if settings is None:
+        return 0.0
+    return settings.quantity("machining_allowance", "mm") or 0.0
 
 
 def _pressure_angle(gear: Component, flank: Component | None) -> Entry:

@@ -173,7 +173,7 @@ def test_not_a_number_is_told_with_its_time(written):
         ("a.out", "Time T\n(s)\n1 2\n", "2 names and 1 units"),
         ("a.out", "Time T\n(s) (N)\n0 2\n1\n", "line 4 has 1 columns"),
         ("a.csv", "time_s,hss\n0,1\n1,2\n2,3\n", "heading 'hss' ends in no unit"),
-        ("a.csv", "time_s,hss_rpm\n0,1\n1,x\n2,3\n", "line 3 holds words"),
+        ("a.csv", "time_s,hss_rpm\n0,1\nx,2\n2,3\n", "line 3 holds words where 'time_s' has a number: 'x'"),
         ("a.csv", "time_s,hss_rpm\n0,1\n2,2\n1,3\n", "time does not grow behind step 2"),
         ("a.csv", "time_s,hss_rpm\n0,1\n", "1 steps of time"),
         ("a.dat", "", "ends in .dat"),
@@ -182,3 +182,35 @@ def test_not_a_number_is_told_with_its_time(written):
 def test_bad_files_are_one_clear_error_each(written, name, text, message):
     with pytest.raises(LoadFileError, match=message):
         assert len(read_channels(written(text.encode(), name)).time)
+
+
+HOLES = "Time RotTorq RotSpeed B1N1Fl\n(s) (kN-m) (rpm) (N)\n0 100 10 {0}\n1 200 10 -4.5678-120\n2 300 10 1.0\n"
+
+
+@pytest.mark.parametrize("hole", ["1.2345-101", "********", "1.5D+03", "NaN", "word"])
+def test_a_hole_in_a_channel_that_nobody_asks_for_is_passed_over(written, hole):
+    series = read_channels(written(HOLES.format(hole).encode(), "turbine.out"))
+    assert series.channel("RotTorq", "torque").tolist() == [100e3, 200e3, 300e3]
+
+
+def test_a_hole_in_a_channel_that_is_asked_for_names_line_channel_and_word(written):
+    series = read_channels(written(HOLES.format("********").encode(), "turbine.out"))
+    with pytest.raises(LoadFileError, match=r"line 3 holds words where 'B1N1Fl' has a number: '\*+'"):
+        series.channel("B1N1Fl", "force")
+
+
+@pytest.mark.parametrize(("word", "value"), [("1.2345-101", 1.2345e-101), ("1.5D+03", 1500.0), ("-2+2", -200.0)])
+def test_numbers_of_fortran_without_e_are_numbers(written, word, value):
+    """Fortran writes no E where an exponent has three digits (numpy issue 5557), and D in double precision."""
+    series = read_channels(written(HOLES.format(word).encode(), "turbine.out"))
+    assert series.channel("B1N1Fl", "force")[0] == pytest.approx(value, rel=1e-12)
+
+
+def test_a_scale_of_zero_is_damage_of_its_channel_alone(written):
+    time, values = np.linspace(0.0, 1.0, 21), np.column_stack([np.linspace(1.0, 2.0, 21), np.linspace(5.0, 6.0, 21)])
+    content = bytearray(packed(2, time, values))
+    content[2 + 8 + 16 + 4 : 2 + 8 + 16 + 8] = struct.pack("<f", 0.0)  # the scale of the second channel
+    series = read_channels(written(bytes(content)))
+    assert series.channel("RotTorq", "torque") == pytest.approx(1e3 * values[:, 0], rel=1e-4)
+    with pytest.raises(LoadFileError, match="channel RotSpeed has the scale 0"):
+        series.channel("RotSpeed", "speed")

@@ -274,12 +274,14 @@ def test_a_spherical_roller_thrust_bearing_holds_the_shaft_its_way(tmp_path):
             axial_force_absorption="positive",
             axial_dynamic_load_rating=390.0,
             axial_static_load_rating=915.0,
+            fatigue_limit_load=112.0,
         )
 
     gearbox = imported(helical(bearings)).gearbox
     catalogues = {b.catalogue.type: b.catalogue for b in gearbox.bearings if b.catalogue}
     thrust = catalogues["thrust_spherical_roller"]
     assert (thrust.holds_towards, thrust.dynamic_rating_kN, thrust.static_rating_kN) == ("+z", 390.0, 915.0)
+    assert thrust.fatigue_load_limit_kN == 112.0
     duties = {duty.kind: duty for duty in bearing_duties(assembly(gearbox, tmp_path))}
     assert duties["thrust_spherical_roller"].axial_load == pytest.approx(axial_force(), rel=1e-3)
 
@@ -460,7 +462,7 @@ def test_one_shift_of_zero_that_cannot_be_is_that_of_the_centre_distance():
 
 
 def test_two_shifts_that_cannot_be_are_refused_with_what_the_centre_distance_offers():
-    with pytest.raises(RexsError, match=rf"asks for {asked_for(91.5):.5f}; .*--shifts centre-distance, which gives"):
+    with pytest.raises(RexsError, match=rf"asks for {asked_for(91.5):.5f}; .*--shifts centre-distance, which replaces"):
         imported(shifted_pair((0.0, 0.0)))
     with pytest.raises(RexsError, match="--shifts centre-distance"):
         imported(shifted_pair((0.2, 0.1)))

@@ -57,6 +57,23 @@ def test_a_spectrum_table_and_its_series_count_alike(tmp_path):
     assert one.revolutions == pytest.approx(other.revolutions, rel=2e-3)  # the ends of a series last half a step
 
 
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ("1000,10,3\n2000,-20,1\n", "positive torque at a negative speed for 25 % of its hours"),
+        ("-1000,10,3\n2000,20,1\n", "negative torque at a positive speed for 75 % of its hours"),
+        ("-1000,10,1\n2000,20,3\n", ""),  # a drive that brakes now and then
+        ("-1000,-10,1\n2000,20,3\n", ""),  # one that is reversed
+    ],
+)
+def test_torques_against_the_speed_are_doubted(tmp_path, rows, told):
+    """Power is torque times speed: it flows back where their signs differ."""
+    remarks = count_loads(loaded(tmp_path, f"torque_N_m,speed_rpm,hours\n{rows}")).remarks
+    warnings = [line for line in remarks if line.startswith("Warning: bench: loads.csv has ")]
+    assert len(warnings) == bool(told)
+    assert all(told in line for line in warnings)
+
+
 def test_skipped_time_is_left_out_and_told(tmp_path):
     lines = "\n".join(f"{t},{1e6 if t < 10 else 2000},10" for t in range(100))
     counted = count_loads(loaded(tmp_path, f"time_s,carrier_N_m,carrier_rpm\n{lines}\n", skip_s=10.0))

@@ -218,7 +218,7 @@ def test_weight_is_that_of_the_bodies(grc: Gearbox, stiffness: dict) -> None:
     heavy = assembled(grc.varied({"gravity.acceleration_m_per_s2": [0.0, -9.81, 0.0]}), Choice("flexible"), stiffness)
     for name, place in heavy.elastic_slices.items():
         down = heavy.elastic_bodies[name].reduced.rigid_motions((0.0, 0.0, 0.0))[:, 1]
-        assert down @ heavy.weight[place] == pytest.approx(-9.81 * grc.body(name).mass, rel=1e-9)
+        assert down @ heavy.constant_forces[place] == pytest.approx(-9.81 * grc.body(name).mass, rel=1e-9)
 
 
 def test_damping_of_shafts_is_a_key_of_the_case(grc: Gearbox, stiffness: dict) -> None:

@@ -138,7 +138,7 @@ def test_weight_and_mass_of_a_housing_are_those_of_its_solid(box: Gearbox) -> No
     assert body.shape_inertia.mass == pytest.approx(mass, rel=1e-9)
     assert body.shape_inertia.centre == pytest.approx((0.0375, 0.0, -0.006), abs=1e-9)
     down = body.reduced.rigid_motions((0.0, 0.0, 0.0))[:, 1]
-    assert down @ heavy.weight[place] == pytest.approx(-9.81 * mass, rel=1e-9)
+    assert down @ heavy.constant_forces[place] == pytest.approx(-9.81 * mass, rel=1e-9)
     q = locked_equilibrium(heavy, {}, ["shaft_2"], heavy.mean_meshes)
     loads = heavy.bearing_loads(q, np.zeros(heavy.size))
     # The foot carries the plate and both shafts (1 and 2 kg).

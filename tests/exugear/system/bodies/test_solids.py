@@ -415,3 +415,47 @@ def test_shapes_of_the_grc_weigh_what_is_printed_and_have_all_seats(shapes, name
     assert np.linalg.matrix_rank(rows @ solid.rigid_motions((0.0, 0.0, 0.0))) == 6
     motion = solid.rigid_motions((0.0, 0.0, 0.0))[:, :3].sum(axis=1)
     assert (rows @ motion).reshape(-1, 6) == pytest.approx(np.tile([1, 1, 1, 0, 0, 0], (len(model.seats), 1)), abs=1e-9)
+
+
+def saved_by_gmsh(path: Path, **options: float) -> Path:
+    """Box of 1 x 0.5 x 0.25 in a mesh file of gmsh, whose volume has a physical group and whose surfaces have none."""
+    gmsh = pytest.importorskip("gmsh")
+    gmsh.initialize(["test", "-nopopup"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addBox(0.0, 0.0, 0.0, 1.0, 0.5, 0.25)
+        gmsh.model.occ.synchronize()
+        gmsh.model.addPhysicalGroup(3, [1])
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.3)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        for name, value in options.items():
+            gmsh.option.setNumber(f"Mesh.{name}", value)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+    return path
+
+
+@pytest.mark.parametrize("binary", [0, 1])
+def test_a_mesh_of_gmsh_with_all_elements_is_that_with_those_of_the_group(tmp_path: Path, binary: int) -> None:
+    """Mesh.SaveAll writes elements without a physical group too, which meshio does not take (its issue 1388)."""
+    plain = read_solid(saved_by_gmsh(tmp_path / "plain.msh"))
+    whole = read_solid(saved_by_gmsh(tmp_path / "whole.msh", SaveAll=1, Binary=binary))
+    assert whole.t.shape == plain.t.shape
+    assert np.sort(whole.p[:, np.unique(whole.t)], axis=1) == pytest.approx(
+        np.sort(plain.p[:, np.unique(plain.t)], axis=1), abs=1e-12
+    )
+
+
+def test_a_damaged_mesh_of_gmsh_is_refused_and_never_run_as_a_script(tmp_path: Path) -> None:
+    path = saved_by_gmsh(tmp_path / "plain.msh")
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(SolidError, match="meshio cannot read it as gmsh"):
+        read_solid(path)
+    told = tmp_path / "told"
+    script = tmp_path / "script.msh"
+    script.write_text(f'SystemCall "touch {told}";\n', encoding="utf-8")
+    with pytest.raises(SolidError, match="meshio cannot read it as gmsh"):
+        read_solid(script)
+    assert not told.exists()

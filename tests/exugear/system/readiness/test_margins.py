@@ -57,6 +57,18 @@ def test_a_small_margin_foretells_contact_at_the_form_circle_and_the_proposal_me
     assert at_form_circle(mended) == 0
 
 
+def test_a_pressure_that_no_steel_bears_is_a_warning() -> None:
+    """By Hertz it grows as the root of the torque: 3 GPa at the torque that gives it, and 97 GPa at (97/3)^2 times."""
+    content = pair(helix_deg=0.0)
+    bearable = pitch_point_pressure(Gearbox.from_dict(content).pairs["helical"].pair, 1.0)
+    for pressure, told in ((2.9e9, False), (3.1e9, True), (97e9, True)):
+        torque = (pressure / bearable) ** 2
+        content["static_load"]["torques_N_m"] = dict.fromkeys(content["static_load"]["torques_N_m"], torque)
+        gearbox = Gearbox.from_dict(content)
+        expected = f"pairs.helical: {1e-6 * pair_margins(gearbox.pairs['helical']).pitch_point_pressure:.4g} MPa"
+        assert any(line.startswith(expected) for line in remarks(gearbox)) == told
+
+
 def test_a_thin_tip_is_a_warning_and_a_pointed_one_a_fault() -> None:
     thin = spur(1.2)
     assert pair_margins(thin.pairs["helical"]).tip_thickness[0] == pytest.approx(0.120, abs=1e-3)

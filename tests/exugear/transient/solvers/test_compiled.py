@@ -116,7 +116,7 @@ def test_signals_and_energies_are_those_of_the_plain_kernels(grc: Gearbox, stiff
         states = [disturbed(assembly, angle) for angle in (0.0, 0.7)]
         q, v = (np.array(values) for values in zip(*states, strict=True))
         powers = assert_signals_are_those_of_the_plain_kernels(assembly, q, v, LOAD)
-        load = v @ (assembly.torque_vector(LOAD) + assembly.weight)
+        load = v @ (assembly.torque_vector(LOAD) + assembly.constant_forces)
         assert powers[:, 0] == pytest.approx(load, rel=1e-12)
 
 
