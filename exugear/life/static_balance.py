@@ -531,14 +531,12 @@ def _wider(
     highest = math.ceil(reach / REACH_STEP - 1e-6) * REACH_STEP
     shares = TABLE_TORQUE_SHARES if highest <= 1.0 else (*TABLE_TORQUE_SHARES, highest)
     openings = [ROOM * highest * tilt * width for tilt in tilts]
-    low = math.floor(min(0.0, *openings) / ROUNDING) * ROUNDING
-    high = math.ceil(max(0.0, *openings) / ROUNDING) * ROUNDING
+    low, high = _ends(openings)
     steps = max(1, math.ceil((high - low) / LARGEST_STEP - 1e-6))
     nodes = [low + (high - low) * step / steps for step in range(steps + 1)]
     back = math.ceil(reversed_reach / REACH_STEP - 1e-6) * REACH_STEP
-    turned = [-ROOM * back * tilt * width for tilt in tilts]
-    below = _nodes(low, math.floor(min(low, *turned) / ROUNDING) * ROUNDING)
-    nodes = [*reversed(below), *nodes, *_nodes(high, math.ceil(max(high, *turned) / ROUNDING) * ROUNDING)]
+    lowest, uppermost = _ends([*openings, *(-ROOM * back * tilt * width for tilt in tilts)])
+    nodes = [*reversed(_nodes(low, lowest)), *nodes, *_nodes(high, uppermost)]
     wanted = replace(
         static,
         torque=tuple(_rounded(static.torque[0] * share) for share in shares),
@@ -546,6 +544,12 @@ def _wider(
     )
     path = folder / "stress" / f"{request.name}.states.nc"
     return TableRequest(request.name, wanted, path, _stored(path, wanted))
+
+
+def _ends(openings: Sequence[float]) -> tuple[float, float]:
+    """Return the ends of an axis that holds openings over the face (m) and none."""
+    low = math.floor(min(0.0, *openings) / ROUNDING) * ROUNDING
+    return low, math.ceil(max(0.0, *openings) / ROUNDING) * ROUNDING
 
 
 def _nodes(begin: float, end: float) -> list[float]:
