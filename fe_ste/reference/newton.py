@@ -151,8 +151,9 @@ _MOST_AUGMENTATIONS = 25
 #: Pressures still to be added when a Newton step is taken, as part of the largest and of the tolerances.
 _PRESSURE_LEFT = 0.01
 
-#: Nodes that face the other surface with less than this part of their area carry no pressure.
-_LEAST_FACING = 1e-3
+#: Nodes that face the other surface with less than this part of their area carry no pressure: to close their gap, the
+#: sliver would be crushed.
+_LEAST_FACING = 1e-2
 
 #: Nodes that face it with more than this part do so with their whole area: the rest is the surface's curvature.
 _WHOLLY_FACING = 0.95
