@@ -282,7 +282,7 @@ def _simulate(project: Project, resume: bool, command: str, **options: Any) -> R
     except KeyboardInterrupt:
         if not has_pieces(directory / PARTIAL_NAME):
             raise
-        raise StoppedError(f"kept in {directory}; go on from there with: {command}") from None
+        raise StoppedError(f"kept in {directory}; go on from there with:\n{command}") from None
 
 
 def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, command: str, as_json: bool) -> None:
@@ -290,7 +290,7 @@ def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, co
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
         raise StoppedError(
-            f"at {finished.end:.3f} s; kept in {finished.path}; go on from there with: {command}{so_far}"
+            f"at {finished.end:.3f} s; kept in {finished.path}; go on from there with:\n{command}{so_far}"
         )
     import numpy as np
 

@@ -149,7 +149,7 @@ def stopped_run(case, number, delay=None):
 def test_a_run_that_is_terminated_keeps_what_it_reached(case):
     code, said, _, partial = stopped_run(case, signal.SIGTERM)
     assert code == 130, said
-    assert "go on from there with: exugear run " in said
+    assert "go on from there with:\nexugear run " in said
     assert load_run(partial).sizes["time"] > 0
 
 
