@@ -77,6 +77,7 @@ def test_stored_cases_are_those_of_the_benchmark(cross_check: ModuleType):
 
 
 @pytest.mark.validation
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX (ccx) is not installed")
 def test_calculix_still_gives_the_stored_value(cross_check: ModuleType, tmp_path: Path):
     name = "spur 0.5 coarse"
