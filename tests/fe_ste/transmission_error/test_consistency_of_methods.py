@@ -109,7 +109,7 @@ def test_stored_cases_are_those_of_the_benchmark(agreement):
 
 
 @pytest.mark.validation
-@pytest.mark.sample
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["spur 0 coarse", "helical 0.4", "internal 0.6"])
 def test_the_nonlinear_analysis_still_gives_the_stored_value(agreement, name):
     entry = agreement.compare(agreement.CASES[name])
