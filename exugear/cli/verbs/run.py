@@ -110,6 +110,7 @@ def run(
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
+        from exugear.gearbox.reading import CaseError
         from exugear.results.folder import time_noted
 
         choice = Choice(variant.value, mesh_law.value, inertias, load_case)
@@ -123,7 +124,10 @@ def run(
         if compared is not None and solver is Solver.exudyn:
             raise BadInputError("--compare-exudyn: the run itself is one of Exudyn; leave --solver out")
         if compared is not None:
-            _check_extent(project, compared, kept["sample_rate"], out or Path("results"))
+            try:
+                _check_extent(project, compared, kept["sample_rate"], out or Path("results"))
+            except CaseError as error:
+                raise BadInputError(f"--compare-exudyn: {error}") from error
             _check_solver(project.gearbox, variant, Solver.compiled)
         if integrator and solver is Solver.exudyn:
             raise BadInputError(f"--integrator {integrator}: is a method of the compiled solver; leave it out")

@@ -66,7 +66,7 @@ def ste(
     method: Annotated[
         Method | None,
         typer.Option(
-            help="How the teeth deflect; nonlinear takes a minute or two a position. (default: as the file says)"
+            help="How the teeth deflect; nonlinear takes about half a minute a position. (default: as the file says)"
         ),
     ] = None,
     grid: Annotated[

@@ -14,7 +14,7 @@ from exugear.system.tooth_mesh.tables import TABLE_FOLDER, requested_tables
 from fe_ste.reference.newton import Iteration
 from fe_ste.reference.table import NonlinearInput, NonlinearTable
 
-#: Positions of the mesh cycle unless asked for otherwise: one takes a minute or two.
+#: Positions of the mesh cycle unless asked for otherwise: one takes about half a minute.
 DEFAULT_POSITIONS = 10
 
 LARGEST_DIFFERENCE = 0.05

@@ -67,6 +67,7 @@ def test_a_run_of_another_input_is_not_compared_and_the_report_says_so(case):
 def test_what_cannot_be_compared_is_refused_before_anything_runs(case):
     own = run(case, "--compare-exudyn", 0.02, "--solver", "exudyn")
     assert own.exit_code == 2 and "--compare-exudyn" in own.output
-    none = run(case, "--compare-exudyn", 0.0)
-    assert none.exit_code == 2
+    for duration in (0.0, -1.0, "nan", "inf", 1e12):
+        refused = run(case, "--compare-exudyn", duration)
+        assert refused.exit_code == 2 and "--compare-exudyn" in refused.output
     assert not (case.parent / "out" / EXUDYN_FOLDER).exists()

@@ -139,7 +139,7 @@ def test_root_stress_is_that_of_the_closed_ring():
 
 def pairs_of_gearboxes(folder: Path) -> dict[str, tuple[GearPair, float]]:
     """All pairs of the templates and of the reference gearbox, with their static torques (N m)."""
-    files = {"grc": Path("cases/grc750/gearbox.toml")}
+    files = {"grc": Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml"}
     for kind in KINDS:
         files[kind] = folder / f"{kind}.toml"
         files[kind].write_text(template(kind), encoding="utf-8")
