@@ -91,7 +91,7 @@ help:
 	@echo "make validate    the long comparisons with references"
 	@echo "make validate-long  the longest ones, before a release; docs/validation.md records them"
 	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
-	@echo "make check       ruff and mypy"
+	@echo "make check       ruff, mypy and the wording of texts"
 	@echo "make check-web   the pages' scripts: linted, types checked; with a node of its own"
 	@echo "make vendor-web  renew the libraries in the pages from npm, at the versions that web/package.json pins"
 	@echo "make docs        the documentation site, with its examples run, into $(SITE)"
@@ -145,6 +145,7 @@ benchmarks: $(INSTALLED)
 check: $(INSTALLED)
 	$(RUN)/ruff check .
 	$(RUN)/mypy
+	$(RUN)/python docs/tools/check_wording.py
 
 # Node comes as a wheel and stays out of $(VENV): nothing but these two targets needs it.
 $(WEB_VENV)/installed: web/package.json web/package-lock.json
