@@ -37,6 +37,7 @@ from fe_ste.reference.newton import (
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import Displayed, TitledRows, value_range
 from fe_ste.transmission_error.compliance import PairCompliance
+from fe_ste.transmission_error.contact_stress import contact_line_stress, mean_over_contact_line
 from fe_ste.transmission_error.search import flank_radii, hertz_half_width, least_contact_length, normal_load
 from fe_ste.transmission_error.states import ContactState
 
@@ -103,6 +104,8 @@ class NonlinearPosition(Displayed):
     """Gear 1, gear 2."""
     load_share: dict[int, float]
     """Tooth pair -> part of the normal load."""
+    contact_stress: dict[int, float]
+    """Tooth pair -> Hertzian stress of its line load, mean along the contact line weighted by that load, Pa."""
     wall_time: float
     """s."""
 
@@ -178,6 +181,7 @@ def nonlinear_position(
         equilibrium=equilibrium,
         sectors=sectors,
         load_share=_load_share(sectors[0], model, equilibrium),
+        contact_stress=_contact_stress(pair, pmc, sectors[0], model, equilibrium),
         wall_time=time.perf_counter() - started,
     )
 
@@ -255,6 +259,24 @@ def _load_share(sector: GearMesh, model: ContactModel, equilibrium: Equilibrium)
         nodes = np.unique(sector.facets[sector.tooth == tooth])
         shares[int(tooth)] = float(load[np.searchsorted(model.first.nodes, nodes)].sum() / load.sum())
     return shares
+
+
+def _contact_stress(
+    pair: GearPair, pmc: float, sector: GearMesh, model: ContactModel, equilibrium: Equilibrium
+) -> dict[int, float]:
+    """Mean Hertzian stress of each tooth pair, from the forces of the rows of nodes along the face."""
+    force = equilibrium.pressure * equilibrium.weight
+    axial = model.bricks.points[model.first.nodes, 2]
+    rows, row = np.unique(axial.round(9), return_inverse=True)
+    widths = np.convolve(np.diff(rows), [0.5, 0.5])
+    cosine = math.cos(pair.pinion.base_helix_angle)
+    stresses = {}
+    for tooth in np.unique(sector.tooth):
+        nodes = np.searchsorted(model.first.nodes, np.unique(sector.facets[sector.tooth == tooth]))
+        load = np.bincount(row[nodes], weights=force[nodes], minlength=len(rows))
+        stress = contact_line_stress(pair, pmc, tooth, rows, cosine * load / widths)
+        stresses[int(tooth)] = float(mean_over_contact_line(stress, load))
+    return stresses
 
 
 # Stresses in meshing teeth at one position, from the reference analysis or under the superelement's pressures

@@ -32,6 +32,7 @@ from fe_ste.tools.files import FileError
 from fe_ste.tools.stores import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import NONLINEAR_TABLE
 from fe_ste.transmission_error.compliance import pair_compliance
+from fe_ste.transmission_error.contact_stress import mean_contact_stress
 from fe_ste.transmission_error.table import TableError
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 
@@ -46,6 +47,11 @@ _UNITS = {
     "line_of_action_force": ("N", "torque on gear 1 over its base radius"),
     "load_share": ("1", "part of the normal load that a tooth pair carries"),
     "superelement_load_share": ("1", "part of the normal load that a tooth pair carries, by the superelement"),
+    "contact_stress": (
+        "Pa",
+        "Hertzian stress of the line load of a tooth pair, load-weighted mean along its contact line",
+    ),
+    "superelement_contact_stress": ("Pa", "the same by the superelement"),
     "max_pressure": ("Pa", "largest contact pressure where a node's whole area faces the other flank"),
     "superelement_pressure": ("Pa", "largest contact pressure away from edges by the superelement"),
     "edge_pressure": ("Pa", "largest mean contact pressure of nodes at an edge; depends on the mesh"),
@@ -55,7 +61,7 @@ _UNITS = {
     "wall_time": ("s", "of the position"),
     "converged": ("1", "whether the position was solved"),
 }
-_BY_TOOTH = ("load_share", "superelement_load_share")
+_BY_TOOTH = ("load_share", "superelement_load_share", "contact_stress", "superelement_contact_stress")
 _LAYOUT = Layout(
     "table of the non-linear analysis",
     NONLINEAR_TABLE,
@@ -114,10 +120,10 @@ class NonlinearTable(Displayed):
     """Static transmission error of a pair over the mesh cycle by the reference analysis."""
 
     dataset: xr.Dataset
-    """Over (pmc, torque): ste (m), mesh_stiffness (N/m), line_of_action_force (N), load_share by ``tooth``,
-    max_pressure, edge_pressure and max_von_mises (Pa), unknowns, iterations, wall_time (s), converged. Positions
-    that failed or were not reached are not a number. Attributes: input and hash, ``failures``, and the table of all
-    Newton iterations, ``convergence``."""
+    """Over (pmc, torque): ste (m), mesh_stiffness (N/m), line_of_action_force (N), load_share and contact_stress (Pa)
+    by ``tooth``, max_pressure, edge_pressure and max_von_mises (Pa), unknowns, iterations, wall_time (s), converged.
+    Positions that failed or were not reached are not a number. Attributes: input and hash, ``failures``, and the table
+    of all Newton iterations, ``convergence``."""
 
     @classmethod
     def compute(
@@ -221,7 +227,9 @@ class NonlinearTable(Displayed):
         for name, value in _figures(position).items():
             dataset[name].values[number, 0] = value
         for tooth, share in position.load_share.items():
-            dataset["load_share"].loc[{"pmc": dataset["pmc"][number], "tooth": tooth}] = share
+            at = {"pmc": dataset["pmc"][number], "tooth": tooth}
+            dataset["load_share"].loc[at] = share
+            dataset["contact_stress"].loc[at] = position.contact_stress[tooth]
         return NonlinearTable(dataset)
 
     def _line(self) -> str:
@@ -269,8 +277,13 @@ def _by_superelement(wanted: NonlinearInput, teeth: Integers) -> dict[str, Any]:
     curve = static_transmission_error(compliance, wanted.torque, wanted.positions)
     curve = curve.squeeze(("centre_distance", "misalignment"), drop=True)
     found = {"superelement_ste": curve["ste"], "superelement_pressure": curve["max_pressure"]}
-    shares = curve["load_share"].reindex(tooth=teeth, fill_value=0.0).transpose("pmc", "torque", "tooth")
-    found["superelement_load_share"] = shares
+    found |= {
+        f"superelement_{name}": values.reindex(tooth=teeth, fill_value=0.0).transpose("pmc", "torque", "tooth")
+        for name, values in (
+            ("load_share", curve["load_share"]),
+            ("contact_stress", mean_contact_stress(wanted.pair, curve)),
+        )
+    }
     return {name: (values.dims, values.to_numpy()) for name, values in found.items()}
 
 
@@ -289,7 +302,8 @@ def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     variables: dict[str, Any] = {name: (names, np.full(shape, np.nan)) for name in floats}
     variables |= {name: (names, np.zeros(shape, dtype=np.int64)) for name in counts}
     variables["converged"] = (names, np.zeros(shape, dtype=np.bool_))
-    variables["load_share"] = ((*names, "tooth"), np.full((*shape, len(teeth)), np.nan))
+    for name in ("load_share", "contact_stress"):
+        variables[name] = ((*names, "tooth"), np.full((*shape, len(teeth)), np.nan))
     variables |= beside
     axes = {
         "pmc": pmc,

@@ -13,4 +13,4 @@ TABLE = 6
 MEAN_CONTACT = 5
 
 #: Table by the reference analysis (`fe_ste.reference.table`, and what it is computed by).
-NONLINEAR_TABLE = 2
+NONLINEAR_TABLE = 3

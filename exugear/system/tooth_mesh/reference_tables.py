@@ -107,6 +107,10 @@ def summarise_reference(request: ReferenceRequest, table: NonlinearTable) -> dic
             return None
         return figure(1e6 * (values.max() - values.min()))
 
+    def most_loaded(stress: xr.DataArray) -> xr.DataArray:
+        carries = data["load_share"] == data["load_share"].max("tooth")
+        return stress.where(carries).max()
+
     ste = data["ste"]
     # Both means are over the positions that the non-linear analysis solved.
     beside = data["superelement_ste"].where(data["converged"])
@@ -124,6 +128,8 @@ def summarise_reference(request: ReferenceRequest, table: NonlinearTable) -> dic
         "superelement_peak_to_peak_um": peak_to_peak(beside),
         "difference_of_means_percent": figure(100.0 * (ste.mean() / beside.mean() - 1.0)),
         "mesh_stiffness_mean_N_per_m": figure(data["mesh_stiffness"].mean()),
+        "contact_stress_MPa": figure(1e-6 * most_loaded(data["contact_stress"])),
+        "superelement_contact_stress_MPa": figure(1e-6 * most_loaded(data["superelement_contact_stress"])),
         "max_pressure_MPa": figure(1e-6 * data["max_pressure"].max()),
         "max_von_mises_MPa": figure(1e-6 * data["max_von_mises"].max()),
         "wall_time_per_position_s": figure(data["wall_time"].mean()),
