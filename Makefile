@@ -20,9 +20,10 @@ export OPENBLAS_NUM_THREADS ?= 1
 # Tests of one file stay together: they share tables and runs.
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile --durations 20
 
-# Tests and docstrings of one room, such as steady or transmission_error.
-ROOM ?=
-OF_ROOM = $(or $(wildcard exugear/$(ROOM) fe_ste/$(ROOM) tests/exugear/$(ROOM) tests/fe_ste/$(ROOM)),$(error no room $(ROOM)))
+# Tests and docstrings of one package, such as steady or transmission_error.
+PACKAGE ?=
+$(if $(ROOM),$(error ROOM was renamed to PACKAGE: make $(MAKECMDGOALS) PACKAGE=$(ROOM)))
+OF_PACKAGE = $(or $(wildcard exugear/$(PACKAGE) fe_ste/$(PACKAGE) tests/exugear/$(PACKAGE) tests/fe_ste/$(PACKAGE)),$(error no package $(PACKAGE)))
 
 CASE := cases/grc750/gearbox.toml
 RESULTS := results/grc750
@@ -37,7 +38,7 @@ ONE_CORE := $(shell taskset -c 0 true 2>/dev/null && echo taskset -c 0)
 #   $(call tables,FOLDER,OPTIONS OF ste)
 define tables
 @for variant in bushing rigid; do \
-	$(ONE_CORE) $(EXUGEAR) run $(CASE) --variant $$variant --mesh-law iso6336 --duration 0.01 --out $(1)/.kernels >/dev/null 2>&1; \
+	$(ONE_CORE) $(EXUGEAR) run $(CASE) --variant $$variant --mesh-model iso6336 --duration 0.01 --out $(1)/.kernels >/dev/null 2>&1; \
 done & \
 compiling=$$!; $(EXUGEAR) ste $(CASE) --out $(1) $(2); code=$$?; wait $$compiling; rm -rf $(1)/.kernels; exit $$code
 endef
@@ -86,7 +87,7 @@ help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
 	@echo "make demo-short  the same with 10 positions of the mesh cycle and 4 s of the run-up"
 	@echo "make test        tests and documentation examples"
-	@echo "make test ROOM=steady  the tests of one room"
+	@echo "make test PACKAGE=steady  the tests of one package"
 	@echo "make test-browser  claims about the report page in a browser, desk and phone; needs chromium"
 	@echo "make validate    the long comparisons with references"
 	@echo "make validate-long  the longest ones, before a release; docs/validation.md records them"
@@ -126,7 +127,7 @@ demo-short: $(INSTALLED)
 	$(call end,$(RESULTS)-short)
 
 test: $(INSTALLED)
-	$(RUN)/python -m pytest $(SIDE_BY_SIDE) $(if $(ROOM),$(OF_ROOM))
+	$(RUN)/python -m pytest $(SIDE_BY_SIDE) $(if $(PACKAGE),$(OF_PACKAGE))
 
 # Pages in a real browser: skipped, and said, where no chromium is.
 test-browser: $(INSTALLED)

@@ -123,7 +123,7 @@ def nonlinear(gearbox: Gearbox, names: tuple[str, ...]) -> Gearbox:
         assert catalogue is not None
         stated = catalogue.model_dump(exclude_unset=True, exclude={"radial_load_kN", "axial_load_kN"})
         changes |= {f"bearings.{name}.catalogue": stated}
-        changes |= {f"bearings.{name}.law": "iso16281", f"bearings.{name}.cage": "turning"}
+        changes |= {f"bearings.{name}.model": "iso16281", f"bearings.{name}.cage": "turning"}
     return gearbox.varied(changes)
 
 

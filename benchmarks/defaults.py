@@ -3,7 +3,7 @@
     python benchmarks/defaults.py [NAME ...] [--folder FOLDER] [--heights COUNT]
 
 The default: law `line_of_action`, linear bearings, the contact of the teeth as the commands find it. The best: law
-`table` on full grids, bearings by their rows (`law = "iso16281"`). Modes are matched by shape; misalignments and
+`table` on full grids, bearings by their rows (`model = "iso16281"`). Modes are matched by shape; misalignments and
 bearing loads are those of the static load; heights are those of the loudest lines of the overall transmission error,
 beside a dense sweep of the level `nonlinear`. Figures go to `defaults.json` in the folder; docs/validation.md shows
 them.
@@ -91,8 +91,8 @@ def two_stages() -> Content:
     content = tomllib.loads(template("parallel"))
     content["name"] = "two loaded stages, asymmetric"
     content["static_load"]["torques_N_m"] = {"input": 220.0}
-    content["bodies"]["middle"]["wheels_z_mm"] = {"wheel_1": -50.0, "pinion_2": 48.0}
-    content["bodies"]["output"]["wheels_z_mm"] = {"wheel_2": 48.0}
+    content["bodies"]["middle"]["gears_z_mm"] = {"wheel_1": -50.0, "pinion_2": 48.0}
+    content["bodies"]["output"]["gears_z_mm"] = {"wheel_2": 48.0}
     content["housing"]["factor"] = 0.3
     return content
 
@@ -116,7 +116,7 @@ def by_rows(gearbox: Gearbox) -> Gearbox:
     content = copy.deepcopy(dict(gearbox.content))
     for bearing in content["bearings"].values():
         if "catalogue" in bearing and "radial_load_kN" not in bearing["catalogue"]:
-            bearing["law"] = "iso16281"
+            bearing["model"] = "iso16281"
     return Gearbox.from_dict(content)
 
 

@@ -264,16 +264,16 @@ def synthetic(planets: int, stages: int) -> Gearbox:
     }
     angles = [360.0 * n / planets for n in range(planets)]
     bodies: dict[str, Any] = {
-        "housing": {"fixed": True, "axis_position_mm": [0.0, 0.0], "wheels_z_mm": {"ring": 0.0}},
+        "housing": {"fixed": True, "axis_position_mm": [0.0, 0.0], "gears_z_mm": {"ring": 0.0}},
         "carrier": {"axis_position_mm": [0.0, 0.0], "inertia": {"own": {**body, "axial_kg_m2": 8.0}}},
         "planet": {
             "carrier": "carrier",
             "orbit_radius_mm": orbit,
             "planet_angles_deg": angles,
-            "wheels_z_mm": {"planet": 0.0},
+            "gears_z_mm": {"planet": 0.0},
             "inertia": {"own": planet},
         },
-        "shaft_1": {"axis_position_mm": [0.0, 0.0], "wheels_z_mm": {"sun": 0.0}, "inertia": {"own": body}},
+        "shaft_1": {"axis_position_mm": [0.0, 0.0], "gears_z_mm": {"sun": 0.0}, "inertia": {"own": body}},
     }
     meshes: dict[str, Any] = {
         "sun_planet": {"pair": "sun_planet", "pinion_body": "planet", "gear_body": "shaft_1"},
@@ -284,10 +284,10 @@ def synthetic(planets: int, stages: int) -> Gearbox:
         gears[f"wheel_{n}"] = {**wheel, "teeth": 81}
         gears[f"pinion_{n}"] = {**wheel, "teeth": 25}
         pairs[f"stage_{n}"] = {"pinion": f"pinion_{n}", "gear": f"wheel_{n}", "centre_distance_mm": module * 53.0}
-        bodies[f"shaft_{n - 1}"]["wheels_z_mm"][f"wheel_{n}"] = z
+        bodies[f"shaft_{n - 1}"]["gears_z_mm"][f"wheel_{n}"] = z
         bodies[f"shaft_{n}"] = {
             "axis_position_mm": [module * 53.0 * (n - 1), 0.0],
-            "wheels_z_mm": {f"pinion_{n}": z},
+            "gears_z_mm": {f"pinion_{n}": z},
             "inertia": {"own": {**body, "centre_of_mass_z_mm": z}},
         }
         meshes[f"stage_{n}"] = {"pair": f"stage_{n}", "pinion_body": f"shaft_{n}", "gear_body": f"shaft_{n - 1}"}
@@ -381,7 +381,7 @@ def run_up(variant: str, duration: float, tables: Path | None = None) -> dict[st
         step = chosen.step
         return {
             "variant": variant,
-            "law": choice.mesh_law,
+            "law": choice.mesh_model,
             "method": chosen.method.name,
             **size_of(assembly),
             "simulated_s": runs[0].end,

@@ -95,7 +95,7 @@ def bearings_section(part: Results) -> str:
                 [[row["row"], number(row["microseconds"], 2), number(row["ratio"], 2)] for row in rows],
             ),
             "### A step of the GRC, variant bushing, compiled solver\n",
-            f'`law = "iso16281"`, `cage = "turning"`; steps of {1e6 * part["step"]:.2f} µs with one evaluation each, '
+            f'`model = "iso16281"`, `cage = "turning"`; steps of {1e6 * part["step"]:.2f} µs with one evaluation each, '
             "signals and files aside.\n",
             table(
                 [
@@ -138,7 +138,7 @@ def steady_section(part: Results) -> str:
         [
             row["variant"],
             str(part["coordinates"][row["variant"]]),
-            row["level"],
+            row["method"],
             "yes" if row["refined"] else "no",
             str(row["speeds"]),
             duration(row["processor_s"]),
@@ -158,10 +158,10 @@ def steady_section(part: Results) -> str:
             f"included; processor time of one thread; flexible is that with elastic shafts. The last column is over "
             f"the processor time of a run-up of 30 s.\n",
             table(
-                ["variant", "coordinates", "level", "speeds added", "speeds", "all", "a speed", "run-ups"],
+                ["variant", "coordinates", "method", "speeds added", "speeds", "all", "a speed", "run-ups"],
                 rows,
             ),
-            "Lines, variant bushing, level parametric, no speeds added:\n",
+            "Lines, variant bushing, method parametric, no speeds added:\n",
             table(["harmonics", "sum of multiples of combinations", "lines", "all"], growth),
             items(
                 [

@@ -185,7 +185,7 @@ def commands(parts: set[str], extent: Extent) -> Iterator[tuple[str, list[str]]]
 
     The run by Exudyn lies beside the grids, because one by the compiled solver has its name beside the other tables.
     """
-    case, of_table = str(CASE), ["--variant", "bushing", "--mesh-law", "table"]
+    case, of_table = str(CASE), ["--variant", "bushing", "--mesh-model", "table"]
     yield "static", ["ste", case, "--positions", str(extent.positions)]
     if parts != {"speed"}:
         yield "grid", ["ste", case, "--grid", "--positions", str(extent.grid_positions)]

@@ -12,7 +12,7 @@ from typing import Any
 
 from timing import CASE, ROOT, Cost, environment, median, say, timed
 
-RUN = ["run", str(CASE), "--variant", "bushing", "--mesh-law", "iso6336", "--duration", "0.01"]
+RUN = ["run", str(CASE), "--variant", "bushing", "--mesh-model", "iso6336", "--duration", "0.01"]
 
 
 def cost_of(arguments: list[str], cache: str) -> Cost:

@@ -14,7 +14,7 @@ from timing import CASE, say, timed
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.steady.settings import LEVELS, SpeedRange, SteadySettings
+from exugear.steady.settings import METHODS, SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.bodies.of_gearbox import reduced_bodies
@@ -32,7 +32,7 @@ def cost_of(assembly: Assembly, settings: SteadySettings) -> dict[str, Any]:
     found: list[Any] = []
     cost = timed(lambda: found.append(response_of(assembly, settings)))
     return {
-        "level": settings.level,
+        "method": settings.method,
         "lines": len(found[0].lines.orders),
         "speeds": len(found[0].solved.speed),
         "processor_s": cost.processor,
@@ -58,11 +58,11 @@ def measure(quick: bool) -> dict[str, Any]:
         for variant, (case, bodies) in cases.items()
     }
     speeds = SpeedRange.from_text("0:215:20" if quick else SPEEDS)
-    for level in LEVELS:  # loads the compiled code
+    for level in METHODS:  # loads the compiled code
         response_of(assemblies["bushing"], SteadySettings(SpeedRange.from_text("10:20:2"), level, at_resonances=False))
     rows = []
     for variant, assembly in assemblies.items():
-        for level in LEVELS:
+        for level in METHODS:
             for refined in (False, True):
                 settings = SteadySettings(speeds, level, at_resonances=refined)
                 rows.append({"variant": variant, "refined": refined, **cost_of(assembly, settings)})

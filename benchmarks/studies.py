@@ -18,23 +18,23 @@ from timing import CASE, ROOT, say
 from exugear.gearbox.gearbox import Gearbox
 from exugear.studies.executors import Kept, Opens, processes
 from exugear.studies.point_results import PointResults, Shared
+from exugear.studies.runner import run_study, task_of
 from exugear.studies.sampling import changed
 from exugear.studies.study import Study
-from exugear.studies.sweep import sweep, task_of
 
 SMALL = ROOT / "exugear" / "gearbox" / "templates" / "pair.toml"
-FREQUENCIES = {"frequency": {"figure": "frequencies", "count": 4}}
+FREQUENCIES = {"frequency": {"quantity": "frequencies", "count": 4}}
 
 
-def study(case: Path, variant: str, path: str, values: list[float], figures: dict[str, Any], **more: Any) -> Study:
+def study(case: Path, variant: str, path: str, values: list[float], outputs: dict[str, Any], **more: Any) -> Study:
     """Make a study of one parameter."""
     return Study.from_dict(
         {
             "name": "benchmark",
             "case": str(case),
-            "choice": {"variant": variant, "mesh_law": "iso6336"},
+            "choice": {"variant": variant, "mesh_model": "iso6336"},
             "parameters": {"varied": {"path": path, "values": values}},
-            "figures": figures,
+            "outputs": outputs,
             **more,
         }
     )
@@ -57,11 +57,11 @@ def overhead(count: int) -> dict[str, Any]:
         bare(task, few)
         alone = (time.process_time() - start) / len(few)
         start, wall = time.process_time(), time.perf_counter()
-        swept = sweep(own, Path(folder) / "out", processes(1))
+        swept = run_study(own, Path(folder) / "out", processes(1))
         processor, wall = time.process_time() - start, time.perf_counter() - wall
         assert not swept.failed
         start = time.process_time()
-        assert sweep(own, Path(folder) / "out", processes(1)).computed == 0
+        assert run_study(own, Path(folder) / "out", processes(1)).computed == 0
         again = time.process_time() - start
     return {
         "points": count,
@@ -74,11 +74,11 @@ def overhead(count: int) -> dict[str, Any]:
 
 
 def bare(task: Any, points: list[Any]) -> None:
-    """Compute points as a script would: build the gearbox, take its figures."""
+    """Compute points as a script would: build the gearbox, take its outputs."""
     for changes in points:
         gearbox = Gearbox.from_dict(changed(task.content, changes), task.source, task.permissions)
         results = PointResults(gearbox, task.choice, task.settings, Shared(task.folder), task.folder / "work")
-        for kept in task.figures.values():
+        for kept in task.outputs.values():
             kept.of(results)
 
 
@@ -88,9 +88,9 @@ def efficiency(name: str, of: Study, warm: Study) -> dict[str, Any]:
     for workers in (0, 1, 2):
         opens = _in_processes(workers) if workers else processes(1)
         with tempfile.TemporaryDirectory() as folder, Kept(opens) as kept:
-            sweep(warm, Path(folder) / "warm", kept.opened)
+            run_study(warm, Path(folder) / "warm", kept.opened)
             start = time.perf_counter()
-            swept = sweep(of, Path(folder) / "out", kept.opened)
+            swept = run_study(of, Path(folder) / "out", kept.opened)
             walls[workers] = time.perf_counter() - start
             assert not swept.failed, swept.failed[0].error
             memory = max(record.memory for record in swept.records.values())
@@ -123,16 +123,16 @@ def _in_processes(workers: int) -> Opens:
 
 def of_tables(first: float, count: int) -> Study:
     """Every point a table of its own: the flank is modified, its finite elements stay."""
-    figures = {"ripple": {"figure": "ste_peak_to_peak", "pair": "high_speed"}}
+    outputs = {"ripple": {"quantity": "ste_peak_to_peak", "pair": "high_speed"}}
     values = spread(first, first + 0.02, count)
-    return study(CASE, "bushing", "gears.hs_pinion.modification.lead_crowning_um", values, figures)
+    return study(CASE, "bushing", "gears.hs_pinion.modification.lead_crowning_um", values, outputs)
 
 
 def of_runs(first: float, count: int, duration: float) -> Study:
     """Make runs of the bushing variant."""
-    figures = {"speed": {"figure": "final_speed"}}
+    outputs = {"speed": {"quantity": "final_speed"}}
     return study(
-        CASE, "bushing", "housing.factor", spread(first, first + 0.1, count), figures, run={"duration_s": duration}
+        CASE, "bushing", "housing.factor", spread(first, first + 0.1, count), outputs, run={"duration_s": duration}
     )
 
 

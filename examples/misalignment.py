@@ -66,7 +66,7 @@ panels = figure.subplots(1, 3)
 for name, table in {"without crowning": without, "6 um crowning": crowned}.items():
     table = table.squeeze()
     mean, ripple = table.mean("pmc"), table["ste"].max("pmc") - table["ste"].min("pmc")
-    panels[0].plot(1e6 * opening, 1e3 * mean["load_centre"], label=name)
+    panels[0].plot(1e6 * opening, 1e3 * mean["load_centroid"], label=name)
     panels[1].plot(1e6 * opening, 1e-6 * mean["tangent_stiffness"], label=name)
     panels[2].plot(1e6 * opening, 1e6 * ripple, label=name)
 panels[0].set_ylabel("load centre / mm")

@@ -46,7 +46,7 @@ dimensions = {
     "bearing_2": {"type": "tapered_roller", "bore_mm": 70.0, "outer_diameter_mm": 110.0, "width_mm": 31.0},
     "bearing_3": {"type": "tapered_roller", "bore_mm": 60.0, "outer_diameter_mm": 95.0, "width_mm": 27.0},
 }
-dimensions["bearing_3"]["holds_towards"] = "-z"  # the two tapered ones hold against each other
+dimensions["bearing_3"]["locates_towards"] = "-z"  # the two tapered ones hold against each other
 filled = imported.gearbox.varied({f"bearings.{name}.catalogue": values for name, values in dimensions.items()})
 
 # %%

@@ -61,12 +61,12 @@ spur = { pair = "spur", pinion_body = "shaft_1", gear_body = "shaft_2" }
 
 [bodies.shaft_1]
 axis_position_mm = [0.0, 0.0]
-wheels_z_mm = { pinion = 0.0 }
+gears_z_mm = { pinion = 0.0 }
 inertia.disc = { mass_kg = 1.0, axial_kg_m2 = 1e-3, transverse_kg_m2 = 1e-3, centre_of_mass_z_mm = 0.0 }
 
 [bodies.shaft_2]
 axis_position_mm = [75.0, 0.0]
-wheels_z_mm = { wheel = 0.0 }
+gears_z_mm = { wheel = 0.0 }
 inertia.disc = { mass_kg = 2.0, axial_kg_m2 = 3e-3, transverse_kg_m2 = 3e-3, centre_of_mass_z_mm = 0.0 }
 
 [joints]
@@ -94,10 +94,10 @@ print(f"mode at {modes.frequency[-1]:.0f} Hz: the mesh frequency meets it at {re
 # at the one before.
 
 speeds = SpeedRange.from_text(f"{0.8 * resonance:.0f}:{1.1 * resonance:.0f}:24")
-glued = parting.chosen(mesh_law="line_of_action")
+glued = parting.chosen(mesh_model="line_of_action")
 responses = {
-    "teeth that would pull": glued.steady(SteadySettings(speeds, level="parametric")),
-    "teeth that part": parting.steady(SteadySettings(speeds, level="nonlinear")),
+    "teeth that would pull": glued.steady(SteadySettings(speeds, method="parametric")),
+    "teeth that part": parting.steady(SteadySettings(speeds, method="nonlinear")),
 }
 
 # %%
@@ -109,7 +109,7 @@ for name, response in responses.items():
     speed = response["speed_rpm"]
     first = response["amplitude"].sel(signal="overall_dte", line="spur")
     panels[0].plot(speed, 1e6 * first, ".-", label=name)
-panels[1].plot(speed, 100.0 * response["apart_share"].isel(mesh_wave=0), ".-", color="C1")
+panels[1].plot(speed, 100.0 * response["contact_loss_fraction"].isel(mesh_wave=0), ".-", color="C1")
 panels[0].set_ylabel("transmission error, first harmonic / um")
 panels[1].set_ylabel("teeth apart / % of the time")
 panels[0].legend()

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from exugear.steady.settings import SpeedRange, SteadySettings
     from exugear.steady.steady_file import steady_response
     from exugear.studies.dataset import load_study
+    from exugear.studies.runner import run_study
     from exugear.studies.study import Study
-    from exugear.studies.sweep import sweep
     from exugear.system.bodies.solids import SolidModel
     from exugear.system.build import assemble
     from exugear.system.modes import Modes, eigenmodes
@@ -63,7 +63,7 @@ _HOMES = {
     "simulate": "exugear.transient.runup",
     "static_state": "exugear.system.statics",
     "steady_response": "exugear.steady.steady_file",
-    "sweep": "exugear.studies.sweep",
+    "run_study": "exugear.studies.runner",
     "template": "exugear.gearbox.templates.kinds",
     "to_case": "exugear.exchange.rexs.to_case.conversion",
     "write_report": "exugear.report.writer",
@@ -96,7 +96,7 @@ __all__ = [
     "simulate",
     "static_state",
     "steady_response",
-    "sweep",
+    "run_study",
     "template",
     "to_case",
     "write_report",

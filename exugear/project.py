@@ -130,12 +130,12 @@ class Project(Displayed):
         return cls(kept_case(Path(folder), permissions), Path(folder), choice or Choice())
 
     def chosen(self, **changes: Any) -> Project:
-        """Return the same gearbox and folder with other choices: `variant`, `mesh_law`, `inertias`, `load_case`."""
+        """Return the same gearbox and folder with other choices: `variant`, `mesh_model`, `inertias`, `load_case`."""
         return replace(self, choice=replace(self.choice, **changes))
 
     def _line(self) -> str:
         choice = self.choice
-        chosen = ", ".join(str(what) for what in (choice.variant, choice.mesh_law, choice.inertias, choice.load_case))
+        chosen = ", ".join(str(what) for what in (choice.variant, choice.mesh_model, choice.inertias, choice.load_case))
         return f" {self.gearbox.name!r}, {self.folder}, {chosen}"
 
     @property
@@ -174,9 +174,9 @@ class Project(Displayed):
         ste = self.gearbox.ste
         if ste.misalignment_um is not None and ste.centre_distance_offsets_um is not None:
             return {}
-        choice = replace(self.choice, variant=Variant.bushing, mesh_law="iso6336")
+        choice = replace(self.choice, variant=Variant.bushing, mesh_model="iso6336")
         try:
-            at_rest = static_state(assemble(self.gearbox, choice, mesh_stiffness(self.gearbox, choice.mesh_law)))
+            at_rest = static_state(assemble(self.gearbox, choice, mesh_stiffness(self.gearbox, choice.mesh_model)))
         except (VariantError, BalanceError, MeshError, BearingError):
             return {}
         axes: dict[str, list[tuple[float, float]]] = {}
@@ -215,7 +215,7 @@ class Project(Displayed):
 
     def missing_tables(self) -> list[TableRequest]:
         """Tables that the mesh law needs, and that are not there or belong to another input."""
-        law = LAWS.get(self.choice.mesh_law)
+        law = LAWS.get(self.choice.mesh_model)
         if law is None or not law.needs_tables:
             return []
         axes = self.grid_axes() if law.needs_axes else {}
@@ -223,7 +223,7 @@ class Project(Displayed):
 
     def tables_at_work(self) -> dict[str, MeshTable]:
         """Tables that the mesh law reads, as far as they are there."""
-        law = LAWS.get(self.choice.mesh_law)
+        law = LAWS.get(self.choice.mesh_model)
         if law is None or not law.needs_tables:
             return {}
         return tables_at_work(self.gearbox, self.folder, grid=law.needs_axes)
@@ -239,7 +239,7 @@ class Project(Displayed):
             return self._read_stiffness()
 
     def _read_stiffness(self) -> dict[str, MeshData]:
-        return dict(mesh_stiffness(self.gearbox, self.choice.mesh_law, self.folder))
+        return dict(mesh_stiffness(self.gearbox, self.choice.mesh_model, self.folder))
 
     def bodies(self, begin: Callable[[str], None] | None = None) -> dict[str, ElasticBody]:
         """Reduced elastic bodies of the variant by name; those that are missing are reduced and kept.
@@ -266,7 +266,7 @@ class Project(Displayed):
         modes = kept_modes(self.modes_path, assembly)
         if modes is None:
             self.keep_case()
-            with time_noted(self.folder, f"modes, {choice.variant}, {choice.inertias}, {choice.mesh_law}"):
+            with time_noted(self.folder, f"modes, {choice.variant}, {choice.inertias}, {choice.mesh_model}"):
                 modes = modes_of(assembly)
                 modes.save(self.modes_path)
         return modes
@@ -288,7 +288,7 @@ class Project(Displayed):
         assembly = self.assembly()
         choice = self.choice
         self.keep_case()
-        with time_noted(self.folder, f"steady, {choice.variant}, {choice.inertias}, {choice.mesh_law}"):
+        with time_noted(self.folder, f"steady, {choice.variant}, {choice.inertias}, {choice.mesh_model}"):
             return stored_or_computed(self.steady_path(settings), assembly, settings, progress)
 
     def steady_path(self, settings: SteadySettings) -> Path:
@@ -316,7 +316,7 @@ class Project(Displayed):
 
     def life_tables(self) -> list[TableRequest]:
         """List the tables that a life needs, and find those that are there: of all pairs that get one."""
-        return self.requested_tables(grid=LAWS[self.choice.mesh_law].needs_axes)
+        return self.requested_tables(grid=LAWS[self.choice.mesh_model].needs_axes)
 
     def stress_tables(self, counted: CountedLoads) -> list[TableRequest]:
         """List the tables that stresses of a life come from, and find those that are there.
@@ -372,7 +372,7 @@ class Project(Displayed):
 
         counted = counted or self.checked_loads()
         if any(request.stored is None for request in self.life_tables()):
-            self.tables(grid=LAWS[self.choice.mesh_law].needs_axes)
+            self.tables(grid=LAWS[self.choice.mesh_model].needs_axes)
         assembly = self.assembly()
         requests = self.stress_tables(counted)
         tables = {request.name: request.wanted.hash for request in requests}
@@ -385,7 +385,7 @@ class Project(Displayed):
             angles.discard()  # what was killed behind its last file left them
             return kept
         self.keep_case()
-        with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_law}"):
+        with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_model}"):
             self.computed(requests)
             stresses = pair_stresses(self.stress_tables(counted), self.folder, begin)
             life = compute_life(assembly, counted, stresses, dynamic, digest, progress, KeptAngles(angles))
@@ -416,7 +416,7 @@ class Project(Displayed):
         from exugear.life.rating.sheet import RATED_AS, balanced, rated, rated_loads
 
         counted = rated_loads(self.gearbox)
-        at_rest = self.chosen(variant=RATED_AS.variant, mesh_law=RATED_AS.mesh_law)
+        at_rest = self.chosen(variant=RATED_AS.variant, mesh_model=RATED_AS.mesh_model)
         balance = balanced(at_rest.assembly(), counted, progress)
         if self.gearbox.case.loads is not None:
             found, remarks = self._rated_by_life(counted)

@@ -38,7 +38,7 @@ def load_sharing_factor(project: Project, carrier: float, planets: float) -> flo
     """Largest share of a planet, times their number, over all angles of the carrier."""
     changes: dict[str, object] = {"gravity.acceleration_m_per_s2": WEIGHT}
     for bearing, clearance in (("plc_a", carrier), ("plc_b", carrier), ("pl_a", planets), ("pl_b", planets)):
-        changes[f"bearings.{bearing}.law"] = "iso16281"
+        changes[f"bearings.{bearing}.model"] = "iso16281"
         changes[f"bearings.{bearing}.catalogue.radial_clearance_mm"] = clearance
     for bearing in ("plc_a", "plc_b"):
         changes[f"bearings.{bearing}.catalogue.radial_load_kN"] = None

@@ -17,22 +17,22 @@ import typer
 from exugear.cli.console import say, say_what_is_logged
 from exugear.cli.process import leave_out_dask, standard_streams
 
-VERBS = (
-    "case_verbs.new",
-    "case_verbs.import_",
-    "case_verbs.schema",
-    "case_verbs.check",
-    "verbs.ste",
-    "verbs.bearings",
-    "verbs.modes",
-    "verbs.steady",
-    "verbs.run",
-    "verbs.sweep",
-    "verbs.loads",
-    "verbs.life",
-    "verbs.view",
-    "verbs.report",
-    "case_verbs.export",
+COMMANDS = (
+    "file_commands.new",
+    "file_commands.import_",
+    "file_commands.schema",
+    "file_commands.check",
+    "commands.ste",
+    "commands.bearings",
+    "commands.modes",
+    "commands.steady",
+    "commands.run",
+    "commands.study",
+    "commands.loads",
+    "commands.life",
+    "commands.view",
+    "commands.report",
+    "file_commands.export",
 )
 """Room and module of each verb, in the order of the help. The function has the name of its module; what Python reserves
 has a line after it, which the command line leaves out."""
@@ -93,6 +93,6 @@ def _program(
     """Hold what all verbs share."""
 
 
-for place in VERBS:
+for place in COMMANDS:
     verb = place.rpartition(".")[2]
     app.command(verb.rstrip("_"))(getattr(importlib.import_module(f"exugear.cli.{place}"), verb))

@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 # What verbs ask of a gearbox file before they work
 
 
-def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
+def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
     """Read a gearbox file for a verb, with what the user permits it, and try all its parts; tell what is unusual."""
     from exugear.gearbox.gearbox import Gearbox
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.reading import CaseError, read_toml
     from exugear.system.readiness import check_parts, faults_of_bearings, remarks
 
-    check_files_below(files_below)
+    check_allow_dir(allow_dir)
     try:
         content = read_toml(case)
         try:
-            gearbox = Gearbox.from_dict(content, str(case), Permissions(scripts, files_below))
+            gearbox = Gearbox.from_dict(content, str(case), Permissions(scripts, allow_dir))
         except CaseError as error:
             raise CaseError(*error.faults, *faults_of_bearings(content, str(case))) from None
         check_parts(gearbox)
@@ -43,24 +43,24 @@ def read_gearbox(case: Path, files_below: Path | None = None, scripts: bool = Fa
     return gearbox
 
 
-def check_files_below(folder: Path | None) -> None:
+def check_allow_dir(folder: Path | None) -> None:
     """Refuse a further folder for the files of a case that is not there."""
     if folder is not None and not folder.is_dir():
-        raise BadInputError(f"--files-below {folder}: no such folder; name one that the gearbox file may read from")
+        raise BadInputError(f"--allow-dir {folder}: no such folder; name one that the gearbox file may read from")
 
 
 def open_project(
     case: Path,
     choice: Choice,
     out: Path | None,
-    files_below: Path | None,
+    allow_dir: Path | None,
     scripts: bool,
 ) -> WatchedProject:
     """Read a gearbox file and refuse choices that it does not have, or may not have; write nothing."""
     from exugear.cli.watched import WatchedProject
     from exugear.project import default_folder
 
-    gearbox = read_gearbox(case, files_below, scripts)
+    gearbox = read_gearbox(case, allow_dir, scripts)
     folder = out or default_folder(case)
     check_choice(gearbox, choice, folder)
     check_results_folder(folder)
@@ -113,13 +113,13 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
         raise gearbox.fault(f"variant {choice.variant}: {reason}")
     if choice.variant.is_elastic:
         check_solids(gearbox, bodies_folder(folder))
-    if LAWS[choice.mesh_law].needs_axes:
+    if LAWS[choice.mesh_model].needs_axes:
         without = without_table(gearbox, [mesh.pair.name for mesh in gearbox.meshes])
         if without:
             raise BadInputError(gearbox.fault(without))
-    if not LAWS[choice.mesh_law].has_force and not choice.variant.spins_only:
+    if not LAWS[choice.mesh_model].has_force and not choice.variant.spins_only:
         raise BadInputError(
-            f"--mesh-law {choice.mesh_law}: its gears only roll, which needs the variant rigid, not {choice.variant}"
+            f"--mesh-model {choice.mesh_model}: needs the variant rigid, whose gears only roll, not {choice.variant}"
         )
 
 
@@ -133,7 +133,7 @@ OutOption = Annotated[
 ]
 
 
-class MeshLaw(StrEnum):
+class MeshModel(StrEnum):
     """How teeth in mesh push each other: the laws of `exugear.system.tooth_mesh.laws.registry`."""
 
     _ignore_ = ["members", "law"]
@@ -174,7 +174,7 @@ DistancesOption = Annotated[
     ),
 ]
 
-USUAL_LAW = MeshLaw("line_of_action")
+USUAL_LAW = MeshModel("line_of_action")
 
 
 def _variant(name: str) -> Variant:
@@ -191,13 +191,13 @@ VariantOption = Annotated[
 _LAWS_TOLD = "How teeth in mesh push each other. " + "; ".join(
     f"{law.name}: {law.description.replace('; ', ', ')}" for law in LAWS.values()
 )
-LawOption = Annotated[MeshLaw, typer.Option("--mesh-law", help=_LAWS_TOLD)]
+LawOption = Annotated[MeshModel, typer.Option("--mesh-model", help=_LAWS_TOLD)]
 FilesBelowOption = Annotated[
     Path | None,
     typer.Option(
-        "--files-below",
+        "--allow-dir",
         metavar="DIR",
-        envvar="EXUGEAR_FILES_BELOW",
+        envvar="EXUGEAR_ALLOW_DIR",
         help="A further folder that files may lie in which the gearbox file names. (default: its own alone)",
         show_default=False,
     ),

@@ -12,6 +12,7 @@ from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSe
 from exugear.gearbox.sections.case import CaseFile, ForceSection, LoadCaseSection
 from exugear.gearbox.sections.connections import (
     BearingSection,
+    ConnectorDampingSection,
     CouplingSection,
     JointSection,
     MountSection,
@@ -91,7 +92,7 @@ def _body(
         orbit_angle=angle if section.carrier else 0.0,
         spin_only=section.spin_only,
         fixed=section.fixed,
-        wheels={gear: z * MM for gear, z in section.wheels_z_mm.items()},
+        wheels={gear: z * MM for gear, z in section.gears_z_mm.items()},
         planet_of=section.carrier,
     )
 
@@ -115,7 +116,7 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
             if name in places:  # others are refused
                 ring = MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, MM * places[name])
                 rings.append(ring)
-    for name, z in section.wheels_z_mm.items():
+    for name, z in section.gears_z_mm.items():
         if name in origin.case.gears and not (shape is not None and name in shape.blanks):
             tubes.append(gear_tube(origin.case.gears[name], MM * z, tubes))
     total = together([mass_properties(tubes), *rings])
@@ -135,7 +136,7 @@ def blank_places(case: CaseFile, family: str) -> dict[str, float]:
     on its axis: the seats of an elastic shaft, whether or not the body is elastic.
     """
     section = case.bodies[family]
-    places = dict(section.wheels_z_mm)
+    places = dict(section.gears_z_mm)
     for name, bearing in case.bearings.items():
         ends = [case.bodies[end] for end in (bearing.body, bearing.on) if end in case.bodies]
         if family in (bearing.body, bearing.on) and all(end.carrier is None for end in ends):
@@ -297,7 +298,7 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
 def _usual_joints(origin: Origin) -> Iterator[tuple[str, JointSection]]:
     for name, section in origin.enabled.items():
         held = [bearing.z_mm for bearing in origin.case.bearings.values() if bearing.body == name]
-        places = held or list(section.wheels_z_mm.values())
+        places = held or list(section.gears_z_mm.values())
         if places and not section.fixed and not section.spin_only:
             place = sum(places) / len(places)
             yield name, JointSection.model_construct(body=name, on=section.carrier or GROUND, z_mm=place)
@@ -335,7 +336,7 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
                 carries_outer_ring=bodies[body].planet_of == on
                 if section.outer_ring is None
                 else section.outer_ring == "body",
-                law=section.law,
+                model=section.model,
                 cage=section.cage,
             )
             for suffix, body, on in origin.instances(key, section.body, section.on)
@@ -374,7 +375,7 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
             position=(*bodies[body].axis, place),
             stiffness=StiffnessSection(torsion_N_m_per_rad=section.stiffness_N_m_per_rad),
             catalogue=None,
-            damping=StiffnessSection(torsion_N_m_per_rad=damping),
+            damping=ConnectorDampingSection(torsion_N_m_s_per_rad=damping),
             factor=1.0,
         )
 

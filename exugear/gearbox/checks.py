@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.body_parts import blank_places
-from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, PointForce, stiffness_matrix
+from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, PointForce, connector_matrix
 from exugear.gearbox.reading import CaseError, shortened
 from exugear.gearbox.sections.case import CaseFile, OverallSection
-from exugear.gearbox.sections.connections import BearingSection, StiffnessSection
+from exugear.gearbox.sections.connections import BearingSection, ConnectorDampingSection, StiffnessSection
 from exugear.gearbox.sections.entries import GROUND
 from fe_ste.geometry.gears import Gear
 
@@ -87,9 +87,9 @@ def faults_of_bodies(case: CaseFile) -> Iterator[str]:
             if name in families:
                 yield f"bodies.{family}: planets are numbered, and bodies.{families[name]} is {name}, too; rename one"
             families[name] = family
-        for gear in section.wheels_z_mm:
+        for gear in section.gears_z_mm:
             if gear not in case.gears:
-                yield f"bodies.{family}.wheels_z_mm.{gear}: no such gear; gears are {', '.join(case.gears)}"
+                yield f"bodies.{family}.gears_z_mm.{gear}: no such gear; gears are {', '.join(case.gears)}"
         if section.enabled and section.carrier is not None:
             yield from _faults_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
 
@@ -366,7 +366,7 @@ def faults_of_torsion(
                 paths[start][end] = [*to_start[::-1], coupling.name, *to_end]
                 paths[end][start] = paths[start][end][::-1]
     for bearing in bearings:
-        torsion = stiffness_matrix(bearing.stiffness)[5, 5]
+        torsion = connector_matrix(bearing.stiffness)[5, 5]
         if torsion and bearing.on in spinning:
             yield (
                 f"bearings.{bearing.family}.stiffness: torsion {torsion:g} N m/rad between {bearing.on} and "
@@ -385,7 +385,7 @@ def faults_of_supports(case: CaseFile) -> Iterator[str]:
             catalogue = isinstance(section, BearingSection) and section.catalogue is not None
             if stiffness is not None:
                 yield from _faults_of_matrix(f"{key}.stiffness", stiffness)
-                if not catalogue and not np.any(stiffness_matrix(stiffness)):
+                if not catalogue and not np.any(connector_matrix(stiffness)):
                     yield f"{key}.stiffness: is zero in all directions; give at least one above zero"
             if damping is not None:
                 yield from _faults_of_matrix(f"{key}.damping", damping)
@@ -408,11 +408,11 @@ def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[s
                 )
 
 
-def _faults_of_matrix(key: str, section: StiffnessSection) -> Iterator[str]:
+def _faults_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSection) -> Iterator[str]:
     """Compare each entry with the diagonal entries of its row and column: units differ by row."""
     if section.matrix is None:
         return
-    matrix = stiffness_matrix(section)
+    matrix = connector_matrix(section)
     scale = np.sqrt(np.abs(np.diag(matrix)))
     scaled = matrix / np.outer(*[np.where(scale > 0.0, scale, 1.0)] * 2)
     skew = np.abs(scaled - scaled.T)

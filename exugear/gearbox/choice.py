@@ -21,12 +21,12 @@ class Choice:
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> Choice("bushing").of(gearbox)
-    Choice(variant='bushing', mesh_law='line_of_action', inertias='assemblies', load_case='reference')
+    Choice(variant='bushing', mesh_model='line_of_action', inertias='assemblies', load_case='reference')
     """
 
     variant: Variant
     """How bodies are held; chosen by its name."""
-    mesh_law: str
+    mesh_model: str
     """How teeth in mesh push each other; `exugear.system.tooth_mesh.laws.registry` lists the laws."""
     inertias: str | None
     """Inertia set."""
@@ -36,12 +36,17 @@ class Choice:
     def __init__(
         self,
         variant: str = Variant.bushing,
-        mesh_law: str = "line_of_action",
+        mesh_model: str = "line_of_action",
         inertias: str | None = None,
         load_case: str | None = None,
     ) -> None:
         """Take the variant by its name."""
-        values = {"variant": Variant.of(variant), "mesh_law": mesh_law, "inertias": inertias, "load_case": load_case}
+        values = {
+            "variant": Variant.of(variant),
+            "mesh_model": mesh_model,
+            "inertias": inertias,
+            "load_case": load_case,
+        }
         for name, value in values.items():
             object.__setattr__(self, name, value)
 

@@ -536,7 +536,7 @@ def _middle_of_faces(origin: Origin, key: str, pair: GearPair, pinion_body: Body
         if gear.name not in body.wheels:
             raise origin.fault(
                 f"{key}: body {body.family!r} carries no gear {gear.name!r}; give its z in "
-                f"bodies.{body.family}.wheels_z_mm"
+                f"bodies.{body.family}.gears_z_mm"
             )
         low = max(low, body.wheels[gear.name] - gear.face_width / 2)
         high = min(high, body.wheels[gear.name] + gear.face_width / 2)

@@ -27,7 +27,7 @@ from exugear.gearbox.parts import (
     PairSpec,
     PointForce,
     WheelDeviation,
-    stiffness_matrix,
+    connector_matrix,
 )
 from exugear.gearbox.reading import CaseError, Origin, parse_case, read_toml, readable, shortened
 from exugear.gearbox.sections.case import NAMED_TABLES, CaseFile, SteSection, labels_in_use
@@ -195,7 +195,7 @@ class Gearbox(Displayed):
         """What is possible and unusual about the file, a line each."""
         lines = [f"{key} = {value:g}: {warning}" for key, value, warning in unusual_values(self.case)]
         for bearing in self.bearings:
-            torsion = stiffness_matrix(bearing.stiffness)[5, 5]
+            torsion = connector_matrix(bearing.stiffness)[5, 5]
             ends = (self.case.overall.input, self.case.overall.output)
             if torsion and bearing.body in ends and bearing.on not in self.spinning:
                 key = f"bearings.{bearing.family}.stiffness"
@@ -371,7 +371,7 @@ class Gearbox(Displayed):
         return {
             bearing.body: Tie(bearing.on, bearing.body)
             for bearing in (*self.bearings, *mounts)
-            if stiffness_matrix(bearing.stiffness)[5, 5]
+            if connector_matrix(bearing.stiffness)[5, 5]
             and bearing.body in self.spinning
             and bearing.body not in ends
             and bearing.on not in self.spinning

@@ -243,7 +243,7 @@ def doubt_about_bearings(gearbox: Gearbox, loads: LoadSummary, variant: str) -> 
     led = [
         bearing
         for bearing in gearbox.bearings
-        if bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None and bearing.law == "stiffness"
+        if bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None and bearing.model == "linear"
     ]
     light = {family: share for family, share in loads.least_shares.items() if share < LEAST_SHARE}
     if not led or not light or not Variant.of(variant).on_bearings:
@@ -253,7 +253,7 @@ def doubt_about_bearings(gearbox: Gearbox, loads: LoadSummary, variant: str) -> 
     how = f"reverses the load of {', '.join(turned)}" if turned else f"takes {', '.join(light)} to {least:.2g} of it"
     return (
         f"linear bearings are of the static load, and the load case {loads.name} {how}: "
-        'displacements and loads there want law = "iso16281" on the bearings'
+        'displacements and loads there want model = "iso16281" on the bearings'
     )
 
 

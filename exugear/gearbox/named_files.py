@@ -85,7 +85,7 @@ def named_file(name: str, folder: Path, permissions: Permissions, largest: int) 
     ...
     exugear.gearbox.named_files.NamedFileError: lies outside the gearbox file's folder; put it there, or permit its
     folder \
-    by --files-below DIR or EXUGEAR_FILES_BELOW
+    by --allow-dir DIR or EXUGEAR_ALLOW_DIR
     """
     path = folder / name
     try:
@@ -95,8 +95,8 @@ def named_file(name: str, folder: Path, permissions: Permissions, largest: int) 
         raise NamedFileError("no such file") from None
     if not any(real_path.is_relative_to(parent) for parent in permitted):
         raise NamedFileError(
-            "lies outside the gearbox file's folder; put it there, or permit its folder by --files-below DIR or "
-            "EXUGEAR_FILES_BELOW"
+            "lies outside the gearbox file's folder; put it there, or permit its folder by --allow-dir DIR or "
+            "EXUGEAR_ALLOW_DIR"
         )
     check_regular(path, largest)
     return path

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from exugear.gearbox.sections.connections import CatalogueSection, StiffnessSection
+from exugear.gearbox.sections.connections import CatalogueSection, ConnectorDampingSection, StiffnessSection
 from exugear.gearbox.units import RPM
 from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import GearPair
@@ -98,13 +98,13 @@ class Bearing(Displayed):
     """As the file gives it; beside a catalogue the least stiffness of each direction."""
     catalogue: CatalogueSection | None
     """Dimensions and loads from which its stiffness follows."""
-    damping: StiffnessSection | None
+    damping: ConnectorDampingSection | None
     """As the file gives it; in proportion to the stiffness otherwise."""
     factor: float
     """Factor of the housing on its stiffness, not yet multiplied in."""
     carries_outer_ring: bool = False
     """Whether the outer ring sits in the body, as in planets; else the inner ring does."""
-    law: Literal["stiffness", "iso16281"] = "stiffness"
+    model: Literal["linear", "iso16281"] = "linear"
     """Linear, or the law of the rolling elements themselves."""
     cage: Literal["averaged", "turning"] = "averaged"
     """Of a non-linear bearing: whether rolling elements move on as its rings turn."""
@@ -310,15 +310,19 @@ def _point(coordinates: tuple[float, ...]) -> str:
     return f"({', '.join(f'{1e3 * value:.6g}' for value in coordinates)}) mm"
 
 
-def stiffness_matrix(section: StiffnessSection | None) -> Floats:
-    """Stiffness or damping (6, 6) as a section gives it; zeros for none."""
+def connector_matrix(section: StiffnessSection | ConnectorDampingSection | None) -> Floats:
+    """Return the stiffness or damping matrix (6, 6) of a section; zeros without one."""
     if section is None:
         return np.zeros((6, 6))
     if section.matrix is not None:
         return np.array(section.matrix, dtype=np.float64)
-    radial = section.radial_N_per_m
-    tilt = section.tilt_N_m_per_rad
-    return np.diag([radial, radial, section.axial_N_per_m, tilt, tilt, section.torsion_N_m_per_rad])
+    if isinstance(section, ConnectorDampingSection):
+        entries = [section.radial_N_s_per_m, section.axial_N_s_per_m]
+        entries += [section.tilt_N_m_s_per_rad, section.torsion_N_m_s_per_rad]
+    else:
+        entries = [section.radial_N_per_m, section.axial_N_per_m, section.tilt_N_m_per_rad, section.torsion_N_m_per_rad]
+    radial, axial, tilt, torsion = entries
+    return np.diag([radial, radial, axial, tilt, tilt, torsion])
 
 
 def seat_key(body: str, item: str) -> str:

@@ -159,7 +159,7 @@ def readable(content: Mapping[str, Any]) -> CaseFile:
         found["bodies"] = {
             name: body
             for name, body in found["bodies"].items()
-            if (not lost["gears"] or set(body.wheels_z_mm) <= known)
+            if (not lost["gears"] or set(body.gears_z_mm) <= known)
             and (not lost["bodies"] or body.carrier is None or body.carrier in carriers)
         }
     return CaseFile.model_construct(None, **found)

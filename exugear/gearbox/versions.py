@@ -10,12 +10,12 @@ from __future__ import annotations
 #: Reduced elastic bodies (`exugear.system.bodies`). Runs and modes rest on it.
 REDUCTION = 1
 #: Eigenmodes (`exugear.system.modes`, and the laws and matrices of `exugear.system.system`).
-MODES = 4
+MODES = 5
 #: Runs in time (`exugear.transient`, both solvers, the laws, signals and filters).
-RUN = 9
+RUN = 10
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
-LIFE = 7
+LIFE = 8
 #: Steady responses (`exugear.steady`, and all that modes rest on).
-STEADY = 11
-#: Points of studies (`exugear.studies`: their figures; what these rest on has its own version).
-STUDY = 1
+STEADY = 12
+#: Points of studies (`exugear.studies`: their outputs; what these rest on has its own version).
+STUDY = 2

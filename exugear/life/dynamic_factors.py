@@ -114,7 +114,7 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
         found.setdefault(mesh.family, []).append((ratio * np.interp(instants, arrays["time"], speed), values))
     every = np.concatenate([speeds for parts in found.values() for speeds, _ in parts]) / RPM
     source = f"the run {rating.dynamic_factor_run} over {every.min():.4g} to {every.max():.4g} rpm of {body}"
-    return {family: merged(parts, rating.least_dynamic_factor or 1.0, source) for family, parts in found.items()}
+    return {family: merged(parts, rating.minimum_dynamic_factor or 1.0, source) for family, parts in found.items()}
 
 
 def window_factors(time: Floats, frequency: Floats, force: Floats) -> tuple[Floats, Floats] | None:
@@ -202,7 +202,7 @@ def response_path(folder: Path, assembly: Assembly, rating: RatingSection) -> Pa
 
 
 def _choice(assembly: Assembly, load_case: str | None = None) -> Choice:
-    return Choice(assembly.variant, assembly.mesh_law, assembly.inertias, load_case)
+    return Choice(assembly.variant, assembly.mesh_model, assembly.inertias, load_case)
 
 
 def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
@@ -226,7 +226,7 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
         data = load_response(path)
         fits = settings_of(data.attrs).hash_with(assembly) == data.attrs["input_hash"]
     except (FileError, ValueError) as error:
-        command = f"exugear steady CASE.toml --variant {assembly.variant} --level {level}"
+        command = f"exugear steady CASE.toml --variant {assembly.variant} --method {level}"
         raise gearbox.fault(f"{key}: {error}; `{command}` makes it") from error
     if not fits:
         raise gearbox.fault(f"{key}: {path} belongs to another input; compute it again")
@@ -245,7 +245,7 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
         f"the steady response ({level}) at {len(speed)} speeds of {body} "
         f"from {speed.min() / RPM:.4g} to {speed.max() / RPM:.4g} rpm"
     )
-    least = rating.least_dynamic_factor or 1.0
+    least = rating.minimum_dynamic_factor or 1.0
     return {family: merged(parts, least, source) for family, parts in found.items()}
 
 

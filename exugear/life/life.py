@@ -97,15 +97,15 @@ def shortfalls(
 
     Parameters
     ----------
-    rating : its `least_S_H`, `least_S_F` and `least_S_0`
+    rating : its `minimum_S_H`, `minimum_S_F` and `minimum_S_0`
     hours : of operation in the life
     """
     for flank in flanks:
         of_flank = (flank.contact_safety, flank.contact_static)
         of_root = (flank.root_safety, flank.root_static)
         for name, found, asked, holder in (
-            ("S_H", of_flank, rating.least_S_H, flank.contact_holder),
-            ("S_F", of_root, rating.least_S_F, flank.root_holder),
+            ("S_H", of_flank, rating.minimum_S_H, flank.contact_holder),
+            ("S_F", of_root, rating.minimum_S_F, flank.root_holder),
         ):
             least = min((value for value in found if not math.isnan(value)), default=math.inf)
             if least < asked:
@@ -125,8 +125,8 @@ def shortfalls(
         ):
             if lasting < hours:
                 yield f"{bearing.name}: {name} = {lasting:,.0f} h, {hours:,.0f} h are asked for"
-        if bearing.static_safety < rating.least_S_0:
-            yield f"{bearing.name}: S_0 = {bearing.static_safety:.3g}, {rating.least_S_0:g} is asked for"
+        if bearing.static_safety < rating.minimum_S_0:
+            yield f"{bearing.name}: S_0 = {bearing.static_safety:.3g}, {rating.minimum_S_0:g} is asked for"
 
 
 def reaches(flanks: Iterable[FlankLife]) -> Iterator[str]:
@@ -178,7 +178,7 @@ class Life(Displayed, line=" of {variant}: {flanks!n} flanks, {bearings!n} beari
     """What a gearbox bears over its life."""
 
     variant: str
-    mesh_law: str
+    mesh_model: str
     inertias: str
     edition: str
     """What the forces are of, and the edition of the standard that gears are rated by."""
@@ -323,7 +323,7 @@ def compute_life(
     told = {name: one for name, one in sharing.items() if len(families[name]) > 1 or one > TOLD_SHARING}
     return Life(
         variant=str(assembly.variant),
-        mesh_law=assembly.mesh_law,
+        mesh_model=assembly.mesh_model,
         inertias=assembly.inertias,
         edition=rating.edition,
         counted=counted,
@@ -393,7 +393,7 @@ def _assumptions(
             if any(len(stress.misalignment) > 1 for stress in stresses.values())
             else ", of gears that stand aligned: tables with axes (--grid) have their misalignment"
         ),
-        f"S_H of {rating.least_S_H:g}, S_F of {rating.least_S_F:g} and S_0 of {rating.least_S_0:g} are asked for",
+        f"S_H of {rating.minimum_S_H:g}, S_F of {rating.minimum_S_F:g} and S_0 of {rating.minimum_S_0:g} are asked for",
         "S_H and S_F by ISO stand for nominal stresses with K_Hbeta of the finite elements and K_Halpha = K_Falpha = 1",
         "Z_W = Z_X = 1; S-N curves go on beyond their last point: no load is without damage",
         _oil_in_words(oil),
@@ -434,5 +434,5 @@ def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor
     beyond = "" if inside else "; beyond its speeds that of its end is taken"
     return (
         f"K_v of {first.source}, taken from {lowest:.4g} to {highest:.4g} rpm, where the loads turn{beyond}, "
-        f"at least {rating.least_dynamic_factor:g}: {values}"
+        f"at least {rating.minimum_dynamic_factor:g}: {values}"
     )

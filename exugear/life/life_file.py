@@ -65,7 +65,7 @@ _LAYOUT = Layout(
     | {"flank": ("flank",), "bearing": ("bearing",)}
     | {f"flank_{name}": ("flank",) for name in FLANK_WORDS}
     | {f"{name}_{by_bin}": (name, "bin") for name, _, by_bin in DAMAGES.values()},
-    ("gearbox", "variant", "mesh_law", "inertias", "edition", "input_hash", *LISTS),
+    ("gearbox", "variant", "mesh_model", "inertias", "edition", "input_hash", *LISTS),
 )
 
 
@@ -112,7 +112,7 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
     attributes = {
         "gearbox": gearbox,
         "variant": life.variant,
-        "mesh_law": life.mesh_law,
+        "mesh_model": life.mesh_model,
         "inertias": life.inertias,
         "edition": life.edition,
         "body": life.counted.body,
@@ -177,7 +177,7 @@ def summary(dataset: xr.Dataset) -> dict[str, Any]:
     return {
         "failures": json.loads(dataset.attrs["failures"]),
         "shortfalls": json.loads(dataset.attrs["shortfalls"]),
-        **{key: str(dataset.attrs[key]) for key in ("variant", "mesh_law", "edition", "input_hash")},
+        **{key: str(dataset.attrs[key]) for key in ("variant", "mesh_model", "edition", "input_hash")},
         "flanks": [*_entries(dataset, "flank", FLANK_NUMBERS)],
         "bearings": [*_entries(dataset, "bearing", BEARING_NUMBERS)],
         "load_sharing": dict(
@@ -230,7 +230,7 @@ def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], A
     for path in sorted(folder.glob("*/*/life.nc")):
         try:
             data = read_life(path)
-            assembly = assembled(Choice(*(str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias"))))
+            assembly = assembled(Choice(*(str(data.attrs[key]) for key in ("variant", "mesh_model", "inertias"))))
             counted = checked_loads(gearbox)
             source = source_hash(assembly, rating_of(gearbox), folder)
             tables = {request.name: request.wanted.hash for request in life_requests(assembly, counted, folder)}

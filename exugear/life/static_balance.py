@@ -254,7 +254,7 @@ def _at_rest(
         return locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench, near)
     except BalanceError as error:
         hint = "; tables may end at a smaller load or misalignment: widen the axes of [ste]"
-        needs_axes = LAWS[assembly.mesh_law].needs_axes
+        needs_axes = LAWS[assembly.mesh_model].needs_axes
         raise BalanceError(f"under {torque:.6g} N m on {body}: {error}{hint if needs_axes else ''}") from error
 
 
@@ -292,7 +292,7 @@ def is_linear(assembly: Assembly) -> bool:
     constant = any(assembly.gearbox.case.gravity.acceleration_m_per_s2) or bool(assembly.gearbox.forces)
     through_points = bool(assembly.connectors.point_load.any())
     curved = any(element.is_curved or element.bears_beside for element in assembly.elements)
-    not_linear = assembly.at_rest.has_rows or through_points or curved or LAWS[assembly.mesh_law].loses_contact
+    not_linear = assembly.at_rest.has_rows or through_points or curved or LAWS[assembly.mesh_model].loses_contact
     return not (not_linear or constant)
 
 
@@ -455,7 +455,7 @@ def life_requests(assembly: Assembly, counted: CountedLoads, folder: Path) -> li
 
     Of a law that reads grids these are its grids; else see `stress_requests`.
     """
-    grid = LAWS[assembly.mesh_law].needs_axes
+    grid = LAWS[assembly.mesh_model].needs_axes
     requests = requested_tables(assembly.gearbox, folder, grid=grid)
     if grid:
         return requests

@@ -164,9 +164,7 @@ def _accelerations(material: Material, data: xr.Dataset) -> str:
                 "at / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
             }
         )
-    title = (
-        f"Accelerations of the seats: steady response of {words_of(choice_of(data.attrs))}, level {data.attrs['level']}"
-    )
+    title = f"Accelerations of the seats: steady response of {words_of(choice_of(data.attrs))}, {data.attrs['method']}"
     words = (
         f"Largest amplitude of a single order over all speeds, the {SEATS} largest; x, y and z are the axes of the "
         "gearbox. Seats of a planet set move as waves around the carrier: mean, cosine and sine."
@@ -199,7 +197,7 @@ def _duties(material: Material, assembly: Assembly) -> str:
     remarks = [f"{material.words.of(duty.name)}: {remark}." for duty, remark in said]
     rows = [_duty_row(material, duty) for duty in duties]
     table = pieces.table(
-        rows, ("law",), caption=f"Bearings at the static load, {name}", name=f"duties-{'-'.join(name.split())}"
+        rows, ("model",), caption=f"Bearings at the static load, {name}", name=f"duties-{'-'.join(name.split())}"
     )
     words = (
         "Rows of rolling elements by ISO/TS 16281 between rigid rings, under the static load of the case. L10 by "
@@ -242,7 +240,7 @@ def _mesh_row(material: Material, duty: MeshDuty) -> dict[str, object]:
         "force / kN": f"{1e-3 * duty.force:.4g}",
         "misaligned / mrad": f"{1e3 * duty.misalignment:.3f}",
         "opens / µm": f"{1e6 * duty.opening:.1f}",
-        "load centre / mm": shown(1e3 * duty.load_centre, ".1f"),
+        "load centre / mm": shown(1e3 * duty.load_centroid, ".1f"),
         "K_Hbeta": shown(duty.face_load_factor, ".2f"),
         "pressure / MPa": shown(1e-6 * duty.pressure, ".0f"),
     }
@@ -258,7 +256,7 @@ def _duty_row(material: Material, duty: BearingDuty) -> dict[str, object]:
     tilt = 0.5e-6 * float(duty.stiffness[3, 3] + duty.stiffness[4, 4])
     return {
         "bearing": material.words.of(duty.name),
-        "law": duty.law,
+        "model": duty.model,
         "radial load / kN": f"{1e-3 * duty.radial_load:.4g}",
         "axial load / kN": f"{round(1e-3 * duty.axial_load, 3) + 0.0:.4g}",
         "radial / (GN/m)": f"{1e-9 * duty.radial_stiffness:.3g}",

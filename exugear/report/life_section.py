@@ -88,7 +88,7 @@ def _of_variant(material: Material, data: xr.Dataset) -> str:
     told = material.words.told
     data = data.assign_coords({key: [told(str(own)) for own in data[key].to_numpy()] for key in ("flank", "bearing")})
     name = words_of(choice_of(data.attrs))
-    label = f"life-{data.attrs['variant']}-{data.attrs['mesh_law']}"
+    label = f"life-{data.attrs['variant']}-{data.attrs['mesh_model']}"
     rested = [line for key in ("assumptions", "unrated") for line in json.loads(data.attrs[key])]
     return (
         pieces.element("h3", pieces.text(f"{name[0].upper()}{name[1:]}, gears by {data.attrs['edition']}"))

@@ -77,8 +77,8 @@ def only_for(content: str, group: str, variant: str = "") -> str:
 def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
     """Tell one group from the others in few words: its source, and law and inertia set where these differ."""
     parts = [own.source]
-    if len({group.mesh_law for group in groups}) > 1:
-        parts.append(f"law {own.mesh_law}")
+    if len({group.mesh_model for group in groups}) > 1:
+        parts.append(f"law {own.mesh_model}")
     if len({group.inertias for group in groups}) > 1:
         parts.append(f"inertias {own.inertias}")
     words = ", ".join(parts)
@@ -92,7 +92,7 @@ def told_groups(groups: Sequence[RunGroup]) -> list[RunGroup]:
 
 def model_name(choice: Choice) -> str:
     """Name of a model for links and data: variant, law, inertia set."""
-    return f"{choice.variant}-{choice.mesh_law}-{choice.inertias}"
+    return f"{choice.variant}-{choice.mesh_model}-{choice.inertias}"
 
 
 # Line figures as data: curves with axes and marks, which one script draws

@@ -197,7 +197,7 @@ def _row(material: Material, model: Choice, data: xr.Dataset, index: int, target
     mode = report_mode(data, index)
     return {
         "variant": model.variant,
-        "inertias": f"{model.inertias} ({model.mesh_law})",
+        "inertias": f"{model.inertias} ({model.mesh_model})",
         "frequency / Hz": f"{mode.frequency:.1f}",
         "near": "yes" if mode.is_near(target) else "no",
         "damping / %": f"{100 * mode.damping_ratio:.2f}",
@@ -255,7 +255,7 @@ def _match_row(material: Material, found: ModelMatch, target: float) -> dict[str
     mode = report_mode(data, match.index)
     return {
         "variant": found.model.variant,
-        "inertias": f"{found.model.inertias} ({found.model.mesh_law})",
+        "inertias": f"{found.model.inertias} ({found.model.mesh_model})",
         "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
         "frequency / Hz": f"{mode.frequency:.0f}",
         "share / %": f"{100 * mode.share:.1f}",
@@ -270,7 +270,7 @@ def _reference_frequency(material: Material, found: ModelMatch, target: float) -
     context = material.context
     match = found.match
     reference = replace(found.model, variant=REFERENCE_VARIANT)
-    parameters = assumed_parameters(context.gearbox, reference, context.stiffness(found.model.mesh_law))
+    parameters = assumed_parameters(context.gearbox, reference, context.stiffness(found.model.mesh_model))
     same = next((parameter for parameter in parameters if parameter.label == match.parameter.label), None)
     assembly = same.build(match.value) if same else context.assembled(reference)
     nearest = nearest_mode(modes_of(assembly).to_dataset(), target, VISIBLE_SHARE)

@@ -58,7 +58,7 @@ def steady_section(material: Material) -> Part:
 def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> str:
     context = material.context
     choice = choice_of(data.attrs)
-    level = str(data.attrs["level"])
+    level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
     label = f"{words_of(choice)}, level {level}"
     context.tell(f"steady response, {label}")
@@ -129,7 +129,8 @@ def _remarks(data: xr.Dataset, name: str) -> str:
     speeds = data["speed"].to_numpy()
     said = [(abs(float(speed)), str(words)) for speed, words in zip(speeds, data["remark"].to_numpy(), strict=True)]
     lost = [
-        (abs(float(load["speed"])), f"left out: {load['reason']}") for load in json.loads(str(data.attrs["unsolved"]))
+        (abs(float(load["speed"])), f"left out: {load['reason']}")
+        for load in json.loads(str(data.attrs["not_converged"]))
     ]
     told = sorted([own for own in said if own[1]] + lost)
     if not told:

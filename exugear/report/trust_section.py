@@ -163,12 +163,12 @@ def _beside_exudyn(material: Material, run: VariantRun, charts: dict[str, Any]) 
 def _response_row(data: xr.Dataset) -> dict[str, object]:
     speed = np.abs(data["speed"].to_numpy()) / RPM
     return {
-        "steady response": f"{words_of(choice_of(data.attrs))}, level {data.attrs['level']}",
+        "steady response": f"{words_of(choice_of(data.attrs))}, level {data.attrs['method']}",
         "speeds": data.sizes["point"],
         "slowest / rpm": f"{speed.min():.1f}",
         "fastest / rpm": f"{speed.max():.1f}",
         "lines": data.sizes["line"] - 1,
-        "left out": len(json.loads(data.attrs["unsolved"])),
+        "left out": len(json.loads(data.attrs["not_converged"])),
         "largest share of power not accounted for": f"{float(np.nanmax(data['energy_error'])):.1e}",
         "fastest growth of a disturbance / (1/s)": f"{float(data.attrs['growth_rate']):.3g}",
     }
@@ -217,7 +217,7 @@ def _provenance(material: Material) -> str:
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
     hashes |= {
-        f"steady response {words_of(choice_of(data.attrs))}, {data.attrs['level']}": data.attrs["input_hash"]
+        f"steady response {words_of(choice_of(data.attrs))}, {data.attrs['method']}": data.attrs["input_hash"]
         for data in results.steady
     }
     hashes |= {f"modes {words_of(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}

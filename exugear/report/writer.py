@@ -134,7 +134,7 @@ def write_report(
     folder: str | Path,
     target: float | None = None,
     tell: Callable[[str], None] | None = None,
-    files_below: Path | None = None,
+    allow_dir: Path | None = None,
     executor: Executor | None = None,
 ) -> Report:
     """Write ``report.html`` from what a results folder holds: tables, runs, modes, steady responses.
@@ -144,7 +144,7 @@ def write_report(
     folder : what ``exugear ste``, ``run``, ``modes`` and ``steady`` wrote into
     target : frequency to look for modes at, Hz; the case's reference frequency by default
     tell : called with what is being done
-    files_below
+    allow_dir
         A further folder that files may lie in which the gearbox file names. Scripts among them never run: what they
         would make must be kept in the folder.
     executor : works beside this process where that saves time, such as `fe_ste.tools.threads.Workers`
@@ -157,7 +157,7 @@ def write_report(
         Neither tables nor modes nor runs in it belong to its case.
     """
     folder = Path(folder)
-    gearbox = kept_case(folder, Permissions(below=files_below))
+    gearbox = kept_case(folder, Permissions(below=allow_dir))
     reference = gearbox.case.report.reference_frequency_Hz if target is None else target
     context = Context(folder, gearbox, reference, tell or (lambda what: None))
     material = _material(context, executor)

@@ -77,7 +77,7 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
 
 def modes_path(folder: str | Path, choice: Choice) -> Path:
     """Place of the modes of a choice that names its inertia set: ``<variant>/<law>-<inertias>/modes.nc``."""
-    return Path(folder) / choice.variant / f"{choice.mesh_law}-{choice.inertias}" / "modes.nc"
+    return Path(folder) / choice.variant / f"{choice.mesh_model}-{choice.inertias}" / "modes.nc"
 
 
 def bearings_path(folder: str | Path, choice: Choice) -> Path:
@@ -157,7 +157,7 @@ def run_directory(out: str | Path, choice: Choice) -> Path:
 
     Nothing in the choice is left open (`Choice.of`).
     """
-    return Path(out) / choice.variant / f"{choice.load_case}-{choice.mesh_law}-{choice.inertias}"
+    return Path(out) / choice.variant / f"{choice.load_case}-{choice.mesh_model}-{choice.inertias}"
 
 
 # Studies in a results folder: their datasets and pictures, as a report finds them
@@ -235,7 +235,7 @@ def duty_summary(duty: BearingDuty) -> dict[str, Any]:
     return {
         "bearing": duty.name,
         "type": duty.kind,
-        "law": duty.law,
+        "model": duty.model,
         "radial_load_kN": 1e-3 * duty.radial_load,
         "axial_load_kN": 1e-3 * duty.axial_load,
         "reaction_kN": None if duty.reaction is None else 1e-3 * duty.reaction,
@@ -265,7 +265,7 @@ def mesh_summary(duty: MeshDuty) -> dict[str, Any]:
         "misalignment_mrad": 1e3 * duty.misalignment,
         "opening_um": 1e6 * duty.opening,
         "centre_distance_change_um": 1e6 * duty.centre_distance_change,
-        "load_centre_mm": _finite(1e3 * duty.load_centre),
+        "load_centroid_mm": _finite(1e3 * duty.load_centroid),
         "K_Hbeta": _finite(duty.face_load_factor),
         "contact_pressure_MPa": _finite(1e-6 * duty.pressure),
         "remark": duty.remark,

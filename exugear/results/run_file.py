@@ -304,7 +304,7 @@ _LAYOUT = Layout(
     "run",
     RUN,
     {name: VARIABLES[name].dimensions for name in ("time", "input_speed", "overall_dte")},
-    ("gearbox", "variant", "load_case", "mesh_law", "inertias", "highest_order"),
+    ("gearbox", "variant", "load_case", "mesh_model", "inertias", "highest_order"),
 )
 
 
@@ -519,9 +519,9 @@ def verdict_of(attributes: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> verdict_of({"trusted": 0, "verdict": "energy: ..."}), verdict_of({"trusted": 1}), verdict_of({})
+    >>> verdict_of({"valid": 0, "validity_message": "energy: ..."}), verdict_of({"valid": 1}), verdict_of({})
     ('energy: ...', '', '')
     """
-    if int(attributes.get("trusted", 1)):
+    if int(attributes.get("valid", 1)):
         return ""
-    return str(attributes.get("verdict", "no reason is kept"))
+    return str(attributes.get("validity_message", "no reason is kept"))

@@ -170,7 +170,7 @@ class Gearset:
         # Shared by all that differ in their lines alone.
         self._lattices: dict[tuple[Reach, int, int], Lattice] = {}
         self._one_by_one: dict[int, Gearset] = {}
-        self.parting = LAWS[waves.assembly.mesh_law].loses_contact
+        self.parting = LAWS[waves.assembly.mesh_model].loses_contact
         self.bearings: BearingWaves | None = None
         self._bearing_means: tuple[BearingMean, ...] = ()
         ports = []

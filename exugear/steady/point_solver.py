@@ -75,7 +75,7 @@ def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int | None = None,
     Where teeth may part, each state takes the lines that it needs: then it begins with few.
     """
     waves = mesh_waves(mean_system(assembly, speeds))
-    usual = FEWEST if LAWS[assembly.mesh_law].loses_contact else waves.needed_harmonics()
+    usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
     return Gearset(waves, usual if harmonics is None else harmonics, combinations)
 
 
@@ -121,8 +121,8 @@ class PointSolver:
     """
 
     def __init__(self, gearset: Gearset, settings: SteadySettings) -> None:
-        self.linear, self._level = gearset, settings.level
-        self.gearset = gearset.with_bearings if settings.level == "nonlinear" else gearset
+        self.linear, self._level = gearset, settings.method
+        self.gearset = gearset.with_bearings if settings.method == "nonlinear" else gearset
         self._last: Complexes | None = None
         self.state: PartingState | None = None
 

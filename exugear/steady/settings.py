@@ -1,4 +1,4 @@
-"""What a steady response is asked for: speeds, level, lines."""
+"""What a steady response is asked for: speeds, method, lines."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 
-Level = Literal["linear", "parametric", "nonlinear"]
-LEVELS: tuple[Level, ...] = get_args(Level)
+Method = Literal["linear", "parametric", "nonlinear"]
+METHODS: tuple[Method, ...] = get_args(Method)
 USUAL_COUNT = 400
 MOST_COUNT = 20000
 MOST_HARMONICS = 100
@@ -129,20 +129,20 @@ def check_speeds(gearbox: Gearbox, speeds: SpeedRange) -> None:
         )
 
 
-def check_law(name: str, level: Level) -> None:
-    """Refuse a mesh law that a level cannot take.
+def check_law(name: str, method: Method) -> None:
+    """Refuse a mesh law that a method cannot take.
 
     Raises
     ------
     SteadyError
-        The gears only roll, or the teeth part and the level is linear in the deflections.
+        The gears only roll, or the teeth part and the method is linear in the deflections.
     """
     law = LAWS[name]
     if not law.has_force:
         raise SteadyError(f"mesh law {name}: its gears only roll, so that nothing vibrates; take another law")
-    if law.loses_contact and level != "nonlinear":
+    if law.loses_contact and method != "nonlinear":
         raise SteadyError(
-            f"mesh law {name}: its teeth may part, which the level {level} cannot tell; take the level nonlinear, or "
+            f"mesh law {name}: its teeth may part, which the method {method} cannot tell; take --method nonlinear, or "
             "the law line_of_action"
         )
 
@@ -152,7 +152,7 @@ class SteadySettings:
     """What is asked for."""
 
     speeds: SpeedRange
-    level: Level = "parametric"
+    method: Method = "parametric"
     """{"linear", "parametric", "nonlinear"}: the static transmission error as excitation, stiffness that varies with
     the mesh cycle, or laws evaluated in time, the position in the cycle moving with the vibration."""
     harmonics: int | None = None
@@ -166,13 +166,13 @@ class SteadySettings:
     stability of each; the count of speeds and `at_resonances` then play no part."""
 
     def __post_init__(self) -> None:
-        """Refuse what is no level, too many harmonics, and branches where there are none."""
-        if self.level not in LEVELS:
-            raise SteadyError(f"level {self.level!r} is unknown; levels are {', '.join(LEVELS)}")
+        """Refuse unknown methods, too many harmonics, and branches where there are none."""
+        if self.method not in METHODS:
+            raise SteadyError(f"method {self.method!r} is unknown; methods are {', '.join(METHODS)}")
         if self.harmonics is not None and not 1 <= self.harmonics <= MOST_HARMONICS:
             raise SteadyError(f"harmonics {self.harmonics}: must be from 1 to {MOST_HARMONICS}")
-        if self.branches and self.level != "nonlinear":
-            raise SteadyError(f"branches: the level {self.level} has one state at each speed; take the level nonlinear")
+        if self.branches and self.method != "nonlinear":
+            raise SteadyError(f"branches: the method {self.method} has one state at each speed; take nonlinear")
 
     def hash_with(self, assembly: Assembly) -> str:
         """SHA-256 of all that a response depends on."""

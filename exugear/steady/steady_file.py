@@ -45,7 +45,7 @@ _LAYOUT = Layout(
         "energy_error": ("point",),
         "growth": ("point",),
         "remark": ("point",),
-        "apart_share": ("point", "mesh_wave"),
+        "contact_loss_fraction": ("point", "mesh_wave"),
         "left_out": ("mesh_wave",),
     }
     | {name: (name,) for name in ("base", "signal", "mesh_wave")}
@@ -53,12 +53,12 @@ _LAYOUT = Layout(
     (
         "gearbox",
         "variant",
-        "mesh_law",
+        "mesh_model",
         "inertias",
-        "level",
+        "method",
         "input_hash",
         "growth_rate",
-        "unsolved",
+        "not_converged",
         "harmonics",
         "operating_range",
         "carried_seats",
@@ -68,7 +68,7 @@ _LAYOUT = Layout(
 
 def steady_path(folder: str | Path, choice: Choice, settings: SteadySettings) -> Path:
     """Place of the steady response of a choice that names its inertia set: beside its modes."""
-    return modes_path(folder, choice).with_name(f"steady-{'branch' if settings.branches else settings.level}.nc")
+    return modes_path(folder, choice).with_name(f"steady-{'branch' if settings.branches else settings.method}.nc")
 
 
 def to_dataset(response: SteadyResponse) -> xr.Dataset:
@@ -101,11 +101,15 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
             response.left_out,
             {"units": "1", "long_name": "share of the compliance's variation above the harmonics"},
         ),
-        "apart_share": (("point", "mesh_wave"), solved.apart, {"units": "1", "long_name": "share of time apart"}),
+        "contact_loss_fraction": (
+            ("point", "mesh_wave"),
+            solved.apart,
+            {"units": "1", "long_name": "share of time apart"},
+        ),
     }
     if response.bearing_names:
         words = "share of time in which no rolling element of a bearing touches"
-        variables["free_share"] = (("point", "bearing"), solved.free, {"units": "1", "long_name": words})
+        variables["unloaded_fraction"] = (("point", "bearing"), solved.free, {"units": "1", "long_name": words})
     variables |= response.campbell.variables()
     coordinates: dict[str, Any] = {
         "mesh_wave": np.array(response.wave_names, dtype=object),
@@ -123,9 +127,9 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
     return {
         "gearbox": assembly.gearbox.name,
         "variant": str(assembly.variant),
-        "mesh_law": assembly.mesh_law,
+        "mesh_model": assembly.mesh_model,
         "inertias": assembly.inertias,
-        "level": response.settings.level,
+        "method": response.settings.method,
         "settings": json.dumps(asdict(response.settings), sort_keys=True),
         "input_hash": response.input_hash,
         "method_version": STEADY,
@@ -146,7 +150,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "contributions": json.dumps([{"line": line, **asdict(own)} for line, own in response.contributions]),
         "folds": json.dumps(response.folds),
         "branch_ended": response.branch_ended,
-        "unsolved": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),
+        "not_converged": json.dumps([{"speed": speed, "reason": reason} for speed, reason in response.unsolved]),
         "crossings": json.dumps([asdict(crossing) for crossing in response.crossings]),
     }
 
@@ -157,7 +161,7 @@ def _static_loads(assembly: Assembly) -> dict[str, list[float]]:
         point.bearing.name: [float(value) for value in point.load[:3]]
         for point in assembly.operating_points
         if point is not None
-        and point.bearing.law != "iso16281"
+        and point.bearing.model != "iso16281"
         and point.load_stands_still
         and not point.is_unloaded
         and point.bearing.on not in assembly.spin

@@ -141,7 +141,7 @@ def _ended(branch: Branch, last: float) -> str:
     return (
         f"the branch ends at {p[-1] / RPM:.5g} rpm after {len(p)} points, before {last / RPM:.5g} rpm: its steps are "
         f"short where teeth graze, and it turned back {len(turns)} times, {lately} of them in its second half; ask for "
-        "the speeds from there on, or leave --branches out"
+        "the speeds from there on, or leave --continuation out"
     )
 
 
@@ -232,8 +232,8 @@ class SteadyResponse(Displayed):
     def _line(self) -> str:
         assembly = self.assembly
         return (
-            f" of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_law}, "
-            f"{self.settings.level}: {len(self.solved.speed)} speeds, {len(self.lines.orders)} lines"
+            f" of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_model}, "
+            f"{self.settings.method}: {len(self.solved.speed)} speeds, {len(self.lines.orders)} lines"
         )
 
     def _table(self) -> TitledRows:
@@ -297,7 +297,7 @@ def response_of(
     keep_every : seconds between them
     """
     check_speeds(assembly.gearbox, settings.speeds)
-    check_law(assembly.mesh_law, settings.level)
+    check_law(assembly.mesh_model, settings.method)
     even = settings.speeds.values
     gearset = gearset_of(assembly, even, settings.harmonics, settings.combinations)
     solver = PointSolver(gearset, settings)

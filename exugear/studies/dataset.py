@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 _PACKAGES = ("exugear", "numpy", "scipy", "numba", "exudyn")
 _LOCAL = "slope_"
-"""Before the name of a figure: its local derivative."""
+"""Before the name of a output: its local derivative."""
 
 
 def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
@@ -40,7 +40,7 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        Figures over the parameters; `error`, `doubts`, `seconds` and `memory` of each point; as attributes the study,
+        Outputs over the parameters; `error`, `doubts`, `seconds` and `memory` of each point; as attributes the study,
         its case, versions and numbers of points.
     """
     import xarray as xr
@@ -52,14 +52,14 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
     done = [(index, record) for index, record in at if record is not None]
     variables: dict[str, Any] = {}
     labels: dict[str, list[str]] = {}
-    for name, kept in study.figures.items():
-        dimension = kept.figure.dimension
+    for name, kept in study.outputs.items():
+        dimension = kept.quantity.dimension
         if dimension:
             told = [label for _, record in done for label in record.values.get(name, {})]
             labels[dimension] = list(dict.fromkeys([*labels.get(dimension, []), *told]))
-    for name, kept in study.figures.items():
-        dimension = kept.figure.dimension
-        attributes = {"units": kept.units, "long_name": kept.figure.description}
+    for name, kept in study.outputs.items():
+        dimension = kept.quantity.dimension
+        attributes = {"units": kept.units, "long_name": kept.quantity.description}
         attributes["options"] = json.dumps(dict(kept.options))
         if dimension:
             values = _filled(
@@ -106,7 +106,7 @@ def _of_points(
         error[index], doubts[index] = record.error, "; ".join(record.doubts)
         seconds[index], memory[index] = record.seconds, record.memory
     return {
-        "error": (dimensions, error, {"long_name": "why a point has no figures"}),
+        "error": (dimensions, error, {"long_name": "why a point has no outputs"}),
         "doubts": (dimensions, doubts, {"long_name": "what speaks against trusting a point"}),
         "seconds": (dimensions, seconds, {"units": "s", "long_name": "wall time of a point"}),
         "memory": (dimensions, memory, {"units": "B", "long_name": "peak memory of its process so far"}),
@@ -122,7 +122,7 @@ def _attributes(study: Study, at: list[tuple[tuple[int, ...], Record | None]]) -
         "case": json.dumps(study.gearbox.content),
         "gearbox": study.gearbox.name,
         "variant": str(study.choice.variant),
-        "mesh_law": study.choice.mesh_law,
+        "mesh_model": study.choice.mesh_model,
         "inertias": str(study.choice.inertias),
         "load_case": str(study.choice.load_case),
         "case_digest": study.case_digest,
@@ -139,9 +139,9 @@ def _attributes(study: Study, at: list[tuple[tuple[int, ...], Record | None]]) -
 
 
 def with_slopes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
-    """Add the local derivative of each figure by each parameter: the central difference over two steps."""
+    """Add the local derivative of each output by each parameter: the central difference over two steps."""
     added = {}
-    for name, kept in study.figures.items():
+    for name, kept in study.outputs.items():
         below, above = (dataset[name].isel({SIDE: side}) for side in (0, 1))
         slope = (above - below) / (2.0 * dataset["step"])
         slope = slope.transpose(PARAMETER, ...)
@@ -151,15 +151,15 @@ def with_slopes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
 
 
 def slopes(dataset: xr.Dataset) -> Iterator[tuple[str, str, float]]:
-    """Figure, parameter and relative change for a step up of each single figure of local derivatives."""
+    """Quantity, parameter and relative change for a step up of each single output of local derivatives."""
     for name in dataset.data_vars:
-        figure = str(name).removeprefix(_LOCAL)
-        if figure == name or dataset[name].ndim > 1:
+        output = str(name).removeprefix(_LOCAL)
+        if output == name or dataset[name].ndim > 1:
             continue
-        mean = dataset[figure].mean(SIDE).to_numpy()
+        mean = dataset[output].mean(SIDE).to_numpy()
         relative = dataset[name].to_numpy() * dataset["step"].to_numpy() / mean
         for parameter, change in zip(dataset[PARAMETER].to_numpy(), relative, strict=True):
-            yield figure, str(parameter), float(change)
+            yield output, str(parameter), float(change)
 
 
 def write_study(folder: Path, dataset: xr.Dataset) -> Path:
@@ -186,7 +186,7 @@ def load_study(path: str | Path) -> xr.Dataset:
     return load_dataset(Path(path), STUDY_LAYOUT)
 
 
-# What a search looked at: points by their figures and limits, and the dataset of all of them
+# What a search looked at: points by their outputs and limits, and the dataset of all of them
 
 EVALUATION = "evaluation"
 """Dimension of the points that a search looked at, in its order; the first is the case as it is."""
@@ -194,7 +194,7 @@ USUAL_PERCENTILE = 95.0
 FAR = 1e9
 """Violation of a limit by what has no end."""
 Side = Literal["high", "low"]
-"""The end of a figure's spread over tolerances that counts: the high one of what is made small or limited above."""
+"""The end of a output's spread over tolerances that counts: the high one of what is made small or limited above."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,18 +212,18 @@ class Looked:
         return self.draws[0][0]
 
 
-Figure = Callable[[Looked, str], Floats]
-"""Gives a figure of all draws of a point; NaN where one failed."""
+Quantity = Callable[[Looked, str], Floats]
+"""Gives a output of all draws of a point; NaN where one failed."""
 
 
 @dataclass(frozen=True)
 class Criteria:
     """What points of a search are judged by."""
 
-    figures: tuple[str, ...]
+    outputs: tuple[str, ...]
     """Made small."""
     limits: tuple[tuple[str, Side, float], ...]
-    """Figure, the side that is limited, and the limit."""
+    """Quantity, the side that is limited, and the limit."""
     percentile: float
     """Over tolerances, of the bad side."""
 
@@ -237,8 +237,8 @@ class Criteria:
 
     @property
     def sides(self) -> list[tuple[str, Side]]:
-        """Figures with the side of their spread that counts, each once."""
-        minimised: list[tuple[str, Side]] = [(name, "high") for name in self.figures]
+        """Outputs with the side of their spread that counts, each once."""
+        minimised: list[tuple[str, Side]] = [(name, "high") for name in self.outputs]
         return list(dict.fromkeys([*minimised, *((name, side) for name, side, _ in self.limits)]))
 
     def percent(self, side: Side) -> float:
@@ -248,22 +248,22 @@ class Criteria:
         return 100.0 - self.percentile
 
     def over_draws(self, values: Floats, side: Side) -> Floats:
-        """Bring a figure (..., draws) into one value; a draw that failed counts as worst."""
+        """Bring a output (..., draws) into one value; a draw that failed counts as worst."""
         filled = np.where(np.isnan(values), np.inf if side == "high" else -np.inf, values)
         if filled.shape[-1] == 1:
             return filled[..., 0]
         return percentile_of(filled, self.percent(side))
 
-    def minimised(self, figure: Figure, points: Sequence[Looked]) -> Floats:
-        """Figures (points, figures) that are made small; infinite where a point failed."""
-        found = [[float(self.over_draws(figure(point, name), "high")) for name in self.figures] for point in points]
-        return np.array(found).reshape(len(points), len(self.figures))
+    def minimised(self, quantity: Quantity, points: Sequence[Looked]) -> Floats:
+        """Return the outputs (points, outputs) to be minimised; infinite where a point failed."""
+        found = [[float(self.over_draws(quantity(point, name), "high")) for name in self.outputs] for point in points]
+        return np.array(found).reshape(len(points), len(self.outputs))
 
-    def violations(self, figure: Figure, points: Sequence[Looked]) -> Floats:
+    def violations(self, quantity: Quantity, points: Sequence[Looked]) -> Floats:
         """How far points are beyond limits (points, limits), over the size of the limit; negative within."""
         found = [
             [
-                beyond(float(self.over_draws(figure(point, name), side)), side, limit)
+                beyond(float(self.over_draws(quantity(point, name), side)), side, limit)
                 for name, side, limit in self.limits
             ]
             for point in points
@@ -272,7 +272,7 @@ class Criteria:
 
 
 def _limits(name: str, limit: LimitSection) -> list[tuple[str, Side, float]]:
-    sides: list[tuple[Side, float | None]] = [("high", limit.most), ("low", limit.least)]
+    sides: list[tuple[Side, float | None]] = [("high", limit.max), ("low", limit.min)]
     return [(name, side, value) for side, value in sides if value is not None]
 
 
@@ -288,17 +288,17 @@ def beyond(value: float, side: Side, limit: float) -> float:
     return float(np.clip(difference / (abs(limit) or 1.0), -FAR, FAR))
 
 
-def on_front(figures: Floats) -> Booleans:
-    """Tell which points (points, figures) no other one beats: not larger in any figure and smaller in one.
+def on_front(outputs: Floats) -> Booleans:
+    """Tell which points (points, outputs) no other one beats: not larger in any output and smaller in one.
 
     Examples
     --------
     >>> on_front(np.array([[1.0, 4.0], [2.0, 2.0], [3.0, 3.0]])).tolist()
     [True, True, False]
     """
-    kept: Booleans = np.asarray(np.isfinite(figures).all(axis=1))
+    kept: Booleans = np.asarray(np.isfinite(outputs).all(axis=1))
     for n in np.flatnonzero(kept):
-        beaten = (figures <= figures[n]).all(axis=1) & (figures < figures[n]).any(axis=1)
+        beaten = (outputs <= outputs[n]).all(axis=1) & (outputs < outputs[n]).any(axis=1)
         kept[n] = not beaten.any()
     return kept
 
@@ -318,25 +318,25 @@ def searched_dataset(
     kept = np.ones(len(points), dtype=bool)
     for name, side, limit in criteria.limits:
         kept &= np.array([beyond(float(value), side, limit) <= 0.0 for value in judged[name, side].to_numpy()])
-    figures = np.array([judged[name, "high"].to_numpy() for name in criteria.figures]).T
-    front = on_front(np.where(kept[:, None], figures, np.inf))
+    outputs = np.array([judged[name, "high"].to_numpy() for name in criteria.outputs]).T
+    front = on_front(np.where(kept[:, None], outputs, np.inf))
     if study.tolerances is not None:
         dataset = dataset.assign({judged_name(study, *side): values for side, values in judged.items()})
     if criteria.limits:
         dataset = dataset.assign(meets_limits=((EVALUATION,), kept.astype(np.int8), words))
-    words = {"long_name": "whether no other point within all limits is better in all figures that are made small"}
+    words = {"long_name": "whether no other point within all limits is better in all outputs that are made small"}
     return dataset.assign(on_front=((EVALUATION,), front.astype(np.int8), words))
 
 
 def judged_name(study: Study, name: str, side: Side) -> str:
-    """Variable of the dataset that points are judged by: the figure, or its percentile over the tolerances."""
+    """Variable of the dataset that points are judged by: the output, or its percentile over the tolerances."""
     if study.tolerances is None:
         return name
     return f"{name}_{side}"
 
 
 def _judged(dataset: xr.Dataset, study: Study, criteria: Criteria, name: str, side: Side) -> xr.DataArray:
-    """Give a figure of each point, or its percentile over tolerances; infinite where draws failed."""
+    """Give a output of each point, or its percentile over tolerances; infinite where draws failed."""
     import xarray as xr
 
     values = dataset[name].to_numpy().reshape(dataset.sizes[EVALUATION], -1)

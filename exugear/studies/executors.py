@@ -35,8 +35,8 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import CaseError
 from exugear.results.folder import peak_memory
-from exugear.studies.figures import KeptFigure, Values
 from exugear.studies.point_results import PointResults, PointSettings, Shared
+from exugear.studies.quantities import Output, Values
 from exugear.studies.sampling import changed
 from exugear.system.readiness import check_parts
 from fe_ste.tools.files import FileError, open_regular, write_all
@@ -59,7 +59,7 @@ class Record:
     point: str
     """Hash of its input."""
     values: Mapping[str, Any] = field(default_factory=dict)
-    """Figures by name: a number, or numbers by name; None for one that is none, `INFINITE` for one without end."""
+    """Outputs by name: a number, or numbers by name; None for one that is none, `INFINITE` for one without end."""
     error: str = ""
     """Why it failed; empty if it did not."""
     doubts: list[str] = field(default_factory=list)
@@ -207,7 +207,7 @@ class Task:
     permissions: Permissions
     choice: Choice
     settings: PointSettings
-    figures: Mapping[str, KeptFigure]
+    outputs: Mapping[str, Output]
     """By name."""
     folder: Path
     """Of the study."""
@@ -265,7 +265,7 @@ def compute_point(task: Task, work: Work) -> Record:
     try:
         gearbox = _built(task, work)
         results = PointResults(gearbox, task.choice, task.settings, Shared(task.folder / SHARED_FOLDER), folder)
-        values = {name: _told(kept.of(results)) for name, kept in task.figures.items()}
+        values = {name: _told(kept.of(results)) for name, kept in task.outputs.items()}
         doubts = list(results.doubts)
         results.clear()
     except StoppedError:

@@ -1,4 +1,4 @@
-"""Results of one point: computed when a figure asks for them, each once."""
+"""Results of one point: computed when a output asks for them, each once."""
 
 from __future__ import annotations
 
@@ -219,7 +219,7 @@ def response_of_factors(
     """Compute the steady response that K_v is taken from, at the speeds of the study or the usual ones."""
     level = rating_of(assembly.gearbox).dynamic_factor_steady
     assert level is not None
-    if settings is None or settings.level != level:
+    if settings is None or settings.method != level:
         settings = SteadySettings(usual_speeds(assembly.gearbox), level)
     stored_or_computed(steady_path(folder, choice, settings), assembly, settings, progress)
 
@@ -229,11 +229,11 @@ def _requests(gearbox: Gearbox, choice: Choice, folder: Path) -> list[TableReque
 
 
 def _has_axes(choice: Choice) -> bool:
-    law = LAWS.get(choice.mesh_law)
+    law = LAWS.get(choice.mesh_model)
     return law is not None and law.needs_axes
 
 
-# Results of one point: computed when a figure asks for them, each once
+# Results of one point: computed when a output asks for them, each once
 
 
 class PointError(RuntimeError):
@@ -279,11 +279,11 @@ class PointResults:
     @cached_property
     def stiffness(self) -> dict[str, MeshData]:
         """Mesh stiffness by pair at work, as the mesh law needs it."""
-        law = LAWS.get(self.choice.mesh_law)
+        law = LAWS.get(self.choice.mesh_model)
         if law is not None and not law.has_force:
             return {}
         found: dict[str, MeshData] = {}
-        reader = law_of(self.choice.mesh_law)
+        reader = law_of(self.choice.mesh_model)
         for pair in dict.fromkeys(mesh.pair.name for mesh in self.gearbox.meshes):
             folder = Path()
             if law is not None and law.needs_tables and (law.needs_axes or pair not in self.gearbox.stated_stiffness):
@@ -324,7 +324,7 @@ class PointResults:
             The study does not say over which speeds.
         """
         if self.settings.steady is None:
-            raise PointError("figures of steady responses need a section [steady] with speeds")
+            raise PointError("outputs of steady responses need a section [steady] with speeds")
         from exugear.steady.steady_file import to_dataset
         from exugear.steady.steady_response import response_of
 
@@ -396,7 +396,7 @@ class PointResults:
     def states(
         self, pair: str, positions: int, torque_factors: Sequence[float], misalignment_um: Sequence[float]
     ) -> xr.Dataset:
-        """States of contact of a pair over loads and misalignments, kept for the next figure that asks the same."""
+        """States of contact of a pair over loads and misalignments, kept for the next output that asks the same."""
         key = (pair, positions, tuple(torque_factors), tuple(misalignment_um))
         if key not in self._states:
             self._states[key] = self._computed_states(*key)

@@ -492,10 +492,10 @@ def distribution_of(parameter: ParameterSection, gearbox: Gearbox) -> Distributi
         The case has no such gear, or it lies outside ISO 1328.
     """
     if parameter.uniform is not None:
-        return Uniform(parameter.uniform.least, parameter.uniform.most)
+        return Uniform(parameter.uniform.min, parameter.uniform.max)
     if parameter.normal is not None:
         normal = parameter.normal
-        limits = (-np.inf if normal.least is None else normal.least, np.inf if normal.most is None else normal.most)
+        limits = (-np.inf if normal.min is None else normal.min, np.inf if normal.max is None else normal.max)
         return Normal(normal.mean, normal.deviation, *limits)
     assert parameter.iso1328 is not None
     wanted = parameter.iso1328

@@ -1,4 +1,4 @@
-"""Sections of a study file as it is written: parameters, what is computed, and which figures are kept."""
+"""Sections of a study file as it is written: parameters, what is computed, and which outputs are kept."""
 
 from __future__ import annotations
 
@@ -52,30 +52,30 @@ class NormalSection(StudyPart):
     """Mean."""
     deviation: Annotated[float, Field(gt=0.0)]
     """Standard deviation before it is cut off."""
-    least: float | None = None
+    min: float | None = None
     """No draw lies below."""
-    most: float | None = None
+    max: float | None = None
     """No draw lies above."""
 
     @model_validator(mode="after")
     def _order(self) -> NormalSection:
-        if self.least is not None and self.most is not None and self.least >= self.most:
-            raise ValueError("least must be below most")
+        if self.min is not None and self.max is not None and self.min >= self.max:
+            raise ValueError("min must be below max")
         return self
 
 
 class UniformSection(StudyPart):
     """Every value between two is as likely."""
 
-    least: float
+    min: float
     """Lower end."""
-    most: float
+    max: float
     """Upper end."""
 
     @model_validator(mode="after")
     def _order(self) -> UniformSection:
-        if self.least >= self.most:
-            raise ValueError("least must be below most")
+        if self.min >= self.max:
+            raise ValueError("min must be below max")
         return self
 
 
@@ -158,7 +158,7 @@ class ChoiceSection(StudyPart):
 
     variant: Annotated[str, AfterValidator(Variant.offered)] = Variant.bushing
     """How bodies are held."""
-    mesh_law: str = "line_of_action"
+    mesh_model: str = "line_of_action"
     """How teeth push each other."""
     inertias: str | None = None
     """Inertia set; that of the case by default."""
@@ -167,11 +167,11 @@ class ChoiceSection(StudyPart):
 
 
 class SteadySection(StudyPart):
-    """Steady responses, for figures that are read from them."""
+    """Steady responses, for outputs that are read from them."""
 
     speeds: str
     """FIRST:LAST:COUNT in rpm of the input."""
-    level: Literal["linear", "parametric", "nonlinear"] = "parametric"
+    method: Literal["linear", "parametric", "nonlinear"] = "parametric"
     """What varies."""
     harmonics: Annotated[int, Field(ge=1, le=100)] | None = None
     """Harmonics of each mesh frequency; by default as many as the mesh stiffness asks for."""
@@ -182,7 +182,7 @@ class SteadySection(StudyPart):
 
 
 class RunSection(StudyPart):
-    """Runs in time, for figures that are read from them."""
+    """Runs in time, for outputs that are read from them."""
 
     duration_s: Annotated[float, Field(gt=0.0)] | None = None
     """Simulated time; that of the load case by default."""
@@ -191,33 +191,33 @@ class RunSection(StudyPart):
 
 
 class LimitSection(StudyPart):
-    """Bounds that a figure is kept within by a search."""
+    """Bounds that a output is kept within by a search."""
 
-    least: float | None = None
-    """The figure is this or more."""
-    most: float | None = None
-    """The figure is this or less."""
+    min: float | None = None
+    """The output is this or more."""
+    max: float | None = None
+    """The output is this or less."""
 
     @model_validator(mode="after")
     def _order(self) -> LimitSection:
-        if self.least is None and self.most is None:
-            raise ValueError("give least, most or both")
-        if self.least is not None and self.most is not None and self.least > self.most:
-            raise ValueError("least must not be above most")
+        if self.min is None and self.max is None:
+            raise ValueError("set min, max or both")
+        if self.min is not None and self.max is not None and self.min > self.max:
+            raise ValueError("min must not be above max")
         return self
 
 
 class OptimisationSection(StudyPart):
-    """Search for parameters, each within its `uniform` limits, that make figures small."""
+    """Search for parameters, each within its `uniform` limits, that make outputs small."""
 
     minimise: Annotated[list[Name], Field(min_length=1, max_length=2)]
-    """One figure, or two that are weighed against each other."""
+    """One output, or two that are weighed against each other."""
     limits: dict[Name, LimitSection] = {}
-    """Figures that are kept within bounds meanwhile."""
+    """Outputs that are kept within bounds meanwhile."""
     percentile: Annotated[float, Field(ge=50.0, le=100.0)] | None = None
-    """Of each figure over the tolerances, on its bad side; 95 by default. Of 100 it is the worst draw."""
+    """Of each output over the tolerances, on its bad side; 95 by default. Of 100 it is the worst draw."""
     weightings: Annotated[int, Field(ge=1, le=50)] = 5
-    """Of two figures: how many weightings, one search each, from the first alone to the second alone."""
+    """Of two outputs: how many weightings, one search each, from the first alone to the second alone."""
     population: Annotated[int, Field(ge=4, le=1000)] = 16
     """Points of a generation."""
     generations: Annotated[int, Field(ge=1, le=10000)] = 20
@@ -239,8 +239,8 @@ class StudyFile(StudyPart):
     """Keys of the case with other values in all points."""
     parameters: Annotated[dict[Name, ParameterSection], Field(min_length=1, max_length=200)]
     """What is varied, by name."""
-    figures: Annotated[dict[Name, dict[str, Any]], Field(min_length=1, max_length=200)]
-    """What is kept, by name: `figure` says which, other keys are its options."""
+    outputs: Annotated[dict[Name, dict[str, Any]], Field(min_length=1, max_length=200)]
+    """What is kept, by name: `quantity` says which, other keys are its options."""
     sampling: Literal["sobol", "latin_hypercube", "random"] = "latin_hypercube"
     """How distributions are drawn from."""
     samples: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
@@ -279,11 +279,11 @@ class StudyFile(StudyPart):
 
     def _check_search(self, wanted: OptimisationSection) -> None:
         for key, names in (("minimise", wanted.minimise), ("limits", list(wanted.limits))):
-            lost = [name for name in names if name not in self.figures]
+            lost = [name for name in names if name not in self.outputs]
             if lost:
-                raise ValueError(f"optimise.{key}: no figure {lost[0]!r}; figures are {', '.join(self.figures)}")
+                raise ValueError(f"optimise.{key}: no output {lost[0]!r}; outputs are {', '.join(self.outputs)}")
         if len(set(wanted.minimise)) < len(wanted.minimise):
-            raise ValueError(f"optimise.minimise: {wanted.minimise[0]} against itself; name two figures, or one")
+            raise ValueError(f"optimise.minimise: {wanted.minimise[0]} against itself; name two outputs, or one")
         listed = [name for name, tolerance in self.tolerances.items() if not tolerance.is_drawn]
         if listed:
             raise ValueError(f"tolerances.{listed[0]}: give it a distribution: normal, uniform or iso1328")
@@ -345,12 +345,12 @@ def parse_study(content: dict[str, Any], source: str) -> StudyFile:
 
     Examples
     --------
-    >>> parse_study({"name": "a", "case": "b.toml", "parameters": {}, "figure": {}}, "s.toml")
+    >>> parse_study({"name": "a", "case": "b.toml", "parameters": {}, "quantity": {}}, "s.toml")
     Traceback (most recent call last):
     ...
     exugear.studies.sections.StudyError: s.toml: parameters: must have at least 1 entry
-    s.toml: figures: this key is missing
-    s.toml: figure: unknown key; did you mean 'figures'?
+    s.toml: outputs: this key is missing
+    s.toml: output: unknown key; did you mean 'outputs'?
     """
     try:
         return StudyFile.model_validate(content)

@@ -1,4 +1,4 @@
-"""A study: a gearbox, the points that vary it, and the figures that are kept, read from a file and checked."""
+"""A study: a gearbox, the points that vary it, and the outputs that are kept, read from a file and checked."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from exugear.gearbox.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
 from exugear.results.folder import case_digest, read_content
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.settings import SpeedRange, SteadySettings, check_law
-from exugear.studies.figures import (
-    FIGURES,
-    LEAST,
-    LIVES,
-    OVERALL,
-    SAFETIES,
-    Figure,
-    FigureError,
-    KeptFigure,
-    kept_figures,
-)
 from exugear.studies.point_results import PointSettings, life_loads
+from exugear.studies.quantities import (
+    LIVES,
+    MINIMUM,
+    OVERALL,
+    QUANTITIES,
+    SAFETIES,
+    Output,
+    OutputError,
+    Quantity,
+    outputs_of,
+)
 from exugear.studies.sampling import (
     PARAMETER,
     SAMPLE,
@@ -58,10 +58,10 @@ from fe_ste.tools.versions import TABLE
 # What speaks against a study before any point is computed: names taken, equal points, options out of range
 
 OF_POINTS = ("error", "doubts", "seconds", "memory")
-"""What a dataset tells of each point beside its figures."""
+"""What a dataset tells of each point beside its outputs."""
 OF_SEARCHES = ("evaluation", "on_front", "meets_limits")
 SLOPE = "slope_"
-"""Before the name of a figure: its local derivative."""
+"""Before the name of a output: its local derivative."""
 LIMITS: Mapping[str, tuple[float, float]] = {
     "count": (1, 10_000),
     "harmonic": (1, 1000),
@@ -75,13 +75,13 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "misalignment_um": (-1e5, 1e5),
     "speed_rpm": (-1e7, 1e7),
 }
-"""Least and most of the options of figures."""
+"""Least and most of the options of outputs."""
 SHOWN = 3
 """Most names of what is equal that a line has."""
 
 
-def faults_of_names(study: StudyFile, kept: Mapping[str, KeptFigure]) -> Iterator[str]:
-    """Tell parameters and figures whose names the dataset has for something else."""
+def faults_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
+    """Tell parameters and outputs whose names the dataset has for something else."""
     taken = dict.fromkeys(OF_POINTS, "what is told of each point")
     drawn = [name for name, parameter in study.parameters.items() if parameter.is_drawn]
     stepped = any(parameter.kind == "step" for parameter in study.parameters.values())
@@ -93,16 +93,16 @@ def faults_of_names(study: StudyFile, kept: Mapping[str, KeptFigure]) -> Iterato
         taken |= {f"{name}_path": f"the paths of parameters.{name}" for name in drawn if study.parameters[name].paths}
     if stepped:
         taken |= dict.fromkeys((PARAMETER, SIDE, "step"), "local derivatives")
-        taken |= {f"{SLOPE}{name}": f"the local derivative of figures.{name}" for name in study.figures}
-    for name, figure in kept.items():
-        if figure.figure.dimension:
-            taken.setdefault(figure.figure.dimension, f"a dimension of figures.{name}")
+        taken |= {f"{SLOPE}{name}": f"the local derivative of outputs.{name}" for name in study.outputs}
+    for name, output in kept.items():
+        if output.quantity.dimension:
+            taken.setdefault(output.quantity.dimension, f"a dimension of outputs.{name}")
     named = {"parameters": () if stepped else study.parameters, "tolerances": study.tolerances}
-    for table, names in {**named, "figures": study.figures}.items():
+    for table, names in {**named, "outputs": study.outputs}.items():
         for name in names:
             if name in taken:
                 yield f"{table}.{name}: this name is that of {taken[name]} in the dataset; choose another"
-    for first, second in (("parameters", "figures"), ("parameters", "tolerances"), ("tolerances", "figures")):
+    for first, second in (("parameters", "outputs"), ("parameters", "tolerances"), ("tolerances", "outputs")):
         for name in getattr(study, first):
             if name in getattr(study, second):
                 yield f"{second}.{name}: {first}.{name} has this name, too; rename one"
@@ -117,19 +117,19 @@ def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
         for name, tolerance in study.tolerances.items()
         if tolerance.paths
     }
-    sides = {f"{name}_{side}": f"a percentile of figures.{name}" for name in study.figures for side in ("high", "low")}
+    sides = {f"{name}_{side}": f"a percentile of outputs.{name}" for name in study.outputs for side in ("high", "low")}
     return {SAMPLE: "the draws", **taken, **sides}
 
 
-def faults_of_search(study: StudyFile, kept: Mapping[str, KeptFigure]) -> Iterator[str]:
-    """Tell figures of many numbers where a search needs one."""
+def faults_of_search(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
+    """Tell outputs of many numbers where a search needs one."""
     if study.optimise is None:
         return
     for key, names in (("minimise", study.optimise.minimise), ("limits", list(study.optimise.limits))):
         for name in names:
-            along = kept[name].figure.dimension
+            along = kept[name].quantity.dimension
             if along:
-                yield f"optimise.{key}: figures.{name} has a number for each {along}; a search needs a single one"
+                yield f"optimise.{key}: outputs.{name} has a number for each {along}; a search needs a single one"
 
 
 def faults_of_paths(study: StudyFile) -> Iterator[str]:
@@ -172,52 +172,52 @@ def faults_of_values(design: Design) -> Iterator[str]:
                 break
 
 
-def faults_of_options(kept: Mapping[str, KeptFigure], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
-    """Tell options of the program's own figures that no gearbox bears, or that this one does not have."""
-    own = {id(figure) for figure in FIGURES.values()}
+def faults_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
+    """Tell options of the program's own outputs that no gearbox bears, or that this one does not have."""
+    own = {id(quantity) for quantity in QUANTITIES.values()}
     known = _names(gearbox, choice)
-    for name, figure in kept.items():
-        if id(figure.figure) not in own:
+    for name, output in kept.items():
+        if id(output.quantity) not in own:
             continue
-        for key, value in figure.options.items():
+        for key, value in output.options.items():
             entries = value if isinstance(value, list) else [value]
             low, high = LIMITS.get(key, (-math.inf, math.inf))
             numbers = [entry for entry in entries if isinstance(entry, int | float) and not isinstance(entry, bool)]
             if not all(low <= entry <= high and math.isfinite(entry) for entry in numbers):
-                yield f"figures.{name}.{key} = {value!r}: must be finite, and lie between {low:g} and {high:g}"
+                yield f"outputs.{name}.{key} = {value!r}: must be finite, and lie between {low:g} and {high:g}"
             elif key in known and value and value not in known[key]:
-                yield f"figures.{name}.{key} = {str(value)[:200]!r}: no such {key}; there are {_listed(known[key])}"
-        yield from _faults_of_orders(name, figure.options, gearbox)
+                yield f"outputs.{name}.{key} = {str(value)[:200]!r}: no such {key}; there are {_listed(known[key])}"
+        yield from _faults_of_orders(name, output.options, gearbox)
 
 
 def _faults_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -> Iterator[str]:
     """Tell options that contradict each other, or the table's positions."""
     if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
-        yield f"figures.{name}.from_Hz = {options['from_Hz']:g}: lies above to_Hz = {options['to_Hz']:g}"
+        yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: lies above to_Hz = {options['to_Hz']:g}"
     most = gearbox.ste.positions // 2
     if options.get("harmonic", 1) > most:
         yield (
-            f"figures.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has "
+            f"outputs.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has "
             f"{most} harmonics; give fewer, or more ste.positions"
         )
 
 
-def faults_of_needs(study: StudyFile, kept: Mapping[str, KeptFigure], gearbox: Gearbox) -> Iterator[str]:
-    """Tell figures that are read from what the study does not compute."""
-    for name, figure in kept.items():
-        needs = figure.figure.needs
+def faults_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearbox) -> Iterator[str]:
+    """Tell outputs that are read from what the study does not compute."""
+    for name, output in kept.items():
+        needs = output.quantity.needs
         if needs == "steady" and study.steady is None:
-            yield f"figures.{name}: is read from a steady response; give a section [steady] with speeds"
+            yield f"outputs.{name}: is read from a steady response; give a section [steady] with speeds"
         if needs == "bearings" and (not Variant.of(study.choice.variant).on_bearings or not _rated_bearings(gearbox)):
             yield (
-                f"figures.{name}: is one of bearings with a section catalogue, which the variant "
+                f"outputs.{name}: is one of bearings with a section catalogue, which the variant "
                 f"{study.choice.variant!r} of this gearbox has not"
             )
 
 
-def faults_of_signals(kept: Mapping[str, KeptFigure], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
+def faults_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
     """Tell signals and lines that neither runs nor steady responses of this gearbox have."""
-    tabled = choice.mesh_law == "table"
+    tabled = choice.mesh_model == "table"
     jointed = choice.variant.spins_only
     of_runs = [one for one in signals_of(tabled, jointed) if one.stored and one.dimensions[0] == "time"]
     families = [mesh.family for mesh in gearbox.meshes]
@@ -225,27 +225,27 @@ def faults_of_signals(kept: Mapping[str, KeptFigure], gearbox: Gearbox, choice: 
     if not jointed:
         supports = [word for bearing in gearbox.bearings for word in (bearing.name, bearing.family)]
         parts |= {"support_force": supports, "seat_acceleration": supports}
-    for name, figure in kept.items():
-        signal = str(figure.options.get("signal", OVERALL))
-        if figure.figure.needs == "run":
-            single = figure.figure.dimension != ""
+    for name, output in kept.items():
+        signal = str(output.options.get("signal", OVERALL))
+        if output.quantity.needs == "run":
+            single = output.quantity.dimension != ""
             known = [of_run.name for of_run in of_runs if not single or len(of_run.dimensions) == 1]
             if signal not in known:
-                yield f"figures.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
-        elif figure.figure.needs == "steady":
+                yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
+        elif output.quantity.needs == "steady":
             quantity, _, rest = signal.partition(" ")
             if signal != OVERALL and not any(rest.split(" ")[0] == part for part in parts.get(quantity, ())):
                 known = [OVERALL, *(f"{own} {part}" for own, of in parts.items() for part in dict.fromkeys(of))]
-                yield f"figures.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
-            yield from _faults_of_line(name, figure, families)
+                yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
+            yield from _faults_of_line(name, output, families)
 
 
-def _faults_of_line(name: str, figure: KeptFigure, families: Sequence[str]) -> Iterator[str]:
-    line = figure.options.get("line")
+def _faults_of_line(name: str, output: Output, families: Sequence[str]) -> Iterator[str]:
+    line = output.options.get("line")
     unknown = [word for word in str(line).split() if not word.isdecimal() and word not in ("x", "+", "-", *families)]
     if line is not None and (unknown or not line):
         yield (
-            f"figures.{name}.line = {str(line)[:200]!r}: no such line; lines are as {families[0]} and 2 x {families[0]}"
+            f"outputs.{name}.line = {str(line)[:200]!r}: no such line; lines are as {families[0]} and 2 x {families[0]}"
             f", of {_listed(list(dict.fromkeys(families)))}"
         )
 
@@ -257,7 +257,7 @@ def _rated_bearings(gearbox: Gearbox) -> list[str]:
 def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
     """Names that options may have."""
     families = list(dict.fromkeys(mesh.family for mesh in gearbox.meshes))
-    law = LAWS.get(choice.mesh_law)
+    law = LAWS.get(choice.mesh_model)
     elements = [mesh.name for mesh in gearbox.meshes] if law is None or law.has_force else []
     if choice.variant.on_bearings:
         elements += [bearing.name for bearing in gearbox.bearings]
@@ -274,7 +274,7 @@ def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
         "element": elements,
         "bearing": _rated_bearings(gearbox),
         "of": list(SAFETIES),
-        "by": [LEAST, *LIVES],
+        "by": [MINIMUM, *LIVES],
     }
 
 
@@ -284,7 +284,7 @@ def _listed(names: Sequence[str]) -> str:
     return (", ".join(shown) or "none") + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
 
 
-# A study: a gearbox, the points that vary it, and the figures that are kept, read from a file and checked
+# A study: a gearbox, the points that vary it, and the outputs that are kept, read from a file and checked
 
 
 @dataclass(frozen=True)
@@ -297,9 +297,9 @@ class Study(Displayed):
     ...     {
     ...         "name": "housing",
     ...         "case": "cases/grc750/gearbox.toml",
-    ...         "choice": {"variant": "bushing", "mesh_law": "iso6336"},
+    ...         "choice": {"variant": "bushing", "mesh_model": "iso6336"},
     ...         "parameters": {"seat": {"path": "housing.factor", "values": [0.2, 0.3, 0.5]}},
-    ...         "figures": {"ringing": {"figure": "nearest_frequency", "near_Hz": 3215.0}},
+    ...         "outputs": {"ringing": {"quantity": "nearest_frequency", "near_Hz": 3215.0}},
     ...     }
     ... )
     >>> study
@@ -314,7 +314,7 @@ class Study(Displayed):
     """The case, with the changes that all points have."""
     choice: Choice
     settings: PointSettings
-    figures: Mapping[str, KeptFigure]
+    outputs: Mapping[str, Output]
     """By name."""
     design: Design
     """All points; of a search none."""
@@ -325,14 +325,14 @@ class Study(Displayed):
 
     @classmethod
     def from_toml(
-        cls, path: str | Path, permissions: Permissions = NOTHING_MORE, figures: Mapping[str, Figure] = FIGURES
+        cls, path: str | Path, permissions: Permissions = NOTHING_MORE, quantities: Mapping[str, Quantity] = QUANTITIES
     ) -> Study:
         """Read and check a study file and the gearbox file that it names.
 
         Parameters
         ----------
         permissions : what the gearbox file may do
-        figures : figures that may be named
+        quantities : those that may be named
 
         Raises
         ------
@@ -340,7 +340,7 @@ class Study(Displayed):
             Anything wrong with either file.
         """
         path = Path(path)
-        return cls._of(read_study_file(path), str(path), path.parent, permissions, figures)
+        return cls._of(read_study_file(path), str(path), path.parent, permissions, quantities)
 
     @classmethod
     def from_dict(
@@ -348,14 +348,14 @@ class Study(Displayed):
         content: dict[str, Any],
         source: str = "study",
         permissions: Permissions = NOTHING_MORE,
-        figures: Mapping[str, Figure] = FIGURES,
+        quantities: Mapping[str, Quantity] = QUANTITIES,
     ) -> Study:
         """Check content already in memory; its case lies where it says, seen from the working directory."""
-        return cls._of(parse_study(content, source), source, Path(), permissions, figures)
+        return cls._of(parse_study(content, source), source, Path(), permissions, quantities)
 
     @classmethod
     def _of(
-        cls, file: StudyFile, source: str, folder: Path, permissions: Permissions, figures: Mapping[str, Figure]
+        cls, file: StudyFile, source: str, folder: Path, permissions: Permissions, quantities: Mapping[str, Quantity]
     ) -> Study:
         case = Gearbox.from_toml(folder / file.case, permissions)
         try:
@@ -366,9 +366,9 @@ class Study(Displayed):
                         _guarded(f"{table}.{name}", check_path, gearbox.content, path)
             design = design_of(file, gearbox) if file.optimise is None else Design({}, {}, ())
             tolerances = tolerances_of(file, gearbox)
-            kept = kept_figures(file.figures, figures)
+            kept = outputs_of(file.outputs, quantities)
             settings = _settings(file)
-        except (PathError, FigureError, SteadyError, ValueError) as error:
+        except (PathError, OutputError, SteadyError, ValueError) as error:
             if isinstance(error, CaseError | StudyError):
                 raise
             raise StudyError(fault_line(source, str(error))) from None
@@ -384,12 +384,12 @@ class Study(Displayed):
         return cls(file, source, gearbox, choice, settings, kept, design, case_digest(case, of_life), tolerances)
 
     def _line(self) -> str:
-        return f" {self.file.name[:60]!r}: {len(self.design.points)} points, {', '.join(self.figures)}"
+        return f" {self.file.name[:60]!r}: {len(self.design.points)} points, {', '.join(self.outputs)}"
 
     @cached_property
     def case_hash(self) -> str:
-        """SHA-256 of all that every point depends on: the case with its files, choices, figures, versions."""
-        of_life = _of_life(self.figures)
+        """SHA-256 of all that every point depends on: the case with its files, choices, outputs, versions."""
+        of_life = _of_life(self.outputs)
         cases = self.gearbox.content.get("load_cases", {})
         read = read_content(self.gearbox, of_life)
         run = None if self.gearbox.case.rating is None else self.gearbox.case.rating.dynamic_factor_run
@@ -398,9 +398,9 @@ class Study(Displayed):
             "case": {key: value for key, value in read.items() if key != "load_cases"},
             "load": [cases.get(self.choice.load_case), cases.get(run) if of_life else None],
             "files": self._digests(read),
-            "choice": [self.choice.variant, self.choice.mesh_law, self.choice.inertias, self.choice.load_case],
+            "choice": [self.choice.variant, self.choice.mesh_model, self.choice.inertias, self.choice.load_case],
             "settings": [repr(self.settings.steady), self.settings.duration, self.settings.solver],
-            "figures": self.file.figures,
+            "outputs": self.file.outputs,
         }
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
@@ -457,9 +457,9 @@ def _patterns(content: Any) -> Iterator[str]:
             yield from _patterns(value)
 
 
-def _of_life(figures: Mapping[str, KeptFigure]) -> bool:
+def _of_life(outputs: Mapping[str, Output]) -> bool:
     """Whether loads of a life are read."""
-    return any(kept.figure.needs in ("life", "bearings") for kept in figures.values())
+    return any(kept.quantity.needs in ("life", "bearings") for kept in outputs.values())
 
 
 def _settings(file: StudyFile) -> PointSettings:
@@ -467,7 +467,7 @@ def _settings(file: StudyFile) -> PointSettings:
     steady = None
     if file.steady is not None:
         own = file.steady
-        check_law(file.choice.mesh_law, own.level)
+        check_law(file.choice.mesh_model, own.method)
         speeds = SpeedRange.from_text(own.speeds)
-        steady = SteadySettings(speeds, own.level, own.harmonics, own.combinations, own.at_resonances)
+        steady = SteadySettings(speeds, own.method, own.harmonics, own.combinations, own.at_resonances)
     return PointSettings(steady, file.run.duration_s, file.run.solver)

@@ -73,7 +73,7 @@ def assemble(
     8
     """
     variant = choice.variant
-    law = choice.mesh_law
+    law = choice.mesh_model
     inertias = choice.inertia_set(gearbox)
     elastic = elastic_names(gearbox) if variant.is_elastic else ()
     moving = [body for body in gearbox.bodies(inertias) if not body.fixed or body.name in elastic]

@@ -165,12 +165,12 @@ class Modes(Displayed):
     names: tuple[str, ...]
     """What moves, in words."""
     growth_rate: float
-    """Fastest growth of any disturbance, 1/s; above 0 only where the law `seed` makes a mode flutter."""
+    """Fastest growth of any disturbance, 1/s; above 0 only where the law `tangential` makes a mode flutter."""
 
     def _line(self) -> str:
         assembly = self.assembly
         return (
-            f" of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_law}: "
+            f" of {assembly.gearbox.name[:60]!r}, {assembly.variant}, {assembly.mesh_model}: "
             f"{len(self.frequency)} modes up to {self.frequency.max(initial=0.0):.5g} Hz"
         )
 
@@ -187,7 +187,7 @@ class Modes(Displayed):
     def label(self) -> str:
         """What the modes belong to: variant, mesh law, inertia set and housing factor."""
         assembly = self.assembly
-        law = f"law {assembly.mesh_law}, inertias {assembly.inertias}"
+        law = f"law {assembly.mesh_model}, inertias {assembly.inertias}"
         return f"{assembly.variant}, {law}, housing factor {assembly.housing_factor:g}"
 
     def nearest(self, frequency: float) -> int:
@@ -221,7 +221,7 @@ class Modes(Displayed):
         attributes = {
             "gearbox": assembly.gearbox.name,
             "variant": str(assembly.variant),
-            "mesh_law": assembly.mesh_law,
+            "mesh_model": assembly.mesh_model,
             "inertias": assembly.inertias,
             "input_hash": input_hash(assembly),
             "method_version": MODES,
@@ -254,7 +254,7 @@ _LAYOUT = Layout(
         "name": ("mode",),
     }
     | {name: (name,) for name in ("mode", "coordinate", "element", "body", "motion", "mesh")},
-    ("gearbox", "variant", "mesh_law", "inertias", "input_hash", "housing_factor", "growth_rate"),
+    ("gearbox", "variant", "mesh_model", "inertias", "input_hash", "housing_factor", "growth_rate"),
 )
 
 
@@ -327,7 +327,7 @@ def eigenmodes(
         Mesh stiffness F_bt / STE over the cycle, N/m, for example from the STE tables.
     bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
     angles : {"reference", "operating"}
-        Angles of the law `seed`.
+        Angles of the law `tangential`.
 
     Examples
     --------
@@ -377,7 +377,7 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
             mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else FREE_ROTATION
             for m in range(frequency.size)
         ),
-        growth_rate=growth_rate(linear) if LAWS[assembly.mesh_law].has_force else 0.0,
+        growth_rate=growth_rate(linear) if LAWS[assembly.mesh_model].has_force else 0.0,
     )
 
 
@@ -469,8 +469,8 @@ def counterparts(before: Modes, after: Modes) -> tuple[NDArray[np.int64], Floats
 def undamped_modes(mass: Floats, stiffness: Floats, motions: Floats | None = None) -> tuple[Floats, Floats]:
     """Solve M x'' + K x = 0 for frequencies (Hz, ascending) and real shapes; M symmetric, K any.
 
-    A preloaded connector or the law `seed` makes K unsymmetric. Equal frequencies may then come out as a complex pair
-    that differs from real by round-off; its real and imaginary parts span the same plane. `motions` (size, n) are
+    A preloaded connector or the law `tangential` makes K unsymmetric. Equal frequencies may then come out as a complex
+    pair that differs from real by round-off; its real and imaginary parts span the same plane. `motions` (size, n) are
     those that are free, all by default.
     """
     # In coordinates with unit mass the problem is an ordinary one; only in free motions, an orthonormal basis of them.

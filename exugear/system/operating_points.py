@@ -257,7 +257,7 @@ def _in_motion(
     equal = {planet.name for planets in _equal(assembly) for planet in planets}
     found = []
     for n, (support, law) in enumerate(zip(assembly.supports, laws, strict=True)):
-        if not is_catalogued(support) or support.law == "iso16281":
+        if not is_catalogued(support) or support.model == "iso16281":
             found.append(law)
             continue
         states = [here] if support.body in equal else over_turns.get(bodies[support.body].carrier or "", all_around)
@@ -296,7 +296,9 @@ def _what_holds_one_way(laws: Sequence[SupportLaw], names: Sequence[str]) -> str
     one_way = [name for name, law in zip(names, laws, strict=True) if law.rows and holds_one_way(law.rows)]
     if not one_way:
         return "look for a body that only clearances hold"
-    return f"{', '.join(one_way)}: held along the axis in one direction only; look at arrangements and `holds_towards`"
+    return (
+        f"{', '.join(one_way)}: held along the axis in one direction only; look at arrangements and `locates_towards`"
+    )
 
 
 # What all catalogue bearings and all meshes of a gearbox bear under its static load

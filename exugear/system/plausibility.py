@@ -218,7 +218,7 @@ def _faces(gearbox: Gearbox) -> Iterator[str]:
             told.add(mesh.family)
             family = bodies[mesh.gear].family
             yield (
-                f"bodies.{family}.wheels_z_mm.{gears[1].name} = {1e3 * (places[1] or 0.0):g}: {mesh.family} has "
+                f"bodies.{family}.gears_z_mm.{gears[1].name} = {1e3 * (places[1] or 0.0):g}: {mesh.family} has "
                 f"{1e3 * max(high - low, 0.0):.4g} mm of its face in mesh, and counts with "
                 f"{1e3 * mesh.pair.face_width:.4g} mm; move a gear, or give common_face_width_mm"
             )
@@ -279,7 +279,7 @@ def _faces_in_bearings(gearbox: Gearbox) -> Iterator[str]:
                 if depth > 0.0 and (name, bearing.family) not in told:
                     told.add((name, bearing.family))
                     yield (
-                        f"bodies.{body.family}.wheels_z_mm.{name} = {1e3 * wheel:g}: its face runs {1e3 * depth:.3g} "
+                        f"bodies.{body.family}.gears_z_mm.{name} = {1e3 * wheel:g}: its face runs {1e3 * depth:.3g} "
                         f"mm into bearings.{bearing.family} at z_mm = {1e3 * bearing.position[2]:g}; move one of them"
                     )
 

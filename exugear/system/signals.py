@@ -154,7 +154,7 @@ SIGNALS = (
         on_bearings=True,
     ),
     Signal(
-        "pulling_time",
+        "tensile_time",
         ("mesh",),
         "s",
         "time in which the deflection had the sign that teeth cannot carry (where the law is bilateral)",
@@ -162,7 +162,7 @@ SIGNALS = (
         laws="bilateral",
     ),
     Signal(
-        "apart_time",
+        "contact_loss_time",
         ("mesh",),
         "s",
         "time in which the teeth were apart (law table)",
@@ -170,7 +170,7 @@ SIGNALS = (
         laws="table",
     ),
     Signal(
-        "outside_time",
+        "extrapolation_time",
         ("mesh",),
         "s",
         "time in which load, centre distance or misalignment lay outside the table, which then goes on in a straight "
@@ -179,7 +179,7 @@ SIGNALS = (
         laws="table",
     ),
     Signal(
-        "unsolved_time",
+        "interpolation_time",
         ("mesh",),
         "s",
         "time in which the table was read beside states that are not solved, where others stand in for them",
@@ -272,7 +272,7 @@ SIGNALS = (
         "non_conservative_work",
         ("balance_time",),
         "J",
-        "work of the law seed beyond its deflection, since the start",
+        "work of the law tangential beyond its deflection, since the start",
         sign_convention="taken from the motion",
         filled_by=("observe_meshes",),
         is_power=True,
@@ -290,8 +290,8 @@ SIGNALS = (
 """All signals, in the order of the file.
 
 The account of energy: the loads' work = change of kinetic and elastic energy + the other four. The last two of these
-are what the law `seed` does because its force has parts that its deflection does not see, and what the bearings do
-because their rate is not the derivative of their displacement (see
+are what the law `tangential` does because its force has parts that its deflection does not see, and what the bearings
+do because their rate is not the derivative of their displacement (see
 `exugear.system.kernels.connectors`).
 """
 MESH_TIMES = tuple(signal.name for signal in SIGNALS if signal.is_mesh_time)
@@ -414,7 +414,7 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
     gearbox = assembly.gearbox
     joints = tuple(joint.name for joint in gearbox.joints) if assembly.variant.spins_only else ()
     return SignalLayout(
-        signals_of(LAWS[assembly.mesh_law].signals_positions, assembly.variant.spins_only),
+        signals_of(LAWS[assembly.mesh_model].signals_positions, assembly.variant.spins_only),
         {"mesh": assembly.mesh_names, "support": assembly.connector_names or joints, "axis": AXES},
         gearbox.output_radius,
     )
@@ -478,10 +478,10 @@ def support_loads(assembly: Assembly, run: Mapping[str, Floats]) -> Floats:
     force = np.asarray(run["support_force"], dtype=np.float64)
     if not assembly.variant.spins_only:
         return np.concatenate([force, np.asarray(run["support_moment"], dtype=np.float64)], axis=2)
-    if LAWS[assembly.mesh_law].needs_axes:
+    if LAWS[assembly.mesh_model].needs_axes:
         raise LoadsUnknownError(
-            f"moments of ideal joints under the mesh law {assembly.mesh_law}: uneven loads along the face add moments "
-            "that the run does not hold; run the variant bushing, which stores them"
+            f"moments of ideal joints under the mesh model {assembly.mesh_model}: uneven loads along the face add "
+            "moments that the run does not hold; run the variant bushing, which stores them"
         )
     return np.concatenate([force, _joint_moments(assembly, run)], axis=2)
 

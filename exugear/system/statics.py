@@ -478,7 +478,7 @@ def _touching(
     solve: _Solve,
 ) -> tuple[Floats, MeshArrays | None]:
     """Begin where linear teeth would be, on the flanks that they press; these teeth, where they may part."""
-    if not LAWS[assembly.mesh_law].loses_contact:
+    if not LAWS[assembly.mesh_model].loses_contact:
         curved = any(element.is_curved for element in assembly.elements)
         return (solve(assembly, start, assembly.linear_meshes()) if curved else start), None
     teeth = assembly.linear_meshes()

@@ -108,7 +108,7 @@ class Assembly(Displayed):
     """Largest change of stiffness that made bearings of equal planets equal, over that stiffness."""
 
     def _line(self) -> str:
-        choice = f"{self.variant}, {self.mesh_law}, {self.inertias}"
+        choice = f"{self.variant}, {self.mesh_model}, {self.inertias}"
         return f" {self.gearbox.name!r}, {choice}: {self.size} coordinates, {len(self.elements)} meshes"
 
     @property
@@ -117,9 +117,9 @@ class Assembly(Displayed):
         return self.choice.variant
 
     @property
-    def mesh_law(self) -> str:
+    def mesh_model(self) -> str:
         """Mesh law."""
-        return self.choice.mesh_law
+        return self.choice.mesh_model
 
     @property
     def inertias(self) -> str:
@@ -542,7 +542,7 @@ def input_hash(assembly: Assembly, load_case: str | None = None) -> str:
         "gearbox": gearbox.computed_content,
         "load": gearbox.content["load_cases"][load_case] if load_case else None,
         "variant": assembly.variant,
-        "law": assembly.mesh_law,
+        "law": assembly.mesh_model,
         "inertias": assembly.inertias,
         "load_case": load_case,
         "torque_series": hashlib.sha256(series.read_bytes()).hexdigest() if series else None,

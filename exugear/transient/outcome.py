@@ -116,7 +116,7 @@ class Run(Displayed):
         return "stopped"
 
     def _line(self) -> str:
-        trust = "trusted" if self.trusted else "not to be trusted"
+        trust = "valid" if self.trusted else "not to be trusted"
         return f" {self.path}: {self._state}, {self.end:g} s simulated in {self.wall:.1f} s, {trust}"
 
     def _table(self) -> TitledRows:
@@ -144,9 +144,9 @@ WORK_OF_LOADS, KINETIC, ELASTIC = map(BALANCE_TERMS.index, ("work_of_loads", "ki
 """Terms of the account that say how much energy there is; what varying stiffness pumps in shows up in them."""
 EXPLAINING = [number for number, term in enumerate(BALANCE_TERMS) if term != "work_of_loads"]
 """Terms of the account that explain where the work of the loads went."""
-PULLING = MESH_TIMES.index("pulling_time")
+PULLING = MESH_TIMES.index("tensile_time")
 """Row of the times of meshes in which they pull."""
-UNSOLVED = MESH_TIMES.index("unsolved_time")
+UNSOLVED = MESH_TIMES.index("interpolation_time")
 """Row of those in which they read a table beside states that are not solved."""
 WHOLLY = 0.9
 """Part of a run in which a mesh pulls that is not swaying about no load, but load on the other flank."""
@@ -230,7 +230,7 @@ class Judge:
         self.limits = limits
         self.figures = np.full(FIGURES, np.nan)
         self.figures[:ACCOUNT, LARGEST] = 0.0
-        self._law = assembly.mesh_law
+        self._law = assembly.mesh_model
         self._bodies = tuple(radii)
         self._spins = np.array([assembly.spin[name] for name in self._bodies], dtype=np.int64)
         self._radii = np.array([radii[name] for name in self._bodies])

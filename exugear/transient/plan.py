@@ -232,7 +232,7 @@ class RunPlan:
             "gearbox": gearbox.name,
             "variant": str(assembly.variant),
             "load_case": self.case.name,
-            "mesh_law": assembly.mesh_law,
+            "mesh_model": assembly.mesh_model,
             "inertias": assembly.inertias,
             "input_hash": input_hash(assembly, self.case.name),
             "method_version": RUN,

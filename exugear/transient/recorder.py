@@ -337,5 +337,5 @@ class Recorder:
     def _note_verdict(self, against: tuple[str, ...]) -> None:
         pieces = self._start.pieces
         pieces.note("limits", self._judge.limits.to_json())
-        pieces.note("verdict", "; ".join(against) or "within all limits")
-        pieces.note("trusted", 0 if against else 1)
+        pieces.note("validity_message", "; ".join(against) or "within all limits")
+        pieces.note("valid", 0 if against else 1)

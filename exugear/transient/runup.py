@@ -203,7 +203,7 @@ def simulate(
     integrator : {"adams", "rk4"}, optional
         Kind of method of the compiled solver; whichever takes fewer evaluations by default. ``rk4`` is the reference.
     angles : {"reference", "operating"}
-        Angles of the law `seed`.
+        Angles of the law `tangential`.
     mesh_route : {"element", "loads"}
         See `exugear.transient.exudyn_model.system`; "loads" is Exudyn's alone.
     resume : go on with a run that was stopped

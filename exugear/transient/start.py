@@ -144,7 +144,7 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         state = _first_state(assembly, case, series, layout, judge)
         (plan.directory / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
         doubt = doubt_about_bearings(gearbox, summary, assembly.variant)
-        other = doubt_about_tables(gearbox, summary, LAWS[assembly.mesh_law].of_one_load)
+        other = doubt_about_tables(gearbox, summary, LAWS[assembly.mesh_model].of_one_load)
         load = load_in_words(case)
         beyond = doubt_about_band(summary, plan.band)
         doubts = {"bearing_doubt": doubt, "table_doubt": other, "band_doubt": beyond}

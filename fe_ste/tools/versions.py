@@ -7,10 +7,10 @@ version are then computed again or refused. A change that leaves all numbers as 
 from __future__ import annotations
 
 #: Table of the static transmission error by the superelement (`fe_ste.transmission_error`).
-TABLE = 6
+TABLE = 7
 
 #: Contact about a state (`fe_ste.transmission_error.mean_contact`); it rests on `TABLE`, too.
-MEAN_CONTACT = 5
+MEAN_CONTACT = 6
 
 #: Table by the reference analysis (`fe_ste.reference.table`, and what it is computed by).
 NONLINEAR_TABLE = 3

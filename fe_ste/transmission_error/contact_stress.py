@@ -45,7 +45,8 @@ def contact_line_stress(
     >>> round(1e-6 * float(contact_line_stress(pair, 0.0, 0, 0.0, 1e5)), 1)
     684.2
     """
-    pinion, gear = pair.pinion, pair.gear
+    pinion = pair.pinion
+    gear = pair.gear
     kind = -1.0 if gear.internal else 1.0
     # Along the line of action from its point on the base circle of gear 1; `base_points` is that of gear 2.
     twist = math.tan(pinion.base_helix_angle)

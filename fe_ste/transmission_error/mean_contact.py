@@ -120,9 +120,9 @@ class MeanContact(Displayed):
     """(2,) mean of the static transmission error, m."""
     stiffness: Floats
     """(2,) force over that, by a little more force: 1 / mean (d deflection / d force), N/m."""
-    load_centre: Floats
+    load_centroid: Floats
     """(2,) axial position of the resultant, m from the middle of the common face; mean under the constant force."""
-    tangent_load_centre: Floats
+    tangent_load_centroid: Floats
     """(2,) that of a little more force, m: derivative of the deflection by the misalignment."""
     deflection_by_distance: float
     """Slope of the deflection by the centre distance under constant force, between both misalignments."""
@@ -137,8 +137,8 @@ class MeanContact(Displayed):
     """(2, k) of all tooth pairs together, mean of the cycle, N/m."""
     cycle_deflection: Floats
     cycle_stiffness: Floats
-    cycle_load_centre: Floats
-    cycle_tangent_load_centre: Floats
+    cycle_load_centroid: Floats
+    cycle_tangent_load_centroid: Floats
     """(2, n) static transmission error (m), force over deflection by a little more force (N/m), axial position of
     the resultant (m) and of that of a little more force (m) at n equal steps of the mesh cycle from its beginning."""
 
@@ -148,8 +148,8 @@ class MeanContact(Displayed):
 
     @property
     def tilt_stiffness(self) -> float:
-        """Moment against misalignment under constant force, -force d load_centre / d misalignment, N m/rad."""
-        return float(-self.force * np.diff(self.load_centre)[0] / np.diff(self.misalignment)[0])
+        """Moment against misalignment under constant force, -force d load_centroid / d misalignment, N m/rad."""
+        return float(-self.force * np.diff(self.load_centroid)[0] / np.diff(self.misalignment)[0])
 
     def at(self, values: Floats, misalignment: float) -> Floats:
         """One of the fields, (2,) or (2, k) or (2, n), at a misalignment (rad): on the straight line through both.
@@ -158,7 +158,7 @@ class MeanContact(Displayed):
         --------
         >>> two = np.array([0.0, 1.0])
         >>> contact = MeanContact(1.0, 1.0, 1e-5 * two, *[two] * 14)
-        >>> float(contact.at(contact.load_centre, 5e-6))
+        >>> float(contact.at(contact.load_centroid, 5e-6))
         0.5
         """
         low, high = self.misalignment
@@ -252,8 +252,8 @@ def mean_contact(wanted: TableInput) -> MeanContact:
         misalignment=np.array(wanted.misalignment),
         deflection=mean["ste"].to_numpy(),
         stiffness=1.0 / (1.0 / data["tangent_stiffness"]).mean("pmc").to_numpy(),
-        load_centre=mean["load_centre"].to_numpy(),
-        tangent_load_centre=mean["tangent_load_centre"].to_numpy(),
+        load_centroid=mean["load_centroid"].to_numpy(),
+        tangent_load_centroid=mean["tangent_load_centroid"].to_numpy(),
         deflection_by_distance=(float(other["ste"].mean()) - float(mean["ste"].mean())) / change,
         face_load_factor=face_load_factor(data).to_numpy(),
         max_pressure=largest["max_pressure"].to_numpy(),
@@ -262,8 +262,8 @@ def mean_contact(wanted: TableInput) -> MeanContact:
         line_load=load_along_face(data).to_numpy(),
         cycle_deflection=finer["ste"].transpose("misalignment", "pmc").to_numpy(),
         cycle_stiffness=finer["tangent_stiffness"].transpose("misalignment", "pmc").to_numpy(),
-        cycle_load_centre=finer["load_centre"].transpose("misalignment", "pmc").to_numpy(),
-        cycle_tangent_load_centre=finer["tangent_load_centre"].transpose("misalignment", "pmc").to_numpy(),
+        cycle_load_centroid=finer["load_centroid"].transpose("misalignment", "pmc").to_numpy(),
+        cycle_tangent_load_centroid=finer["tangent_load_centroid"].transpose("misalignment", "pmc").to_numpy(),
     )
 
 

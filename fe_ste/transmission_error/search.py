@@ -154,7 +154,7 @@ def _counted(
         if isinstance(state, ContactError):
             return ContactError(f"contact reaches the form circle, where the involute ends, and beyond: {state}")
     assert isinstance(cut, ContactState) and isinstance(whole, ContactState)
-    return replace(cut, cut_off_share=share_beyond(compliance.flanks, whole.cells, whole.solution.force))
+    return replace(cut, truncated_load=share_beyond(compliance.flanks, whole.cells, whole.solution.force))
 
 
 def _searched(

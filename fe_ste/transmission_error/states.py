@@ -36,7 +36,7 @@ class ContactState(Displayed):
     solution: ContactSolution
     pressure: Floats
     """(n,) Pa."""
-    cut_off_share: float = 0.0
+    truncated_load: float = 0.0
     """Share of the load that would be beyond the form circles, where contact is cut off: see
     `fe_ste.contact.kinematics`."""
 
@@ -134,7 +134,7 @@ class StateAxes(Displayed):
         }
 
 
-CUT_OFF = "cut_off_share"
+CUT_OFF = "truncated_load"
 """Variable of what contact leaves out at form circles: see `fe_ste.contact.kinematics`."""
 
 _UNITS = {
@@ -150,8 +150,11 @@ _UNITS = {
     "line_of_action_force": ("N", "torque on gear 1 over its base radius"),
     "load_share": ("1", "part of the normal load that a tooth pair carries"),
     "line_load": ("N/m", "normal load per length of contact line"),
-    "load_centre": ("m", "axial position of the resultant normal load"),
-    "tangent_load_centre": ("m", "axial position of the resultant of a little more load: slope of ste by misalignment"),
+    "load_centroid": ("m", "axial position of the resultant normal load"),
+    "tangent_load_centroid": (
+        "m",
+        "axial position of the resultant of a little more load: slope of ste by misalignment",
+    ),
     "tangent_load_share": ("1", "part of a little more load that a tooth pair carries: slope of ste by a gap there"),
     "max_pressure": ("Pa", "largest contact pressure away from tip edges"),
     "edge_pressure": ("Pa", "largest contact pressure in cells at a tip edge; depends on their size"),
@@ -167,8 +170,8 @@ STATE_AXES = ("torque", "centre_distance", "misalignment")
 RESULTS = (
     "ste",
     "tangent_stiffness",
-    "load_centre",
-    "tangent_load_centre",
+    "load_centroid",
+    "tangent_load_centroid",
     "max_pressure",
     "edge_pressure",
     CUT_OFF,
@@ -271,11 +274,11 @@ class StateResults(Displayed):
         self.values["ste"][index] = solution.approach / cosine
         self.values["tangent_stiffness"][index] = cosine**2 / solution.approach_per_load
         axial = compliance.axial[cells.layer]
-        self.values["load_centre"][index] = solution.force @ axial / state.normal_load
-        self.values["tangent_load_centre"][index] = solution.force_per_load @ axial
+        self.values["load_centroid"][index] = solution.force @ axial / state.normal_load
+        self.values["tangent_load_centroid"][index] = solution.force_per_load @ axial
         self.values["max_pressure"][index] = state.pressure[~cells.cut].max(initial=0.0)
         self.values["edge_pressure"][index] = state.pressure[cells.cut].max(initial=0.0)
-        self.values[CUT_OFF][index] = state.cut_off_share
+        self.values[CUT_OFF][index] = state.truncated_load
         loads = np.zeros((len(self.teeth), len(self.axial)))
         np.add.at(loads, (cells.tooth - self.teeth[0], cells.layer), solution.force)
         self.line_load[index] = loads * cosine / compliance.slice_width

@@ -280,7 +280,7 @@ class SteSurface(Displayed):
             table["line_of_action_force"].to_numpy().reshape(-1, table.sizes["torque"])[0],
             table["ste"].to_numpy(),
             table["tangent_stiffness"].to_numpy(),
-            table["tangent_load_centre"].to_numpy(),
+            table["tangent_load_centroid"].to_numpy(),
             table["unloaded_ste"].transpose(*position_axes).to_numpy(),
             table["unloaded_centre"].transpose(*position_axes).to_numpy(),
             table["converged"].to_numpy().astype(bool),
@@ -294,7 +294,7 @@ class SteSurface(Displayed):
         force: ArrayLike,
         ste: ArrayLike,
         tangent_stiffness: ArrayLike,
-        tangent_load_centre: ArrayLike = 0.0,
+        tangent_load_centroid: ArrayLike = 0.0,
         unloaded: ArrayLike = 0.0,
         unloaded_centre: ArrayLike = 0.0,
         solved: ArrayLike = True,
@@ -305,7 +305,7 @@ class SteSurface(Displayed):
         ----------
         centre_distance, misalignment : (c,), (a,) m, rad
         force : (l,) line-of-action forces, N, positive and increasing
-        ste, tangent_stiffness, tangent_load_centre : (p, c, a, l)
+        ste, tangent_stiffness, tangent_load_centroid : (p, c, a, l)
             m, N/m, m: the last is the derivative of the first by misalignment.
         unloaded, unloaded_centre : (p, c, a) arrays or floats
             Transmission error at no load, and its derivative by misalignment, m.
@@ -331,18 +331,18 @@ class SteSurface(Displayed):
         root = np.concatenate([[0.0], np.sqrt(loads)])
         nodes = _from_no_load(unloaded, values)
         tangent = np.asarray(tangent_stiffness, dtype=np.float64)
-        load_centre: Floats = np.broadcast_to(np.asarray(tangent_load_centre, dtype=np.float64), values.shape)
+        load_centroid: Floats = np.broadcast_to(np.asarray(tangent_load_centroid, dtype=np.float64), values.shape)
         known: Booleans = np.broadcast_to(np.asarray(solved, dtype=np.bool_), values.shape)
         if not known.all():
             try:
-                nodes, tangent, load_centre = complete_loads(root, nodes, tangent, load_centre, known)
+                nodes, tangent, load_centroid = complete_loads(root, nodes, tangent, load_centroid, known)
             except GapError as error:
                 raise InterpolationError(str(error)) from None
         slopes = _load_slopes(root, nodes, tangent)
         pieces = _load_pieces(root, nodes, slopes)
         misalignments = np.atleast_1d(np.asarray(misalignment, dtype=np.float64))
         if misalignments.size > 1:
-            centres = _from_no_load(unloaded_centre, load_centre)
+            centres = _from_no_load(unloaded_centre, load_centroid)
             by_misalignment = _load_pieces(root, centres, centres @ _slope_matrix(root).T)
             pieces = np.stack([pieces, by_misalignment], axis=3).reshape(*values.shape[:2], -1, *pieces.shape[3:])
         distances = np.atleast_1d(np.asarray(centre_distance, dtype=np.float64))

@@ -59,7 +59,7 @@ def static_transmission_error(
     -------
     xarray.Dataset
         Over (pmc, torque, centre_distance, misalignment): ste (m), mesh_stiffness and tangent_stiffness (N/m),
-        line_of_action_force (N), load_centre and tangent_load_centre (m), load_share and tangent_load_share by
+        line_of_action_force (N), load_centroid and tangent_load_centroid (m), load_share and tangent_load_share by
         ``tooth``, line_load (N/m of contact line) by ``tooth`` and ``axial_position``, max_pressure and edge_pressure
         (Pa; inside the flank, and in cells at a tip edge, where it depends on the cells), iterations, converged.
         What is tangent belongs to a little more load, and is the derivative of ste by misalignment or by a gap of one

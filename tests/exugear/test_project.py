@@ -42,7 +42,7 @@ def test_a_choice_left_open_is_filled_in_by_the_gearbox_file(case: Path) -> None
 
 
 def test_other_choices_leave_gearbox_and_folder_alone(project: Project) -> None:
-    other = project.chosen(variant="rigid", mesh_law="constant")
+    other = project.chosen(variant="rigid", mesh_model="constant")
     assert (other.gearbox, other.folder) == (project.gearbox, project.folder)
     assert other.choice == Choice("rigid", "constant", "disc", "run_up")
     assert other.modes_path != project.modes_path and other.run_directory != project.run_directory
@@ -52,7 +52,7 @@ def test_its_modes_are_those_of_the_command_line(project: Project, case: Path, t
     modes = project.modes()
     assert isinstance(modes, Modes)
     out = tmp_path / "by-command"
-    options = ["--variant", "bushing", "--mesh-law", "iso6336", "--out", str(out)]
+    options = ["--variant", "bushing", "--mesh-model", "iso6336", "--out", str(out)]
     assert exugear("modes", case, *options).exit_code == 0
     theirs = load_modes(out / project.modes_path.relative_to(project.folder))
     ours = load_modes(project.modes_path)
@@ -83,7 +83,7 @@ def test_its_run_is_that_of_the_command_line(project: Project, case: Path, tmp_p
     run = project.run(duration=0.02)
     assert isinstance(run, Run) and run.complete and run.path == project.run_path
     out = tmp_path / "by-command"
-    options = ["--variant", "bushing", "--mesh-law", "iso6336", "--duration", "0.02", "--out", str(out)]
+    options = ["--variant", "bushing", "--mesh-model", "iso6336", "--duration", "0.02", "--out", str(out)]
     assert exugear("run", case, *options).exit_code == 0
     assert load_run(run.path).identical(load_run(out / run.path.relative_to(project.folder)))
 

@@ -184,7 +184,7 @@ class BodySection(Section):
     """Distance of the planets' axes from the carrier's."""
     planet_angles_deg: Annotated[tuple[q.AngleDeg, ...], Field(strict=False, max_length=MOST_PLANETS)] = ()
     """Places of the planets at zero angle of the carrier; one body for each."""
-    wheels_z_mm: dict[Name, q.PlaceMm] = {}
+    gears_z_mm: dict[Name, q.PlaceMm] = {}
     """Gears on the body, by name: place of the middle of the face."""
     fixed: bool = False
     """Whether it stands still: the housing."""
@@ -216,14 +216,14 @@ class BodySection(Section):
         planet = (self.carrier is not None, self.orbit_radius_mm is not None, bool(self.planet_angles_deg))
         if any(planet) and not all(planet):
             raise ValueError("a planet needs all of carrier, orbit_radius_mm and planet_angles_deg")
-        placeless = self.spin_only or (self.fixed and not self.wheels_z_mm)
+        placeless = self.spin_only or (self.fixed and not self.gears_z_mm)
         if all(planet) == (self.axis_position_mm is not None) and (all(planet) or not placeless):
             raise ValueError("give either axis_position_mm = [x, y] or the three keys of a planet")
         if self.fixed and self.inertia:
             raise ValueError("a fixed body has no inertia: leave the section out or set fixed = false")
-        if self.spin_only and self.wheels_z_mm:
+        if self.spin_only and self.gears_z_mm:
             raise ValueError("a spin-only body carries no gears: it has no position in space")
-        follows = self.shape is not None or (self.wheels_z_mm and self.carrier is not None)
+        follows = self.shape is not None or (self.gears_z_mm and self.carrier is not None)
         if not self.fixed and not self.inertia and not follows:
             raise ValueError(
                 "a moving body needs an inertia table, e.g. [bodies.NAME.inertia.assemblies], or a shape from which "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -33,8 +33,20 @@ class JointSection(Section):
 _MatrixRow = Annotated[tuple[q.StiffnessEntry, ...], Field(strict=False, max_length=6)]
 
 
+Matrix = Annotated[tuple[_MatrixRow, ...], Field(strict=False, max_length=6)]
+
+
+def _check_matrix(section: Section, matrix: Matrix | None) -> None:
+    """Refuse a matrix that is not 6x6, or that isotropic entries are combined with."""
+    if matrix is not None and [len(row) for row in matrix] != [6] * 6:
+        raise ValueError("matrix: specify 6 rows of 6 numbers, in the order x y z rx ry rz")
+    others = section.model_fields_set - {"matrix"}
+    if matrix is not None and others:
+        raise ValueError(f"matrix: cannot be combined with {', '.join(sorted(others))}; remove one or the other")
+
+
 class StiffnessSection(Section):
-    """6x6 stiffness (or damping) of a bearing, about its place: isotropic entries or the full matrix."""
+    """6x6 stiffness of a connector about its place: isotropic entries or the full matrix."""
 
     radial_N_per_m: q.Stiffness = 0.0
     """Against displacement across the axis."""
@@ -44,16 +56,32 @@ class StiffnessSection(Section):
     """Against tilting."""
     torsion_N_m_per_rad: q.Stiffness = 0.0
     """Against rotation about the axis."""
-    matrix: Annotated[tuple[_MatrixRow, ...], Field(strict=False, max_length=6)] | None = None
+    matrix: Matrix | None = None
     """Full 6x6 matrix instead, rows x y z rx ry rz, N/m, N and N m/rad."""
 
     @model_validator(mode="after")
-    def _shape(self) -> StiffnessSection:
-        if self.matrix is not None and [len(row) for row in self.matrix] != [6] * 6:
-            raise ValueError("matrix needs 6 rows of 6 numbers (N/m, N, N m/rad; order x y z rx ry rz)")
-        others = self.model_fields_set - {"matrix"}
-        if self.matrix is not None and others:
-            raise ValueError(f"matrix stands alone: leave {', '.join(sorted(others))} out, or give no matrix")
+    def _shape(self) -> Self:
+        _check_matrix(self, self.matrix)
+        return self
+
+
+class ConnectorDampingSection(Section):
+    """6x6 viscous damping of a connector about its place: isotropic entries or the full matrix."""
+
+    radial_N_s_per_m: q.Stiffness = 0.0
+    """Against velocity across the axis."""
+    axial_N_s_per_m: q.Stiffness = 0.0
+    """Against velocity along the axis."""
+    tilt_N_m_s_per_rad: q.Stiffness = 0.0
+    """Against the rate of tilting."""
+    torsion_N_m_s_per_rad: q.Stiffness = 0.0
+    """Against the rate of rotation about the axis."""
+    matrix: Matrix | None = None
+    """Full 6x6 matrix instead, rows x y z rx ry rz, N s/m, N s and N m s/rad."""
+
+    @model_validator(mode="after")
+    def _shape(self) -> Self:
+        _check_matrix(self, self.matrix)
         return self
 
 
@@ -97,7 +125,7 @@ TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
     "row_count": (_RADIAL | _SELF_ALIGNING, "two rows with a contact angle are an arrangement, X or O"),
     "ribs": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
     "rib_contact_mm": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
-    "holds_towards": (_ANGULAR | {"thrust_spherical_roller"}, "it holds both directions or none"),
+    "locates_towards": (_ANGULAR | {"thrust_spherical_roller"}, "it holds both directions or none"),
     "axial_preload_um": (_ANGULAR, "only a pair with contact angles can be set along the axis"),
 }
 """Keys of a catalogue section that only some types have, and why."""
@@ -137,7 +165,7 @@ class CatalogueSection(Section):
     """Contact angle; that of the type by default."""
     arrangement: Literal["single", "X", "O", "tandem"] = "single"
     """How two bearings of a pair stand to each other."""
-    holds_towards: Literal["+z", "-z"] = "+z"
+    locates_towards: Literal["+z", "-z"] = "+z"
     """Which way of the inner ring a single bearing, or a tandem, holds."""
     ribs: Literal["none", "+z", "-z", "both"] = "none"
     """Which way of the inner ring the ribs of cylindrical rollers hold: "+z" a ring that is pushed towards +z."""
@@ -189,8 +217,8 @@ class CatalogueSection(Section):
             raise ValueError(
                 f"arrangement = {self.arrangement!r} makes no sense for type = {self.type!r}: use 'single'"
             )
-        if self.type in _ANGULAR and self.arrangement in ("X", "O") and "holds_towards" in self.model_fields_set:
-            raise ValueError(f"holds_towards makes no sense for arrangement = {self.arrangement!r}: it holds both")
+        if self.type in _ANGULAR and self.arrangement in ("X", "O") and "locates_towards" in self.model_fields_set:
+            raise ValueError(f"locates_towards makes no sense for arrangement = {self.arrangement!r}: it holds both")
         if self.rib_contact_mm is not None and self.ribs == "none":
             raise ValueError("rib_contact_mm needs ribs = '+z', '-z' or 'both'")
         if self.axial_preload_um != 0.0 and self.arrangement not in ("X", "O"):
@@ -284,7 +312,7 @@ class BearingSection(Section):
     """Place of the middle along the axis."""
     housing_factor_applies: bool = True
     """Whether its seat yields by `housing.factor`."""
-    law: Literal["stiffness", "iso16281"] = "stiffness"
+    model: Literal["linear", "iso16281"] = "linear"
     """Whether it is linear at its load, or follows its rows."""
     cage: Literal["averaged", "turning"] = "averaged"
     """Whether the elements of a non-linear bearing stand at the mean stiffness, or pass as the rings turn."""
@@ -296,7 +324,7 @@ class BearingSection(Section):
     """Stiffness given, or floor beside a catalogue."""
     catalogue: CatalogueSection | None = None
     """Catalogue data."""
-    damping: StiffnessSection | None = None
+    damping: ConnectorDampingSection | None = None
     """Damping; in proportion to the stiffness by default."""
 
     @model_validator(mode="after")
@@ -312,12 +340,14 @@ class BearingSection(Section):
 
     @model_validator(mode="after")
     def _law(self) -> BearingSection:
-        if self.law == "iso16281" and self.catalogue is None:
-            raise ValueError("law = 'iso16281' needs a [.catalogue] table, whose rolling elements it follows")
-        if self.law == "iso16281" and self.catalogue is not None and self.catalogue.radial_load_kN is not None:
-            raise ValueError("law = 'iso16281' follows the load: leave catalogue.radial_load_kN and .axial_load_kN out")
-        if self.law != "iso16281" and "cage" in self.model_fields_set:
-            raise ValueError(f"cage = {self.cage!r} stands beside law = 'iso16281' only")
+        if self.model == "iso16281" and self.catalogue is None:
+            raise ValueError("model = 'iso16281' needs a [.catalogue] table, whose rolling elements it follows")
+        if self.model == "iso16281" and self.catalogue is not None and self.catalogue.radial_load_kN is not None:
+            raise ValueError(
+                "model = 'iso16281' follows the load: leave catalogue.radial_load_kN and .axial_load_kN out"
+            )
+        if self.model != "iso16281" and "cage" in self.model_fields_set:
+            raise ValueError(f"cage = {self.cage!r} stands beside model = 'iso16281' only")
         return self
 
 
@@ -338,7 +368,7 @@ class MountSection(Section):
     """Place."""
     stiffness: StiffnessSection
     """Stiffness."""
-    damping: StiffnessSection | None = None
+    damping: ConnectorDampingSection | None = None
     """Damping; in proportion to the stiffness by default."""
 
 

@@ -189,7 +189,7 @@ class RatingSection(Section):
     """Load case whose run gives K_v over speed: largest over mean force of each mesh within 20 cycles."""
     dynamic_factor_steady: Literal["linear", "parametric", "nonlinear"] | None = None
     """Level of the steady response that gives K_v over speed, by the same windows."""
-    least_dynamic_factor: q.LoadFactorK | None = None
+    minimum_dynamic_factor: q.LoadFactorK | None = None
     """Least K_v beside a run or a response: without errors of the wheels these have too little."""
     application_factor: q.LoadFactorK = 1.0
     """K_A on the nominal load of `exugear check --rating`, where there is no section `[loads]`: counted loads have what
@@ -202,22 +202,22 @@ class RatingSection(Section):
     """Angles of the input at which the static balance is taken."""
     gears: Entries[StrengthSection] = {}
     """What gears withstand, by name of the gear; others are not rated."""
-    least_S_H: q.SafetyFactor = 1.0
+    minimum_S_H: q.SafetyFactor = 1.0
     """Safety against pitting that is asked for, over the life and under the largest load; rules for machines ask for
     more than 1."""
-    least_S_F: q.SafetyFactor = 1.0
+    minimum_S_F: q.SafetyFactor = 1.0
     """Safety against breakage that is asked for, likewise."""
-    least_S_0: q.SafetyFactor = 1.0
+    minimum_S_0: q.SafetyFactor = 1.0
     """Static safety of bearings that is asked for."""
 
     @model_validator(mode="after")
     def _dynamic_factor(self) -> RatingSection:
         sources = (self.dynamic_factor, self.dynamic_factor_run, self.dynamic_factor_steady)
         stated = self.dynamic_factor is not None
-        least = self.least_dynamic_factor is not None
+        least = self.minimum_dynamic_factor is not None
         if sum(source is not None for source in sources) != 1 or stated == least:
             raise ValueError(
-                "give dynamic_factor, or one of dynamic_factor_run and dynamic_factor_steady with least_dynamic_factor"
+                "set dynamic_factor, or minimum_dynamic_factor with dynamic_factor_run or dynamic_factor_steady"
             )
         return self
 

@@ -16,7 +16,7 @@ from exugear.life.rating.sheet import rated_loads
 QUICK = 1 << 20
 """Bytes of all files of loads together up to which they are read: tables of counted loads, not series of hours."""
 
-VERBS = ("loads", "life", "check --rating")
+COMMANDS = ("loads", "life", "check --rating")
 
 
 def lacks_of_life(gearbox: Gearbox) -> dict[str, tuple[str, ...]]:
@@ -33,7 +33,7 @@ def lacks_of_life(gearbox: Gearbox) -> dict[str, tuple[str, ...]]:
     checks: tuple[Callable[[Gearbox], object], ...] = (section_of, _checked_by_keys, _checked_by_keys)
     if _are_quick(gearbox):
         checks = (count_loads, checked_loads, rated_loads)
-    return {verb: _faults(gearbox, check) for verb, check in zip(VERBS, checks, strict=True)}
+    return {verb: _faults(gearbox, check) for verb, check in zip(COMMANDS, checks, strict=True)}
 
 
 def _faults(gearbox: Gearbox, check: Callable[[Gearbox], object]) -> tuple[str, ...]:

@@ -203,7 +203,7 @@ def _rules(gearbox: Gearbox, rating: RatingSection, counted: CountedLoads, tooth
         member=tooth.member,
         strengths=strengths,
         application_factor=rating.application_factor if gearbox.case.loads is None else 1.0,
-        stated_dynamic_factor=rating.dynamic_factor or rating.least_dynamic_factor or 1.0,
+        stated_dynamic_factor=rating.dynamic_factor or rating.minimum_dynamic_factor or 1.0,
         viscosity=gearbox.viscosity_40,
         meshes=(around[0], around[1]),
         free_bore=bodies[tooth.holder].planet_of is not None,
@@ -257,7 +257,7 @@ def _load_in_words(gearbox: Gearbox, counted: CountedLoads) -> str:
 
 def _shortfalls(rating: RatingSection, flanks: list[FlankSheet]) -> Iterator[str]:
     for flank in flanks:
-        for name, asked in (("S_H", rating.least_S_H), ("S_F", rating.least_S_F)):
+        for name, asked in (("S_H", rating.minimum_S_H), ("S_F", rating.minimum_S_F)):
             found = flank.standard[name]
             if found < asked:
                 part = f"{flank.gear} {flank.flank} {flank.family}"
@@ -274,7 +274,7 @@ def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
     elif rating.application_factor != 1.0:
         yield "application_factor is for nominal loads: K_A = 1 under [loads]"
     if rating.dynamic_factor is None:
-        yield "K_v that is not the standard's is least_dynamic_factor: no run or response is looked at here"
+        yield "K_v that is not the standard's is minimum_dynamic_factor: no run or response is looked at here"
 
 
 # What the finite elements say beside the standard: of a stored life, or under the nominal load by tables
@@ -315,7 +315,7 @@ def of_nominal_load(
     counted : the nominal load times K_A
     stresses : by pair name
     """
-    dynamic = stated_factors(gearbox, rating.dynamic_factor or rating.least_dynamic_factor or 1.0)
+    dynamic = stated_factors(gearbox, rating.dynamic_factor or rating.minimum_dynamic_factor or 1.0)
     lives = flank_lives(gearbox, rating, counted.teeth, acting_loads(counted), balance, stresses, dynamic)
     return {
         (life.gear, life.family, life.flank): {name: float(getattr(life, figure)) for name, figure in _NAMES.items()}

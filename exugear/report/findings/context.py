@@ -44,12 +44,12 @@ VISIBLE_SHARE = 0.01
 
 def choice_of(attributes: Mapping[str, Any]) -> Choice:
     """Choice that a run or modes were computed of, from the attributes of the file; its load case is left out."""
-    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_law", "inertias")))
+    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
 
 
 def words_of(choice: Choice) -> str:
     """Return a choice for headings."""
-    return f"{choice.variant}, law {choice.mesh_law}, inertias {choice.inertias}"
+    return f"{choice.variant}, law {choice.mesh_model}, inertias {choice.inertias}"
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Context:
         """Equations of a choice, with the tables of the folder, assembled once."""
         if choice not in self.assemblies:
             bodies = self.bodies_of(choice)(self.gearbox)
-            self.assemblies[choice] = assemble(self.gearbox, choice, self.stiffness(choice.mesh_law), bodies)
+            self.assemblies[choice] = assemble(self.gearbox, choice, self.stiffness(choice.mesh_model), bodies)
         return self.assemblies[choice]
 
     def bodies_of(self, choice: Choice) -> Callable[[Gearbox], dict[str, ElasticBody]]:
@@ -254,7 +254,7 @@ def _note_distrust(context: Context, path: Path, attributes: Mapping[str, Any]) 
 
 def run_key(attributes: Mapping[str, Any]) -> tuple[str, str, str]:
     """Load case, law and inertia set: what runs to be compared have in common."""
-    return str(attributes["load_case"]), str(attributes["mesh_law"]), str(attributes["inertias"])
+    return str(attributes["load_case"]), str(attributes["mesh_model"]), str(attributes["inertias"])
 
 
 # What excites: the static transmission error of each pair over the mesh cycle, and its harmonics

@@ -107,7 +107,7 @@ class RunGroup:
 
     source: str
     """Where the figures are from, in words: the run-up of a load case, or constant speed at a level."""
-    mesh_law: str
+    mesh_model: str
     inertias: str
     runs: Mapping[str, VariantRun]
     """By variant, the stiffest first."""
@@ -126,7 +126,7 @@ class RunGroup:
     @property
     def name(self) -> str:
         """Name for files and links."""
-        return f"{self.source.replace(', ', '_').replace(' ', '_')}-{self.mesh_law}-{self.inertias}"
+        return f"{self.source.replace(', ', '_').replace(' ', '_')}-{self.mesh_model}-{self.inertias}"
 
     @property
     def main(self) -> str:
@@ -140,13 +140,13 @@ class RunGroup:
 
     def choice(self, variant: str) -> Choice:
         """Choice that a run was computed of."""
-        return Choice(variant, self.mesh_law, self.inertias)
+        return Choice(variant, self.mesh_model, self.inertias)
 
     @property
     def title(self) -> str:
         """What its runs have in common, in words."""
         factors = sorted({f"{float(run.attributes['housing_factor']):g}" for run in self.runs.values()})
-        return f"{self.source}, law {self.mesh_law}, inertias {self.inertias}, housing factor {', '.join(factors)}"
+        return f"{self.source}, law {self.mesh_model}, inertias {self.inertias}, housing factor {', '.join(factors)}"
 
 
 def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
@@ -160,7 +160,7 @@ def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
         runs.setdefault(run_key(run.attributes), []).append(run)
     responses: dict[tuple[str, str, str], dict[str, xr.Dataset]] = {}
     for data in filter(is_over_speed, results.steady):
-        key = str(data.attrs["level"]), str(data.attrs["mesh_law"]), str(data.attrs["inertias"])
+        key = str(data.attrs["method"]), str(data.attrs["mesh_model"]), str(data.attrs["inertias"])
         responses.setdefault(key, {})[str(data.attrs["variant"])] = data
     default = context.gearbox.case.default_inertias
 

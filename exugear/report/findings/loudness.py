@@ -21,7 +21,7 @@ from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.signals import Quantity, quantities_of
 from exugear.steady.peaks import BESIDE, line_name
-from exugear.steady.settings import LEVELS
+from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Booleans, Floats
 
@@ -266,7 +266,7 @@ def truest_response(responses: Iterable[xr.Dataset], choice: Choice) -> xr.Datas
     Branches are no function of speed and are left to the section on steady responses.
     """
     own = [data for data in responses if choice_of(data.attrs) == choice and not settings_of(data.attrs).branches]
-    return max(own, key=lambda data: LEVELS.index(data.attrs["level"]), default=None)
+    return max(own, key=lambda data: METHODS.index(data.attrs["method"]), default=None)
 
 
 def truest_of(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
@@ -306,5 +306,5 @@ def response_spectra(
     parts = response["amplitude"].to_numpy()[places, 1:][..., [names.index(name) for name in signals]]
     amplitude = np.sqrt((parts.astype(np.float64) ** 2).sum(axis=-1))
     orders = response["order"].to_numpy()[1:]
-    unknown = [abs(float(load["speed"])) for load in json.loads(response.attrs.get("unsolved", "[]"))]
+    unknown = [abs(float(load["speed"])) for load in json.loads(response.attrs.get("not_converged", "[]"))]
     return line_spectra(speed, orders, amplitude, highest, unknown=unknown, reference=reference, unit=unit)

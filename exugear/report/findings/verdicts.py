@@ -135,13 +135,13 @@ def _of_response(response: xr.Dataset) -> list[Verdict]:
         Verdict(error < STEADY_ENERGY, f"what damping takes is what the meshes give within {100.0 * error:.1g} %"),
         Verdict(growth <= 0.0, f"disturbances {'decay' if growth <= 0.0 else 'grow: the steady state does not last'}"),
     ]
-    unsolved = json.loads(response.attrs["unsolved"])
+    unsolved = json.loads(response.attrs["not_converged"])
     if unsolved:
         verdicts.append(Verdict(False, f"no steady state was found at {len(unsolved)} speeds, which are left blank"))
     remarks = [str(words) for words in response["remark"].to_numpy() if str(words)]
     if remarks:
         verdicts.append(Verdict(False, f"speeds with remarks: {len(remarks)}, the first: {remarks[0]}"))
-    for pull in () if LAWS[str(response.attrs["mesh_law"])].loses_contact else pulls(response):
+    for pull in () if LAWS[str(response.attrs["mesh_model"])].loses_contact else pulls(response):
         where = f"{pull.count} of {response.sizes['point']} speeds, longest at {abs(pull.speed) / RPM:.4g} rpm"
         said = f"teeth of {pull.mesh} would have to pull at {where}: they would part, and levels there are not real"
         verdicts.append(Verdict(False, said))
@@ -151,7 +151,7 @@ def _of_response(response: xr.Dataset) -> list[Verdict]:
             f"{abs(swing.speed) / RPM:.4g} rpm): linear bearings make levels there too high"
         )
         verdicts.append(Verdict(False, said))
-    apart = float(np.nanmax(response["apart_share"], initial=0.0))
+    apart = float(np.nanmax(response["contact_loss_fraction"], initial=0.0))
     if apart > 0.0:
         verdicts.append(
             Verdict(True, f"teeth are apart for up to {100.0 * apart:.2g} % of the time, and the law knows")
@@ -224,9 +224,9 @@ def begin_variations(context: Context, modes: Mapping[Choice, xr.Dataset], execu
     return executor.submit(varied_models, context.folder, below, _models_to_vary(context, modes))
 
 
-def varied_models(folder: Path, files_below: Path | None, models: Sequence[Choice]) -> VariedModels:
+def varied_models(folder: Path, allow_dir: Path | None, models: Sequence[Choice]) -> VariedModels:
     """Vary what was assumed in models of the case that a folder keeps: for `begin_variations`."""
-    context = Context(folder, kept_case(folder, Permissions(below=files_below)), None, lambda what: None)
+    context = Context(folder, kept_case(folder, Permissions(below=allow_dir)), None, lambda what: None)
     return {
         model: {parameter.label: _figures(parameter) for parameter in _parameters(context, model)} for model in models
     }
@@ -255,7 +255,7 @@ def _models_to_vary(context: Context, modes: Mapping[Choice, xr.Dataset]) -> lis
 
 
 def _parameters(context: Context, model: Choice) -> tuple[Parameter, ...]:
-    stiffness = context.stiffness(model.mesh_law)
+    stiffness = context.stiffness(model.mesh_model)
     return assumed_parameters(context.gearbox, model, stiffness, context.bodies_of(model))
 
 

@@ -248,7 +248,7 @@ class VariantRun(Displayed):
     @property
     def conditions(self) -> str:
         """Load case, law and inertia set in words."""
-        load_case, law, inertias = (self.attributes[key] for key in ("load_case", "mesh_law", "inertias"))
+        load_case, law, inertias = (self.attributes[key] for key in ("load_case", "mesh_model", "inertias"))
         return f"load case {load_case}, law {law}, inertias {inertias}"
 
     def findings(self, picks: Sequence[Pick] | None = None) -> tuple[Finding, ...]:
@@ -420,7 +420,7 @@ def compare(first: VariantRun, second: VariantRun, rule: AbsenceRule | None = No
     ValueError
         They differ in more than the variant, or were analysed with different windows.
     """
-    for key in ("gearbox", "load_case", "level", "mesh_law", "inertias"):
+    for key in ("gearbox", "load_case", "method", "mesh_model", "inertias"):
         values = first.attributes.get(key), second.attributes.get(key)
         if values[0] != values[1]:
             raise ValueError(f"runs to compare differ in {key}: {values[0]!r} and {values[1]!r}")

@@ -327,8 +327,8 @@ def _check_rows(assembly: Assembly) -> None:
             )
         if not load_stands_still(support, bodies):
             raise SteadyError(
-                f"bearings.{support.family}.law = 'iso16281': its elements turn with {support.on} against the load, "
-                "which the steady response cannot treat; take law = 'stiffness', or run the load case in time"
+                f"bearings.{support.family}.model = 'iso16281': its elements turn with {support.on} against the load, "
+                "which the steady response cannot treat; take model = 'linear', or run the load case in time"
             )
 
 

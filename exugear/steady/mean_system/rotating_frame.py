@@ -140,7 +140,7 @@ class RotatingFrame:
         Tables become their stiffness at the static load, curves their tangents there: as they are, stiffness would
         change with each planet's misalignment and load.
         """
-        if not LAWS[self.assembly.mesh_law].loses_contact:
+        if not LAWS[self.assembly.mesh_model].loses_contact:
             return self.assembly.tangent_meshes
         teeth = self.assembly.linear_meshes()
         # What tables resist misalignment with is in the forces that they have beyond this.

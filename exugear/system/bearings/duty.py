@@ -183,7 +183,7 @@ class BearingDuty:
     name: str
     family: str
     kind: str
-    law: str
+    model: str
     """Its name, that of its section, the type of bearing, and what its force follows."""
     radial_load: float
     axial_load: float
@@ -269,7 +269,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
         name=bearing.name,
         family=bearing.family,
         kind=section.type,
-        law=law_in_words(bearing, point.load_stands_still),
+        model=law_in_words(bearing, point.load_stands_still),
         radial_load=radial,
         axial_load=axial,
         stiffness=point.stiffness,

@@ -1,11 +1,12 @@
 """Laws of supports: stiffness and damping as matrices, or rows of rolling elements with a law of their own.
 
-A bearing with `law = "stiffness"` is linear: given matrices through the origin, or the tangent of its rows through the
-point that they are in under the static load, which `exugear.system.operating_points` finds. One with `law = "iso16281"`
-keeps its rows. The housing factor f stands for the seat: it gives way in proportion to the bearing, so that the bearing
-takes the share f of a deflection under any load. A linear bearing is then f times as stiff, and the rows of a non-
-linear one see f times the deflection: both agree in the limit of small motions, and forces keep a potential. A
-clearance closes without load, which no share of a deflection does: such rows want an elastic housing or no factor.
+A bearing with `model = "linear"` is linear: given matrices through the origin, or the tangent of its rows through the
+point that they are in under the static load, which `exugear.system.operating_points` finds. One with
+`model = "iso16281"` keeps its rows. The housing factor f stands for the seat: it gives way in proportion to the
+bearing, so that the bearing takes the share f of a deflection under any load. A linear bearing is then f times as
+stiff, and the rows of a non-linear one see f times the deflection: both agree in the limit of small motions, and forces
+keep a potential. A clearance closes without load, which no share of a deflection does: such rows want an elastic
+housing or no factor.
 
 Catalogue bearings take their laws from the static load at one position of the carrier, where planets may be loaded
 unequally. As the carrier turns every planet passes all positions: what lasts is the mean. Left as they are, unequal
@@ -25,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import Bearing, Body, stiffness_matrix
+from exugear.gearbox.parts import Bearing, Body, connector_matrix
 from exugear.gearbox.sections.connections import CatalogueSection
 from exugear.gearbox.units import KN
 from exugear.gearbox.variant import Variant
@@ -174,7 +175,7 @@ def law_in_words(bearing: Bearing, stands_still: bool = True) -> str:
     """
     if bearing.catalogue is None:
         return "linear, stiffness given"
-    if bearing.law == "iso16281":
+    if bearing.model == "iso16281":
         return f"rows by ISO/TS 16281, cage {bearing.cage}"
     if not is_catalogued(bearing):
         return "linear, at a stated load, through the origin"
@@ -210,9 +211,9 @@ def misplaced_factor(bearing: Bearing) -> str:
     ''
     """
     rows = () if bearing.catalogue is None else catalogue_rows(bearing.catalogue)
-    if bearing.law == "iso16281" and bearing.factor != 1.0 and any(row.radial_clearance > 0.0 for row in rows):
+    if bearing.model == "iso16281" and bearing.factor != 1.0 and any(row.radial_clearance > 0.0 for row in rows):
         return (
-            f'bearings.{bearing.family}: law = "iso16281" with clearance and the housing factor {bearing.factor:g}: '
+            f'bearings.{bearing.family}: model = "iso16281" with clearance and the housing factor {bearing.factor:g}: '
             "a clearance closes without load, so the factor does not apply; set housing_factor_applies = false, or "
             "use the variant flexible with an elastic housing"
         )
@@ -234,13 +235,13 @@ def linear_law(bearing: Bearing, damping_time: float, of_rows: Floats | None = N
     BearingError
         The catalogue dimensions or the load are impossible.
     """
-    stiffness = stiffness_matrix(bearing.stiffness)
+    stiffness = connector_matrix(bearing.stiffness)
     if bearing.catalogue is not None:
         rows_stiffness = catalogue_stiffness(bearing.catalogue) if of_rows is None else of_rows
         stiffness = regularised(rows_stiffness, np.diag(stiffness))
     stiffness = bearing.factor * stiffness
     if bearing.damping is not None:
-        return SupportLaw(stiffness, stiffness_matrix(bearing.damping))
+        return SupportLaw(stiffness, connector_matrix(bearing.damping))
     return SupportLaw(stiffness, proportional_damping(stiffness, damping_time))
 
 
@@ -257,10 +258,10 @@ def rolling_law(bearing: Bearing, damping_time: float, of_rows: Floats, directio
     rows = bearing_rows(bearing)
     if misplaced_factor(bearing):
         raise BearingError(misplaced_factor(bearing))
-    stated = stiffness_matrix(bearing.stiffness)
+    stated = connector_matrix(bearing.stiffness)
     added = bearing.factor * (regularised(of_rows, np.diag(stated)) - of_rows)
     given = bearing.damping is not None
-    damping = stiffness_matrix(bearing.damping) if given else proportional_damping(added, damping_time)
+    damping = connector_matrix(bearing.damping) if given else proportional_damping(added, damping_time)
     turning = bearing.cage == "turning"
     return SupportLaw(
         stiffness=added,

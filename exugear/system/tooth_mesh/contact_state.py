@@ -46,8 +46,8 @@ class ContactCycle:
     """Tuple of float. Static transmission error, m."""
     tangent_stiffness: Samples
     """Tuple of float. N/m."""
-    load_centre: Samples
-    tangent_load_centre: Samples
+    load_centroid: Samples
+    tangent_load_centroid: Samples
     """Tuple of float. Of the load, and of what a little more deflection adds to it, m."""
 
 
@@ -58,7 +58,7 @@ class ContactState:
     Examples
     --------
     >>> state = ContactState(50e3, 20e-6, 2.6e9, 1e-4, -2e-3, -1.9e-3, 2e5)
-    >>> state.seen_by(-1).load_centre, state.seen_by(-1).misalignment
+    >>> state.seen_by(-1).load_centroid, state.seen_by(-1).misalignment
     (0.002, -0.0001)
     """
 
@@ -70,9 +70,9 @@ class ContactState:
     """Change of the load with the deflection at that misalignment, N/m."""
     misalignment: float
     """g0, rad; it opens the gap at the +z end."""
-    load_centre: float
+    load_centroid: float
     """Zc, m."""
-    tangent_load_centre: float
+    tangent_load_centroid: float
     """Centre zt of the load that a little more deflection adds, m; also the change of the deflection with the
     misalignment under constant load, m/rad."""
     tilt_stiffness: float
@@ -91,14 +91,14 @@ class ContactState:
         cycle = self.cycle
         if cycle is not None:
             centres = (
-                tuple(flank * centre for centre in own) for own in (cycle.load_centre, cycle.tangent_load_centre)
+                tuple(flank * centre for centre in own) for own in (cycle.load_centroid, cycle.tangent_load_centroid)
             )
             cycle = ContactCycle(cycle.deflection, cycle.tangent_stiffness, *centres)
         return replace(
             self,
             misalignment=flank * self.misalignment,
-            load_centre=flank * self.load_centre,
-            tangent_load_centre=flank * self.tangent_load_centre,
+            load_centroid=flank * self.load_centroid,
+            tangent_load_centroid=flank * self.tangent_load_centroid,
             cycle=cycle,
         )
 
@@ -237,21 +237,21 @@ def contact_state(contact: MeanContact) -> ContactState:
     middle = float(contact.misalignment.mean())
     deflection, stiffness, centre, tangent_centre = (
         float(contact.at(values, middle))
-        for values in (contact.deflection, contact.stiffness, contact.load_centre, contact.tangent_load_centre)
+        for values in (contact.deflection, contact.stiffness, contact.load_centroid, contact.tangent_load_centroid)
     )
     over_cycle = (
         contact.cycle_deflection,
         contact.cycle_stiffness,
-        contact.cycle_load_centre,
-        contact.cycle_tangent_load_centre,
+        contact.cycle_load_centroid,
+        contact.cycle_tangent_load_centroid,
     )
     return ContactState(
         force=contact.force,
         deflection=deflection,
         tangent_stiffness=stiffness,
         misalignment=middle,
-        load_centre=centre,
-        tangent_load_centre=tangent_centre,
+        load_centroid=centre,
+        tangent_load_centroid=tangent_centre,
         tilt_stiffness=contact.tilt_stiffness,
         centre_distance=contact.centre_distance,
         deflection_by_distance=contact.deflection_by_distance,
@@ -278,7 +278,7 @@ class MeshDuty(Displayed):
     """Of the gears, opening the gap at the +z end, rad; over the common face, m."""
     centre_distance_change: float
     """Axes further apart than nominal, m."""
-    load_centre: float = math.nan
+    load_centroid: float = math.nan
     """Axial position of the resultant from the middle of the common face, m; NaN where no contact was solved."""
     face_load_factor: float = math.nan
     """K_Hbeta: highest over mean line load along the face; NaN likewise."""
@@ -307,6 +307,6 @@ def with_contact(duty: MeshDuty, place: MeshPlace | None, flank: int) -> MeshDut
     contact = solved.contacts[duty.name]
     centre, factor, pressure = (
         float(contact.at(values, place.misalignment))
-        for values in (contact.load_centre, contact.face_load_factor, contact.max_pressure)
+        for values in (contact.load_centroid, contact.face_load_factor, contact.max_pressure)
     )
-    return replace(duty, load_centre=flank * centre, face_load_factor=factor, pressure=pressure)
+    return replace(duty, load_centroid=flank * centre, face_load_factor=factor, pressure=pressure)

@@ -77,8 +77,8 @@ class MeshCurve:
     """Load on the transverse line of action at which they are, N."""
     table: TableInput | None = None
     """What they were computed from: contact at other loads and misalignments can be solved then."""
-    load_centre: Floats | None = None
-    tangent_load_centre: Floats | None = None
+    load_centroid: Floats | None = None
+    tangent_load_centroid: Floats | None = None
     """(n,) where the load bears along the face at the same positions, and what a little more deflection adds to it,
     m from its middle, in the axes of the table. The second is the first by default."""
 
@@ -266,7 +266,7 @@ class MeshElement:
         softness = np.maximum(softness, 1.0 / (STEEPEST * contact.tangent_stiffness))
         ways = self.load_ways
         if ways.size:
-            centres = cycle.load_centre, cycle.tangent_load_centre
+            centres = cycle.load_centroid, cycle.tangent_load_centroid
             pairs = zip(self.flank * ways, centres, strict=True)
             ways = self.flank * np.array([changed_over_cycle(known, found) for known, found in pairs])
         return contact.force / deflection, 1.0 / softness, ways
@@ -280,7 +280,7 @@ class MeshElement:
     def bears_beside(self) -> bool:
         """Whether the load bears beside the middle of the face where the gears stand straight."""
         contact = self.contact
-        return contact is not None and any((contact.misalignment, contact.load_centre, contact.tangent_load_centre))
+        return contact is not None and any((contact.misalignment, contact.load_centroid, contact.tangent_load_centroid))
 
     @property
     def rest(self) -> float:
@@ -309,7 +309,7 @@ def mesh_elements(
     inertias : inertia set: it decides where the bodies' nodes (centres of mass) are
     flanks : loaded flank of each mesh; from the static load by default
     angles : {"reference", "operating"}
-        Angles of the law `seed`.
+        Angles of the law `tangential`.
     displaced : place of bodies at zero coordinates against their nominal one, x and y seen from the mesh's frame, m
     nodes : position (3,) of the node that carries a gear, by `seat_key` of body and gear; the body's own otherwise
     contact : by mesh name

@@ -213,7 +213,7 @@ def requested_tables(
 
 def without_table(gearbox: Gearbox, names: Iterable[str]) -> str:
     """Say why the first of these pairs without a table has none, and what would be right; empty if all have one."""
-    law = "take a mesh law that needs a stiffness alone (line_of_action, constant, seed, iso6336)"
+    law = "take a mesh law that needs a stiffness alone (line_of_action, constant, tangential, iso6336)"
     for name in names:
         if gearbox.case.pairs[name].stiffness is not None:
             return (
@@ -500,7 +500,7 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %"
 
 
-# How far the load moves along the face over a mesh cycle, which the law `seed` leaves out, and how much that is
+# How far the load moves along the face over a mesh cycle, which the law `tangential` leaves out, and how much that is
 
 LEAST_PUSH = 1e-6
 """Push of a transmission error over the load below which it is round-off."""
@@ -549,7 +549,7 @@ def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[WanderingLoad, ...]
 def _way(name: str, point: xr.Dataset, width: float) -> WanderingLoad:
     centre, error, stiffness = (
         np.asarray(point[key].to_numpy(), dtype=np.float64).reshape(-1)
-        for key in ("load_centre", "ste", "mesh_stiffness")
+        for key in ("load_centroid", "ste", "mesh_stiffness")
     )
     force = float(point["line_of_action_force"].mean())
     at_ends = force * _first_harmonic(centre) / (0.5 * width)

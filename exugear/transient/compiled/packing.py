@@ -493,7 +493,7 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         shares=1.0 / np.stack([inertia.mass, inertia.transverse, inertia.axial], axis=1),
         spin=inertia.spin,
         spin_inertia=inertia.spin_inertia,
-        inverse=np.zeros((0, 0)) if LAWS[assembly.mesh_law].has_force else _rolling_inverse(assembly),
+        inverse=np.zeros((0, 0)) if LAWS[assembly.mesh_model].has_force else _rolling_inverse(assembly),
         turning=np.array(numbers.turning, dtype=np.int64),
     )
     return Equations(

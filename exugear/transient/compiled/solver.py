@@ -319,7 +319,7 @@ class CompiledSystem:
         self._method = method
         self._layout = signal_layout(assembly)
         self._columns = bundle(columns_of(self._layout))
-        parting = LAWS[assembly.mesh_law].signals_positions
+        parting = LAWS[assembly.mesh_model].signals_positions
         interval = POWER_INTERVAL_PARTING if parting else POWER_INTERVAL
         self._stride = max(1, int(interval / step + 1e-9))
         self._past = Past.of(method, np.zeros((0, assembly.size)) if past is None else past)

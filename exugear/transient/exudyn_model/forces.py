@@ -286,7 +286,7 @@ def add_minimal_system(
 
     # The drive's spring is in no jacobian, and gears that only roll have coordinates of their own.
     jacobian: Any = 0
-    if loading.drive is None and meshes is not None and LAWS[assembly.mesh_law].has_force:
+    if loading.drive is None and meshes is not None and LAWS[assembly.mesh_model].has_force:
         jacobian = mesh_jacobian(assembly, meshes)
     mbs.AddObject(
         items.ObjectGenericODE2(

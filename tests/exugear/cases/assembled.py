@@ -46,7 +46,7 @@ def simulated(gearbox: Gearbox, choice: Choice, stiffness: Mapping[str, Any], ou
     return simulate(gearbox, choice, stiffness, out, bodies=bodies_of(gearbox, choice), **options)
 
 
-def spur_with_tables(folder: Path, mesh_law: str) -> tuple[Gearbox, Mapping[str, Any]]:
+def spur_with_tables(folder: Path, mesh_model: str) -> tuple[Gearbox, Mapping[str, Any]]:
     """The spur pair and its mesh stiffness by a law, its case and tables kept in a folder of results."""
     case = folder / "spur.toml"
     case.write_text(SPUR_CASE, encoding="utf-8")
@@ -54,4 +54,4 @@ def spur_with_tables(folder: Path, mesh_law: str) -> tuple[Gearbox, Mapping[str,
     keep_case(gearbox, folder)
     for request in requested_tables(gearbox, folder):
         request.compute()
-    return gearbox, mesh_stiffness(gearbox, mesh_law, folder)
+    return gearbox, mesh_stiffness(gearbox, mesh_model, folder)

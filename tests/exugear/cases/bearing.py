@@ -36,7 +36,7 @@ bore_mm = 30.0
 outer_diameter_mm = 62.0
 width_mm = 17.25
 contact_angle_deg = 14.0
-holds_towards = "-z"
+locates_towards = "-z"
 
 [bearings.taper_2]
 body = "shaft_2"
@@ -47,12 +47,12 @@ bore_mm = 30.0
 outer_diameter_mm = 62.0
 width_mm = 17.25
 contact_angle_deg = 14.0
-holds_towards = "+z"
+locates_towards = "+z"
 """
 before, after = SPUR_CASE.index("[bearings.bearing_1]"), SPUR_CASE.index("[meshes]")
 BEARING_CASE = SPUR_CASE[:before] + BEARINGS + "\n" + SPUR_CASE[after:]
 NAMES = ("ball", "roller", "taper_1", "taper_2")
-NON_LINEAR = {f"bearings.{name}.law": "iso16281" for name in NAMES}
+NON_LINEAR = {f"bearings.{name}.model": "iso16281" for name in NAMES}
 STIFFNESS = {"spur": 3e8}
 
 

@@ -91,7 +91,7 @@ def _modified() -> dict[str, Any]:
     for place, value in enumerate((2e7, 3e7, 1e8, 1e6, 1e6, 0.0)):
         rows[place][place] = value
     case["bearings"]["bearing_1"]["stiffness"] = {"matrix": rows}
-    case["bearings"]["bearing_1"]["damping"] = {"radial_N_per_m": 100.0, "axial_N_per_m": 10.0}
+    case["bearings"]["bearing_1"]["damping"] = {"radial_N_s_per_m": 100.0, "axial_N_s_per_m": 10.0}
     case["gears"]["wheel"]["held_diameter_mm"] = 64.0  # around the bearing
     case["bearings"]["bearing_2"] = {
         "body": "shaft_2", "z_mm": 0.0, "stiffness": {"axial_N_per_m": 1e8},
@@ -114,11 +114,11 @@ def _planetary(grc: dict[str, Any]) -> dict[str, Any]:
         "gears": gears,
         "pairs": {name: copy.deepcopy(grc["pairs"][name]) for name in ("sun_planet", "ring_planet")},
         "bodies": {
-            "rim": {"fixed": True, "axis_position_mm": [0.0, 0.0], "wheels_z_mm": {"ring": 0.0}},
+            "rim": {"fixed": True, "axis_position_mm": [0.0, 0.0], "gears_z_mm": {"ring": 0.0}},
             "carrier": {"axis_position_mm": [0.0, 0.0], "inertia": {"given": mass}},
             "planet": {"carrier": "carrier", "orbit_radius_mm": 308.0, "planet_angles_deg": [0.0, 120.0, 240.0],
-                       "wheels_z_mm": {"planet": 0.0}, "inertia": {"given": mass}},
-            "shaft": {"axis_position_mm": [0.0, 0.0], "wheels_z_mm": {"sun": 0.0}, "inertia": {"given": mass}},
+                       "gears_z_mm": {"planet": 0.0}, "inertia": {"given": mass}},
+            "shaft": {"axis_position_mm": [0.0, 0.0], "gears_z_mm": {"sun": 0.0}, "inertia": {"given": mass}},
         },
         "meshes": {
             "sun_planet": {"pair": "sun_planet", "pinion_body": "shaft", "gear_body": "planet"},
@@ -152,7 +152,7 @@ def _with_shapes() -> dict[str, Any]:
                 "blanks": {"torque": {"mass_kg": 0.2, "axial_kg_m2": 1e-4, "transverse_kg_m2": 1e-4}},
             },
         }  # fmt: skip
-        case["bodies"][name]["wheels_z_mm"] = {gear: 20.0}
+        case["bodies"][name]["gears_z_mm"] = {gear: 20.0}
     for number in (1, 2):
         case["bearings"][f"bearing_{number}"]["z_mm"] = -40.0
     belt = {"force_N": [0.0, -200.0, 50.0], "moment_N_m": [1.0, 0.0]}

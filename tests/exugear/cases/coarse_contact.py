@@ -39,8 +39,8 @@ def coarse_curves(gearbox: Gearbox) -> dict[str, MeshCurve]:
             state["tangent_stiffness"].to_numpy(),
             wanted.torque[0] / wanted.pair.pinion.base_radius,
             wanted,
-            state["load_centre"].to_numpy(),
-            state["tangent_load_centre"].to_numpy(),
+            state["load_centroid"].to_numpy(),
+            state["tangent_load_centroid"].to_numpy(),
         )
     return curves
 

@@ -24,7 +24,7 @@ def curves_of(stiffness: Mapping[str, np.ndarray]) -> dict[str, MeshCurve]:
     centre = 1e-3 + 3e-3 * np.cos(cycle + 1.0) + 1e-3 * np.sin(2 * cycle)
     added = -2e-3 + 4e-3 * np.cos(cycle + 0.7) + 1.5e-3 * np.sin(3 * cycle)
     return {
-        name: MeshCurve(values, exponent * values, LOADS[name], load_centre=centre, tangent_load_centre=added)
+        name: MeshCurve(values, exponent * values, LOADS[name], load_centroid=centre, tangent_load_centroid=added)
         for name, values in stiffness.items()
     }
 

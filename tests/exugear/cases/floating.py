@@ -23,7 +23,7 @@ pair = { pinion = "pinion", gear = "wheel", centre_distance_mm = 76.7 }
 
 [bodies.shaft]
 axis_position_mm = [0.0, 0.0]
-wheels_z_mm = { pinion = 250.0 }
+gears_z_mm = { pinion = 250.0 }
 inertia.disc = { mass_kg = 4.0, axial_kg_m2 = 2e-3, transverse_kg_m2 = 2.5e-2, centre_of_mass_z_mm = 150.0 }
 flexibility = "ffrf"
 [bodies.shaft.shape]
@@ -34,7 +34,7 @@ blanks = { pinion = { mass_kg = 1.2, axial_kg_m2 = 8e-4, transverse_kg_m2 = 5e-4
 
 [bodies.wheel]
 axis_position_mm = [76.7, 0.0]
-wheels_z_mm = { wheel = 250.0 }
+gears_z_mm = { wheel = 250.0 }
 inertia.disc = { mass_kg = 4.0, axial_kg_m2 = 1e-2, transverse_kg_m2 = 8e-3, centre_of_mass_z_mm = 250.0 }
 
 [bodies.motor]

@@ -81,7 +81,7 @@ class Train:
         place = {} if at is None else {"axis_position_mm": list(at)}
         body = {**place, "inertia": {"discs": inertia}, **keys}
         if wheels:
-            body["wheels_z_mm"] = dict(wheels)
+            body["gears_z_mm"] = dict(wheels)
         self.content["bodies"][name] = body
         if held:
             on = {"on": keys["carrier"]} if "carrier" in keys else {}
@@ -92,7 +92,7 @@ class Train:
     def elastic(self, name: str) -> Train:
         """Let a body be a shaft on two bearings beside its wheels, elastic in the variant flexible."""
         body = self.content["bodies"][name]
-        places = body.get("wheels_z_mm", {"": 0.0}).values()
+        places = body.get("gears_z_mm", {"": 0.0}).values()
         start, end = min(places) - 60.0, max(places) + 60.0
         section = {"length_mm": end - start, "outer_diameter_mm": 30.0}
         shape = {"start_z_mm": start, "sections": [section], "torque_z_mm": start + 20.0}
@@ -107,7 +107,7 @@ class Train:
         self.content["bodies"]["housing"] = {
             "fixed": True,
             "axis_position_mm": [0.0, 0.0],
-            "wheels_z_mm": dict(wheels),
+            "gears_z_mm": dict(wheels),
         }
         return self
 

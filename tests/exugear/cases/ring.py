@@ -41,14 +41,14 @@ def ring_content(grc: Gearbox, folder: Path) -> dict[str, Any]:
     bodies = {name: content["bodies"][name] for name in ("carrier", "planet", "lss")}
     for body in bodies.values():
         body["flexibility"] = "none"
-    bodies["lss"]["wheels_z_mm"] = {"sun": 1e3 * MIDDLE}
+    bodies["lss"]["gears_z_mm"] = {"sun": 1e3 * MIDDLE}
     for key in ("shape", "solid"):
         bodies["lss"].pop(key, None)
         bodies["carrier"].pop(key, None)
     bodies["housing"] = {
         "fixed": True,
         "axis_position_mm": [0.0, 0.0],
-        "wheels_z_mm": {"ring": 1e3 * MIDDLE},
+        "gears_z_mm": {"ring": 1e3 * MIDDLE},
         "flexibility": "elastic",
         "solid": {
             "file": "rim.vtu",

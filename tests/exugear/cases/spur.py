@@ -30,12 +30,12 @@ spur = { pinion = "pinion", gear = "wheel", centre_distance_mm = 75.0 }
 
 [bodies.shaft_1]
 axis_position_mm = [0.0, 0.0]
-wheels_z_mm = { pinion = 0.0 }
+gears_z_mm = { pinion = 0.0 }
 inertia.disc = { mass_kg = 1.0, axial_kg_m2 = 1e-2, transverse_kg_m2 = 1e-2, centre_of_mass_z_mm = 0.0 }
 
 [bodies.shaft_2]
 axis_position_mm = [75.0, 0.0]
-wheels_z_mm = { wheel = 0.0 }
+gears_z_mm = { wheel = 0.0 }
 inertia.disc = { mass_kg = 2.0, axial_kg_m2 = 3e-2, transverse_kg_m2 = 3e-2, centre_of_mass_z_mm = 0.0 }
 
 [joints]

@@ -27,7 +27,7 @@ def study_content(folder: Path, **changes: Any) -> dict[str, Any]:
     return {
         "name": "seats and bearing",
         "case": str(written_case(folder)),
-        "choice": {"variant": "bushing", "mesh_law": "iso6336"},
+        "choice": {"variant": "bushing", "mesh_model": "iso6336"},
         "parameters": {
             "seat": {"path": "housing.factor", "values": [0.2, 0.4, 0.6, 0.8]},
             "bearing": {
@@ -35,10 +35,10 @@ def study_content(folder: Path, **changes: Any) -> dict[str, Any]:
                 "range": {"first": 1e7, "last": 4e7, "count": 3, "scale": "logarithmic"},
             },
         },
-        "figures": {
-            "frequency": {"figure": "frequencies", "count": 4},
-            "nearest": {"figure": "nearest_frequency", "near_Hz": 500.0},
-            "forces": {"figure": "mesh_forces"},
+        "outputs": {
+            "frequency": {"quantity": "frequencies", "count": 4},
+            "nearest": {"quantity": "nearest_frequency", "near_Hz": 500.0},
+            "forces": {"quantity": "mesh_forces"},
         },
         **changes,
     }

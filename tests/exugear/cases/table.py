@@ -48,7 +48,7 @@ def surface_of(
         force,
         ste,
         1.0 / slope,
-        tangent_load_centre=centre_of_load,
+        tangent_load_centroid=centre_of_load,
         unloaded=np.broadcast_to(unloaded, ste.shape[:3]),
         unloaded_centre=np.broadcast_to(-2e-6 * a[..., 0] / 4e-4, ste.shape[:3]),
     )

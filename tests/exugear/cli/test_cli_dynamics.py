@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.cli.case import MeshLaw
-from exugear.cli.verbs.run import Solver
+from exugear.cli.case import MeshModel
+from exugear.cli.commands.run import Solver
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant, VariantError
-from exugear.system.tooth_mesh.laws.registry import MESH_LAWS
+from exugear.system.tooth_mesh.laws.registry import MESH_MODELS
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import missing_tables, requested_tables
@@ -35,11 +35,11 @@ pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 def iso(verb, case, *more):
     """Call a verb with the law that needs no tables."""
-    return exugear(verb, case, "--mesh-law", "iso6336", "--out", case.parent / "out", *more)
+    return exugear(verb, case, "--mesh-model", "iso6336", "--out", case.parent / "out", *more)
 
 
 def test_the_choices_offered_are_those_of_the_library():
-    assert [law.value for law in MeshLaw] == list(MESH_LAWS)
+    assert [law.value for law in MeshModel] == list(MESH_MODELS)
     assert {solver.value for solver in Solver} == set(SOLVERS)
 
 
@@ -113,7 +113,7 @@ def test_modes_are_those_of_the_closed_form(case):
         0.0,
         pytest.approx(np.sqrt(stiffness * flexibility) / (2 * np.pi), rel=1e-9),  # one spring, one degree of freedom
     ]
-    assert summary["modes"][1]["share_of_overall_dte"] == pytest.approx(1.0, abs=1e-12)
+    assert summary["modes"][1]["te_participation"] == pytest.approx(1.0, abs=1e-12)
     assert Path(summary["file"]) == case.parent / "out" / "rigid" / "iso6336-disc" / "modes.nc"
     assert Path(summary["picture"]).is_file()
 
@@ -152,7 +152,7 @@ def test_dynamics_refuses_a_table_of_another_input_but_not_of_other_positions(ca
         ("run", ["--variant", "rigid", "--load-case", "nothing"], "load cases are run_up"),
         ("run", ["--variant", "rigid", "--duration", "-1"], "duration = -1"),
         ("run", ["--variant", "rigid", "--resume"], "was stopped here"),
-        ("run", ["--variant", "bushing", "--mesh-law", "rigid"], "needs the variant rigid"),
+        ("run", ["--variant", "bushing", "--mesh-model", "kinematic"], "needs the variant rigid"),
     ],
 )
 def test_bad_input_is_one_message_and_code_2(case, verb, options, said):
@@ -214,7 +214,7 @@ def test_a_stopped_run_goes_on_to_the_duration_of_its_first_call(case, monkeypat
         stopped = iso("run", case, *rigid, "--duration", 1.3)  # the load case's is 0.3 s
     assert stopped.exit_code == 130
     out = case.parent / "out"
-    again = f"exugear run {case} --variant rigid --mesh-law iso6336 --duration 1.3 --out {out} --resume"
+    again = f"exugear run {case} --variant rigid --mesh-model iso6336 --duration 1.3 --out {out} --resume"
     assert again in stopped.stderr
     shorter = iso("run", case, *rigid, "--duration", 0.01, "--resume")
     assert shorter.exit_code == 2

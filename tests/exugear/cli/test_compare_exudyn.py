@@ -28,7 +28,7 @@ def case(tmp_path: Path) -> Path:
 
 
 def run(case: Path, *more: object):
-    usual = ("--variant", "bushing", "--mesh-law", "iso6336", "--duration", 0.05, "--out", case.parent / "out")
+    usual = ("--variant", "bushing", "--mesh-model", "iso6336", "--duration", 0.05, "--out", case.parent / "out")
     return exugear("run", case, *usual, *more)
 
 

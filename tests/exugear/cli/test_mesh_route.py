@@ -12,7 +12,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from exugear.cli.verbs.run import MeshRoute
+from exugear.cli.commands.run import MeshRoute
 from exugear.gearbox.choice import Choice
 from exugear.project import Project
 from exugear.results.run_file import load_run
@@ -31,7 +31,7 @@ SEVEN_DIGITS = 2e-7
 
 
 def run(case, out, *options):
-    return exugear("run", case, "--mesh-law", "iso6336", "--out", out, *options)
+    return exugear("run", case, "--mesh-model", "iso6336", "--out", out, *options)
 
 
 def assert_same_run(first, second):
@@ -62,7 +62,7 @@ def test_both_routes_give_the_same_run_and_each_file_says_which_it_was(case, tmp
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("law", ["seed", pytest.param("table", marks=pytest.mark.long)])
+@pytest.mark.parametrize("law", ["tangential", pytest.param("table", marks=pytest.mark.long)])
 def test_both_routes_give_the_same_run_of_a_whole_gearbox(grc, stiffness, tmp_path, law):
     """By the law whose force is not along its deflection, and by that which knows how gears stand."""
     data = surfaces(grc) if law == "table" else stiffness
@@ -78,7 +78,7 @@ def test_both_routes_give_the_same_run_of_a_whole_gearbox(grc, stiffness, tmp_pa
     [
         (["--variant", "bushing"], "exist in Exudyn only, not in the solver compiled; add --solver exudyn"),
         (["--variant", "rigid", "--solver", "exudyn"], "the variant rigid has no bodies, only their spins"),
-        (["--variant", "rigid", "--mesh-law", "rigid", "--solver", "exudyn"], "the variant rigid has no bodies"),
+        (["--variant", "rigid", "--mesh-model", "kinematic", "--solver", "exudyn"], "the variant rigid has no bodies"),
         (["--variant", "bushing", "--solver", "exudyn", "--mesh-route", "springs"], "'element', 'loads'"),
     ],
 )

@@ -15,8 +15,8 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import CaseError
 from exugear.project import Project
 from exugear.studies.executors import processes
+from exugear.studies.runner import run_study
 from exugear.studies.study import Study
-from exugear.studies.sweep import sweep
 from exugear.system.readiness import check_parts, remarks
 from exugear.system.tooth_mesh import tables
 from exugear.system.tooth_mesh.laws.iso6336 import iso6336_stiffness
@@ -29,11 +29,11 @@ from ..cases.spur import COARSE_INPUT, SPUR_CASE
 
 SHORT = ("--duration", 0.01)
 TWO_SPEEDS = ("--speeds", "1000:1010:2")
-VERBS: dict[str, tuple[object, ...]] = {
+COMMANDS: dict[str, tuple[object, ...]] = {
     "check": (),
     "ste": ("--positions", 8),
     "modes": ("--variant", "flexible"),
-    "bearings": ("--variant", "flexible", "--mesh-law", "line_of_action"),
+    "bearings": ("--variant", "flexible", "--mesh-model", "line_of_action"),
     "run": ("--variant", "bushing", *SHORT),
     "steady": ("--variant", "bushing", *TWO_SPEEDS),
 }
@@ -66,7 +66,7 @@ def idle(content: dict[str, Any]) -> None:
     content["pairs"]["idle"] = {"pinion": "pump", "gear": "wheel", "centre_distance_mm": 75.0}
     content["meshes"]["idle"] = {"pair": "idle", "pinion_body": "shaft_3", "gear_body": "shaft_2"}
     one = content["bodies"]["shaft_2"]
-    content["bodies"]["shaft_3"] = one | {"axis_position_mm": [150.0, 0.0], "wheels_z_mm": {"pump": 0.0}}
+    content["bodies"]["shaft_3"] = one | {"axis_position_mm": [150.0, 0.0], "gears_z_mm": {"pump": 0.0}}
     content["joints"]["joint_3"] = {"body": "shaft_3", "z_mm": 0.0}
     content["bearings"]["bearing_3"] = content["bearings"]["bearing_2"] | {"body": "shaft_3"}
 
@@ -88,7 +88,7 @@ def near_a_form_circle(content: dict[str, Any]) -> None:
 DOUBTFUL: dict[str, tuple[Callable[[dict[str, Any]], None], str]] = {
     "idle pair": (idle, "pairs.idle: carries no torque in [static_load], and so gets no table"),
     "shoulder": (across_a_shoulder, "the seat of left reaches 1.5 mm across a shoulder or the end of the shaft"),
-    "bearing": (into_a_bearing, "bodies.shaft_1.wheels_z_mm.pinion = 0: its face runs 5.5 mm into bearings.left at"),
+    "bearing": (into_a_bearing, "bodies.shaft_1.gears_z_mm.pinion = 0: its face runs 5.5 mm into bearings.left at"),
     "form circle": (near_a_form_circle, "of the flank to the form circle of"),
 }
 
@@ -125,7 +125,7 @@ def test_the_case_behind_the_doubtful_ones_is_beyond_doubt():
 def test_every_verb_accepts_a_doubtful_case_with_the_same_remark(name, tmp_path):
     change, remark = DOUBTFUL[name]
     case, folder = written(content_of(change), tmp_path), tmp_path / "results"
-    for verb, options in VERBS.items():
+    for verb, options in COMMANDS.items():
         out = () if verb == "check" else ("--out", folder)
         result = exugear(verb, case, *options, *out)
         assert result.exit_code == 0, (verb, result.output)
@@ -145,19 +145,19 @@ def test_a_study_accepts_a_doubtful_case(name, tmp_path):
         {
             "name": "seats",
             "case": str(case),
-            "choice": {"variant": "flexible", "mesh_law": "line_of_action"},
+            "choice": {"variant": "flexible", "mesh_model": "line_of_action"},
             "parameters": {"seat": {"path": "housing.factor", "values": [0.4, 0.6]}},
-            "figures": {"frequency": {"figure": "frequencies", "count": 2}},
+            "outputs": {"frequency": {"quantity": "frequencies", "count": 2}},
         }
     )
-    assert not sweep(study, tmp_path / "study", processes(1)).failed
+    assert not run_study(study, tmp_path / "study", processes(1)).failed
 
 
 def test_what_reaches_too_far_across_a_shoulder_every_verb_refuses_alike(tmp_path):
     content = shafted()
     content["bodies"]["shaft_1"]["shape"]["sections"] = shaft(12.0)
     case, folder, fault = written(content, tmp_path), tmp_path / "results", "seat left: a shoulder lies between"
-    for verb, options in VERBS.items():
+    for verb, options in COMMANDS.items():
         out = () if verb == "check" else ("--out", folder)
         result = exugear(verb, case, *options, *out)
         assert result.exit_code == 2 and fault in one_line(result.stderr), (verb, result.output)
@@ -166,7 +166,7 @@ def test_what_reaches_too_far_across_a_shoulder_every_verb_refuses_alike(tmp_pat
     assert not folder.exists()
 
 
-WITH_WHOLE_TABLES = ("--variant", "bushing", "--mesh-law", "table")
+WITH_WHOLE_TABLES = ("--variant", "bushing", "--mesh-model", "table")
 
 
 @pytest.mark.parametrize(
@@ -220,8 +220,12 @@ def with_stiffness(content: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("change", "arguments", "reason"),
     [
-        (with_steps, ("run", "--variant", "bushing", "--mesh-law", "table"), "ste.centre_distance_offsets_um: -3000"),
-        (with_steps, ("modes", "--variant", "bushing", "--mesh-law", "table"), "ste.centre_distance_offsets_um: -3000"),
+        (with_steps, ("run", "--variant", "bushing", "--mesh-model", "table"), "ste.centre_distance_offsets_um: -3000"),
+        (
+            with_steps,
+            ("modes", "--variant", "bushing", "--mesh-model", "table"),
+            "ste.centre_distance_offsets_um: -3000",
+        ),
         (with_steps, ("ste", "--grid"), "ste.centre_distance_offsets_um: -3000"),
         (with_stiffness, ("ste",), "pairs.spur.stiffness: is stated, so the pair has no table"),
         (idle, ("ste", "--mesh", "spur", "--mesh", "nothing"), "no gear pair 'nothing'; the pairs are spur, idle"),
@@ -253,7 +257,7 @@ def test_a_folder_that_cannot_be_is_refused_before_any_work(verb, tmp_path):
 
 def test_gears_that_only_roll_have_modes_of_rolling_alone(tmp_path):
     case = written(shafted(), tmp_path)
-    result = exugear("modes", case, "--variant", "rigid", "--mesh-law", "rigid", "--out", tmp_path, "--json")
+    result = exugear("modes", case, "--variant", "rigid", "--mesh-model", "kinematic", "--out", tmp_path, "--json")
     assert result.exit_code == 0, result.output
     assert [mode["frequency_Hz"] for mode in json.loads(result.stdout)["modes"]] == [0.0]
 

@@ -132,7 +132,7 @@ def stopped_run(case, number, delay=None):
     """
     out = case.parent / "out"
     case.write_text(SPUR_CASE.replace("shaft_2 = 140.0", "shaft_2 = 149.9"), encoding="utf-8")
-    process = begun("run", case, "--variant", "bushing", "--mesh-law", "iso6336", "--duration", 300, "--out", out)
+    process = begun("run", case, "--variant", "bushing", "--mesh-model", "iso6336", "--duration", 300, "--out", out)
     folder = out / "bushing" / "run_up-iso6336-disc"
     begun_with = folder / "run.partial" / "000001.npz" if delay is None else out
     deadline = time.monotonic() + 300.0
@@ -261,7 +261,7 @@ def test_what_cannot_be_said_on_standard_error_costs_nothing(case):
     """A verb with a progress bar and messages."""
     out = case.parent / "out"
     with open("/dev/full", "w") as full:
-        run = ("run", case, "--variant", "rigid", "--mesh-law", "iso6336", "--duration", 0.01, "--out", out)
+        run = ("run", case, "--variant", "rigid", "--mesh-model", "iso6336", "--duration", 0.01, "--out", out)
         outcome = outcome_into(subprocess.PIPE, *run, stderr=full)
         assert outcome.returncode == 0
         assert "Results in" in outcome.stdout
@@ -272,7 +272,7 @@ def test_what_cannot_be_said_on_standard_error_costs_nothing(case):
 def test_no_result_is_lost_with_a_standard_output_that_cannot_be_written(case):
     """Nor does what is printed get into a file that was given the number of a closed stream."""
     out = case.parent / "out"
-    run = ("run", case, "--variant", "rigid", "--mesh-law", "iso6336", "--duration", 0.01, "--out", out)
+    run = ("run", case, "--variant", "rigid", "--mesh-model", "iso6336", "--duration", 0.01, "--out", out)
     outcome = outcome_into(None, *run, preexec_fn=close_standard_output)
     assert outcome.returncode == 1
     assert "standard output: " in outcome.stderr
@@ -295,7 +295,7 @@ def test_what_the_library_logs_is_said_on_standard_error(capsys):
 @pytest.mark.validation
 def test_what_is_compiled_is_told_before_it_is_and_ctrl_c_ends_it(tmp_path):
     """The first verb of an installation: nothing is left of a run that did not begin."""
-    verb = ["run", str(CASE), "--variant", "rigid", "--mesh-law", "iso6336", "--duration", "0.01"]
+    verb = ["run", str(CASE), "--variant", "rigid", "--mesh-model", "iso6336", "--duration", "0.01"]
     command = [sys.executable, "-c", PROGRAM, *verb, "--out", str(tmp_path / "out")]
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
     with subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True) as process:

@@ -61,8 +61,11 @@ def refusal(content: Content, keys: dict[str, Any], bearing: dict[str, Any] | No
         ({"type": "deep_groove_ball", "element_length_mm": 9.0}, "element_length_mm makes no sense for type"),
         ({"type": "deep_groove_ball", "profile": "none"}, "profile makes no sense for type = 'deep_groove_ball'"),
         ({"osculation": 0.98}, "osculation makes no sense for type = 'cylindrical_roller'"),
-        ({"holds_towards": "-z"}, "holds_towards makes no sense for type = 'cylindrical_roller'"),
-        ({"type": "tapered_roller", "holds_towards": "+z", "arrangement": "O"}, "holds_towards makes no sense for arr"),
+        ({"locates_towards": "-z"}, "locates_towards makes no sense for type = 'cylindrical_roller'"),
+        (
+            {"type": "tapered_roller", "locates_towards": "+z", "arrangement": "O"},
+            "locates_towards makes no sense for arr",
+        ),
         ({"type": "tapered_roller", "row_count": 2}, "row_count makes no sense for type = 'tapered_roller'"),
         ({"axial_preload_um": 5.0}, "axial_preload_um makes no sense for type = 'cylindrical_roller'"),
         ({"type": "tapered_roller", "axial_preload_um": 5.0}, "axial_preload_um needs arrangement = 'X' or 'O'"),
@@ -107,9 +110,9 @@ def test_dimensions_that_cannot_be_are_refused(content: Content, keys: dict[str,
 @pytest.mark.parametrize(
     ("keys", "bearing", "said"),
     [
-        ({}, {"law": "iso16281"}, "leave catalogue.radial_load_kN and .axial_load_kN out"),
-        ({}, {"law": "iso16281", "catalogue": None}, "law = 'iso16281' needs a [.catalogue] table"),
-        ({}, {"cage": "turning"}, "cage = 'turning' stands beside law = 'iso16281' only"),
+        ({}, {"model": "iso16281"}, "leave catalogue.radial_load_kN and .axial_load_kN out"),
+        ({}, {"model": "iso16281", "catalogue": None}, "model = 'iso16281' needs a [.catalogue] table"),
+        ({}, {"cage": "turning"}, "cage = 'turning' stands beside model = 'iso16281' only"),
         ({}, {"law": "linear"}, "law"),
     ],
 )
@@ -120,9 +123,9 @@ def test_laws_that_make_no_sense_are_refused(
 
 
 def test_the_non_linear_law_takes_a_catalogue_without_loads(content: Content) -> None:
-    gearbox = with_keys(content, {"radial_load_kN": None}, {"law": "iso16281", "cage": "turning"})
+    gearbox = with_keys(content, {"radial_load_kN": None}, {"model": "iso16281", "cage": "turning"})
     section = gearbox.case.bearings["bearing_2"]
-    assert (section.law, section.cage) == ("iso16281", "turning")
+    assert (section.model, section.cage) == ("iso16281", "turning")
 
 
 def test_keys_of_a_type_alone_name_types_that_exist() -> None:

@@ -15,7 +15,7 @@ import exugear
 from exugear.cli.app import app
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import stiffness_matrix
+from exugear.gearbox.parts import connector_matrix
 from exugear.gearbox.sections import (
     bodies,
     case,
@@ -117,7 +117,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
             bearing_duties(assembly)
         for support in (*gearbox.bearings, *gearbox.mounts):
             linear_law(support, gearbox.case.damping.bearing_time_s)
-            stiffness_matrix(support.stiffness)
+            connector_matrix(support.stiffness)
         for body in elastic_names(gearbox):
             check_elastic_body(gearbox, body)
         assert gearbox.name

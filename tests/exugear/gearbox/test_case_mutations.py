@@ -77,7 +77,7 @@ def survives_modes(starts: dict[str, dict[str, Any]], seed: int, file: Path) -> 
     told = mutant(starts, seed)[1]
     for variant in ("rigid", "bushing"):
         out = file.parent / f"out-{seed}-{variant}"
-        outcome = exugear("modes", file, "--variant", variant, "--mesh-law", "iso6336", "--out", out)
+        outcome = exugear("modes", file, "--variant", variant, "--mesh-model", "iso6336", "--out", out)
         try:
             refused = is_refused_in_words(outcome, file)
         except AssertionError as error:

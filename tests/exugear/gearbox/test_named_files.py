@@ -73,14 +73,16 @@ def scripted(tmp_path: Path) -> tuple[Path, Path]:
 
 def modes(case: Path, *more: object, **environment: str) -> Any:
     out = case.parents[1] / "out"
-    return exugear("modes", case, "--variant", "flexible", "--mesh-law", "iso6336", "--out", out, *more, **environment)
+    return exugear(
+        "modes", case, "--variant", "flexible", "--mesh-model", "iso6336", "--out", out, *more, **environment
+    )
 
 
 @pytest.mark.parametrize("verb", ["modes", "run", "view"])
 def test_a_script_is_refused_before_anything_is_written(scripted: tuple[Path, Path], verb: str) -> None:
     case, mark = scripted
     out = case.parents[1] / "out"
-    choices = ("--variant", "flexible", "--mesh-law", "iso6336", "--out", out)
+    choices = ("--variant", "flexible", "--mesh-model", "iso6336", "--out", out)
     outcome = exugear(verb, case, *choices, EXUGEAR_ALLOW_SCRIPTS="0")
     assert outcome.exit_code == 2
     assert "bodies.box.solid.file = 'plate.geo': a gmsh script can run any command" in said(outcome)
@@ -249,17 +251,17 @@ def test_files_that_are_named_lie_below_the_gearbox_file_unless_permitted(tmp_pa
         outcome = exugear("check", case)
         assert outcome.exit_code == 2
         assert f"{key} = '{name}': lies outside the gearbox file's folder" in said(outcome)
-        assert "--files-below DIR or EXUGEAR_FILES_BELOW" in said(outcome)
-        assert exugear("check", case, "--files-below", outside).exit_code == 0
-        assert exugear("check", case, EXUGEAR_FILES_BELOW=str(tmp_path)).exit_code == 0
-        assert exugear("check", case, "--files-below", inside).exit_code == 2
+        assert "--allow-dir DIR or EXUGEAR_ALLOW_DIR" in said(outcome)
+        assert exugear("check", case, "--allow-dir", outside).exit_code == 0
+        assert exugear("check", case, EXUGEAR_ALLOW_DIR=str(tmp_path)).exit_code == 0
+        assert exugear("check", case, "--allow-dir", inside).exit_code == 2
         assert Gearbox.from_toml(case, Permissions(below=outside)).varied({"housing.factor": 0.4})
     for name in ("round.csv", "none.csv", "a\0b.csv", 200 * "long", 300 * "long"):
         outcome = exugear("check", with_files(inside, **{kind: name}))
         assert outcome.exit_code == 2
         assert len(outcome.stderr.splitlines()) == 1
         assert re.search("no such file|File name too long|no control characters|at most 1000", said(outcome))
-    outcome = exugear("check", case, "--files-below", tmp_path / "nowhere")
+    outcome = exugear("check", case, "--allow-dir", tmp_path / "nowhere")
     assert outcome.exit_code == 2
     assert "nowhere: no such folder" in said(outcome)
 
@@ -272,7 +274,7 @@ def test_a_report_follows_the_same_rule(tmp_path: Path, monkeypatch: Any) -> Non
     outside.mkdir()
     (outside / "torque.csv").write_text(TABLE, encoding="utf-8")
     case = with_files(inside, series="../measured/torque.csv")
-    permitted = ("--variant", "rigid", "--mesh-law", "iso6336", "--out", out, "--files-below", outside)
+    permitted = ("--variant", "rigid", "--mesh-model", "iso6336", "--out", out, "--allow-dir", outside)
     assert exugear("modes", case, *permitted).exit_code == 0
     outcome = exugear("report", out)
     assert outcome.exit_code == 2

@@ -38,7 +38,7 @@ spur = { pinion = "pinion", gear = "wheel", centre_distance_mm = 75.0 }
 
 [bodies.one]
 axis_position_mm = [0.0, 0.0]
-wheels_z_mm = { pinion = 60.0 }
+gears_z_mm = { pinion = 60.0 }
 [bodies.one.shape]
 start_z_mm = 10.0
 sections = [
@@ -49,7 +49,7 @@ sections = [
 
 [bodies.two]
 axis_position_mm = [75.0, 0.0]
-wheels_z_mm = { wheel = 60.0 }
+gears_z_mm = { wheel = 60.0 }
 [bodies.two.shape]
 start_z_mm = 20.0
 sections = [{ length_mm = 80.0, outer_diameter_mm = 50.0 }]
@@ -158,7 +158,7 @@ def test_joints_of_planets_are_on_their_carrier() -> None:
 def test_a_computed_inertia_can_be_varied_like_a_given_one() -> None:
     gearbox = gearbox_of()
     choice = Choice("rigid", "iso6336").of(gearbox)
-    parameters = assumed_parameters(gearbox, choice, mesh_stiffness(gearbox, choice.mesh_law))
+    parameters = assumed_parameters(gearbox, choice, mesh_stiffness(gearbox, choice.mesh_model))
     label = next(one for one in parameters if one.label.startswith("axial inertia"))
     assembly = label.build(2.0 * gearbox.body("two").axial)
     body = assembly.gearbox.body("two")

@@ -51,7 +51,7 @@ def test_a_run_gives_factors_over_speed_and_must_fit(tmp_path):
     content = content_of(TABLE, tmp_path)
     content["rating"] = {
         "dynamic_factor_run": "run_up",
-        "least_dynamic_factor": 1.02,
+        "minimum_dynamic_factor": 1.02,
         "viscosity_40_mm2_per_s": 320.0,
     }
     gearbox = Gearbox.from_dict(content, str(tmp_path / "gearbox.toml"))
@@ -74,7 +74,7 @@ CONSTANT_SPEED = {
     "duration_s": 1.2,
 }
 """The soft drive leaves the gears as free as the response has them."""
-RATING = {"least_dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
+RATING = {"minimum_dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
 
 
 def varying_spur(folder: Path, rating: dict[str, object], speed: float) -> tuple[Gearbox, Assembly]:

@@ -233,8 +233,8 @@ def test_safeties_below_what_is_asked_for_are_named(tmp_path, stresses):
     asked = {"dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
     assert least < 1.0
     assert f"S_H = {least:.3g}, 1 is asked for" in next(shortfalls(RatingSection(**asked), flanks, [], 1.0))
-    assert not list(shortfalls(RatingSection(**asked, least_S_H=0.999 * least), flanks, [], 1.0))
-    told = list(shortfalls(RatingSection(**asked, least_S_H=1.001 * least), flanks, [], 1.0))
+    assert not list(shortfalls(RatingSection(**asked, minimum_S_H=0.999 * least), flanks, [], 1.0))
+    told = list(shortfalls(RatingSection(**asked, minimum_S_H=1.001 * least), flanks, [], 1.0))
     assert len(told) == 1
     assert f"S_H = {least:.3g}" in told[0]
 
@@ -289,10 +289,10 @@ def test_an_extreme_load_counts_for_static_safety_alone(tmp_path, first, stresse
         (lambda content: content["loads"].update(body="shaft_2"), "static_load.locked holds shaft_2"),
         (lambda content: content["rating"]["gears"]["pinion"].pop("curve"), "give curve, or contact_curve"),
         (lambda content: content["rating"].update(dynamic_factor=0.5), "must lie between 1 and 10"),
-        (lambda content: content["rating"].update(dynamic_factor_run="run_up"), "give dynamic_factor, or"),
+        (lambda content: content["rating"].update(dynamic_factor_run="run_up"), "set dynamic_factor, or"),
         (
             lambda content: content.update(
-                rating={"dynamic_factor_run": "no", "least_dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
+                rating={"dynamic_factor_run": "no", "minimum_dynamic_factor": 1.0, "viscosity_40_mm2_per_s": 320.0}
             ),
             "dynamic_factor_run = 'no': load cases are run_up",
         ),
@@ -502,7 +502,7 @@ def test_the_verb_tells_what_limits_and_what_that_rests_on(tmp_path, first):
     text += '\n[loads]\nbody = "shaft_1"\nlife_years = 10.0\nsources.spectrum = '
     text += '{ file = "loads.csv", hours_per_year = 1000.0 }\n'
     case.write_text(text)
-    arguments = ["life", str(case), "--variant", "rigid", "--mesh-law", "iso6336", "--out", str(tmp_path / "out")]
+    arguments = ["life", str(case), "--variant", "rigid", "--mesh-model", "iso6336", "--out", str(tmp_path / "out")]
     result = exugear(*arguments, "--json")
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)

@@ -174,7 +174,7 @@ def broken(tmp_path_factory) -> tuple[Path, Path]:
 @pytest.mark.validation
 def test_infinite_damage_is_the_first_thing_told_with_the_stress_that_causes_it(broken):
     case, out = broken
-    arguments = ["life", str(case), "--variant", "rigid", "--mesh-law", "iso6336", "--out", str(out)]
+    arguments = ["life", str(case), "--variant", "rigid", "--mesh-model", "iso6336", "--out", str(out)]
     shown = exugear(*arguments)
     assert shown.exit_code == 1, shown.output
     first = shown.stdout.splitlines()[0]

@@ -86,7 +86,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Any]]:
     case, out = folder / "].toml", folder / "] :skull: \x1b[1m"
     text = SPUR_CASE.replace('"one spur pair"', json.dumps(TITLE)) + "\n[report]\nreference_frequency_Hz = 3000.0\n"
     case.write_text(text, encoding="utf-8")
-    choices = ("--variant", "bushing", "--mesh-law", "iso6336", "--out", out)
+    choices = ("--variant", "bushing", "--mesh-model", "iso6336", "--out", out)
     with pytest.MonkeyPatch.context() as patch:
 
         def unable(*arguments: Any, **options: Any) -> None:

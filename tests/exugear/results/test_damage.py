@@ -42,7 +42,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("damage")
     (folder / "spur.toml").write_text(SPUR_CASE, encoding="utf-8")
     for verb, more in (("modes", ()), ("run", ("--duration", "0.3"))):
-        model = ("--variant", "rigid", "--mesh-law", "iso6336", "--out", folder / "out")
+        model = ("--variant", "rigid", "--mesh-model", "iso6336", "--out", folder / "out")
         assert exugear(verb, folder / "spur.toml", *model, *more).exit_code == 0
     return folder / "out"
 

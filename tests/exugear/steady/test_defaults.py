@@ -82,11 +82,11 @@ def test_the_load_in_an_overhung_ring_moves_as_contact_at_fifty_positions_has_it
     exact = solve_positions(compliance, axes, range(50)).dataset(axes)
     (element,) = state.assembly.elements
     # The tangent jumps where a point of the grid opens or closes, the load does not: 0.4 mm of 4 at single positions.
-    bounds = {"load_centre": 0.02, "tangent_load_centre": 0.05}
+    bounds = {"load_centroid": 0.02, "tangent_load_centroid": 0.05}
     for way, (name, bound) in zip(element.load_ways, bounds.items(), strict=True):
         truth = np.fft.rfft(element.flank * exact[name].to_numpy().ravel())[1:5]
         found = np.fft.rfft(way)[1:5]
         assert np.abs(found - truth) == pytest.approx(0.0, abs=bound * np.abs(truth[0])), name
     centre = np.abs(np.fft.rfft(element.load_ways[0])[1:5])
-    truth = np.abs(np.fft.rfft(exact["load_centre"].to_numpy().ravel())[1:5])
+    truth = np.abs(np.fft.rfft(exact["load_centroid"].to_numpy().ravel())[1:5])
     assert centre == pytest.approx(truth, rel=0.03)

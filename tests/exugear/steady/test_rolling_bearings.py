@@ -39,8 +39,8 @@ def varying(share):
     return {"spur": 3e8 * (1.0 + share * (np.cos(cycle) + 0.4 * np.sin(2.0 * cycle)))}
 
 
-def spur_solver(gearbox, speeds, share=0.1, level="nonlinear"):
-    return solver_of(assemble(gearbox, Choice("bushing"), varying(share)), speeds, level)
+def spur_solver(gearbox, speeds, share=0.1, method="nonlinear"):
+    return solver_of(assemble(gearbox, Choice("bushing"), varying(share)), speeds, method)
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +120,7 @@ def test_the_tangents_of_bearings_are_those_of_differences(loose_solver):
 
 @pytest.fixture(scope="module")
 def grc_rows(grc):
-    return grc.varied({f"bearings.{family}.law": "iso16281" for family in FAMILIES})
+    return grc.varied({f"bearings.{family}.model": "iso16281" for family in FAMILIES})
 
 
 @pytest.fixture(scope="module")
@@ -170,7 +170,7 @@ STOP = """
 [bearings.stop]
 body = "shaft_1"
 z_mm = 20.0
-law = "iso16281"
+model = "iso16281"
 [bearings.stop.catalogue]
 type = "cylindrical_roller"
 bore_mm = 25.0
@@ -213,7 +213,7 @@ def test_the_file_says_which_bearings_followed_their_law(tmp_path):
         settings = SteadySettings(SpeedRange(80.0, 90.0, 2), level, at_resonances=False)
         data = stored_or_computed(tmp_path / f"{level}.nc", assembly, settings)
         attributes[level] = data.attrs["bearings_in_time"]
-        assert ("free_share" in data) == (level == "nonlinear")
+        assert ("unloaded_fraction" in data) == (level == "nonlinear")
         assert "rows by ISO/TS 16281" in data.attrs["bearing_laws"]
     assert attributes == {"parametric": "", "nonlinear": ", ".join(NAMES)}
 
@@ -240,13 +240,13 @@ def test_elements_that_turn_against_their_load_are_refused():
         '[bearings.roller]\nbody = "shaft_1"', '[bearings.roller]\nbody = "shaft_1"\non = "shaft_2"'
     )
     gearbox = Gearbox.from_dict(tomllib.loads(between)).varied(NON_LINEAR)
-    with pytest.raises(SteadyError, match=r"bearings\.roller\.law.*turn with shaft_2 against the load"):
+    with pytest.raises(SteadyError, match=r"bearings\.roller\.model.*turn with shaft_2 against the load"):
         spur_solver(gearbox, (50.0, 60.0))
 
 
 @pytest.fixture(scope="module")
 def shafts_solver(grc_shafts, stiffness):
-    rows = grc_shafts.varied({f"bearings.{family}.law": "iso16281" for family in FAMILIES})
+    rows = grc_shafts.varied({f"bearings.{family}.model": "iso16281" for family in FAMILIES})
     return solver_of(assembled(rows, Choice("flexible"), stiffness), (1.0, 22.5), "nonlinear", 10, 3)
 
 

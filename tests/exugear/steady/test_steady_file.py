@@ -43,7 +43,7 @@ def test_a_file_gives_back_the_response_with_units_and_origin(assembly, tmp_path
     stored = data["amplitude"][:, line, 0] * np.exp(1j * data["phase"][:, line, 0])
     # Single precision.
     np.testing.assert_allclose(stored, known, rtol=1e-6, atol=1e-6 * abs(known).max())
-    assert json.loads(data.attrs["settings"])["level"] == "parametric"
+    assert json.loads(data.attrs["settings"])["method"] == "parametric"
 
 
 @pytest.mark.validation

@@ -250,7 +250,7 @@ def moving_load():
     stiffness, cycle = spur_stiffness()["spur"], 2.0 * np.pi * np.arange(50) / 50
     centre = 1.5e-3 * np.cos(cycle + 0.7) + 0.3e-3 * np.sin(2 * cycle)
     added = 1.3 * np.roll(centre, 2)
-    return {"spur": MeshCurve(stiffness, 1.15 * stiffness, 1e3, load_centre=centre, tangent_load_centre=added)}
+    return {"spur": MeshCurve(stiffness, 1.15 * stiffness, 1e3, load_centroid=centre, tangent_load_centroid=added)}
 
 
 @pytest.mark.parametrize("speed", [60.0, 100.0])
@@ -266,7 +266,7 @@ def test_levels_agree_on_a_load_that_moves_along_the_face():
     found, (curve,) = {}, moving_load().values()
     mean = curve.stiffness.mean()
     stiffness = mean + 1e-3 * (curve.stiffness - mean)
-    centres = 1e-3 * curve.load_centre, 1e-3 * curve.tangent_load_centre
+    centres = 1e-3 * curve.load_centroid, 1e-3 * curve.tangent_load_centroid
     small = MeshCurve(stiffness, 1.15 * stiffness, curve.force, None, *centres)
     for level in ("linear", "parametric", "nonlinear"):
         solver = solver_of(assemble(SPUR, Choice("bushing"), {"spur": small}), (50.0, 150.0), level)

@@ -15,7 +15,7 @@ import xarray as xr
 
 from exugear.studies.dataset import load_study
 from exugear.studies.executors import processes
-from exugear.studies.sweep import sweep
+from exugear.studies.runner import run_study
 
 from ..cases.study import figures_of, small_study, study_content
 
@@ -36,11 +36,11 @@ STUDY = """
 import json, sys
 from exugear.studies.executors import dask_cluster
 from exugear.studies.study import Study
-from exugear.studies.sweep import sweep
+from exugear.studies.runner import run_study
 
 content, folder, address = json.loads(sys.argv[1])
 told = lambda done, failed, total: print(done, flush=True)
-sweep(Study.from_dict(content), folder, dask_cluster(address), progress=told)
+run_study(Study.from_dict(content), folder, dask_cluster(address), progress=told)
 """
 
 
@@ -66,7 +66,7 @@ def on_cluster(address, content, folder):
 @pytest.mark.validation
 def test_a_cluster_gives_the_same_bits_even_if_a_worker_is_killed(cluster, tmp_path):
     address, workers = cluster
-    here = sweep(small_study(tmp_path), tmp_path / "here", processes(1))
+    here = run_study(small_study(tmp_path), tmp_path / "here", processes(1))
     with on_cluster(address, study_content(tmp_path), tmp_path / "cluster") as running:
         assert running.stdout.readline().strip() == "0"
         assert int(running.stdout.readline()) >= 1
@@ -82,5 +82,5 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(executors, "CONNECT_SECONDS", 1.0)
     start = time.monotonic()
     with pytest.raises(executors.ExecutorError, match="no Dask scheduler answers there"):
-        sweep(small_study(tmp_path), tmp_path / "out", executors.dask_cluster("tcp://127.0.0.1:9"))
+        run_study(small_study(tmp_path), tmp_path / "out", executors.dask_cluster("tcp://127.0.0.1:9"))
     assert time.monotonic() - start < 60.0

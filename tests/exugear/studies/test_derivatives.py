@@ -1,4 +1,4 @@
-"""Local derivatives of figures against those that are known."""
+"""Local derivatives of outputs against those that are known."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import pytest
 
 from exugear.studies.dataset import slopes
 from exugear.studies.executors import processes
-from exugear.studies.sweep import sweep
+from exugear.studies.runner import run_study
 
 from ..cases.study import small_study
 
@@ -21,15 +21,15 @@ def derivatives(folder, **settings):
         },
         "torque": {"path": "static_load.torques_N_m.shaft_1", "step": 1.0},
     }
-    figures = {
-        "frequency": {"figure": "nearest_frequency", "near_Hz": 3000.0},
-        "damping": {"figure": "nearest_damping", "near_Hz": 3000.0},
-        "forces": {"figure": "mesh_forces"},
-        "sum": {"figure": "load_sharing", "meshes": "spur"},
+    outputs = {
+        "frequency": {"quantity": "nearest_frequency", "near_Hz": 3000.0},
+        "damping": {"quantity": "nearest_damping", "near_Hz": 3000.0},
+        "forces": {"quantity": "mesh_forces"},
+        "sum": {"quantity": "load_sharing", "meshes": "spur"},
     }
-    choice = {"variant": "rigid", "mesh_law": "iso6336"}
-    study = small_study(folder, parameters=parameters, figures=figures, choice=choice, **settings)
-    return sweep(study, folder / "out", processes(1)).dataset
+    choice = {"variant": "rigid", "mesh_model": "iso6336"}
+    study = small_study(folder, parameters=parameters, outputs=outputs, choice=choice, **settings)
+    return run_study(study, folder / "out", processes(1)).dataset
 
 
 def test_the_mode_of_two_discs_moves_as_its_formula_says(tmp_path):
@@ -56,7 +56,7 @@ def test_a_mesh_carries_torque_over_base_radius(tmp_path):
 
 
 def test_slopes_are_ranked_by_what_a_step_changes(tmp_path):
-    changes = {(figure, parameter): change for figure, parameter, change in slopes(derivatives(tmp_path))}
+    changes = {(output, parameter): change for output, parameter, change in slopes(derivatives(tmp_path))}
     assert changes["frequency", "inertia"] == pytest.approx(-0.005, rel=2e-4)
     assert changes["damping", "time"] == pytest.approx(0.01, rel=1e-9)
     assert changes["sum", "time"] == 0.0

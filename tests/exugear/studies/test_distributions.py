@@ -28,12 +28,12 @@ def pins_study(**parameter) -> Study:
         {
             "name": "pins",
             "case": str(CASE),
-            "choice": {"variant": "bushing", "mesh_law": "iso6336"},
+            "choice": {"variant": "bushing", "mesh_model": "iso6336"},
             "changes": PINS,
             "samples": 512,
             "sampling": "sobol",
             "parameters": {"pins": {"paths": PIN_PATHS, "normal": {"deviation": 10.0}, **parameter}},
-            "figures": {"sharing": {"figure": "load_sharing", "meshes": "sun_planet"}},
+            "outputs": {"sharing": {"quantity": "load_sharing", "meshes": "sun_planet"}},
         }
     )
 
@@ -96,7 +96,7 @@ def test_a_tolerance_class_bounds_the_flanks_of_a_production(tmp_path):
 
 def test_lists_and_draws_are_combined(tmp_path):
     content = study_content(tmp_path)["parameters"]
-    content["time"] = {"path": "damping.mesh_time_s", "uniform": {"least": 1e-6, "most": 5e-6}}
+    content["time"] = {"path": "damping.mesh_time_s", "uniform": {"min": 1e-6, "max": 5e-6}}
     study = small_study(tmp_path, parameters=content, samples=5)
     assert dict(study.design.shape) == {"seat": 4, "bearing": 3, "sample": 5} and len(study.design.points) == 60
     assert study.design.axes["bearing"].values.tolist() == [1e7, 2e7, 4e7]
@@ -108,9 +108,9 @@ def test_values_scale_or_shift_those_of_the_case():
             {
                 "name": "scaled",
                 "case": str(CASE),
-                "choice": {"variant": "bushing", "mesh_law": "iso6336"},
+                "choice": {"variant": "bushing", "mesh_model": "iso6336"},
                 "parameters": {"own": {"paths": ["bearings.pl_a.z_mm", "bearings.pl_b.z_mm"], **parameter}},
-                "figures": {"frequency": {"figure": "frequencies"}},
+                "outputs": {"frequency": {"quantity": "frequencies"}},
             }
         )
         return [list(point.changes.values()) for point in study.design.points]
@@ -139,11 +139,11 @@ def test_settings_set_several_keys_by_one_name(tmp_path):
         ({"parameters": {"a": {"values": [1.0]}}}, "give path or paths"),
         ({"parameters": {"a": {"path": "housing.factor", "normal": {"deviation": 0.1}}}}, "say how often, samples"),
         ({"samples": 8}, "no parameter has a distribution"),
-        ({"figures": {"f": {"figure": "frequencis"}}}, "did you mean 'frequencies'?"),
-        ({"figures": {"f": {"figure": "frequencies", "cont": 3}}}, "did you mean 'count'?"),
-        ({"figures": {"f": {"figure": "frequencies", "count": 3.5}}}, "must be a whole number"),
-        ({"figures": {"f": {"figure": "nearest_frequency"}}}, "near_Hz: this option is missing"),
-        ({"figure": {}}, "did you mean 'figures'?"),
+        ({"outputs": {"f": {"quantity": "frequencis"}}}, "did you mean 'frequencies'?"),
+        ({"outputs": {"f": {"quantity": "frequencies", "cont": 3}}}, "did you mean 'count'?"),
+        ({"outputs": {"f": {"quantity": "frequencies", "count": 3.5}}}, "must be a whole number"),
+        ({"outputs": {"f": {"quantity": "nearest_frequency"}}}, "near_Hz: this option is missing"),
+        ({"output": {}}, "did you mean 'outputs'?"),
         ({"case": "nowhere.toml"}, "nowhere.toml"),
         ({"steady": {"speeds": "ten"}}, "must be FIRST:LAST:COUNT"),
         ({"changes": {"name.x": 1.0}}, "neither a table nor a list"),
@@ -156,7 +156,7 @@ def test_a_study_that_cannot_be_is_told_with_file_key_and_remedy(tmp_path, chang
 
 
 def test_a_sobol_sequence_of_an_uneven_number_of_points_is_refused():
-    content = {"name": "a", "case": "b", "samples": 100, "sampling": "sobol", "figures": {"f": {}}}
+    content = {"name": "a", "case": "b", "samples": 100, "sampling": "sobol", "outputs": {"f": {}}}
     content["parameters"] = {"a": {"path": "p", "normal": {"deviation": 1.0}}}
     with pytest.raises(StudyError, match="even over a power of two"):
         parse_study(content, "s")

@@ -7,9 +7,9 @@ import pytest
 
 from exugear.studies.dataset import EVALUATION, on_front
 from exugear.studies.executors import processes
-from exugear.studies.figures import FIGURES, Figure
+from exugear.studies.quantities import QUANTITIES, Quantity
+from exugear.studies.runner import optimise
 from exugear.studies.study import Study
-from exugear.studies.sweep import optimise
 
 from ..cases.study import study_content
 
@@ -22,18 +22,18 @@ def distance(results, *, of: float) -> float:
     return (case.housing.factor - of) ** 2 + (1e6 * case.damping.mesh_time_s - 3.0) ** 2
 
 
-KNOWN = {**FIGURES, "distance": Figure(distance, "1")}
+KNOWN = {**QUANTITIES, "distance": Quantity(distance, "1")}
 
 
 def searched(folder, *minimise, **settings):
     parameters = {
-        "seat": {"path": "housing.factor", "uniform": {"least": 0.1, "most": 1.0}},
-        "time": {"path": "damping.mesh_time_s", "uniform": {"least": 1e-6, "most": 9e-6}},
+        "seat": {"path": "housing.factor", "uniform": {"min": 0.1, "max": 1.0}},
+        "time": {"path": "damping.mesh_time_s", "uniform": {"min": 1e-6, "max": 9e-6}},
     }
-    figures = {"low": {"figure": "distance", "of": 0.3}, "high": {"figure": "distance", "of": 0.7}}
-    content = study_content(folder, parameters=parameters, figures=figures)
+    outputs = {"low": {"quantity": "distance", "of": 0.3}, "high": {"quantity": "distance", "of": 0.7}}
+    content = study_content(folder, parameters=parameters, outputs=outputs)
     content["optimise"] = {"minimise": list(minimise), "population": 12, "generations": 12, **settings}
-    return Study.from_dict(content, figures=KNOWN)
+    return Study.from_dict(content, quantities=KNOWN)
 
 
 @pytest.mark.validation
@@ -71,10 +71,10 @@ def test_a_search_that_is_begun_again_computes_nothing_twice(tmp_path):
 
 
 def test_points_on_a_front_are_beaten_by_none():
-    figures = np.random.default_rng(1).random((60, 2))
-    front = on_front(figures)
-    for n, own in enumerate(figures):
-        beaten = any(np.all(other <= own) and np.any(other < own) for other in figures)
+    outputs = np.random.default_rng(1).random((60, 2))
+    front = on_front(outputs)
+    for n, own in enumerate(outputs):
+        beaten = any(np.all(other <= own) and np.any(other < own) for other in outputs)
         assert front[n] != beaten
 
 

@@ -1,4 +1,4 @@
-"""Studies that would lose a figure, never end or fail after the work are refused on reading, with the names."""
+"""Studies that would lose a output, never end or fail after the work are refused on reading, with the names."""
 
 from __future__ import annotations
 
@@ -8,30 +8,30 @@ import re
 import pytest
 
 from exugear.studies.executors import processes
+from exugear.studies.runner import run_study
 from exugear.studies.sections import StudyError
-from exugear.studies.sweep import sweep
 
 from ..cases.study import small_study
 
 SEAT = {"path": "housing.factor", "values": [0.2, 0.4]}
-FREQUENCIES = {"figure": "frequencies", "count": 2}
-DRAWN = {"path": "housing.factor", "uniform": {"least": 0.2, "most": 0.4}}
+FREQUENCIES = {"quantity": "frequencies", "count": 2}
+DRAWN = {"path": "housing.factor", "uniform": {"min": 0.2, "max": 0.4}}
 
 
 def nearest(**options):
-    return {"f": {"figure": "nearest_frequency", "near_Hz": 500.0, **options}}
+    return {"f": {"quantity": "nearest_frequency", "near_Hz": 500.0, **options}}
 
 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
         *(
-            ({"figures": {name: FREQUENCIES}}, f"figures.{name}: this name is that of what is told of each point")
+            ({"outputs": {name: FREQUENCIES}}, f"outputs.{name}: this name is that of what is told of each point")
             for name in ("error", "seconds", "memory", "doubts")
         ),
         ({"parameters": {"error": SEAT}}, "parameters.error: this name is that of what is told of each point"),
-        ({"parameters": {"mode": SEAT}}, "parameters.mode: this name is that of a dimension of figures.frequency"),
-        ({"parameters": {"forces": SEAT}}, "figures.forces: parameters.forces has this name, too"),
+        ({"parameters": {"mode": SEAT}}, "parameters.mode: this name is that of a dimension of outputs.frequency"),
+        ({"parameters": {"forces": SEAT}}, "outputs.forces: parameters.forces has this name, too"),
         ({"parameters": {"sample": DRAWN}, "samples": 4}, "parameters.sample: this name is that of the draws"),
         (
             {"parameters": {"a": SEAT, "b": SEAT}},
@@ -50,28 +50,31 @@ def nearest(**options):
             "parameters.a: values 1 and 2 are one and the same point",
         ),
         (
-            {"figures": {"f": FREQUENCIES | {"count": -1}}},
-            "figures.f.count = -1: must be finite, and lie between 1 and",
+            {"outputs": {"f": FREQUENCIES | {"count": -1}}},
+            "outputs.f.count = -1: must be finite, and lie between 1 and",
         ),
-        ({"figures": nearest(near_Hz=math.nan)}, "figures.f.near_Hz = nan: must be finite"),
+        ({"outputs": nearest(near_Hz=math.nan)}, "outputs.f.near_Hz = nan: must be finite"),
         (
             {"parameters": {"a": {"path": "housing.factor", "range": {"first": math.nan, "last": 1.0, "count": 3}}}},
             "parameters.a.range.first = nan: should be a finite number",
         ),
-        ({"figures": nearest(near_Hz=-1.0)}, "figures.f.near_Hz = -1.0: must be finite, and lie between 0"),
+        ({"outputs": nearest(near_Hz=-1.0)}, "outputs.f.near_Hz = -1.0: must be finite, and lie between 0"),
         (
-            {"figures": nearest(element="nope")},
-            "figures.f.element = 'nope': no such element; there are spur, bearing_1",
+            {"outputs": nearest(element="nope")},
+            "outputs.f.element = 'nope': no such element; there are spur, bearing_1",
         ),
-        ({"figures": {"f": {"figure": "ste_harmonic", "pair": "nope"}}}, "figures.f.pair = 'nope': no such pair"),
-        ({"figures": {"f": {"figure": "load_sharing", "meshes": "nope"}}}, "figures.f.meshes = 'nope': no such meshes"),
+        ({"outputs": {"f": {"quantity": "ste_harmonic", "pair": "nope"}}}, "outputs.f.pair = 'nope': no such pair"),
         (
-            {"figures": {"f": {"figure": "ste_harmonic", "pair": "spur", "harmonic": 5}}},
-            "figures.f.harmonic = 5: a table of 8 positions has 4 harmonics",
+            {"outputs": {"f": {"quantity": "load_sharing", "meshes": "nope"}}},
+            "f.meshes = 'nope': no such meshes",
         ),
         (
-            {"figures": {"f": {"figure": "loudest_frequency", "from_Hz": 900.0, "to_Hz": 100.0}}},
-            "figures.f.from_Hz = 900: lies above to_Hz = 100",
+            {"outputs": {"f": {"quantity": "ste_harmonic", "pair": "spur", "harmonic": 5}}},
+            "outputs.f.harmonic = 5: a table of 8 positions has 4 harmonics",
+        ),
+        (
+            {"outputs": {"f": {"quantity": "loudest_frequency", "from_Hz": 900.0, "to_Hz": 100.0}}},
+            "outputs.f.from_Hz = 900: lies above to_Hz = 100",
         ),
     ],
 )
@@ -82,15 +85,15 @@ def test_what_would_be_lost_or_fail_after_the_work_is_refused_with_names(changes
 
 def test_all_that_is_wrong_is_told_at_once(tmp_path):
     with pytest.raises(StudyError) as caught:
-        small_study(tmp_path, parameters={"a": SEAT, "b": SEAT}, figures={"error": FREQUENCIES, **nearest(element="x")})
+        small_study(tmp_path, parameters={"a": SEAT, "b": SEAT}, outputs={"error": FREQUENCIES, **nearest(element="x")})
     assert len(str(caught.value).splitlines()) == 3
 
 
 def test_elements_are_those_that_modes_have(tmp_path):
     """Names that reading takes are those that the modes of the variant know."""
-    figures = {
-        name: {"figure": "nearest_strain", "near_Hz": 500.0, "element": name}
+    outputs = {
+        name: {"quantity": "nearest_strain", "near_Hz": 500.0, "element": name}
         for name in ("spur", "bearing_1", "bearing_2")
     }
-    study = small_study(tmp_path, figures=figures, parameters={"a": SEAT})
-    assert not sweep(study, tmp_path / "out", processes(1)).failed
+    study = small_study(tmp_path, outputs=outputs, parameters={"a": SEAT})
+    assert not run_study(study, tmp_path / "out", processes(1)).failed

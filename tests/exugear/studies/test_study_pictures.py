@@ -1,4 +1,4 @@
-"""Pictures of studies: one for each figure, drawn as its dimensions ask for."""
+"""Pictures of studies: one for each output, drawn as its dimensions ask for."""
 
 from __future__ import annotations
 

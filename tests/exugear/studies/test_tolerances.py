@@ -11,12 +11,12 @@ import pytest
 
 from exugear.studies.dataset import EVALUATION, beyond, load_study
 from exugear.studies.executors import processes
-from exugear.studies.figures import FIGURES, Figure
 from exugear.studies.pictures import draw_study
+from exugear.studies.quantities import QUANTITIES, Quantity
+from exugear.studies.runner import optimise
 from exugear.studies.sampling import percentile_of
 from exugear.studies.sections import StudyError
 from exugear.studies.study import Study
-from exugear.studies.sweep import optimise
 
 from ..cases.case_mutations import toml_text
 from ..cases.command import exugear
@@ -24,8 +24,8 @@ from ..cases.study import study_content
 
 HERE = processes(1)
 SMALL = {"population": 6, "generations": 8}
-SEAT = {"path": "housing.factor", "uniform": {"least": 0.2, "most": 0.8}}
-MADE = {"path": "housing.factor", "acts": "shifts", "uniform": {"least": -0.1, "most": 0.1}}
+SEAT = {"path": "housing.factor", "uniform": {"min": 0.2, "max": 0.8}}
+MADE = {"path": "housing.factor", "acts": "shifts", "uniform": {"min": -0.1, "max": 0.1}}
 
 
 def place(results) -> float:
@@ -52,25 +52,25 @@ def failing(results) -> float:
 
 
 def depth(results) -> float:
-    """A figure below zero, least at 0.6."""
+    """A output below zero, least at 0.6."""
     return (results.gearbox.case.housing.factor - 0.6) ** 2 - 1.0
 
 
 KNOWN = {
-    "depth": Figure(depth, "1"),
-    **FIGURES,
-    "place": Figure(place, "1"),
-    "wall": Figure(wall, "1"),
-    "endless": Figure(endless, "1"),
-    "failing": Figure(failing, "1"),
+    "depth": Quantity(depth, "1"),
+    **QUANTITIES,
+    "place": Quantity(place, "1"),
+    "wall": Quantity(wall, "1"),
+    "endless": Quantity(endless, "1"),
+    "failing": Quantity(failing, "1"),
 }
 
 
-def searched(folder, figures, optimise, **changes):
-    content = study_content(folder, parameters={"seat": SEAT}, figures={name: {"figure": name} for name in figures})
+def searched(folder, outputs, optimise, **changes):
+    content = study_content(folder, parameters={"seat": SEAT}, outputs={name: {"quantity": name} for name in outputs})
     content["changes"] = {"housing.factor": 0.5}
     content["optimise"] = {"population": 12, "generations": 14, **optimise}
-    return Study.from_dict({**content, **changes}, figures=KNOWN)
+    return Study.from_dict({**content, **changes}, quantities=KNOWN)
 
 
 def best(dataset, name):
@@ -82,7 +82,7 @@ def best(dataset, name):
 @pytest.mark.validation
 def test_a_limit_holds_where_the_optimum_lies_beyond_it(tmp_path):
     """(x - 0.3)^2 has its least value at 0.3; with x at least 0.45 it is at the limit, 0.0225."""
-    study = searched(tmp_path, ["failing", "place"], {"minimise": ["failing"], "limits": {"place": {"least": 0.45}}})
+    study = searched(tmp_path, ["failing", "place"], {"minimise": ["failing"], "limits": {"place": {"min": 0.45}}})
     data = optimise(study, tmp_path / "out", HERE).dataset
     found = best(data, "failing")
     assert 0.45 <= float(found["place"]) < 0.452
@@ -99,7 +99,7 @@ def test_a_figure_below_zero_is_made_small_all_the_same(tmp_path):
 
 @pytest.mark.validation
 def test_limits_of_both_sides_and_of_the_figure_itself_hold(tmp_path):
-    limits = {"place": {"least": 0.62, "most": 0.7}, "wall": {"most": 0.3}}
+    limits = {"place": {"min": 0.62, "max": 0.7}, "wall": {"max": 0.3}}
     data = optimise(
         searched(tmp_path, ["wall", "place"], {"minimise": ["wall"], "limits": limits}), tmp_path / "out", HERE
     )
@@ -145,7 +145,7 @@ def test_what_is_limited_below_counts_by_its_low_percentile(tmp_path):
     study = searched(
         tmp_path,
         ["endless", "place"],
-        {"minimise": ["endless"], "limits": {"place": {"least": 0.35}}, "percentile": 90.0, **SMALL},
+        {"minimise": ["endless"], "limits": {"place": {"min": 0.35}}, "percentile": 90.0, **SMALL},
         tolerances={"made": MADE},
         samples=16,
         sampling="sobol",
@@ -157,23 +157,23 @@ def test_what_is_limited_below_counts_by_its_low_percentile(tmp_path):
 
 
 @pytest.mark.sample
-@pytest.mark.parametrize("figure", ["endless", "failing"])
-def test_draws_that_fail_or_have_no_end_are_worst(tmp_path, figure):
+@pytest.mark.parametrize("output", ["endless", "failing"])
+def test_draws_that_fail_or_have_no_end_are_worst(tmp_path, output):
     """Above 0.6 less than 5 of 100 draws may lie: x + 0.09 stays below."""
     study = searched(
         tmp_path,
-        [figure, "place"],
-        {"minimise": [figure], "limits": {"place": {"least": 0.3}}, "population": 8, "generations": 1},
+        [output, "place"],
+        {"minimise": [output], "limits": {"place": {"min": 0.3}}, "population": 8, "generations": 1},
         tolerances={"made": MADE},
         samples=8,
         changes={"housing.factor": 0.4},
     )
     data = optimise(study, tmp_path / "out", HERE).dataset
-    high, seats = data[f"{figure}_high"].to_numpy()[1:], data["seat"].to_numpy()[1:]
+    high, seats = data[f"{output}_high"].to_numpy()[1:], data["seat"].to_numpy()[1:]
     assert np.isinf(high[seats > 0.53]).all() and np.isfinite(high[seats < 0.5]).all()
-    lost = data[figure].to_numpy()[1:][seats > 0.71]
-    assert lost.size and (np.isinf(lost) if figure == "endless" else np.isnan(lost)).all()
-    draw_study(data, tmp_path / "drawn", (f"{figure}_high",))
+    lost = data[output].to_numpy()[1:][seats > 0.71]
+    assert lost.size and (np.isinf(lost) if output == "endless" else np.isnan(lost)).all()
+    draw_study(data, tmp_path / "drawn", (f"{output}_high",))
     assert (tmp_path / "drawn" / "pictures" / "search.png").is_file()
 
 
@@ -196,7 +196,7 @@ def test_a_limit_of_what_has_no_end_is_far_beyond_or_kept():
 
 @pytest.mark.validation
 def test_a_search_over_tolerances_that_is_begun_again_computes_nothing_twice(tmp_path):
-    options = {"minimise": ["wall"], "generations": 2, "limits": {"wall": {"most": 0.1}}}
+    options = {"minimise": ["wall"], "generations": 2, "limits": {"wall": {"max": 0.1}}}
     made = {"tolerances": {"made": MADE}, "samples": 8}
     first = optimise(searched(tmp_path, ["wall"], options, **made), tmp_path / "out", HERE)
     assert first.computed == first.dataset.sizes[EVALUATION] * 8
@@ -208,12 +208,12 @@ def test_a_search_over_tolerances_that_is_begun_again_computes_nothing_twice(tmp
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"optimise": {"minimise": ["f"], "limits": {"g": {"least": 1.0}}}}, "optimise.limits: no figure 'g'"),
-        ({"optimise": {"minimise": ["f"], "limits": {"f": {}}}}, "give least, most or both"),
-        ({"optimise": {"minimise": ["f"], "limits": {"f": {"least": 2.0, "most": 1.0}}}}, "least must not be above"),
-        ({"optimise": {"minimise": ["f"], "limits": {"f": {"least": float("nan")}}}}, "finite number"),
+        ({"optimise": {"minimise": ["f"], "limits": {"g": {"min": 1.0}}}}, "optimise.limits: no output 'g'"),
+        ({"optimise": {"minimise": ["f"], "limits": {"f": {}}}}, "set min, max or both"),
+        ({"optimise": {"minimise": ["f"], "limits": {"f": {"min": 2.0, "max": 1.0}}}}, "min must not be above"),
+        ({"optimise": {"minimise": ["f"], "limits": {"f": {"min": float("nan")}}}}, "finite number"),
         ({"optimise": {"minimise": ["f", "f"]}}, "f against itself"),
-        ({"optimise": {"minimise": ["many"]}}, "figures.many has a number for each mode; a search needs a single one"),
+        ({"optimise": {"minimise": ["many"]}}, "outputs.many has a number for each mode; a search needs a single one"),
         ({"optimise": {"minimise": ["f"], "percentile": 95.0}}, "is taken over tolerances"),
         ({"tolerances": {"made": MADE}}, "say how many draws each point has"),
         ({"tolerances": {"made": MADE}, "samples": 12, "sampling": "sobol"}, "a power of two of points"),
@@ -223,13 +223,13 @@ def test_a_search_over_tolerances_that_is_begun_again_computes_nothing_twice(tmp
         ({"tolerances": {"made": {**MADE, "path": "name"}}, "samples": 8}, "no number there"),
         ({"tolerances": {"sample": MADE}, "samples": 8}, "tolerances.sample: this name is that of the draws"),
         ({"tolerances": {"seat": MADE}, "samples": 8}, "tolerances.seat: parameters.seat has this name, too"),
-        ({"tolerances": {"f_high": MADE}, "samples": 8}, "tolerances.f_high: this name is that of a percentile of fig"),
+        ({"tolerances": {"f_high": MADE}, "samples": 8}, "tolerances.f_high: this name is that of a percentile of out"),
         ({"optimise": None, "tolerances": {"made": MADE}}, "tolerances: belong to a search"),
     ],
 )
 def test_searches_that_cannot_be_are_refused_on_reading(tmp_path, changes, words):
-    figures = {"f": {"figure": "nearest_frequency", "near_Hz": 500.0}, "many": {"figure": "frequencies"}}
-    content = {"optimise": {"minimise": ["f"]}, "parameters": {"seat": SEAT}, "figures": figures, **changes}
+    outputs = {"f": {"quantity": "nearest_frequency", "near_Hz": 500.0}, "many": {"quantity": "frequencies"}}
+    content = {"optimise": {"minimise": ["f"]}, "parameters": {"seat": SEAT}, "outputs": outputs, **changes}
     with pytest.raises(StudyError) as told:
         Study.from_dict({key: value for key, value in study_content(tmp_path, **content).items() if value is not None})
     assert words in str(told.value) and len(str(told.value).splitlines()) == 1
@@ -237,7 +237,7 @@ def test_searches_that_cannot_be_are_refused_on_reading(tmp_path, changes, words
 
 def test_the_example_of_the_guide_can_be_read():
     page = Path("docs/howto/design_for_production.md").read_text(encoding="utf-8")
-    content = tomllib.loads(page[page.index("```toml") + 7 : page.index("```\n\n    exugear sweep")])
+    content = tomllib.loads(page[page.index("```toml") + 7 : page.index("```\n\n    exugear study")])
     study = Study.from_dict({**content, "case": "cases/grc750/gearbox.toml"})
     path = "gears.hs_pinion.modification.tip_relief_um"
     made = study.tolerances.produced(study.gearbox, {path: 30.0})
@@ -247,33 +247,33 @@ def test_the_example_of_the_guide_can_be_read():
 
 def verb(folder, content):
     (folder / "a.study.toml").write_text(toml_text({**content, "case": "spur.toml"}), encoding="utf-8")
-    return exugear("sweep", folder / "a.study.toml", "--workers", "1", "--out", folder / "out")
+    return exugear("study", folder / "a.study.toml", "--workers", "1", "--out", folder / "out")
 
 
 def damped(folder, limits, **changes):
     """Damping of the nearest mode, with its frequency within limits."""
-    figures = {
-        "damping": {"figure": "nearest_damping", "near_Hz": 500.0},
-        "frequency": {"figure": "nearest_frequency", "near_Hz": 500.0},
+    outputs = {
+        "damping": {"quantity": "nearest_damping", "near_Hz": 500.0},
+        "frequency": {"quantity": "nearest_frequency", "near_Hz": 500.0},
     }
     search = {"minimise": ["damping"], "population": 6, "generations": 2, "limits": limits}
-    return study_content(folder, parameters={"seat": SEAT}, figures=figures, optimise=search, **changes)
+    return study_content(folder, parameters={"seat": SEAT}, outputs=outputs, optimise=search, **changes)
 
 
 @pytest.mark.validation
 def test_the_verb_tells_percentiles_limits_and_front(tmp_path):
-    tolerances = {"made": {**MADE, "uniform": {"least": -0.01, "most": 0.01}}}
-    outcome = verb(tmp_path, damped(tmp_path, {"frequency": {"least": 10.0}}, tolerances=tolerances, samples=4))
+    tolerances = {"made": {**MADE, "uniform": {"min": -0.01, "max": 0.01}}}
+    outcome = verb(tmp_path, damped(tmp_path, {"frequency": {"min": 10.0}}, tolerances=tolerances, samples=4))
     assert outcome.exit_code == 0, outcome.stderr
     assert "damping_high" in outcome.stdout and "frequency_low" in outcome.stdout
     told = " ".join((outcome.stdout + outcome.stderr).split())
     assert "95th percentile of damping over 4 draws of the tolerances (latin_hypercube, seed 0" in told
     data = load_study(tmp_path / "out" / "study.nc")
-    assert json.loads(data.attrs["study"])["tolerances"]["made"]["uniform"] == {"least": -0.01, "most": 0.01}
+    assert json.loads(data.attrs["study"])["tolerances"]["made"]["uniform"] == {"min": -0.01, "max": 0.01}
 
 
 def test_a_search_that_finds_nothing_within_its_limits_ends_with_1_and_says_so(tmp_path):
-    outcome = verb(tmp_path, damped(tmp_path, {"frequency": {"least": 1e6, "most": 2e6}}))
+    outcome = verb(tmp_path, damped(tmp_path, {"frequency": {"min": 1e6, "max": 2e6}}))
     assert outcome.exit_code == 1
     assert "points that were looked at keeps the limits frequency from 1e+06 to 2e+06; widen" in outcome.stderr
     data = load_study(tmp_path / "out" / "study.nc")

@@ -46,7 +46,7 @@ def rolling(grc: Gearbox) -> Gearbox:
         for name, bearing in grc.case.bearings.items()
         if bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None
     ]
-    return grc.varied({f"bearings.{name}.law": "iso16281" for name in names})
+    return grc.varied({f"bearings.{name}.model": "iso16281" for name in names})
 
 
 @pytest.fixture(scope="module")

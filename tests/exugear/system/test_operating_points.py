@@ -122,8 +122,8 @@ def test_clearance_makes_a_linear_bearing_softer_and_its_seat_takes_no_share_of_
 
 
 def test_a_non_linear_bearing_with_clearance_and_a_housing_factor_is_refused_by_name(tmp_path):
-    keys = {"bearings.roller.law": "iso16281", "bearings.roller.catalogue.radial_clearance_mm": 0.04}
-    said = r"bearings\.roller: law.*housing_factor_applies = false"
+    keys = {"bearings.roller.model": "iso16281", "bearings.roller.catalogue.radial_clearance_mm": 0.04}
+    said = r"bearings\.roller: model.*housing_factor_applies = false"
     refused = bearing_gearbox(tmp_path).varied(keys)
     assert re.match(said, lacking(refused, "bushing"))
     with pytest.raises(BearingError, match=said):
@@ -133,13 +133,13 @@ def test_a_non_linear_bearing_with_clearance_and_a_housing_factor_is_refused_by_
 
 
 def test_an_elastic_housing_takes_non_linear_bearings_with_clearance(grc):
-    keys = {"bearings.hss_a.law": "iso16281", "bearings.hss_a.catalogue.radial_clearance_mm": 0.05}
+    keys = {"bearings.hss_a.model": "iso16281", "bearings.hss_a.catalogue.radial_clearance_mm": 0.05}
     assert lacking(grc.varied(keys), "flexible") == ""
     assert "bearings.hss_a" in lacking(grc.varied(keys), "bushing")
 
 
 def test_a_shaft_that_is_held_one_way_only_is_named_with_its_bearings(tmp_path):
-    loose = bearing_gearbox(tmp_path, bearings__taper_1__catalogue__holds_towards="+z")
+    loose = bearing_gearbox(tmp_path, bearings__taper_1__catalogue__locates_towards="+z")
     with pytest.raises(BalanceError, match="taper_1, taper_2: held along the axis in one direction only"):
         on_bearings(loose)
 

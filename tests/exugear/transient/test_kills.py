@@ -36,7 +36,7 @@ def case(tmp_path: Path) -> Path:
 
 
 def run(case: Path, out: Path, *more: object):
-    return exugear("run", case, "--variant", "rigid", "--mesh-law", "iso6336", "--out", out, *more)
+    return exugear("run", case, "--variant", "rigid", "--mesh-model", "iso6336", "--out", out, *more)
 
 
 def python(program: str, *arguments: object, **options) -> subprocess.Popen:
@@ -135,7 +135,7 @@ def small_disk(tmp_path: Path):
 
 def test_a_full_disk_ends_each_verb_with_a_sentence(case: Path, small_disk: Path) -> None:
     out = small_disk / "out"
-    assert exugear("modes", case, "--variant", "rigid", "--mesh-law", "iso6336", "--out", out).exit_code == 0
+    assert exugear("modes", case, "--variant", "rigid", "--mesh-model", "iso6336", "--out", out).exit_code == 0
     before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
     with (small_disk / "ballast").open("wb", buffering=0) as ballast:
         for size in (65536, 4096):
@@ -144,12 +144,12 @@ def test_a_full_disk_ends_each_verb_with_a_sentence(case: Path, small_disk: Path
                     ballast.write(bytes(size))
                 except OSError:
                     break
-    refused = exugear("run", case, "--variant", "rigid", "--mesh-law", "iso6336", "--duration", 0.1, "--out", out)
+    refused = exugear("run", case, "--variant", "rigid", "--mesh-model", "iso6336", "--duration", 0.1, "--out", out)
     assert refused.exit_code == 2
     assert f"{out} has 0 GB free" in refused.stderr
     verbs = [
-        ("modes", case, "--variant", "bushing", "--mesh-law", "iso6336", "--out", out),
-        ("view", case, "--variant", "rigid", "--mesh-law", "iso6336", "--out", out),
+        ("modes", case, "--variant", "bushing", "--mesh-model", "iso6336", "--out", out),
+        ("view", case, "--variant", "rigid", "--mesh-model", "iso6336", "--out", out),
         ("report", out),
     ]
     for verb in verbs:

@@ -78,7 +78,7 @@ def test_every_pair_of_the_grc_shows_its_curve(grc: Gearbox) -> None:
 def test_moment_of_misalignment_is_the_loads_lever(grc: Gearbox, pair: str) -> None:
     """The potential's derivative by misalignment against F times the place of the load in the finite-element contact.
 
-    Nothing of `load_centre` entered the surface: the derivative integrates the slopes of the transmission error over
+    Nothing of `load_centroid` entered the surface: the derivative integrates the slopes of the transmission error over
     the load.
     """
     spec = grc.pairs[pair]
@@ -104,4 +104,4 @@ def test_moment_of_misalignment_is_the_loads_lever(grc: Gearbox, pair: str) -> N
             ]
             lever = float(np.trapezoid(slope, loads)) / force
             # 2 % of half the face: the first piece of the load axis carries most of the difference.
-            assert lever == pytest.approx(float(point.load_centre[p, m]), abs=0.01 * spec.pair.face_width)
+            assert lever == pytest.approx(float(point.load_centroid[p, m]), abs=0.01 * spec.pair.face_width)

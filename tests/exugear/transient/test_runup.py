@@ -52,7 +52,7 @@ def test_work_of_the_loads_is_accounted_for(
 def test_seed_law_shows_its_non_conservative_work(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     # With the light damping of the case the law's unsymmetric tangent makes a bearing mode flutter.
     damped = grc.varied({"damping.bearing_time_s": 2.5e-5, "damping.mesh_time_s": 2.5e-5})
-    data = load_run(simulate(damped, Choice("bushing", "seed"), stiffness, tmp_path, duration=0.3).path)
+    data = load_run(simulate(damped, Choice("bushing", "tangential"), stiffness, tmp_path, duration=0.3).path)
     assert abs(balance_residual(data)) < 1e-6
     assert abs(float(data.non_conservative_work[-1])) > 1e-3
     conservative = load_run(simulate(damped, Choice("bushing"), stiffness, tmp_path, duration=0.3).path)
@@ -232,7 +232,7 @@ def test_wrong_torque_series_is_named(grc: Gearbox, stiffness: dict, tmp_path: P
 
 
 def test_run_with_rigid_meshes(grc: Gearbox, tmp_path: Path) -> None:
-    data = load_run(simulate(grc, Choice("rigid", "rigid"), {}, tmp_path, duration=0.05).path)
+    data = load_run(simulate(grc, Choice("rigid", "kinematic"), {}, tmp_path, duration=0.05).path)
     assert data.sizes["mesh"] == 0
     # Nothing yields between input and output but round-off of the angles.
     assert float(np.abs(data.overall_dte).max()) < 1e-12
@@ -252,7 +252,7 @@ def test_equal_planets_in_phase_load_the_sun_evenly(grc: Gearbox, stiffness: dic
     radial = np.hypot(force @ np.cos(angles), force @ np.sin(angles))
     assert np.ptp(force) > 1e-3 * force.mean()  # the meshes do vibrate
     assert radial.max() < 1e-6 * force.mean()  # forces are stored with seven digits
-    assert float(data.pulling_time.max()) == 0.0
+    assert float(data.tensile_time.max()) == 0.0
 
 
 @pytest.mark.validation

@@ -55,7 +55,7 @@ def attributes(path: Path) -> dict[str, object]:
 
 
 def exugear(verb: str, case: Path, *more: object):
-    arguments = [verb, case, "--mesh-law", "iso6336", "--out", case.parent / "out", "--variant", "rigid", *more]
+    arguments = [verb, case, "--mesh-model", "iso6336", "--out", case.parent / "out", "--variant", "rigid", *more]
     return CliRunner().invoke(cli.app, [str(argument) for argument in arguments])
 
 
@@ -73,7 +73,7 @@ def test_a_train_that_runs_away_is_stopped_where_its_rims_would_burst(tmp_path):
     outcome = exugear("run", written(tmp_path, RUNAWAY, 3.0), "--json")
     assert outcome.exit_code == 1
     summary = json.loads(outcome.stdout)
-    assert summary["trusted"] is False and summary["complete"] is False
+    assert summary["valid"] is False and summary["complete"] is False
     (reason,) = summary["reasons"]
     # 300 m/s on the tip radius of 33 mm, at the net torque over the inertia at the pinion.
     instant = 300.0 / 33e-3 / ((100 + 140 / 1.5) / (1e-2 + 3e-2 / 2.25))
@@ -82,7 +82,7 @@ def test_a_train_that_runs_away_is_stopped_where_its_rims_would_burst(tmp_path):
     message = " ".join(outcome.stderr.split())
     assert "not to be trusted" in message and reason in message and "run.partial" in message
     kept = attributes(Path(summary["file"]))
-    assert (kept["trusted"], kept["complete"], kept["verdict"]) == (0, 0, reason)
+    assert (kept["valid"], kept["complete"], kept["validity_message"]) == (0, 0, reason)
     assert summary["simulated_s"] < 2.0  # and did not go on to 3 s
     again = exugear("run", tmp_path / "spur.toml", "--resume")
     assert again.exit_code == 1 and "stopped for good: speed" in " ".join(again.stderr.split())
@@ -92,7 +92,7 @@ def test_teeth_that_pull_for_the_whole_run_end_with_code_1_and_a_red_box_in_the_
     outcome = exugear("run", written(tmp_path, REVERSED), "--json")
     assert outcome.exit_code == 1
     summary = json.loads(outcome.stdout)
-    assert summary["complete"] is True and summary["trusted"] is False
+    assert summary["complete"] is True and summary["valid"] is False
     (reason,) = summary["reasons"]
     assert reason.startswith("pulling: spur pull for up to 100 % of the run") and "wrong sign" in reason
     assert Path(summary["file"]).name == "run.nc"
@@ -110,9 +110,9 @@ def test_a_good_run_is_trusted(tmp_path):
     outcome = exugear("run", written(tmp_path, BALANCED), "--json")
     assert outcome.exit_code == 0, outcome.stderr
     summary = json.loads(outcome.stdout)
-    assert summary["trusted"] is True and summary["reasons"] == []
+    assert summary["valid"] is True and summary["reasons"] == []
     kept = attributes(Path(summary["file"]))
-    assert (kept["trusted"], kept["verdict"]) == (1, "within all limits")
+    assert (kept["valid"], kept["validity_message"]) == (1, "within all limits")
 
 
 @pytest.mark.parametrize("solver", ["compiled", pytest.param("exudyn", marks=pytest.mark.validation)])
@@ -160,7 +160,7 @@ def test_a_mesh_beside_unsolved_states_of_its_table_is_a_reason_not_to_trust() -
     judge = judged()
     seen(judge)
     times = np.zeros((len(MESH_TIMES), 1))
-    times[MESH_TIMES.index("unsolved_time")] = 0.02
+    times[MESH_TIMES.index("interpolation_time")] = 0.02
     (reason,) = judge.reasons(times, 0.1)
     assert reason.startswith("table: spur come beside states of their tables that are not solved")
     assert "for up to 0.02 s" in reason
@@ -236,7 +236,7 @@ def test_whole_run_ups_of_the_reference_gearbox_are_trusted(grc, stiffness, tmp_
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert run.reasons == ()
     assert data.state_judgement.to_numpy()[0, 0] < 1e-3 * LIMITS.energy_marked
-    assert float(data.pulling_time.max()) < 0.1 * LIMITS.pulling_marked * run.end
+    assert float(data.tensile_time.max()) < 0.1 * LIMITS.pulling_marked * run.end
 
 
 # -- what diverges stays inside its arrays --------------------------------------------------------------------------

@@ -124,9 +124,9 @@ def test_slope_by_misalignment_is_the_centre_of_a_little_more_load(spur: PairCom
     ste = results.values["ste"][0, 0, 0]
     slope = (ste[2] - ste[0]) / (2.0 * step)
     # +z opens: load and a little more load sit at the other end.
-    assert results.values["tangent_load_centre"][0, 0, 0, 1] == pytest.approx(slope, abs=1e-5)
+    assert results.values["tangent_load_centroid"][0, 0, 0, 1] == pytest.approx(slope, abs=1e-5)
     assert slope < -1e-4
-    assert results.values["load_centre"][0, 0, 0, 1] < -1e-4
+    assert results.values["load_centroid"][0, 0, 0, 1] < -1e-4
 
 
 def test_equal_gaps_of_all_pairs_are_a_rotation(spur: PairCompliance) -> None:

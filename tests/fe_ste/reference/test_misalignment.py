@@ -60,7 +60,7 @@ def test_load_along_the_face_is_that_of_the_full_contact_of_tilted_gears(complia
     width = PAIR.face_width
     centre = float(z @ load / load.sum())
     assert centre < -0.1 * width
-    assert float(states["load_centre"]) == pytest.approx(centre, abs=0.01 * width)
+    assert float(states["load_centroid"]) == pytest.approx(centre, abs=0.01 * width)
     axial, line = states["axial_position"].to_numpy(), states["line_load"].sum("tooth").to_numpy()
     nearer = load[z < -1e-9].sum() + 0.5 * load[np.abs(z) <= 1e-9].sum()
     assert line[axial < 0.0].sum() / line.sum() == pytest.approx(nearer / load.sum(), abs=0.02)

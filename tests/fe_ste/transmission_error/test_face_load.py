@@ -39,7 +39,7 @@ def test_factor_of_a_tilted_mesh_follows_from_where_its_resultant_acts(states: x
     # Second way: a load that falls linearly along the face has its highest at 1 + 6 e / b of the mean, e the place of
     # its resultant. Ends give way and deviate from the straight line: 0.03 of them stand in the aligned mesh, too.
     factor = face_load_factor(states)
-    excess = abs(states["load_centre"].mean("pmc")) * 6.0 / WIDTH
+    excess = abs(states["load_centroid"].mean("pmc")) * 6.0 / WIDTH
     aligned = float(factor[1])
     assert 1.0 < aligned < 1.1
     for side in (0, 2):

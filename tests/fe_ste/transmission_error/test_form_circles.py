@@ -89,7 +89,7 @@ def test_a_state_cut_off_at_a_form_circle_is_in_balance_and_presses_on_no_fillet
     (cut,) = np.flatnonzero(overloaded[CUT_OFF].values.ravel() == overloaded[CUT_OFF].values.max())
     state = contact_state(spur, OVERLOAD, cut / 50)
     force = state.solution.force
-    assert 1e-3 < state.cut_off_share < 1e-2
+    assert 1e-3 < state.truncated_load < 1e-2
     assert force.sum() == pytest.approx(state.normal_load, rel=1e-10)
     # Forces act along the line of action: their levers about gear 1's axis are its base radius.
     assert force.sum() * spur.pair.pinion.base_radius == pytest.approx(OVERLOAD, rel=1e-10)
@@ -112,7 +112,7 @@ def test_the_share_cut_off_does_not_depend_on_the_cells(overloaded: xr.Dataset) 
     cut = int(overloaded[CUT_OFF].values.argmax())
     state = contact_state(fine, OVERLOAD, cut / 50)
     assert state.solution.approach == pytest.approx(float(overloaded.ste[cut, 0, 0, 0]), rel=1e-3)
-    assert state.cut_off_share == pytest.approx(float(overloaded[CUT_OFF].max()), rel=0.15)
+    assert state.truncated_load == pytest.approx(float(overloaded[CUT_OFF].max()), rel=0.15)
 
 
 @pytest.mark.parametrize("place", [0.0, 0.4, -0.4])
@@ -134,7 +134,7 @@ def test_the_share_beyond_an_end_is_that_of_the_ellipse_of_hertz(place: float) -
     ended = dataclasses.replace(whole, flanks=(whole.flanks[0], _beginning_at(whole.flanks[1], end)))
     plain, cut = contact_state(whole, torque, 0.0), contact_state(ended, torque, 0.0)
     beyond = (math.acos(place) - place * math.sqrt(1.0 - place**2)) / math.pi
-    assert cut.cut_off_share == pytest.approx(beyond, abs=0.03)
+    assert cut.truncated_load == pytest.approx(beyond, abs=0.03)
     assert share_beyond(ended.flanks, cut.cells, cut.solution.force) < 1e-3  # an arc of one gear, seen on the other
     assert cut.solution.approach > plain.solution.approach
 

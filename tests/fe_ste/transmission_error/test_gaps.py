@@ -65,7 +65,7 @@ def nodes_of(table: MeshTable) -> tuple[np.ndarray, ...]:
     root = np.concatenate([[0.0], np.sqrt(data["line_of_action_force"].values[0, 0, 0])])
     unloaded = data["unloaded_ste"].transpose("pmc", "centre_distance", "misalignment").values
     nodes = np.concatenate([unloaded[..., None], data["ste"].values], axis=-1)
-    return root, nodes, data["tangent_stiffness"].values, data["tangent_load_centre"].values
+    return root, nodes, data["tangent_stiffness"].values, data["tangent_load_centroid"].values
 
 
 @pytest.mark.parametrize("load", [0, 1, 2, 3])

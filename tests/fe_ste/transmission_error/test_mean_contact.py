@@ -85,24 +85,24 @@ def test_a_state_without_contact_is_refused(state: tuple[float, float, float]) -
         contact_input(TABLE, *state)
 
 
-def test_the_deflection_changes_with_tilt_by_the_tangent_load_centre(contact: MeanContact) -> None:
+def test_the_deflection_changes_with_tilt_by_the_tangent_load_centroid(contact: MeanContact) -> None:
     """Maxwell's theorem: the slope of the deflection by misalignment is where a little more load acts."""
     slope = np.diff(contact.deflection)[0] / np.diff(contact.misalignment)[0]
-    assert slope == pytest.approx(contact.tangent_load_centre.mean(), rel=2e-2)
+    assert slope == pytest.approx(contact.tangent_load_centroid.mean(), rel=2e-2)
 
 
-def test_stiffness_and_tangent_load_centre_are_slopes_by_force(contact: MeanContact) -> None:
+def test_stiffness_and_tangent_load_centroid_are_slopes_by_force(contact: MeanContact) -> None:
     """Against two forces half a per cent apart, each solved by itself."""
     tilt, forces = contact.misalignment[0], contact.force * np.array([0.9975, 1.0025])
     two = static_transmission_error(compliance(), tuple(forces * GEAR.base_radius), 5, misalignment=float(tilt)).mean(
         "pmc"
     )
     deflection = two["ste"].to_numpy().ravel()
-    moment = two["load_centre"].to_numpy().ravel() * forces
+    moment = two["load_centroid"].to_numpy().ravel() * forces
     assert contact.stiffness[0] == pytest.approx(np.diff(forces)[0] / np.diff(deflection)[0], rel=5e-3)
     # Cells that begin to touch add their whole share to the tangent at once.
     centre = np.diff(moment)[0] / np.diff(forces)[0]
-    assert contact.tangent_load_centre[0] == pytest.approx(centre, abs=2e-3 * PAIR.face_width)
+    assert contact.tangent_load_centroid[0] == pytest.approx(centre, abs=2e-3 * PAIR.face_width)
 
 
 @pytest.mark.validation
@@ -110,7 +110,7 @@ def test_few_positions_stand_for_the_whole_mesh_cycle(contact: MeanContact) -> N
     whole = mean_contact(contact_input(TABLE, FORCE, TILT, PAIR.centre_distance, positions=40))
     assert contact.tilt_stiffness == pytest.approx(whole.tilt_stiffness, rel=2e-2)
     assert contact.deflection == pytest.approx(whole.deflection, rel=5e-3)
-    assert contact.load_centre == pytest.approx(whole.load_centre, abs=0.01 * PAIR.face_width)
+    assert contact.load_centroid == pytest.approx(whole.load_centroid, abs=0.01 * PAIR.face_width)
     assert contact.face_load_factor == pytest.approx(whole.face_load_factor, rel=0.08)
 
 
@@ -123,8 +123,8 @@ def test_what_changes_over_the_mesh_cycle_is_that_of_states_on_their_own(contact
         for own, name in (
             (contact.cycle_deflection, "ste"),
             (contact.cycle_stiffness, "tangent_stiffness"),
-            (contact.cycle_load_centre, "load_centre"),
-            (contact.cycle_tangent_load_centre, "tangent_load_centre"),
+            (contact.cycle_load_centroid, "load_centroid"),
+            (contact.cycle_tangent_load_centroid, "tangent_load_centroid"),
         ):
             assert own[end] == pytest.approx(alone[name].to_numpy(), rel=1e-6)
             few, many = (np.fft.rfft(values)[1:3] / len(values) for values in (own[end], whole[name].to_numpy()))
@@ -138,13 +138,13 @@ def test_between_the_two_states_all_is_straight(contact: MeanContact) -> None:
         "pmc"
     )
     assert float(contact.at(contact.deflection, middle)) == pytest.approx(float(alone["ste"].item()), rel=1e-4)
-    centre = float(contact.at(contact.load_centre, middle))
-    assert centre == pytest.approx(float(alone["load_centre"].item()), abs=2e-4 * PAIR.face_width)
+    centre = float(contact.at(contact.load_centroid, middle))
+    assert centre == pytest.approx(float(alone["load_centroid"].item()), abs=2e-4 * PAIR.face_width)
 
 
-def test_load_along_the_face_holds_force_and_load_centre(contact: MeanContact) -> None:
+def test_load_along_the_face_holds_force_and_load_centroid(contact: MeanContact) -> None:
     """The distribution that K_Hbeta is taken from has the sum and the resultant of the same contact."""
-    for load, centre, factor in zip(contact.line_load, contact.load_centre, contact.face_load_factor, strict=True):
+    for load, centre, factor in zip(contact.line_load, contact.load_centroid, contact.face_load_factor, strict=True):
         assert load @ contact.axial / load.sum() == pytest.approx(centre, rel=1e-6)
         assert load.max() / load.mean() == pytest.approx(factor, rel=1e-12)
         # Line loads are per length of contact line: the transverse force is their sum over the face.
@@ -169,7 +169,7 @@ def test_an_internal_pair_has_its_moment_against_misalignment() -> None:
     force = 26e3 / pair.pinion.base_radius
     one, other = (mean_contact(contact_input(table, force, tilt, pair.centre_distance)) for tilt in (-1e-4, 1e-4))
     # What opens the +z end moves the load to the -z end.
-    assert one.load_centre.mean() > 10e-3 and other.load_centre.mean() < -10e-3
+    assert one.load_centroid.mean() > 10e-3 and other.load_centroid.mean() < -10e-3
     for contact in (one, other):
         bed = contact.stiffness.mean() * pair.face_width**2 / 12.0
         assert 0.8 * bed < contact.tilt_stiffness < 2.0 * bed
@@ -227,7 +227,7 @@ def test_another_input_is_not_misread(kept: Path, solved: list[str]) -> None:
     (crowned,) = known_contacts([other])
     assert solved == [WANTED.hash, other.hash]
     assert isinstance(first, MeanContact) and isinstance(crowned, MeanContact)
-    assert not np.array_equal(first.load_centre, crowned.load_centre)
+    assert not np.array_equal(first.load_centroid, crowned.load_centroid)
 
 
 def test_another_version_does_not_use_the_files(kept: Path, solved: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -286,7 +286,7 @@ def test_what_is_stopped_goes_on_from_the_contacts_that_are_solved(kept: Path, s
 
 
 def test_contacts_used_least_lately_are_removed(kept: Path, solved: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fe_ste.transmission_error.mean_contact._contacts, "in_files", 6000)
+    monkeypatch.setattr(fe_ste.transmission_error.mean_contact._contacts, "in_files", 6400)
     known_contacts([WANTED])
     other = dataclasses.replace(WANTED, misalignment=(0.0, 1e-5))
     known_contacts([other])

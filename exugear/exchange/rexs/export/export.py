@@ -133,14 +133,14 @@ class StoredResults:
             bodies: dict[str, ElasticBody] = {}
             if choice.variant.is_elastic:
                 bodies = reduced_bodies(self.gearbox, choice.inertia_set(self.gearbox), bodies_folder(self.folder))
-            stiffness = mesh_stiffness(self.gearbox, choice.mesh_law, self.folder)
+            stiffness = mesh_stiffness(self.gearbox, choice.mesh_model, self.folder)
             self._assemblies[choice] = assemble(self.gearbox, choice, stiffness, bodies)
         if input_hash(self._assemblies[choice], load_case) != attributes.get("input_hash"):
             raise CaseError("was computed from another input; compute it again")
 
 
 def _choice(attributes: Mapping[str, Any]) -> Choice:
-    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_law", "inertias")))
+    return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
 
 
 # Results on gears and stages: what their geometry gives, their static load, and their transmission error tables
@@ -440,7 +440,7 @@ def in_axes(stiffness: Floats, axes: Floats) -> Floats:
 
 def words_of(choice: Choice) -> str:
     """Choice as part of an attribute's name."""
-    return "_".join(str(part) for part in (choice.variant, choice.mesh_law, choice.inertias)).replace("-", "_")
+    return "_".join(str(part) for part in (choice.variant, choice.mesh_model, choice.inertias)).replace("-", "_")
 
 
 def put_modes(results: Results, modes: Mapping[Choice, xr.Dataset], unit: int, load_case: int | None) -> None:

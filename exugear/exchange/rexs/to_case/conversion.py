@@ -128,7 +128,7 @@ def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Seq
     wheels = [number for number, owner in teeth.bodies.items() if owner is body]
     if wheels:
         z = {teeth.names[number]: teeth.z[number] for number in wheels}
-        block.entries["wheels_z_mm"] = read(z, "support_vector of the gears")
+        block.entries["gears_z_mm"] = read(z, "support_vector of the gears")
     if body.fixed:
         block.entries["fixed"] = read(True, "joined with the casing")
         return block

@@ -224,7 +224,7 @@ def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:
         found = {"arrangement": read("X" if held[0] == "negative" else "O", source)}
     elif held in (["positive", "positive"], ["negative", "negative"]):
         towards = "+z" if (held[0] == "positive") == (sense > 0) else "-z"
-        found = {"arrangement": read("tandem", source), "holds_towards": read(towards, source)}
+        found = {"arrangement": read("tandem", source), "locates_towards": read(towards, source)}
     else:
         return {}
     distance = part.quantity("distance_between_bearing_rows", "mm")
@@ -322,9 +322,9 @@ def _catalogue(
 def _tell_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry], notes: Notes) -> None:
     """Say which way a bearing holds the shaft, where the law of its type does not already."""
     absorbed = part.text("axial_force_absorption")
-    if kind in TYPES_OF_KEYS["holds_towards"][0] and absorbed in ("positive", "negative"):
+    if kind in TYPES_OF_KEYS["locates_towards"][0] and absorbed in ("positive", "negative"):
         towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
-        entries["holds_towards"] = read(towards, f"axial_force_absorption {absorbed}")
+        entries["locates_towards"] = read(towards, f"axial_force_absorption {absorbed}")
     elif kind in CYLINDERS:
         if absorbed == "both_directions" and not part.quantity("axial_stiffness", "N / m"):
             entries["ribs"] = read("both", "axial_force_absorption both_directions")

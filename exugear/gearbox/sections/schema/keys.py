@@ -36,6 +36,7 @@ UNITS = {
     "kN": "kN",
     "N_m": "N m",
     "N_per_m": "N/m",
+    "N_s_per_m": "N s/m",
     "N_m_per_rad": "N m/rad",
     "N_m_s_per_rad": "N m s/rad",
     "m_per_s2": "m/s²",

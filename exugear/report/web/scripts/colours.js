@@ -6,7 +6,7 @@ export const pageColour = (name) => getComputedStyle(document.documentElement).g
 /** @returns {"light" | "dark"} */
 export const theme = () => (document.documentElement.dataset.theme === "dark" ? "dark" : "light");
 
-const LEVELS = {
+const METHODS = {
   light: ["#ffffff", "#f1eff8", "#d6cfea", "#b49fd6", "#9c68ba", "#a03589", "#a81d4a", "#87101e", "#38060c"],
   dark: ["#0e1117", "#1a1440", "#46136b", "#7c1d6d", "#b23257", "#e05a36", "#f69422", "#f9d648", "#fdffc5"],
 };
@@ -24,7 +24,7 @@ const CURVES = {
 };
 
 /** @param {boolean} difference @returns {string[]} */
-export const mapColours = (difference) => (difference ? DIFFERENCES : LEVELS)[theme()];
+export const mapColours = (difference) => (difference ? DIFFERENCES : METHODS)[theme()];
 
 /** @param {number} number @returns {string} */
 export const familyColour = (number) => FAMILIES[theme()][number % FAMILIES.light.length];

@@ -338,7 +338,7 @@ def _ball_row(section: CatalogueSection) -> BallRow:
 def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollingRow, ...]:
     """Put the rows of a bearing or a pair side by side, with their contact angles."""
     angle = math.radians(section.contact_angle_deg or 0.0)
-    signed = angle if section.holds_towards == "+z" else -angle
+    signed = angle if section.locates_towards == "+z" else -angle
     if section.type == "four_point_ball":
         return tuple(moved(row, each, 0.0) for each in (-angle, angle))
     if section.arrangement != "single":

@@ -35,7 +35,7 @@ CURVE_FORM = 2
 STRAIGHT = 0.05
 """Deflection over that of the table's load below which the curve is a straight line."""
 _LOG_STRAIGHT = math.log(STRAIGHT)
-_CENTRES = ("load_centre", "tangent_load_centre")
+_CENTRES = ("load_centroid", "tangent_load_centroid")
 EXPONENT, PER_LOAD = 4, 8
 """Columns of a curve's coefficients behind the four of F0 / s: four of m - 1, and 1 / F0 (1/N)."""
 
@@ -75,10 +75,10 @@ class LineOfAction(Law):
 
     def load_ways(self, data: MeshData) -> Floats:
         """Ways of the table's load, as `Law.load_ways`; none of a stiffness alone."""
-        if not self.curved or not isinstance(data, MeshCurve) or data.load_centre is None:
+        if not self.curved or not isinstance(data, MeshCurve) or data.load_centroid is None:
             return super().load_ways(data)
-        added = data.load_centre if data.tangent_load_centre is None else data.tangent_load_centre
-        centres = np.array([data.load_centre, added])
+        added = data.load_centroid if data.tangent_load_centroid is None else data.tangent_load_centroid
+        centres = np.array([data.load_centroid, added])
         return np.asarray(centres - centres.mean(axis=1, keepdims=True))
 
 

@@ -303,7 +303,9 @@ def mesh_cycle(q: Floats, v: Floats, m: int, meshes: Meshes) -> tuple[float, flo
 
 
 @kernel
-def mesh_law(q: Floats, v: Floats, m: int, delta: float, meshes: Meshes) -> tuple[float, float, float, float, float]:
+def elastic_mesh_force(
+    q: Floats, v: Floats, m: int, delta: float, meshes: Meshes
+) -> tuple[float, float, float, float, float]:
     """Elastic force of mesh m at a deflection (m), of a law along a row; results as of `row_law`."""
     pmc, cycling = mesh_cycle(q, v, m, meshes)
     return row_law(meshes.form[m], meshes.stiffness[m], meshes.pieces[m], delta, pmc, cycling)
@@ -315,7 +317,7 @@ def add_spinning_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshWo
     index = meshes.coordinates[m]
     state = work.mesh.states[m]
     delta, rate, acting = spinning_motion(q, v, m, meshes)
-    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, delta, meshes)
+    elastic, _, _, energy, cycle_power = elastic_mesh_force(q, v, m, delta, meshes)
     force = elastic + meshes.damping[m] * rate
     torque_1 = force * meshes.force[m, SPIN_1]
     torque_2 = force * meshes.force[m, SPIN_2]
@@ -379,7 +381,7 @@ def add_row_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshWork) -
     if meshes.tilting[m] == 1:
         add_tilting_mesh(q, v, m, delta, rate, c, s, meshes, work)
         return
-    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, delta, meshes)
+    elastic, _, _, energy, cycle_power = elastic_mesh_force(q, v, m, delta, meshes)
     force = elastic + meshes.damping[m] * rate
     push_apart(m, force, gradient, meshes, work)
     keep_state(m, delta, rate, acting, force, energy, cycle_power, meshes, work.mesh.states[m])
@@ -408,7 +410,7 @@ def add_tilting_mesh(
     # Where the load bears beside the middle of the face, it deflects with the misalignment.
     approach = delta - arm * turned
     approaching = rate - arm * tilt_rate
-    elastic, _, _, energy, cycle_power = mesh_law(q, v, m, approach - way * turned, meshes)
+    elastic, _, _, energy, cycle_power = elastic_mesh_force(q, v, m, approach - way * turned, meshes)
     cycle_power += (elastic * moving + changing) * cycling * turned
     force = elastic + meshes.damping[m] * approaching
     push_apart(m, force, work.mesh.gradients[DEFLECTION_ROW], meshes, work)

@@ -43,11 +43,11 @@ class LawProperties:
 
 
 _TABLE_OF_LAWS = (
-    LawProperties("rigid", "gears only roll; variant `rigid` alone", has_force=False, needs_tables=False),
+    LawProperties("kinematic", "gears only roll; variant `rigid` alone", has_force=False, needs_tables=False),
     LawProperties("constant", "as `line_of_action` with the mean of load over deflection, a straight line"),
     LawProperties("iso6336", "as `constant`, stiffness by ISO 6336-1 method B", needs_tables=False),
     LawProperties(
-        "seed",
+        "tangential",
         "the published tangential law: deflection along the pitch circle, force with radial and axial parts; "
         "not conservative",
     ),
@@ -68,7 +68,7 @@ _TABLE_OF_LAWS = (
     ),
 )
 LAWS = {law.name: law for law in _TABLE_OF_LAWS}
-MESH_LAWS = tuple(LAWS)
+MESH_MODELS = tuple(LAWS)
 
 
 def law_of(name: str) -> Law:

@@ -38,7 +38,7 @@ def mesh_stiffness(
 
     Parameters
     ----------
-    law : one of `exugear.system.tooth_mesh.laws.registry.MESH_LAWS`; it says whether it needs tables
+    law : one of `exugear.system.tooth_mesh.laws.registry.MESH_MODELS`; it says whether it needs tables
     directory : results directory with ``tables/<pair>.nc``
 
     Raises
@@ -146,8 +146,8 @@ def _pack_tilts(elements: tuple[MeshElement, ...], index: Integers, linear: bool
         if contact is None or still or (element.table is not None and not linear):
             continue
         stiffness = contact.tilt_stiffness
-        lever = contact.tangent_load_centre
-        moment = contact.force * (contact.load_centre - lever)
+        lever = contact.tangent_load_centroid
+        moment = contact.force * (contact.load_centroid - lever)
         row[:] = stiffness, element.damping_time * stiffness, lever, moment, contact.misalignment
     return tilts
 

@@ -166,7 +166,7 @@ def test_two_rows_of_tapered_rollers_stand_as_their_order_and_senses_say(senses,
     assert catalogue.width_mm == 20.0  # of one of two
     assert catalogue.row_distance_mm == 20.0
     if arrangement == "tandem":
-        assert catalogue.holds_towards == ("-z" if turned else "+z")
+        assert catalogue.locates_towards == ("-z" if turned else "+z")
 
 
 def catalogue_of(file, kind):
@@ -280,7 +280,7 @@ def test_a_spherical_roller_thrust_bearing_holds_the_shaft_its_way(tmp_path):
     gearbox = imported(helical(bearings)).gearbox
     catalogues = {b.catalogue.type: b.catalogue for b in gearbox.bearings if b.catalogue}
     thrust = catalogues["thrust_spherical_roller"]
-    assert (thrust.holds_towards, thrust.dynamic_rating_kN, thrust.static_rating_kN) == ("+z", 390.0, 915.0)
+    assert (thrust.locates_towards, thrust.dynamic_rating_kN, thrust.static_rating_kN) == ("+z", 390.0, 915.0)
     assert thrust.fatigue_load_limit_kN == 112.0
     duties = {duty.kind: duty for duty in bearing_duties(assembly(gearbox, tmp_path))}
     assert duties["thrust_spherical_roller"].axial_load == pytest.approx(axial_force(), rel=1e-3)

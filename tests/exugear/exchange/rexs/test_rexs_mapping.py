@@ -240,7 +240,7 @@ def test_a_tapered_bearing_with_dimensions_holds_the_way_it_says(absorbed, towar
     gearbox = gearbox_of(with_values(INDUSTRIAL, changes))
     catalogue = gearbox.case.bearings["bearing_2"].catalogue
     assert catalogue.type == "tapered_roller"
-    assert catalogue.holds_towards == towards
+    assert catalogue.locates_towards == towards
     assert (catalogue.bore_mm, catalogue.outer_diameter_mm, catalogue.width_mm) == (70.0, 110.0, 31.0)
 
 

@@ -103,7 +103,7 @@ def test_a_torque_series_is_integrated_and_its_flanks_are_told(tmp_path):
 def test_a_run_reaches_the_speed_that_was_told(tmp_path):
     gearbox = spur(torques_N_m={"shaft_1": 100.0, "shaft_2": 140.0}, duration_s=0.5)
     loads = summarise_loads(gearbox, gearbox.load_cases["run_up"])
-    run = simulate(gearbox, Choice("rigid", "rigid", load_case="run_up"), {}, tmp_path)
+    run = simulate(gearbox, Choice("rigid", "kinematic", load_case="run_up"), {}, tmp_path)
     data = xr.load_dataset(run.path, engine="h5netcdf")
     assert float(data.input_speed[-1]) == pytest.approx(loads.end_speed * float(data.time[-1]) / 0.5, rel=1e-9)
 
@@ -178,10 +178,10 @@ def test_a_load_case_far_from_the_static_load_asks_for_rows(grc, torques, said):
     doubt = doubt_about_bearings(varied, loads, "bushing")
     assert bool(doubt) == bool(said)
     assert said in doubt
-    assert not doubt or 'law = "iso16281"' in doubt
+    assert not doubt or 'model = "iso16281"' in doubt
     assert doubt_about_bearings(varied, loads, "rigid") == ""
     names = [name for name, one in grc.case.bearings.items() if one.catalogue and one.catalogue.radial_load_kN is None]
-    rows = varied.varied({f"bearings.{name}.law": "iso16281" for name in names})
+    rows = varied.varied({f"bearings.{name}.model": "iso16281" for name in names})
     assert doubt_about_bearings(rows, loads, "bushing") == ""
 
 

@@ -67,7 +67,7 @@ def test_the_run_up_ends_at_the_speed_that_the_file_says(case: Path, checks: Cal
 def test_a_new_file_runs_and_has_modes_in_both_variants(case: Path) -> None:
     out = case.parent / "out"
     for variant in ("rigid", "bushing"):
-        how = ("--variant", variant, "--mesh-law", "iso6336", "--out", out)
+        how = ("--variant", variant, "--mesh-model", "iso6336", "--out", out)
         ran = exugear("run", case, *how, "--duration", 0.05, "--json")
         assert ran.exit_code == 0, ran.stderr
         modes = exugear("modes", case, *how, "--json")

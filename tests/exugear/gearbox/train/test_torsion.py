@@ -63,17 +63,17 @@ axis_position_mm = [0.0, 0.0]
 inertia.i = { mass_kg = 5.0, axial_kg_m2 = 0.05, transverse_kg_m2 = 0.05, centre_of_mass_z_mm = 0.0 }
 [bodies.ring]
 axis_position_mm = [0.0, 0.0]
-wheels_z_mm = { r = 0.0 }
+gears_z_mm = { r = 0.0 }
 inertia.i = { mass_kg = 3.0, axial_kg_m2 = 0.06, transverse_kg_m2 = 0.06, centre_of_mass_z_mm = 0.0 }
 [bodies.sun]
 axis_position_mm = [0.0, 0.0]
-wheels_z_mm = { s = 0.0 }
+gears_z_mm = { s = 0.0 }
 inertia.i = { mass_kg = 0.5, axial_kg_m2 = 0.0005, transverse_kg_m2 = 0.0005, centre_of_mass_z_mm = 0.0 }
 [bodies.planet]
 carrier = "carrier"
 orbit_radius_mm = 90.0
 planet_angles_deg = [0.0, 120.0, 240.0]
-wheels_z_mm = { p = 0.0 }
+gears_z_mm = { p = 0.0 }
 inertia.i = { mass_kg = 0.7, axial_kg_m2 = 0.001, transverse_kg_m2 = 0.001, centre_of_mass_z_mm = 0.0 }
 [meshes.ms]
 pair = "sp"

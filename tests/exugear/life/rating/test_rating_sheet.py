@@ -244,7 +244,7 @@ def test_the_life_of_another_variant_stands_beside_a_rating_and_is_named(tmp_pat
     (tmp_path / "loads.csv").write_text("torque_N_m,speed_rpm,hours\n100,1500,500\n60,1500,500\n")
     content = spur(tmp_path)
     content["loads"] = {"body": "shaft_1", "life_years": 1.0, "sources": {"one": {"file": "loads.csv"}}}
-    project = project_of(content, tmp_path).chosen(variant="bushing", mesh_law="iso6336")
+    project = project_of(content, tmp_path).chosen(variant="bushing", mesh_model="iso6336")
     other = project.chosen(variant="rigid")
     other.life()
     sheet = project.rating()
@@ -287,7 +287,7 @@ def test_the_verb_prints_all_factors_and_ends_with_1_where_a_safety_is_short(tmp
         assert name in good.output
     for line in LEFT_OUT:
         assert line.split(":")[0] in " ".join(good.output.split())
-    short = run(written(spur(tmp_path, least_S_H=9.0), tmp_path), "--json")
+    short = run(written(spur(tmp_path, minimum_S_H=9.0), tmp_path), "--json")
     assert short.exit_code == 1
     found = json.loads(short.stdout)["rating"]
     assert found["shortfalls"] and found["flanks"][0]["standard"]["sigma_H_MPa"] > 0.0
@@ -330,7 +330,7 @@ def test_random_ratings_are_rated_or_refused_and_never_a_traceback(tmp_path):
         if chance.random() < 0.2:
             content["rating"]["gears"][chance.choice(names)] = dict(STRENGTH)
         if chance.random() < 0.3:
-            key = chance.choice(["application_factor", "nominal_hours", "least_S_H", "dynamic_factor"])
+            key = chance.choice(["application_factor", "nominal_hours", "minimum_S_H", "dynamic_factor"])
             content["rating"][key] = chance.choice(values)
         try:
             sheet = project_of(content, tmp_path).rating()

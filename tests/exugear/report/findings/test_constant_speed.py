@@ -29,7 +29,7 @@ def response(level: str = "parametric", branches: bool = False, sign: float = -1
     speed = sign * 2.0 * np.pi * frequency / STORED_LINE.order
     line = 1e-6 + sum(peak / (1.0 + (frequency - centre) ** 2) for centre, peak in ((790.0, 200e-6), (500.0, 20e-6)))
     amplitude = np.stack([np.zeros_like(line), line, np.full_like(line, 3e-6)], axis=1)[:, :, None]
-    settings = asdict(SteadySettings(speeds=SpeedRange(-1.0, -0.1, 3), level=level, branches=branches))
+    settings = asdict(SteadySettings(speeds=SpeedRange(-1.0, -0.1, 3), method=level, branches=branches))
     return xr.Dataset(
         {
             "speed": ("point", speed),
@@ -40,9 +40,9 @@ def response(level: str = "parametric", branches: bool = False, sign: float = -1
         {"base": ["mesh"], "signal": ["overall_dte"]},
         {
             "variant": CHOICE.variant,
-            "mesh_law": CHOICE.mesh_law,
+            "mesh_model": CHOICE.mesh_model,
             "inertias": CHOICE.inertias,
-            "level": level,
+            "method": level,
             "settings": json.dumps(settings),
         },
     )
@@ -86,7 +86,7 @@ def test_the_level_that_leaves_least_out_is_told_and_branches_are_not():
     assert truest is not None
     assert truest.level.max() == pytest.approx(20.0 * np.log10(402.0), abs=0.01)
     assert truest_of([branch], CHOICE) is None
-    assert truest_of([best], Choice("rigid", CHOICE.mesh_law, CHOICE.inertias)) is None
+    assert truest_of([best], Choice("rigid", CHOICE.mesh_model, CHOICE.inertias)) is None
 
 
 def test_resonances_rank_by_their_level_at_constant_speed(runs):

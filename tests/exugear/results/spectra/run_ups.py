@@ -45,7 +45,7 @@ STORED_LINE = OrderLine("mesh", 100.0)
 LABELS = {
     "gearbox": "synthetic",
     "load_case": "run_up",
-    "mesh_law": "line_of_action",
+    "mesh_model": "line_of_action",
     "inertias": "gears",
     "highest_order": 100.0,
     "method_version": RUN,

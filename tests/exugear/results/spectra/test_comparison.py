@@ -21,7 +21,7 @@ def test_what_only_one_run_shows(runs):
     assert [run.variant for run in comparison.runs] == ["rigid", "bushing"]
 
 
-@pytest.mark.parametrize("key", ["load_case", "mesh_law", "inertias", "gearbox"])
+@pytest.mark.parametrize("key", ["load_case", "mesh_model", "inertias", "gearbox"])
 def test_runs_of_different_models_are_not_compared(runs, tmp_path, key):
     bushing, _ = runs
     other = read_run(write_run(tmp_path / "r.nc", "rigid", [500.0], **{key: "other"}), [STORED_LINE])

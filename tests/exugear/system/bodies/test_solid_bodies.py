@@ -250,7 +250,7 @@ def test_a_gear_in_sectors_has_a_seat_for_each(box: Gearbox) -> None:
     solid = dict(box.content["bodies"]["box"]["solid"])
     wheel = {"sectors": 3, "diameter_mm": 40.0, "width_mm": 8.0}
     with_wheel = solid | {"seats": solid["seats"] | {"wheel": wheel}}
-    case = box.varied({"bodies.box.wheels_z_mm": {"wheel": -6.0}, "bodies.box.solid": with_wheel})
+    case = box.varied({"bodies.box.gears_z_mm": {"wheel": -6.0}, "bodies.box.solid": with_wheel})
     found = solid_body(case, "box")
     assert found.sectors == {"wheel": ("wheel_1", "wheel_2", "wheel_3")}
     assert [seat.name for seat in found.model.seats][:3] == list(found.sectors["wheel"])

@@ -302,8 +302,8 @@ def test_both_solvers_write_the_same_run(grc: Gearbox, tables: dict, tmp_path: P
         expected = two[name].to_numpy()
         # Stored signals have seven digits.
         assert np.abs(one[name].to_numpy() - expected).max() < 1e-6 * np.abs(expected).max(), name
-    assert not one["apart_time"].any()
-    assert not one["outside_time"].any()
+    assert not one["contact_loss_time"].any()
+    assert not one["extrapolation_time"].any()
 
 
 @pytest.mark.validation
@@ -323,11 +323,11 @@ def test_teeth_apart_and_tables_left_are_counted(grc: Gearbox, tables: dict, tmp
     unloaded = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 0.0, "hss": 0.0}})
     run = simulate(unloaded, Choice("rigid", "table"), tables, tmp_path, duration=0.01)
     data = xr.load_dataset(run.path, engine="h5netcdf")
-    assert float(data["apart_time"].min()) == pytest.approx(0.01, rel=0.05)
+    assert float(data["contact_loss_time"].min()) == pytest.approx(0.01, rel=0.05)
     heavy = grc.varied({"load_cases.reference.torques_N_m": {"carrier": 7.2e5, "hss": -7.2e5 / grc.train.ratio}})
     run = simulate(heavy, Choice("rigid", "table"), tables, tmp_path / "heavy", duration=0.01)
     data = xr.load_dataset(run.path, engine="h5netcdf")
-    assert float(data["outside_time"].min()) == pytest.approx(0.01, rel=0.05)
+    assert float(data["extrapolation_time"].min()) == pytest.approx(0.01, rel=0.05)
 
 
 def marked_at(surface: SteSurface, load: int) -> SteSurface:
@@ -346,11 +346,11 @@ def test_a_run_beside_states_that_are_not_solved_says_so(
     marked = tables | {"high_speed": marked_at(tables["high_speed"], 3)}
     run = simulate(grc, Choice(variant, "table"), marked, tmp_path / variant, duration=0.1)
     data = xr.load_dataset(run.path, engine="h5netcdf")
-    beside = dict(zip(data.mesh.values, data.unsolved_time.values, strict=True))
+    beside = dict(zip(data.mesh.values, data.interpolation_time.values, strict=True))
     # Three intervals of fifty, of a train that stands still at first.
     assert 0.0 < beside.pop("high_speed") < 0.1
     assert not any(beside.values())
-    assert not run.trusted and not int(data.attrs["trusted"])
+    assert not run.trusted and not int(data.attrs["valid"])
     assert "high_speed come beside states of their tables that are not solved" in data.attrs["verdict"]
     plain = simulate(grc, Choice(variant, "table"), tables, tmp_path / f"{variant}-plain", duration=0.1)
     assert plain.trusted

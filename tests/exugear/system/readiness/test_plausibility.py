@@ -53,7 +53,7 @@ def shifted_the_other_way(content: dict[str, Any]) -> None:
 
 
 def half_beside(content: dict[str, Any]) -> None:
-    content["bodies"]["output"]["wheels_z_mm"]["wheel"] = 21.0
+    content["bodies"]["output"]["gears_z_mm"]["wheel"] = 21.0
 
 
 def half_a_bearing_bore(content: dict[str, Any]) -> None:
@@ -95,7 +95,7 @@ MISTAKES: dict[str, tuple[str, Callable[[dict[str, Any]], None], str]] = {
     "one bearing": ("pair", without_a_bearing, "bearings.output_left: is the only bearing of output"),
     "centre distance": ("pair", further_apart, "pairs.helical.centre_distance_mm = 129: leaves 926 um of backlash"),
     "profile shift": ("pair", shifted_the_other_way, "profile_shift of both gears (-0.3 and -0.0558) with its sign"),
-    "faces": ("pair", half_beside, "bodies.output.wheels_z_mm.wheel = 21: helical has 20 mm of its face in mesh"),
+    "faces": ("pair", half_beside, "bodies.output.gears_z_mm.wheel = 21: helical has 20 mm of its face in mesh"),
     "bore of a bearing": (
         "pair",
         half_a_bearing_bore,

@@ -152,7 +152,7 @@ def test_a_law_without_contact_resists_with_k_b_squared_over_twelve(grc: Gearbox
 @pytest.mark.parametrize("contact", [False, True])
 def test_the_seed_and_gears_that_only_spin_do_not_tilt(grc: Gearbox, curves: dict, contact: bool) -> None:
     given = contacts(grc) if contact else None
-    for choice in (Choice("bushing", "seed"), Choice("rigid")):
+    for choice in (Choice("bushing", "tangential"), Choice("rigid")):
         assert not assemble(grc, choice, curves, contact=given).meshes.tilt.any()
 
 
@@ -170,7 +170,7 @@ def test_the_state_itself_is_a_balance_with_its_moment(bent: Assembly) -> None:
     assert bent.mesh_states(q, rest, bent.mean_meshes)[-1, FORCE] == pytest.approx(state.force, rel=1e-9)
     f = bent.mesh_forces(q, rest, one)
     along = f[list(ims[TILT : TILT + 2])] + state.force * element.deflection[[TILT, TILT + 1]]
-    assert along @ tilts == pytest.approx(state.force * state.load_centre, rel=1e-6)
+    assert along @ tilts == pytest.approx(state.force * state.load_centroid, rel=1e-6)
     assert np.isfinite(f[list(hss)]).all()
 
 
@@ -195,7 +195,7 @@ def test_contact_of_a_table_is_its_law_near_the_state_on_either_flank(grc: Gearb
     q[own[2]] = (30e-6 - element.deflection[[TILT, TILT + 1]] @ q[own[:2]]) / element.deflection[5]
     state = contact_of(one.table, float(table.mesh_states(q, rest, one)[0, FORCE]), 150e-6)
     assert state.deflection == pytest.approx(30e-6, rel=1e-9)
-    assert abs(state.load_centre) > 1e-3
+    assert abs(state.load_centroid) > 1e-3
     curve = np.array([state.force / state.deflection]), np.array([state.tangent_stiffness])
     law = law_of("line_of_action")
     seen = replace(element, law=law, contact=state.seen_by(flank), table=None, load=state.force)

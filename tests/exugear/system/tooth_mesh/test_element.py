@@ -57,7 +57,7 @@ def states(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return out
 
 
-@pytest.mark.parametrize("law", ["line_of_action", "seed"])
+@pytest.mark.parametrize("law", ["line_of_action", "tangential"])
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 def test_rolling_at_rated_speed_has_no_deflection_rate(grc: Gearbox, stiffness: dict, law: str, variant: str) -> None:
     assembly = assembled(grc, Choice(variant, law), stiffness)
@@ -111,7 +111,7 @@ def test_force_is_the_gradient_of_the_mesh_energy(grc: Gearbox, stiffness: dict)
     assert np.abs(force + gradient).max() < 1e-6 * np.abs(force).max()
 
 
-@pytest.mark.parametrize("law", ["line_of_action", "seed"])
+@pytest.mark.parametrize("law", ["line_of_action", "tangential"])
 def test_power_into_the_bodies_is_the_mesh_power(grc: Gearbox, stiffness: dict, law: str) -> None:
     assembly = assemble(grc, Choice("bushing", law), stiffness)
     q, v = random_state(assembly)
@@ -129,7 +129,7 @@ def test_power_into_the_bodies_is_the_mesh_power(grc: Gearbox, stiffness: dict, 
         assert abs(power - mesh_power) > 1e-3 * abs(mesh_power)
 
 
-@pytest.mark.parametrize("law", ["line_of_action", "seed"])
+@pytest.mark.parametrize("law", ["line_of_action", "tangential"])
 def test_forces_and_moments_of_all_meshes_balance(grc: Gearbox, stiffness: dict, law: str) -> None:
     """Moved or turned as a whole with a turning ring, the gears gain nothing: forces are internal."""
     assembly = assemble(grc, Choice("bushing", law), stiffness)
@@ -218,7 +218,7 @@ def test_phase_in_the_file_overrides_geometry(grc: Gearbox, stiffness: dict) -> 
 
 
 def test_seed_stiffness_is_cos_squared_of_the_tables(grc: Gearbox, stiffness: dict) -> None:
-    for element in mesh_elements(grc, stiffness, law_of("seed")):
+    for element in mesh_elements(grc, stiffness, law_of("tangential")):
         angle = element.mesh.pair.pinion.transverse_pressure_angle
         expected = math.cos(angle) ** 2 * stiffness[element.mesh.pair.name]
         assert np.allclose(element.stiffness, expected, rtol=1e-14)
@@ -226,7 +226,7 @@ def test_seed_stiffness_is_cos_squared_of_the_tables(grc: Gearbox, stiffness: di
 
 def test_seed_force_has_the_printed_direction(grc: Gearbox, stiffness: dict) -> None:
     # T = {1, tan(phi_n) / cos(beta), -tan(beta)}, reference angles, magnitudes.
-    for element in mesh_elements(grc, stiffness, law_of("seed")):
+    for element in mesh_elements(grc, stiffness, law_of("tangential")):
         geometry, pinion = MeshGeometry.of(element.mesh), element.mesh.pair.pinion
         force = element.force[:3]
         assert force @ geometry.tangential == pytest.approx(element.flank, rel=1e-12)

@@ -38,12 +38,12 @@ def check_verbs(case: Path, out: Path, *ste: object) -> list[dict[str, Any]]:
         exugear(*arguments, "--json", "--out", out)
         for arguments in (
             ("ste", case, "--grid", *ste),
-            ("modes", case, "--variant", "bushing", "--mesh-law", "table"),
-            ("run", case, "--variant", "bushing", "--mesh-law", "table", "--duration", 0.01),
+            ("modes", case, "--variant", "bushing", "--mesh-model", "table"),
+            ("run", case, "--variant", "bushing", "--mesh-model", "table", "--duration", 0.01),
         )
     ]
     assert [one.exit_code for one in invoked] == [0, 0, 0], [one.output for one in invoked]
-    assert json.loads(invoked[2].stdout)["longest_time_beside_unsolved_states_s"] == 0.0
+    assert json.loads(invoked[2].stdout)["longest_interpolation_time_s"] == 0.0
     return list(json.loads(invoked[0].stdout)["tables"])
 
 

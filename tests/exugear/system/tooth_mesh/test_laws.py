@@ -39,7 +39,7 @@ def test_the_page_of_choices_says_of_a_law_what_the_table_says(name: str) -> Non
     assert f"| {shown} | {law.description} | {tables} |".replace("|  |", "| |") in GUIDE.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", ["rigid", "springs"])
+@pytest.mark.parametrize("name", ["kinematic", "springs"])
 def test_what_has_no_force_is_refused_with_the_laws_that_have_one(name: str) -> None:
     with pytest.raises(MeshError, match=rf"mesh law '{name}' has no force element; laws are {', '.join(WITH_FORCE)}"):
         law_of(name)
@@ -119,7 +119,7 @@ def test_contact_by_hertz_lies_on_its_curve_at_all_loads() -> None:
         assert found[0] == pytest.approx(share * load, rel=1e-12)
 
 
-@pytest.mark.parametrize("name", ["line_of_action", "constant", "seed"])
+@pytest.mark.parametrize("name", ["line_of_action", "constant", "tangential"])
 def test_only_the_law_line_of_action_is_curved(grc: Gearbox, curves: dict, stiffness: dict, name: str) -> None:
     """Straight laws take from a curve its secant, and a stated stiffness is straight in every law."""
     choice = Choice("rigid", name)

@@ -90,11 +90,11 @@ def test_one_state_does_not_serve_where_a_grid_is_needed_nor_a_grid_with_other_a
 @pytest.mark.validation
 def test_law_table_runs_from_the_command_line_on_its_grid(computed: tuple[Path, Path], tmp_path: Path) -> None:
     case, out = computed
-    arguments = ["--mesh-law", "table", "--variant", "bushing", "--json", "--out", str(out)]
+    arguments = ["--mesh-model", "table", "--variant", "bushing", "--json", "--out", str(out)]
     outcome = exugear("run", case, "--duration", "0.05", *arguments)
     assert outcome.exit_code == 0, outcome.stderr
     summary = json.loads(outcome.stdout)
-    assert summary["mesh_law"] == "table"
+    assert summary["mesh_model"] == "table"
     data = xr.open_dataset(summary["file"])
     assert {"misalignment", "centre_distance_change"} <= set(data)
     # A grid of one load beside the static one ends there, and the gears tilt both ways.

@@ -51,14 +51,14 @@ def test_steady_says_that_the_moment_is_left_out_and_how_much_that_is(tmp_path):
     case = tmp_path / "pair.toml"
     case.write_text(template("pair"), encoding="utf-8")
     usual = ["steady", str(case), "--out", str(tmp_path / "out"), "--variant", "bushing", "--speeds", "500:1500:4"]
-    asked = [*usual, "--mesh-law", "seed"]
+    asked = [*usual, "--mesh-model", "tangential"]
     told = exugear(*asked)
     assert told.exit_code == 0, told.stderr
     words = " ".join(told.stderr.split())
     assert "helical: the load moves by +-" in words
-    assert "is left out by the law seed: peaks of modes in which gears tilt may be many times higher" in words
+    assert "is left out by the law tangential: peaks of modes in which gears tilt may be many times higher" in words
     summary = json.loads(exugear(*asked, "--json").stdout)
-    (own,) = summary["left_out_moments"]
+    (own,) = summary["neglected_shuttling"]
     assert own["pair"] == "helical"
     assert own["over_transmission_error"] > 1.0
     # The usual law has it.

@@ -75,11 +75,11 @@ def with_full_matrices(assembly: Assembly, off_axis: float) -> Assembly:
 def assemblies(grc: Gearbox, stiffness: dict) -> Iterator[Assembly]:
     for law in (name for name, law in LAWS.items() if law.has_force and not law.needs_axes):
         yield assembled(grc, Choice("rigid", law), stiffness)
-    for law in ("line_of_action", "seed"):  # of one row, and of two
+    for law in ("line_of_action", "tangential"):  # of one row, and of two
         yield assembled(grc, Choice("bushing", law), stiffness)
     for choice in (Choice("rigid"), Choice("bushing")):
         yield assemble(grc, choice, curves_of(stiffness), contact=contacts(grc))
-    yield assemble(grc, Choice("rigid", "rigid"), {})
+    yield assemble(grc, Choice("rigid", "kinematic"), {})
     yield with_full_matrices(assemble(grc, Choice("bushing"), stiffness), off_axis=0.05)
     preloaded = replace(CYLINDRICAL, radial_clearance=-20e-6)
     pair = tuple(replace(TAPERED, contact_angle=a, axial_position=0.1 * a) for a in (0.3, -0.3))
@@ -92,17 +92,17 @@ def assemblies(grc: Gearbox, stiffness: dict) -> Iterator[Assembly]:
 @pytest.mark.validation
 def test_accelerations_are_those_of_the_plain_kernels(grc: Gearbox, stiffness: dict) -> None:
     for assembly in assemblies(grc, stiffness):
-        if assembly.mesh_law == "rigid":
+        if assembly.mesh_model == "kinematic":
             continue
         q, v = disturbed(assembly)
         found = CompiledSystem(assembly, q, v, LoadTable(LOAD), STEP).accelerations()
         expected = assembly.accelerations(q, v, assembly.torque_vector(LOAD))
         # The same sums in another order: 1e-16 of positions of 1 m and of spins of 60 rad acts on 1e9 N/m.
-        assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max(), (assembly.variant, assembly.mesh_law)
+        assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max(), (assembly.variant, assembly.mesh_model)
 
 
 def test_gears_that_only_roll_accelerate_together(grc: Gearbox) -> None:
-    assembly = assemble(grc, Choice("rigid", "rigid"), {})
+    assembly = assemble(grc, Choice("rigid", "kinematic"), {})
     rest = np.zeros(assembly.size)
     found = CompiledSystem(assembly, rest, rest, LoadTable(LOAD), STEP).accelerations()
     free = assembly.motions

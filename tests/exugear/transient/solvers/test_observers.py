@@ -61,7 +61,7 @@ def test_columns_of_energy_are_the_observed_terms_of_the_account() -> None:
 
 @pytest.mark.parametrize("choice", [Choice("rigid"), Choice("bushing"), Choice("rigid", "table")])
 def test_columns_of_a_layout_follow_each_other_without_a_gap(grc: Gearbox, stiffness: dict, choice: Choice) -> None:
-    tabled = choice.mesh_law == "table"
+    tabled = choice.mesh_model == "table"
     layout = signal_layout(assemble(grc, choice, surfaces(grc) if tabled else stiffness))
     slices = [layout[signal.name] for signal in SIGNALS if signal.name in layout]
     assert [0, *(columns.stop for columns in slices)] == [*(columns.start for columns in slices), layout.count]
@@ -85,7 +85,7 @@ def test_times_of_meshes_count_the_samples_of_their_law(grc: Gearbox) -> None:
     rows[0, layout["outside_table"].stop - 1] = LEFT_TABLE
     rows[:2, layout["outside_table"].start] = GUESSED
     counts = dict(zip(MESH_TIMES, layout.mesh_times(rows), strict=True))
-    assert counts["apart_time"].tolist() == [3.0] + [0.0] * (len(layout.names["mesh"]) - 1)
-    assert counts["outside_time"].tolist() == [0.0] * (len(layout.names["mesh"]) - 1) + [1.0]
-    assert counts["unsolved_time"].tolist() == [2.0] + [0.0] * (len(layout.names["mesh"]) - 1)
-    assert not counts["pulling_time"].any()
+    assert counts["contact_loss_time"].tolist() == [3.0] + [0.0] * (len(layout.names["mesh"]) - 1)
+    assert counts["extrapolation_time"].tolist() == [0.0] * (len(layout.names["mesh"]) - 1) + [1.0]
+    assert counts["interpolation_time"].tolist() == [2.0] + [0.0] * (len(layout.names["mesh"]) - 1)
+    assert not counts["tensile_time"].any()

@@ -119,7 +119,7 @@ def unexplained_of(gearbox: Gearbox, tables: dict, folder: Path, integrator: str
     options = {"duration": duration, "step": 1.0 / 60e3, "integrator": integrator}
     run = simulate(near, Choice("bushing", "table"), tables, folder / f"{integrator} {rpm}", **options)
     data = opened(run.path)
-    assert float(data.apart_time.max()) > 0.02 * run.end
+    assert float(data.contact_loss_time.max()) > 0.02 * run.end
     return unexplained(data)
 
 

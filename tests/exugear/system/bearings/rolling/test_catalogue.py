@@ -268,7 +268,7 @@ def test_one_row_of_barrels_stands_in_the_middle():
 @pytest.mark.parametrize("kind", ["tapered_roller", "angular_contact_ball"])
 @pytest.mark.parametrize(("towards", "sign"), [("+z", 1.0), ("-z", -1.0)])
 def test_a_single_bearing_holds_the_direction_that_the_file_says(kind, towards, sign):
-    bearing = BearingOfRows(catalogue_rows(section(kind, holds_towards=towards)))
+    bearing = BearingOfRows(catalogue_rows(section(kind, locates_towards=towards)))
     assert equilibrium(bearing, (0.0, 0.0, sign * 1e3)).load[2] == pytest.approx(sign * 1e3)
     with pytest.raises(BearingError, match="no row holds an axial force"):
         equilibrium(bearing, (0.0, 0.0, -sign * 1e3))

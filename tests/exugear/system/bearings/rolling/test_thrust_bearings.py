@@ -38,7 +38,7 @@ def rows(**keys):
 
 @pytest.mark.parametrize(("towards", "sign"), [("+z", 1.0), ("-z", -1.0)])
 def test_it_holds_one_way_and_tilts_freely_about_the_centre_of_its_sphere(towards, sign):
-    found = rows(holds_towards=towards)
+    found = rows(locates_towards=towards)
     state = equilibrium(BearingOfRows(found), (0.0, 0.0, sign * 200e3), tilt=np.zeros(2)).displacement
     with pytest.raises(BearingError):
         equilibrium(BearingOfRows(found), (0.0, 0.0, -sign * 200e3), tilt=np.zeros(2))

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 def view(
     case: CaseArgument,
     variant: VariantOption = Variant.bushing,
-    mesh_law: LawOption = USUAL_LAW,
+    mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     near: Annotated[
         float | None,
@@ -39,7 +39,7 @@ def view(
     ] = None,
     animation: Annotated[bool, typer.Option("--gif", help="Write that mode as an animated picture, too.")] = False,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -47,7 +47,7 @@ def view(
     with exit_codes():
         from exugear.gearbox.choice import Choice
 
-        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
         project.begin()
         project.prepare()
         modes = project.modes()

@@ -95,7 +95,7 @@ def test_a_load_beyond_the_static_rating_is_told(case: Path) -> None:
 
 @pytest.mark.validation
 def test_what_holds_no_axial_load_fails_with_the_bearings_named(case: Path) -> None:
-    loose = rewritten(case, ('holds_towards = "-z"', 'holds_towards = "+z"'))
+    loose = rewritten(case, ('locates_towards = "-z"', 'locates_towards = "+z"'))
     failed = exugear("bearings", loose, "--out", case.parent / "out")
     assert failed.exit_code == 1
     assert "taper_1, taper_2: held along the axis in one direction only" in failed.stderr
@@ -115,7 +115,7 @@ def test_bearings_refuses_what_has_none(case: Path, options: list[str], words: s
 def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
     """By the compiled solver, cages turning: energy closes, and the files say what the bearings follow."""
     out = case.parent / "out"
-    common = [non_linear(case), "--variant", "bushing", "--mesh-law", "iso6336", "--out", out]
+    common = [non_linear(case), "--variant", "bushing", "--mesh-model", "iso6336", "--out", out]
     assert exugear("modes", *common).exit_code == 0
     ran = exugear("run", *common, "--duration", 0.2)
     assert ran.exit_code == 0, ran.stderr
@@ -139,7 +139,7 @@ def test_a_report_leaves_out_what_no_longer_balances(
 ) -> None:
     """An assumption that is varied too far, and a model that has no static state: a line each, no more."""
     out = case.parent / "out"
-    assert exugear("modes", case, "--variant", "bushing", "--mesh-law", "iso6336", "--out", out).exit_code == 0
+    assert exugear("modes", case, "--variant", "bushing", "--mesh-model", "iso6336", "--out", out).exit_code == 0
 
     def unbalanced(*arguments: object) -> None:
         raise BalanceError("static state: no balance found")

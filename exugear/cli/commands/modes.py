@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 def modes(
     case: CaseArgument,
     variant: VariantOption,
-    mesh_law: LawOption = USUAL_LAW,
+    mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -41,7 +41,7 @@ def modes(
         from exugear.gearbox.choice import Choice
         from exugear.system.statics import beside_unsolved_states
 
-        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
         project.begin()
         project.prepare()
         found = project.modes()
@@ -52,7 +52,7 @@ def modes(
             note(f"Unstable: disturbances grow by up to {found.growth_rate:.3g} 1/s; a run diverges", style="yellow")
         if as_json:
             assembly = found.assembly
-            label = {"variant": assembly.variant, "mesh_law": assembly.mesh_law, "inertias": assembly.inertias}
+            label = {"variant": assembly.variant, "mesh_model": assembly.mesh_model, "inertias": assembly.inertias}
             print_json({"case": str(case), **label, "modes": rows, "file": str(path), "picture": str(picture)})
         else:
             print_table(f"Modes of {found.label}", [_mode_row(row) for row in rows], ("what moves",))
@@ -95,7 +95,7 @@ def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
             "mode": mode.index + 1,
             "frequency_Hz": mode.frequency,
             "damping_ratio": mode.damping_ratio,
-            "share_of_overall_dte": mode.share,
+            "te_participation": mode.share,
             "amplification": mode.amplification,
             "name": mode.name,
         }
@@ -108,7 +108,7 @@ def _mode_row(summary: dict[str, Any]) -> dict[str, str]:
         "no.": str(summary["mode"]),
         "Hz": f"{summary['frequency_Hz']:.1f}",
         "damping\n%": f"{100 * summary['damping_ratio']:.2f}",
-        "DTE share\n%": f"{100 * summary['share_of_overall_dte']:.2f}",
+        "DTE share\n%": f"{100 * summary['te_participation']:.2f}",
         "amplif.": f"{summary['amplification']:.2f}",
         "what moves": summary["name"],
     }

@@ -63,7 +63,7 @@ NOTICED_WAY = 0.3
 """Moment of the load's way along the face, over the transmission error's push, that is told."""
 
 
-class Level(StrEnum):
+class Method(StrEnum):
     """What varies: the transmission error as excitation, the stiffness over the mesh cycle, or laws in time."""
 
     linear = "linear"
@@ -74,7 +74,7 @@ class Level(StrEnum):
 def steady(
     case: CaseArgument,
     variant: VariantOption,
-    mesh_law: LawOption = USUAL_LAW,
+    mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     load_case: Annotated[
         str | None,
@@ -86,13 +86,13 @@ def steady(
             show_default=False,
         ),
     ] = None,
-    level: Annotated[
-        Level,
+    method: Annotated[
+        Method,
         typer.Option(
             help="linear: the transmission error as excitation; parametric: stiffness that varies, all meshes at once; "
             "nonlinear: laws in time, such as table with teeth that part, and bearings by iso16281."
         ),
-    ] = Level.parametric,
+    ] = Method.parametric,
     speeds: Annotated[
         str | None,
         typer.Option(
@@ -110,12 +110,10 @@ def steady(
     ] = None,
     branches: Annotated[
         bool,
-        typer.Option(
-            "--branches", help="Follow the states from the first speed to the last through folds (level nonlinear)."
-        ),
+        typer.Option("--continuation", help="Follow states through turning points over speed (--method nonlinear)."),
     ] = False,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -126,11 +124,11 @@ def steady(
     with exit_codes():
         from exugear.gearbox.choice import Choice
 
-        choice = Choice(variant.value, mesh_law.value, inertias, load_case)
-        project = open_project(case, choice, out, files_below, scripts)
+        choice = Choice(variant.value, mesh_model.value, inertias, load_case)
+        project = open_project(case, choice, out, allow_dir, scripts)
         if load_case is not None:
             project = _at_load_of(project, load_case)
-        settings = _settings(project, level, speeds, harmonics, branches)
+        settings = _settings(project, method, speeds, harmonics, branches)
         _refuse_what_has_none(project)
         project.begin()
         project.prepare()
@@ -172,14 +170,14 @@ def _refuse_what_has_none(project: Project) -> None:
 
 
 def _settings(
-    project: Project, level: Level, speeds: str | None, harmonics: int | None, branches: bool
+    project: Project, method: Method, speeds: str | None, harmonics: int | None, branches: bool
 ) -> SteadySettings:
     from exugear.steady.settings import SpeedRange, SteadySettings, check_law, check_speeds, usual_speeds
 
-    check_law(project.choice.mesh_law, level.value)
+    check_law(project.choice.mesh_model, method.value)
     asked = usual_speeds(project.gearbox) if speeds is None else SpeedRange.from_text(speeds)
     check_speeds(project.gearbox, asked)
-    return SteadySettings(asked, level.value, harmonics, branches=branches)
+    return SteadySettings(asked, method.value, harmonics, branches=branches)
 
 
 def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
@@ -198,8 +196,8 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     excited = bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
     if not excited:
         note(
-            f"Nothing excites the gearbox: by the mesh law {data.attrs['mesh_law']} no stiffness varies over the mesh "
-            "cycle, and all lines are zero; take the law line_of_action"
+            f"Nothing excites the gearbox: by the mesh model {data.attrs['mesh_model']} no stiffness varies over the "
+            "mesh cycle, and all lines are zero; take the law line_of_action"
         )
     else:
         _tell_of_harmonics(data)
@@ -208,13 +206,13 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     if as_json:
         summary = _whole_summary(project, settings, data, ranking, pulling, excited)
         remarks = {
-            "left_out_moments": [_wandering_summary(own) for own in wandering],
-            "bearings_beyond_their_line": [_swing_summary(own) for own in swinging],
+            "neglected_shuttling": [_wandering_summary(own) for own in wandering],
+            "bearings_outside_linear_range": [_swing_summary(own) for own in swinging],
         }
         print_json({**summary, **remarks})
         _fail_if_doubtful(data, growth)
         return
-    title = f"Loudest resonances, {_speeds_of(ranking)}, {project.choice.variant}, {settings.level}"
+    title = f"Loudest resonances, {_speeds_of(ranking)}, {project.choice.variant}, {settings.method}"
     title += f", at {static_load_in_words(project.gearbox)}"
     if ranking.resonances:
         print_table(title, [_row(resonance) for resonance in ranking.resonances[:SHOWN_RESONANCES]])
@@ -244,18 +242,19 @@ def _whole_summary(
     found = [peak for peak in peaks(data) if peak.amplitude > LEAST_AMPLITUDE]
     return {
         "case": project.gearbox.source,
-        **{key: str(data.attrs[key]) for key in ("variant", "mesh_law", "inertias", "level")},
+        **{key: str(data.attrs[key]) for key in ("variant", "mesh_model", "inertias", "method")},
         "static_load": static_load_in_words(project.gearbox),
         "speeds": int(data.sizes["point"]),
         "lines": int(data.sizes["line"]),
         "growth_rate_1_per_s": float(data.attrs["growth_rate"]),
         "excited": excited,
         "harmonics": int(data.attrs["harmonics"]),
-        "left_out_of_compliance": _left_out(data),
+        "truncation_of_compliance": _left_out(data),
         "change_with_more_harmonics": _known(float(data.attrs["change_with_more"])),
         "meshes_that_pull": [_pull_summary(pull) for pull in pulling],
-        "unsolved": [
-            {"speed_rpm": load["speed"] / RPM, "reason": load["reason"]} for load in json.loads(data.attrs["unsolved"])
+        "not_converged": [
+            {"speed_rpm": load["speed"] / RPM, "reason": load["reason"]}
+            for load in json.loads(data.attrs["not_converged"])
         ],
         "unstable_points": int((data["growth"] > 0.0).sum()),
         "largest_energy_error": float(abs(data["energy_error"]).max()),
@@ -310,13 +309,13 @@ def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
     from exugear.steady.peaks import pulls
     from exugear.system.tooth_mesh.laws.registry import LAWS
 
-    law = str(data.attrs["mesh_law"])
+    law = str(data.attrs["mesh_model"])
     found: tuple[Pull, ...] = () if LAWS[law].loses_contact else pulls(data)
     for pull in found:
         note(
             f"{pull.mesh}: teeth would have to pull at {pull.count} of {data.sizes['point']} speeds, longest at "
             f"{pull.speed / RPM:.4g} rpm, {100.0 * pull.share:.2g} % of the time: they would part, which the law "
-            f"{law} does not know; take --mesh-law table --level nonlinear",
+            f"{law} does not know; take --mesh-model table --method nonlinear",
             style="yellow",
         )
     return found
@@ -332,7 +331,7 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
     """Say which speeds have no steady state, and where it does not last."""
     from exugear.gearbox.units import RPM
 
-    for missing in json.loads(data.attrs["unsolved"]):
+    for missing in json.loads(data.attrs["not_converged"]):
         note(f"{missing['speed'] / RPM:.4g} rpm: {missing['reason']}", style="yellow")
     for speed, remark in zip(data["speed"].values, data["remark"].values, strict=True):
         if remark:
@@ -348,7 +347,7 @@ def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
     from exugear.system.tooth_mesh.laws.registry import LAWS
     from exugear.system.tooth_mesh.tables import wandering_loads
 
-    law = LAWS[project.choice.mesh_law]
+    law = LAWS[project.choice.mesh_model]
     if law.moves_load or not law.needs_tables or project.choice.variant.spins_only:
         return ()
     found = wandering_loads(project.gearbox, project.folder)
@@ -356,14 +355,14 @@ def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
         note(
             f"{found[0].in_words}; its moment, {found[0].over_error:.2g} times the push of the transmission error, is "
             f"left out by the law {law.name}: peaks of modes in which gears tilt may be many times higher; "
-            "--mesh-law line_of_action has it",
+            "--mesh-model line_of_action has it",
             style="yellow",
         )
     return found
 
 
 def _wandering_summary(load: WanderingLoad) -> dict[str, Any]:
-    return {"pair": load.pair, "load_centre_m": load.amplitude, "over_transmission_error": load.over_error}
+    return {"pair": load.pair, "load_centroid_m": load.amplitude, "over_transmission_error": load.over_error}
 
 
 def _left_out(data: xr.Dataset) -> dict[str, float]:
@@ -399,7 +398,7 @@ def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
     if data.attrs["bearings_in_time"]:
         note(f"Bearings by their rolling elements: {data.attrs['bearings_in_time']}")
     elif "rows by" in data.attrs["bearing_laws"]:
-        note("Non-linear bearings are linear about the static state here; --level nonlinear evaluates their law")
+        note("Non-linear bearings are linear about the static state here; --method nonlinear evaluates their law")
     variation = float(data.attrs["stiffness_variation"])
     if variation > NOTICED_VARIATION:
         note(
@@ -417,7 +416,7 @@ def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
         note(
             f"Vibration takes {100.0 * STRAINED:.0f} % or more of the static load of bearings ({worst}{more}): their "
             "rows are no straight line so far off, and peaks there come out too high, by half where one comes free; "
-            'law = "iso16281" and --level nonlinear follow them',
+            'model = "iso16281" and --method nonlinear follow them',
             style="yellow",
         )
     return swinging

@@ -35,7 +35,7 @@ def export(
         typer.Option("--to", metavar="FILE", help="File to write. (default: NAME-exugear beside FILE.rexs)"),
     ] = None,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     shifts: ShiftsOption = ShiftRule.file,
     distances: DistancesOption = DistanceRule.agreeing,
     as_json: JsonOption = False,
@@ -55,7 +55,7 @@ def export(
         target = to or rexs.with_name(_new_name(rexs.name))
         if target.exists():
             raise BadInputError(f"{target}: is there already; name another file with --to")
-        gearbox = read_gearbox(case, files_below)
+        gearbox = read_gearbox(case, allow_dir)
         try:
             exported = with_results(gearbox, out or default_folder(case), rexs, Rules(shifts.value, distances.value))
         except RexsError as error:

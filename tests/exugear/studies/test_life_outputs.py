@@ -1,4 +1,4 @@
-"""Lives as figures of studies: what the verb `life` tells, damage without end, what is refused on reading."""
+"""Lives as outputs of studies: what the verb `life` tells, damage without end, what is refused on reading."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from exugear.life.life_file import summary
 from exugear.project import Project
 from exugear.studies.dataset import load_study
 from exugear.studies.executors import processes
-from exugear.studies.figures import contact_safeties, worst_planets
 from exugear.studies.pictures import draw_study
 from exugear.studies.point_results import PointResults, PointSettings, Shared
+from exugear.studies.quantities import contact_safeties, worst_planets
+from exugear.studies.runner import run_study
 from exugear.studies.sections import StudyError
 from exugear.studies.study import Study
-from exugear.studies.sweep import sweep
 
 from ..cases.case_mutations import toml_text
 from ..cases.command import exugear
@@ -32,19 +32,19 @@ from ..life.test_verdicts import hertzian, planets_with
 pytestmark = pytest.mark.usefixtures("coarse_tables")
 
 CASE = "gearbox.toml"
-FIGURES = {
-    "S_H": {"figure": "contact_safety"},
-    "S_F": {"figure": "root_safety", "gear": "wheel"},
-    "by_standard": {"figure": "contact_safeties", "of": "iso6336"},
-    "at_rest": {"figure": "root_safeties", "of": "static"},
-    "pitting": {"figure": "contact_damages"},
-    "breakage": {"figure": "root_damage"},
-    "L10": {"figure": "bearing_lives", "by": "L10"},
-    "least_life": {"figure": "bearing_life"},
-    "wear": {"figure": "bearing_damage", "bearing": "bearing_1"},
-    "S_0": {"figure": "static_safety"},
-    "hours": {"figure": "life_hours"},
-    "short": {"figure": "shortfalls"},
+QUANTITIES = {
+    "S_H": {"quantity": "contact_safety"},
+    "S_F": {"quantity": "root_safety", "gear": "wheel"},
+    "by_standard": {"quantity": "contact_safeties", "of": "iso6336"},
+    "at_rest": {"quantity": "root_safeties", "of": "static"},
+    "pitting": {"quantity": "contact_damages"},
+    "breakage": {"quantity": "root_damage"},
+    "L10": {"quantity": "bearing_lives", "by": "L10"},
+    "least_life": {"quantity": "bearing_life"},
+    "wear": {"quantity": "bearing_damage", "bearing": "bearing_1"},
+    "S_0": {"quantity": "static_safety"},
+    "hours": {"quantity": "life_hours"},
+    "short": {"quantity": "shortfalls"},
 }
 
 
@@ -54,9 +54,9 @@ def content(folder: Path, **changes):
     return {
         "name": "lives",
         "case": str(folder / CASE),
-        "choice": {"variant": "bushing", "mesh_law": "iso6336"},
+        "choice": {"variant": "bushing", "mesh_model": "iso6336"},
         "parameters": {"K_v": {"path": "rating.dynamic_factor", "values": [1.0, 2.4]}},
-        "figures": FIGURES,
+        "outputs": QUANTITIES,
         **changes,
     }
 
@@ -65,7 +65,7 @@ def content(folder: Path, **changes):
 def swept(tmp_path_factory):
     """The study, carried out."""
     folder = tmp_path_factory.mktemp("lives")
-    return folder, sweep(Study.from_dict(content(folder)), folder / "out", processes(1)).dataset
+    return folder, run_study(Study.from_dict(content(folder)), folder / "out", processes(1)).dataset
 
 
 @pytest.mark.validation
@@ -104,7 +104,7 @@ def test_damage_without_end_is_infinite_in_file_journal_and_picture(swept):
     assert "not to be trusted" in str(last["doubts"].item()) and not str(last["error"].item())
     lines = "".join(path.read_text() for path in (folder / "out" / "points").iterdir())
     assert '"infinite"' in lines and "Infinity" not in lines
-    again = sweep(Study.from_dict(content(folder)), folder / "out", processes(1))
+    again = run_study(Study.from_dict(content(folder)), folder / "out", processes(1))
     assert again.computed == 0 and again.dataset["pitting"].identical(data["pitting"])
     names = {path.name for path in draw_study(stored, folder / "drawn")}
     assert "pitting.png" in names
@@ -120,15 +120,15 @@ def test_a_dynamic_factor_of_a_run_is_that_of_each_point(swept):
     folder, data = swept
     case = content_of(TABLE, folder)
     del case["rating"]["dynamic_factor"]
-    case["rating"] |= {"dynamic_factor_run": "run_up", "least_dynamic_factor": 1.01}
+    case["rating"] |= {"dynamic_factor_run": "run_up", "minimum_dynamic_factor": 1.01}
     (folder / "run.toml").write_text(toml_text(case), encoding="utf-8")
-    study = content(folder, case=str(folder / "run.toml"), figures={"S_H": {"figure": "contact_safety"}})
+    study = content(folder, case=str(folder / "run.toml"), outputs={"S_H": {"quantity": "contact_safety"}})
     study |= {
-        "choice": {"variant": "bushing", "mesh_law": "line_of_action"},
+        "choice": {"variant": "bushing", "mesh_model": "line_of_action"},
         "parameters": {"damping": {"path": "damping.mesh_time_s", "values": [1e-6, 5e-6]}},
         "run": {"duration_s": 0.3},
     }
-    found = sweep(Study.from_dict(study), folder / "out", processes(1))
+    found = run_study(Study.from_dict(study), folder / "out", processes(1))
     assert not found.failed, [record.error for record in found.failed]
     little, much = found.dataset["S_H"].to_numpy().tolist()
     assert little < much < float(data["S_H"][0])  # that of K_v = 1
@@ -167,22 +167,31 @@ def test_the_worst_planet_is_that_of_the_life(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"figures": {"f": {"figure": "contact_safety", "gear": "sun"}}}, "no such gear; there are pinion, wheel"),
-        ({"figures": {"f": {"figure": "contact_safety", "of": "lif"}}}, "no such of; there are life, static, iso6336"),
-        ({"figures": {"f": {"figure": "bearing_life", "by": "L11"}}}, "no such by; there are least, L10, L10r, L10m"),
-        ({"figures": {"f": {"figure": "bearing_life", "bearing": "b"}}}, "no such bearing; there are bearing_1"),
+        ({"outputs": {"f": {"quantity": "contact_safety", "gear": "sun"}}}, "no such gear; there are pinion, wheel"),
         (
-            {"figures": {"f": {"figure": "static_safety"}}, "choice": {"variant": "rigid", "mesh_law": "iso6336"}},
-            "figures.f: is one of bearings with a section catalogue, which the variant 'rigid'",
+            {"outputs": {"f": {"quantity": "contact_safety", "of": "lif"}}},
+            "no such of; there are life, static",
         ),
-        ({"figures": {"f": {"figure": "loudest_peak"}}}, "give a section [steady] with speeds"),
-        ({"figures": {"f": {"figure": "rms", "signal": "noise"}}}, "figures.f.signal = 'noise': no such signal; there"),
         (
-            {"figures": {"f": {"figure": "loudest_peak", "signal": "mesh_dte x"}}, "steady": {"speeds": "0:100:5"}},
+            {"outputs": {"f": {"quantity": "bearing_life", "by": "L11"}}},
+            "no such by; there are minimum, L10",
+        ),
+        ({"outputs": {"f": {"quantity": "bearing_life", "bearing": "b"}}}, "no such bearing; there are bearing_1"),
+        (
+            {"outputs": {"f": {"quantity": "static_safety"}}, "choice": {"variant": "rigid", "mesh_model": "iso6336"}},
+            "outputs.f: is one of bearings with a section catalogue, which the variant 'rigid'",
+        ),
+        ({"outputs": {"f": {"quantity": "loudest_peak"}}}, "give a section [steady] with speeds"),
+        (
+            {"outputs": {"f": {"quantity": "rms", "signal": "noise"}}},
+            "outputs.f.signal = 'noise': no such signal",
+        ),
+        (
+            {"outputs": {"f": {"quantity": "loudest_peak", "signal": "mesh_dte x"}}, "steady": {"speeds": "0:100:5"}},
             "no such signal; there are overall_dte, mesh_dte spur, mesh_force spur",
         ),
         (
-            {"figures": {"f": {"figure": "largest_line", "line": "2 x nope"}}, "steady": {"speeds": "0:100:5"}},
+            {"outputs": {"f": {"quantity": "largest_line", "line": "2 x nope"}}, "steady": {"speeds": "0:100:5"}},
             "no such line; lines are as spur and 2 x spur",
         ),
     ],
@@ -205,14 +214,14 @@ def test_lives_need_loads_and_strengths_before_any_work(tmp_path, without, words
     with pytest.raises(CaseError, match=words):
         Study.from_dict(study)
     (tmp_path / "a.study.toml").write_text(toml_text({**study, "case": CASE}), encoding="utf-8")
-    outcome = exugear("sweep", tmp_path / "a.study.toml", "--out", tmp_path / "out")
+    outcome = exugear("study", tmp_path / "a.study.toml", "--out", tmp_path / "out")
     assert outcome.exit_code == 2 and words in outcome.stderr
     assert not (tmp_path / "out").exists()
 
 
 def test_a_failed_point_of_a_life_names_parameter_and_value(tmp_path):
     parameters = {"bin": {"path": "loads.sources.spectrum.hours_per_year", "values": [-1.0]}}
-    swept = sweep(Study.from_dict(content(tmp_path, parameters=parameters)), tmp_path / "out", processes(1))
+    swept = run_study(Study.from_dict(content(tmp_path, parameters=parameters)), tmp_path / "out", processes(1))
     (error,) = [record.error for record in swept.records.values()]
     assert "parameters.bin: loads.sources.spectrum.hours_per_year = -1.0" in error
     assert np.isnan(swept.dataset["S_H"].to_numpy()).all()
@@ -229,7 +238,7 @@ def hashes(folder: Path, change=lambda case: None, **changes) -> str:
 def test_points_belong_to_all_that_their_figures_read(tmp_path):
     """Settings of tables belong to every point; loads, also by a pattern of files, and strengths to lives alone."""
     modal = {
-        "figures": {"f": {"figure": "frequencies"}},
+        "outputs": {"f": {"quantity": "frequencies"}},
         "parameters": {"a": {"path": "housing.factor", "values": [1]}},
     }
     seats = {"parameters": {"a": {"path": "housing.factor", "values": [1]}}}
@@ -259,6 +268,6 @@ def test_points_belong_to_all_that_their_figures_read(tmp_path):
 def test_json_of_the_verb_has_no_number_that_json_has_not(swept):
     folder, _ = swept
     (folder / "a.study.toml").write_text(toml_text({**content(folder), "case": CASE}), encoding="utf-8")
-    outcome = exugear("sweep", folder / "a.study.toml", "--out", folder / "out", "--workers", "1", "--json")
+    outcome = exugear("study", folder / "a.study.toml", "--out", folder / "out", "--workers", "1", "--json")
     assert outcome.exit_code == 0, outcome.stderr
     assert json.loads(outcome.stdout, parse_constant=lambda token: pytest.fail(token))["finished"] == 2

@@ -35,10 +35,10 @@ MESH_PRESSURE = (
 def bearings(
     case: CaseArgument,
     variant: VariantOption = Variant.bushing,
-    mesh_law: LawOption = USUAL_LAW,
+    mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -54,7 +54,7 @@ def bearings(
 
         if not variant.on_bearings:
             raise BadInputError(f"--variant {variant}: has ideal joints in place of bearings; use bushing or flexible")
-        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
         if not any(bearing.catalogue for bearing in project.gearbox.bearings):
             raise BadInputError(f"{case}: no bearing has catalogue data; add a [bearings.NAME.catalogue]")
         project.begin()
@@ -62,7 +62,7 @@ def bearings(
         duties, meshes = project.duties()
         path = project.bearings_path
         if as_json:
-            choice = {"variant": variant.value, "mesh_law": mesh_law.value, "inertias": project.choice.inertias}
+            choice = {"variant": variant.value, "mesh_model": mesh_model.value, "inertias": project.choice.inertias}
             print_json({"case": str(case), **choice, **duties_summary(duties, meshes), "file": str(path)})
             return
         title = f"Bearings under the static load, {variant.value}"
@@ -129,7 +129,7 @@ def _mesh_row(duty: MeshDuty) -> dict[str, str]:
         "force\nkN": f"{1e-3 * duty.force:.4g}",
         "misaligned\nmrad": f"{1e3 * duty.misalignment:.3f}",
         "opens +z\nµm": f"{1e6 * duty.opening:.1f}",
-        "load centre\nmm": shown(1e3 * duty.load_centre, ".1f"),
+        "load centre\nmm": shown(1e3 * duty.load_centroid, ".1f"),
         "K_Hbeta": shown(duty.face_load_factor, ".2f"),
         "pressure\nMPa": shown(1e-6 * duty.pressure, ".0f"),
     }

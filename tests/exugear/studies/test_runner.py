@@ -32,7 +32,7 @@ from exugear.studies.executors import (
     read_journals,
 )
 from exugear.studies.point_results import Shared
-from exugear.studies.sweep import Shard, sweep, task_of
+from exugear.studies.runner import Shard, run_study, task_of
 from fe_ste.transmission_error.table import MeshTable
 
 from ..cases.spur import COARSE_INPUT
@@ -51,7 +51,7 @@ def home(tmp_path_factory):
 @pytest.fixture(scope="module")
 def here(home):
     """The study done in this process; nobody changes its folder."""
-    return sweep(small_study(home), home / "here", HERE)
+    return run_study(small_study(home), home / "here", HERE)
 
 
 def journal_lines(folder):
@@ -76,13 +76,13 @@ def test_points_are_those_of_gearboxes_varied_one_by_one(here, home):
 @pytest.mark.validation
 @pytest.mark.long
 def test_one_process_and_two_give_the_same_bits(here, home, tmp_path):
-    two = sweep(small_study(home), tmp_path / "two", processes(2))
+    two = run_study(small_study(home), tmp_path / "two", processes(2))
     xr.testing.assert_identical(figures_of(two.dataset), figures_of(here.dataset))
 
 
 def test_any_executor_of_the_protocol_serves(here, home, tmp_path):
     with ThreadPoolExecutor(1) as executor:
-        other = sweep(small_study(home), tmp_path / "threads", given(executor))
+        other = run_study(small_study(home), tmp_path / "threads", given(executor))
     xr.testing.assert_identical(figures_of(other.dataset), figures_of(here.dataset))
 
 
@@ -95,7 +95,7 @@ def test_a_worker_that_is_killed_costs_nothing_but_time(here, home, tmp_path):
             killed.append(multiprocessing.active_children()[0].pid)
             os.kill(killed[0], signal.SIGKILL)
 
-    swept = sweep(small_study(home), tmp_path / "killed", processes(2), progress=kill_one)
+    swept = run_study(small_study(home), tmp_path / "killed", processes(2), progress=kill_one)
     assert killed and not swept.failed
     xr.testing.assert_identical(figures_of(swept.dataset), figures_of(here.dataset))
 
@@ -108,14 +108,14 @@ sys.path.insert(0, {str(ROOT)!r})
 import os, time
 from exugear.studies import executors
 from exugear.studies.study import Study
-from exugear.studies.sweep import sweep
+from exugear.studies.runner import run_study
 
 compute = executors.compute_point
 def slow(task, work):
     time.sleep(0.2)
     return compute(task, work)
 executors.compute_point = slow
-sweep(Study.from_dict({study_content(home)!r}), {str(tmp_path / "again")!r}, executors.processes(1))
+run_study(Study.from_dict({study_content(home)!r}), {str(tmp_path / "again")!r}, executors.processes(1))
 """
     running = subprocess.Popen([sys.executable, "-c", program], cwd=ROOT)
     deadline = time.monotonic() + 120.0
@@ -126,7 +126,7 @@ sweep(Study.from_dict({study_content(home)!r}), {str(tmp_path / "again")!r}, exe
     study, folder = small_study(home), tmp_path / "again"
     finished = read_journals(folder, {name for name, _ in study.hashed_points()})
     assert 3 <= len(finished) < 12
-    swept = sweep(study, folder, HERE)
+    swept = run_study(study, folder, HERE)
     assert swept.computed == 12 - len(finished)
     assert journal_lines(folder) == 12
     xr.testing.assert_identical(figures_of(swept.dataset), figures_of(here.dataset))
@@ -136,13 +136,13 @@ def test_a_study_that_grows_keeps_the_points_it_had(here, home, tmp_path):
     content = study_content(home)
     content["parameters"]["seat"]["values"] += [0.9]
     shutil.copytree(here.path.parent, tmp_path / "here")
-    grown = sweep(small_study(home, parameters=content["parameters"]), tmp_path / "here", HERE)
+    grown = run_study(small_study(home, parameters=content["parameters"]), tmp_path / "here", HERE)
     assert grown.computed == 3 and grown.dataset.sizes["seat"] == 5
 
 
 def test_other_figures_or_another_case_are_other_points(tmp_path):
     study = small_study(tmp_path)
-    other_figure = small_study(tmp_path, figures={"nearest": {"figure": "nearest_frequency", "near_Hz": 600.0}})
+    other_figure = small_study(tmp_path, outputs={"nearest": {"quantity": "nearest_frequency", "near_Hz": 600.0}})
     other_case = small_study(tmp_path, changes={"damping.mesh_time_s": 5e-6})
     names = [{name for name, _ in own.hashed_points()} for own in (study, other_figure, other_case)]
     assert len(set.union(*names)) == 36
@@ -150,27 +150,27 @@ def test_other_figures_or_another_case_are_other_points(tmp_path):
 
 def test_shards_are_parts_that_merge_to_the_whole(here, home, tmp_path):
     folder = tmp_path / "parts"
-    first = sweep(small_study(home), folder, HERE, shard=Shard(1, 2))
+    first = run_study(small_study(home), folder, HERE, shard=Shard(1, 2))
     assert first.computed == 6 and first.path is None
-    merged = sweep(small_study(home), folder, HERE, merge=True)
+    merged = run_study(small_study(home), folder, HERE, merge=True)
     assert merged.computed == 0 and int(np.isnan(merged.dataset["nearest"]).sum()) == 6
     assert merged.dataset.attrs["missing"] == 6
-    second = sweep(small_study(home), folder, HERE, shard=Shard(2, 2))
+    second = run_study(small_study(home), folder, HERE, shard=Shard(2, 2))
     assert second.computed == 6 and second.path is not None
     xr.testing.assert_identical(figures_of(second.dataset), figures_of(here.dataset))
 
 
 def test_a_point_that_fails_is_told_and_stops_no_other(tmp_path):
-    drawn = {"seat": {"path": "housing.factor", "uniform": {"least": 0.6, "most": 1.4}}}
+    drawn = {"seat": {"path": "housing.factor", "uniform": {"min": 0.6, "max": 1.4}}}
     study = small_study(tmp_path, parameters=drawn, samples=8)
-    swept = sweep(study, tmp_path / "out", HERE)
+    swept = run_study(study, tmp_path / "out", HERE)
     assert len(swept.failed) == 4  # a Latin hypercube: half of the draws lie beyond 1
     assert all("housing.factor" in record.error and "between 0.001 and 1" in record.error for record in swept.failed)
     beyond = swept.dataset["seat"] > 1.0
     assert bool((np.isnan(swept.dataset["nearest"]) == beyond).all())
     assert bool(((swept.dataset["error"] != "") == beyond).all())
-    assert sweep(study, tmp_path / "out", HERE).computed == 0
-    assert sweep(study, tmp_path / "out", HERE, retry=True).computed == 4
+    assert run_study(study, tmp_path / "out", HERE).computed == 0
+    assert run_study(study, tmp_path / "out", HERE, retry=True).computed == 4
 
 
 class Breaking:
@@ -209,13 +209,13 @@ def test_an_executor_that_was_given_is_not_started_again(tmp_path):
     study = small_study(tmp_path)
     first = next(study.hashed_points())[0]
     with pytest.raises(ExecutorError, match="what is finished is kept"):
-        sweep(study, tmp_path / "out", given(Breaking(first), 1))
+        run_study(study, tmp_path / "out", given(Breaking(first), 1))
 
 
 def test_a_line_that_was_cut_short_is_no_point(tmp_path):
     journal = Journal(tmp_path)
     for name in ("a", "b"):
-        journal.add(Record(name, {"figure": 1.25, "several": {"1": None}}))
+        journal.add(Record(name, {"quantity": 1.25, "several": {"1": None}}))
     (path,) = tmp_path.glob("points/*.jsonl")
     whole = path.read_bytes()
     for length in range(len(whole) // 2 + 1, len(whole) - 1):
@@ -231,9 +231,9 @@ def test_points_with_one_table_compute_it_once(tmp_path, monkeypatch):
     computed = []
     compute = MeshTable.compute
     monkeypatch.setattr(MeshTable, "compute", lambda *args, **options: computed.append(1) or compute(*args, **options))
-    figures = {"ripple": {"figure": "ste_peak_to_peak", "pair": "spur"}, "modes": {"figure": "frequencies"}}
-    choice = {"variant": "bushing", "mesh_law": "line_of_action"}
-    swept = sweep(small_study(tmp_path, figures=figures, choice=choice), tmp_path / "out", HERE)
+    outputs = {"ripple": {"quantity": "ste_peak_to_peak", "pair": "spur"}, "modes": {"quantity": "frequencies"}}
+    choice = {"variant": "bushing", "mesh_model": "line_of_action"}
+    swept = run_study(small_study(tmp_path, outputs=outputs, choice=choice), tmp_path / "out", HERE)
     assert not swept.failed and computed == [1]
     assert float(swept.dataset["ripple"].max()) > 1e-7
 
@@ -258,7 +258,7 @@ def test_two_that_want_the_same_table_wait_for_one(tmp_path, monkeypatch):
 def test_memory_of_a_worker_does_not_grow_with_its_points(tmp_path):
     values = {"seat": {"path": "housing.factor", "range": {"first": 0.1, "last": 0.9, "count": 190}}}
     study = small_study(tmp_path, parameters=values)
-    swept = sweep(study, tmp_path / "out", HERE)
+    swept = run_study(study, tmp_path / "out", HERE)
     memory = swept.dataset["memory"].to_numpy()
     assert memory[-1] - memory[60] < 20e6  # a gearbox that stayed behind would be 0.2 MB a point
 
@@ -270,11 +270,11 @@ def test_a_run_that_was_stopped_is_gone_on_with(tmp_path, monkeypatch):
     monkeypatch.setattr(recorder, "FLUSH_INTERVAL", 1e-3)
     settings = {
         "parameters": {"seat": {"path": "housing.factor", "values": [0.4]}},
-        "figures": {"rms": {"figure": "rms"}, "speed": {"figure": "final_speed"}},
+        "outputs": {"rms": {"quantity": "rms"}, "speed": {"quantity": "final_speed"}},
         "run": {"duration_s": 0.05},
     }
     study = small_study(tmp_path, **settings)
-    whole = sweep(study, tmp_path / "whole", HERE)
+    whole = run_study(study, tmp_path / "whole", HERE)
     assert not whole.failed, whole.failed
     assert float(whole.dataset["rms"].max()) > 0.0
     assert not list((tmp_path / "whole" / "work").glob("*"))
@@ -290,5 +290,5 @@ def test_a_run_that_was_stopped_is_gone_on_with(tmp_path, monkeypatch):
     monkeypatch.setattr("exugear.studies.point_results.stop_if_asked", stop_once)
     with pytest.raises(executors.StoppedError):
         compute_batch(task, [Work(name, point.changes)])
-    again = sweep(study, tmp_path / "again", HERE)
+    again = run_study(study, tmp_path / "again", HERE)
     xr.testing.assert_identical(figures_of(again.dataset), figures_of(whole.dataset))

@@ -59,7 +59,7 @@ def run(
     context: typer.Context,
     case: CaseArgument,
     variant: VariantOption,
-    mesh_law: LawOption = USUAL_LAW,
+    mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     load_case: Annotated[
         str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
@@ -100,7 +100,7 @@ def run(
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -113,8 +113,8 @@ def run(
         from exugear.gearbox.reading import CaseError
         from exugear.results.folder import time_noted
 
-        choice = Choice(variant.value, mesh_law.value, inertias, load_case)
-        project = open_project(case, choice, out, files_below, scripts)
+        choice = Choice(variant.value, mesh_model.value, inertias, load_case)
+        project = open_project(case, choice, out, allow_dir, scripts)
         if resume:
             duration = _duration_to_resume(project, duration)
         kept = _kept_band(project, band, resume)
@@ -167,7 +167,7 @@ def _load_case(project: Project) -> LoadCase:
 def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
     """Name of a run in the account of times."""
     choice = project.choice
-    label = f"run, {choice.variant}, {choice.load_case}, {choice.inertias}, {choice.mesh_law}, solver {solver}"
+    label = f"run, {choice.variant}, {choice.load_case}, {choice.inertias}, {choice.mesh_model}, solver {solver}"
     if route is MeshRoute.loads:
         return f"{label}, meshes as loads"
     return label
@@ -194,7 +194,7 @@ def _check_extent(project: Project, duration: float | None, sample_rate: float, 
     gearbox = project.gearbox
     load_case = _load_case(project)
     jointed = project.choice.variant.spins_only
-    tabled = LAWS[project.choice.mesh_law].signals_positions
+    tabled = LAWS[project.choice.mesh_model].signals_positions
     supports = gearbox.joints if jointed else gearbox.bearings
     size = sample_bytes(len(gearbox.meshes), len(supports), tabled, jointed)
     check_duration(gearbox, load_case, duration, sample_rate)
@@ -261,7 +261,7 @@ def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
     from exugear.system.tooth_mesh.laws.registry import LAWS
 
     load_case = _load_case(project)
-    law = LAWS[project.choice.mesh_law]
+    law = LAWS[project.choice.mesh_model]
     loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
     of_bearings = doubt_about_bearings(project.gearbox, loads, project.choice.variant)
     of_tables = doubt_about_tables(project.gearbox, loads, law.of_one_load)
@@ -305,10 +305,10 @@ def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, co
 
     data, attributes = read_run(finished.path, ("input_speed", *MESH_TIMES, *BALANCE_TERMS))
     longest = {name: float(np.max(data[name], initial=0.0)) for name in MESH_TIMES}  # a rotor has no meshes
-    outside = longest["outside_time"]
+    outside = longest["extrapolation_time"]
     summary = {
         "case": str(case),
-        **{key: str(attributes[key]) for key in ("variant", "load_case", "mesh_law", "inertias", "solver")},
+        **{key: str(attributes[key]) for key in ("variant", "load_case", "mesh_model", "inertias", "solver")},
         "file": str(finished.path),
         "simulated_s": finished.end,
         "wall_s": round(finished.wall, 2),
@@ -319,12 +319,12 @@ def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, co
         "energy_not_accounted_for": energy_residual(data),
         "load": str(attributes.get("load", "")),
         **{doubt: str(attributes.get(doubt, "")) for doubt in ("table_doubt", "band_doubt", "bearing_doubt")},
-        "longest_pull_of_a_mesh_s": longest["pulling_time"],
-        "longest_time_apart_s": longest["apart_time"],
+        "longest_tensile_time_s": longest["tensile_time"],
+        "longest_contact_loss_s": longest["contact_loss_time"],
         "longest_time_outside_table_s": outside,
-        "longest_time_beside_unsolved_states_s": longest["unsolved_time"],
+        "longest_interpolation_time_s": longest["interpolation_time"],
         "complete": finished.complete,
-        "trusted": finished.trusted,
+        "valid": finished.trusted,
         "reasons": list(finished.reasons),
     }
     if comparison is not None:
@@ -343,7 +343,7 @@ def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, co
 
 def _print_run(summary: dict[str, Any], outside: float) -> None:
     say(
-        f"{summary['variant']}, {summary['load_case']} ({summary['load']}), law {summary['mesh_law']}, "
+        f"{summary['variant']}, {summary['load_case']} ({summary['load']}), law {summary['mesh_model']}, "
         f"inertias {summary['inertias']}: "
         f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.1f} s ({summary['solver']}), "
         f"{summary['input_speed_rpm']:.1f} rpm reached"
@@ -358,6 +358,6 @@ def _print_run(summary: dict[str, Any], outside: float) -> None:
     if outside > 0.0:
         say(
             f"A mesh was outside its table for {outside:.3g} s, where the table goes on in a straight line: "
-            "outside_time in the results names the mesh; widen the axes of [ste]"
+            "extrapolation_time in the results names the mesh; widen the axes of [ste]"
         )
     say(f"Results in {summary['file']}")

@@ -1,4 +1,4 @@
-"""Figures that studies keep of a point, of modes, statics, tables, steady responses, runs, lives; their table.
+"""Outputs that studies keep of a point, of modes, statics, tables, steady responses, runs, lives; their table.
 
 Of several planets the one that is worn most is rated. A damage without end is infinite, and so is a life that nothing
 ends.
@@ -23,21 +23,21 @@ from exugear.system.modes import FREE_ROTATION, Modes
 from exugear.system.signals import SIGNALS
 from fe_ste.tools.arrays import Floats
 
-# A figure: a number of a point, or some by name, with unit, and the options that say which
+# A output: a number of a point, or some by name, with unit, and the options that say which
 
 Values = float | Mapping[str, float]
-"""One number, or several by name along the figure's dimension."""
+"""One number, or several by name along the output's dimension."""
 Needs = Literal["", "run", "steady", "life", "bearings"]
-"""What a figure is read from, where it is more than modes, tables and the static state: a run, a steady response, a
+"""What a output is read from, where it is more than modes, tables and the static state: a run, a steady response, a
 life, or bearings in that life."""
 
 
-class FigureError(ValueError):
-    """A figure that is not known, or options that it has not got."""
+class OutputError(ValueError):
+    """A output that is not known, or options that it has not got."""
 
 
 @dataclass(frozen=True)
-class Figure:
+class Quantity:
     """What is kept of a point."""
 
     function: Callable[..., Values]
@@ -70,12 +70,12 @@ class Figure:
             if key not in known:
                 near = difflib.get_close_matches(key[:100], known, n=1)
                 hint = f"did you mean {near[0]!r}?" if near else f"its options are {', '.join(known) or 'none'}"
-                raise FigureError(f"figures.{name}.{key}: no such option; {hint}")
+                raise OutputError(f"outputs.{name}.{key}: no such option; {hint}")
             if not _fits(value, str(known[key].annotation)):
-                raise FigureError(f"figures.{name}.{key} = {value!r}: must be {_WORDS[str(known[key].annotation)]}")
+                raise OutputError(f"outputs.{name}.{key} = {value!r}: must be {_WORDS[str(known[key].annotation)]}")
         for key, parameter in known.items():
             if parameter.default is inspect.Parameter.empty and key not in options:
-                raise FigureError(f"figures.{name}.{key}: this option is missing")
+                raise OutputError(f"outputs.{name}.{key}: this option is missing")
 
 
 _WORDS = {
@@ -95,7 +95,7 @@ def _fits(value: object, kind: str) -> bool:
     return isinstance(value, _TYPES[kind]) and (kind == "bool" or not isinstance(value, bool))
 
 
-# Figures of eigenmodes
+# Outputs of eigenmodes
 
 
 def frequencies(results: PointResults, *, count: int = 12) -> dict[str, float]:
@@ -151,7 +151,7 @@ def _element(modes: Modes, name: str) -> int:
     return modes.element_names.index(name)
 
 
-# Figures of the static state: what meshes carry, and how evenly planets share it
+# Outputs of the static state: what meshes carry, and how evenly planets share it
 
 
 def mesh_forces(results: PointResults) -> dict[str, float]:
@@ -185,7 +185,7 @@ def of_planets(results: PointResults, family: str, values: Floats) -> Floats:
     return np.asarray(values[..., chosen], dtype=np.float64)
 
 
-# Figures of runs in time
+# Outputs of runs in time
 
 SETTLING = 0.25
 """Share of a run that is left out at its beginning."""
@@ -266,7 +266,7 @@ def _at_orders(results: PointResults, signal: str, orders: list[float], spacing:
     return [float(abs(np.exp(-1j * order * angle[:whole]) @ weighed)) for order in orders]
 
 
-# Figures of steady responses over speed
+# Outputs of steady responses over speed
 
 
 def _amplitudes(results: PointResults, signal: str) -> Floats:
@@ -315,7 +315,7 @@ def harmonics(
     return {str(n): float(values[line]) for n, line in lines.items()}
 
 
-# Figures of transmission error tables and of contact over loads and misalignments
+# Outputs of transmission error tables and of contact over loads and misalignments
 
 LOADS = (0.25, 0.5, 1.0, 1.5)
 """Loads over the static one that a ripple is looked at."""
@@ -389,13 +389,13 @@ def worst_pressure(
     return float(data["max_pressure"].max())
 
 
-# Figures of lives: safeties, damages and hours of gears and bearings, as the verb `life` tells them
+# Outputs of lives: safeties, damages and hours of gears and bearings, as the verb `life` tells them
 
 SAFETIES: Mapping[str, str] = {"life": "{}_safety", "static": "{}_static", "iso6336": "standard_{}_safety"}
 """Words of the option `of`: over the life, under the largest load, over the life by stresses of the standard."""
 LIVES: Mapping[str, str] = {"L10": "basic", "L10r": "reference", "L10m": "modified"}
 """Words of the option `by`."""
-LEAST = "least"
+MINIMUM = "minimum"
 """Word of the option `by`: whichever is worst for a bearing."""
 Worst = Callable[[Iterable[float]], float]
 
@@ -447,12 +447,12 @@ def root_damage(results: PointResults, *, gear: str = "") -> float:
     return _worst(root_damages(results), gear, max)
 
 
-def bearing_lives(results: PointResults, *, by: str = LEAST) -> dict[str, float]:
+def bearing_lives(results: PointResults, *, by: str = MINIMUM) -> dict[str, float]:
     """Hours until bearings fail by L10, L10r or L10m, or by whichever is least."""
     return _of_bearings(results, "hours", by, min)
 
 
-def bearing_damages(results: PointResults, *, by: str = LEAST) -> dict[str, float]:
+def bearing_damages(results: PointResults, *, by: str = MINIMUM) -> dict[str, float]:
     """Miner's sum of bearings by L10, L10r or L10m, or by whichever is worst."""
     return _of_bearings(results, "damage", by, max)
 
@@ -465,12 +465,12 @@ def static_safeties(results: PointResults) -> dict[str, float]:
     )
 
 
-def bearing_life(results: PointResults, *, bearing: str = "", by: str = LEAST) -> float:
+def bearing_life(results: PointResults, *, bearing: str = "", by: str = MINIMUM) -> float:
     """Least hours until a bearing fails, of all or of one."""
     return _worst(bearing_lives(results, by=by), bearing, min)
 
 
-def bearing_damage(results: PointResults, *, bearing: str = "", by: str = LEAST) -> float:
+def bearing_damage(results: PointResults, *, bearing: str = "", by: str = MINIMUM) -> float:
     """Largest Miner's sum of bearings, of all or of one."""
     return _worst(bearing_damages(results, by=by), bearing, max)
 
@@ -504,9 +504,9 @@ def _of_flanks(results: PointResults, key: str) -> dict[str, float]:
 
 
 def _of_bearings(results: PointResults, key: str, by: str, worst: Worst) -> dict[str, float]:
-    """Figures by bearing, of one kind of life or the worst of all that are known."""
+    """Return values by bearing, of one kind of life or the worst of all known ones."""
     data = results.life
-    names = [_name_of(kind, key) for kind in (LIVES.values() if by == LEAST else [LIVES[by]])]
+    names = [_name_of(kind, key) for kind in (LIVES.values() if by == MINIMUM else [LIVES[by]])]
     columns = zip(*(data[name].to_numpy().tolist() for name in names), strict=True)
     known = [[value for value in column if not math.isnan(value)] for column in columns]
     found = [worst(values) if values else math.nan for values in known]
@@ -524,7 +524,7 @@ def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
     own = {name: value for name, value in values.items() if part in ("", name, name.split(" ")[0])}
     known = [value for value in own.values() if not math.isnan(value)]
     if not known:
-        raise PointError(f"{part or 'no part'}: the life of this gearbox has no such figure; `exugear life` says why")
+        raise PointError(f"{part or 'no part'}: the life of this gearbox has no such quantity; `exugear life` says why")
     return worst(known)
 
 
@@ -535,107 +535,107 @@ def _number_of(holder: str) -> float:
     return math.nan
 
 
-# All figures that a study file can name; a study in Python may bring its own
+# All outputs that a study file can name; a study in Python may bring its own
 
 AS_SIGNAL = "as the signal"
-"""Unit of figures that an option `signal` names."""
-FIGURES: dict[str, Figure] = {
-    "ste_peak_to_peak": Figure(ste_peak_to_peak, "m"),
-    "ste_harmonic": Figure(ste_harmonic, "m"),
-    "mesh_stiffness": Figure(mesh_stiffness, "N/m"),
-    "contact_pressure": Figure(contact_pressure, "Pa"),
-    "worst_ripple": Figure(worst_ripple, "m"),
-    "mean_ripple": Figure(mean_ripple, "m"),
-    "worst_pressure": Figure(worst_pressure, "Pa"),
-    "mesh_forces": Figure(mesh_forces, "N", "mesh"),
-    "misalignments": Figure(misalignments, "rad", "mesh"),
-    "load_sharing": Figure(load_sharing, "1"),
-    "frequencies": Figure(frequencies, "Hz", "mode"),
-    "nearest_frequency": Figure(nearest_frequency, "Hz"),
-    "nearest_damping": Figure(nearest_damping, "1"),
-    "nearest_amplification": Figure(nearest_amplification, "m/m"),
-    "nearest_strain": Figure(nearest_strain, "1"),
-    "loudest_frequency": Figure(loudest_frequency, "Hz"),
-    "largest_line": Figure(largest_line, AS_SIGNAL, needs="steady"),
-    "loudest_peak": Figure(loudest_peak, AS_SIGNAL, needs="steady"),
-    "loudest_speed": Figure(loudest_speed, "rad/s", needs="steady"),
-    "harmonics": Figure(harmonics, AS_SIGNAL, "harmonic", "steady"),
-    "rms": Figure(rms, AS_SIGNAL, needs="run"),
-    "peak_to_peak": Figure(peak_to_peak, AS_SIGNAL, needs="run"),
-    "final_speed": Figure(final_speed, "rad/s", needs="run"),
-    "dynamic_load_sharing": Figure(dynamic_load_sharing, "1", needs="run"),
-    "run_harmonics": Figure(run_harmonics, AS_SIGNAL, "harmonic", "run"),
-    "order_amplitudes": Figure(order_amplitudes, AS_SIGNAL, "sideband", "run"),
-    "contact_safeties": Figure(contact_safeties, "1", "flank", "life"),
-    "root_safeties": Figure(root_safeties, "1", "flank", "life"),
-    "contact_damages": Figure(contact_damages, "1", "flank", "life"),
-    "root_damages": Figure(root_damages, "1", "flank", "life"),
-    "worst_planets": Figure(worst_planets, "1", "flank", "life"),
-    "contact_safety": Figure(contact_safety, "1", needs="life"),
-    "root_safety": Figure(root_safety, "1", needs="life"),
-    "contact_damage": Figure(contact_damage, "1", needs="life"),
-    "root_damage": Figure(root_damage, "1", needs="life"),
-    "bearing_lives": Figure(bearing_lives, "h", "bearing", "bearings"),
-    "bearing_damages": Figure(bearing_damages, "1", "bearing", "bearings"),
-    "static_safeties": Figure(static_safeties, "1", "bearing", "bearings"),
-    "bearing_life": Figure(bearing_life, "h", needs="bearings"),
-    "bearing_damage": Figure(bearing_damage, "1", needs="bearings"),
-    "static_safety": Figure(static_safety, "1", needs="bearings"),
-    "life_hours": Figure(life_hours, "h", needs="life"),
-    "shortfalls": Figure(shortfalls, "1", needs="life"),
+"""Unit of outputs that an option `signal` names."""
+QUANTITIES: dict[str, Quantity] = {
+    "ste_peak_to_peak": Quantity(ste_peak_to_peak, "m"),
+    "ste_harmonic": Quantity(ste_harmonic, "m"),
+    "mesh_stiffness": Quantity(mesh_stiffness, "N/m"),
+    "contact_pressure": Quantity(contact_pressure, "Pa"),
+    "worst_ripple": Quantity(worst_ripple, "m"),
+    "mean_ripple": Quantity(mean_ripple, "m"),
+    "worst_pressure": Quantity(worst_pressure, "Pa"),
+    "mesh_forces": Quantity(mesh_forces, "N", "mesh"),
+    "misalignments": Quantity(misalignments, "rad", "mesh"),
+    "load_sharing": Quantity(load_sharing, "1"),
+    "frequencies": Quantity(frequencies, "Hz", "mode"),
+    "nearest_frequency": Quantity(nearest_frequency, "Hz"),
+    "nearest_damping": Quantity(nearest_damping, "1"),
+    "nearest_amplification": Quantity(nearest_amplification, "m/m"),
+    "nearest_strain": Quantity(nearest_strain, "1"),
+    "loudest_frequency": Quantity(loudest_frequency, "Hz"),
+    "largest_line": Quantity(largest_line, AS_SIGNAL, needs="steady"),
+    "loudest_peak": Quantity(loudest_peak, AS_SIGNAL, needs="steady"),
+    "loudest_speed": Quantity(loudest_speed, "rad/s", needs="steady"),
+    "harmonics": Quantity(harmonics, AS_SIGNAL, "harmonic", "steady"),
+    "rms": Quantity(rms, AS_SIGNAL, needs="run"),
+    "peak_to_peak": Quantity(peak_to_peak, AS_SIGNAL, needs="run"),
+    "final_speed": Quantity(final_speed, "rad/s", needs="run"),
+    "dynamic_load_sharing": Quantity(dynamic_load_sharing, "1", needs="run"),
+    "run_harmonics": Quantity(run_harmonics, AS_SIGNAL, "harmonic", "run"),
+    "order_amplitudes": Quantity(order_amplitudes, AS_SIGNAL, "sideband", "run"),
+    "contact_safeties": Quantity(contact_safeties, "1", "flank", "life"),
+    "root_safeties": Quantity(root_safeties, "1", "flank", "life"),
+    "contact_damages": Quantity(contact_damages, "1", "flank", "life"),
+    "root_damages": Quantity(root_damages, "1", "flank", "life"),
+    "worst_planets": Quantity(worst_planets, "1", "flank", "life"),
+    "contact_safety": Quantity(contact_safety, "1", needs="life"),
+    "root_safety": Quantity(root_safety, "1", needs="life"),
+    "contact_damage": Quantity(contact_damage, "1", needs="life"),
+    "root_damage": Quantity(root_damage, "1", needs="life"),
+    "bearing_lives": Quantity(bearing_lives, "h", "bearing", "bearings"),
+    "bearing_damages": Quantity(bearing_damages, "1", "bearing", "bearings"),
+    "static_safeties": Quantity(static_safeties, "1", "bearing", "bearings"),
+    "bearing_life": Quantity(bearing_life, "h", needs="bearings"),
+    "bearing_damage": Quantity(bearing_damage, "1", needs="bearings"),
+    "static_safety": Quantity(static_safety, "1", needs="bearings"),
+    "life_hours": Quantity(life_hours, "h", needs="life"),
+    "shortfalls": Quantity(shortfalls, "1", needs="life"),
 }
 """By the name in a study file."""
 
 
 @dataclass(frozen=True)
-class KeptFigure:
-    """A figure with its options, as a study keeps it."""
+class Output:
+    """A output with its options, as a study keeps it."""
 
-    figure: Figure
+    quantity: Quantity
     options: Mapping[str, Any]
 
     @property
     def units(self) -> str:
         """Unit of its numbers; of a signal that one's."""
-        if self.figure.units != AS_SIGNAL:
-            return self.figure.units
+        if self.quantity.units != AS_SIGNAL:
+            return self.quantity.units
         named = str(self.options.get("signal", OVERALL)).split(" ")[0]
         return next((signal.units for signal in SIGNALS if signal.name == named), "")
 
     def of(self, results: PointResults) -> Values:
         """Compute it for a point."""
-        return self.figure.of(results, self.options)
+        return self.quantity.of(results, self.options)
 
 
-def kept_figures(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Figure]) -> dict[str, KeptFigure]:
-    """Figures of the sections of a study file, checked.
+def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Quantity]) -> dict[str, Output]:
+    """Check the sections of a study file and return the outputs they specify.
 
     Parameters
     ----------
-    sections : by the name in the dataset: ``figure`` and its options
-    known : figures that may be named
+    sections : by the name in the dataset: ``quantity`` and its options
+    known : quantities that may be named
 
     Raises
     ------
-    FigureError
-        An unknown figure or wrong options.
+    OutputError
+        An unknown output or wrong options.
 
     Examples
     --------
-    >>> kept_figures({"ringing": {"figure": "nearest_frequncy", "near_Hz": 800.0}}, FIGURES)
+    >>> outputs_of({"ringing": {"quantity": "nearest_frequncy", "near_Hz": 800.0}}, QUANTITIES)
     Traceback (most recent call last):
     ...
-    exugear.studies.figures.FigureError: figures.ringing.figure = 'nearest_frequncy': no such figure; did you
+    exugear.studies.quantities.OutputError: outputs.ringing.quantity = 'nearest_frequncy': no such quantity; did you
     mean 'nearest_frequency'?
     """
     kept = {}
     for name, section in sections.items():
         options = dict(section)
-        wanted = str(options.pop("figure", ""))
+        wanted = str(options.pop("quantity", ""))
         if wanted not in known:
             near = difflib.get_close_matches(wanted[:100], known, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"figures are {', '.join(known)}"
-            raise FigureError(f"figures.{name}.figure = {wanted!r}: no such figure; {hint}")
+            hint = f"did you mean {near[0]!r}?" if near else f"quantities are {', '.join(known)}"
+            raise OutputError(f"outputs.{name}.quantity = {wanted!r}: no such quantity; {hint}")
         known[wanted].check(name, options)
-        kept[name] = KeptFigure(known[wanted], options)
+        kept[name] = Output(known[wanted], options)
     return kept

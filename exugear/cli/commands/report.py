@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.case import FilesBelowOption, JsonOption, check_files_below
+from exugear.cli.case import FilesBelowOption, JsonOption, check_allow_dir
 from exugear.cli.console import (
     BadInputError,
     exit_codes,
@@ -28,7 +28,7 @@ def report(
         float | None,
         typer.Option(min=1.0, metavar="HZ", help="Frequency to look for modes at. (default: as the case says)"),
     ] = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write a report of a results folder: one web page that answers where it rings, how loud, and why.
@@ -40,7 +40,7 @@ def report(
         from exugear.report.writer import ReportError, write_report
         from exugear.results.folder import time_noted
 
-        check_files_below(files_below)
+        check_allow_dir(allow_dir)
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; name the one that `exugear run` wrote into")
         try:
@@ -51,7 +51,7 @@ def report(
                     interruption.check()
                     bar.update(task, description=what)
 
-                written = write_report(folder, near, tell, files_below, executor)
+                written = write_report(folder, near, tell, allow_dir, executor)
         except ReportError as error:
             raise BadInputError(error) from error
         _tell_report(folder, written.path, written.statements, written.left_out, as_json)

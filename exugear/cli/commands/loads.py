@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def loads(
     case: CaseArgument,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -38,7 +38,7 @@ def loads(
         from exugear.life.load_spectrum.counted import count_loads, draw_duration, write_spectra
         from exugear.project import default_folder
 
-        gearbox = read_gearbox(case, files_below, scripts)
+        gearbox = read_gearbox(case, allow_dir, scripts)
         folder = (out or default_folder(case)) / "loads"
         check_results_folder(folder)
         with Bars().row() as row:

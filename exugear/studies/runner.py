@@ -1,10 +1,10 @@
 """A study carried out: what is there is taken, what is missing computed, all put together.
 
 Each search is scipy's differential evolution: generations of points, computed as any points of a study, so that they
-are kept, shared by all searches, and found again after a kill. Two figures are brought into one by the larger of both,
+are kept, shared by all searches, and found again after a kill. Two outputs are brought into one by the larger of both,
 weighed and over their values of the case as it is (Chebyshev), which reaches bent-in fronts as well. Limits are
 constraints of the evolution. With tolerances every point is as many as there are draws, the same at every point, and
-a percentile of each figure counts.
+a percentile of each output counts.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ Progress = Callable[[int, int, int], None]
 
 
 @dataclass(frozen=True)
-class Swept:
+class StudyResult:
     """What came of a study."""
 
     records: Mapping[str, Record]
@@ -93,7 +93,7 @@ class Swept:
         return [record for record in self.records.values() if record.error]
 
 
-def sweep(
+def run_study(
     study: Study,
     folder: str | Path,
     opens: Opens | None = None,
@@ -102,7 +102,7 @@ def sweep(
     retry: bool = False,
     merge: bool = False,
     progress: Progress | None = None,
-) -> Swept:
+) -> StudyResult:
     """Carry out a study; points that are finished in the folder are not computed again.
 
     Parameters
@@ -145,23 +145,23 @@ def sweep(
         records |= compute_points(task_of(study, folder), work, opens or processes(), tell)
     records |= {name: record for name, record in read_journals(folder, points).items() if name not in records}
     if len(records) < len(points) and not merge:
-        return Swept(records, len(wanted), None, None)
+        return StudyResult(records, len(wanted), None, None)
     dataset = dataset_of(study, records)
-    return Swept(records, len(wanted), write_study(folder, dataset), dataset)
+    return StudyResult(records, len(wanted), write_study(folder, dataset), dataset)
 
 
 def task_of(study: Study, folder: Path) -> Task:
     """Gather what all points have in common."""
     gearbox = study.gearbox
     names = {path: name for name, parameter in study.file.parameters.items() for path in parameter.targets}
-    settings = (study.choice, study.settings, study.figures)
+    settings = (study.choice, study.settings, study.outputs)
     return Task(gearbox.content, gearbox.source, gearbox.permissions, *settings, folder, names)
 
 
-# Search for parameters that make one figure small, or two weighed against each other, within limits of others
+# Search for parameters that make one output small, or two weighed against each other, within limits of others
 
 BLEND = 0.05
-"""Share of the sum of both figures beside the larger one: of two points that are equal in one, the better wins."""
+"""Share of the sum of both outputs beside the larger one: of two points that are equal in one, the better wins."""
 
 
 class OptimisationError(RuntimeError):
@@ -190,7 +190,7 @@ class _Evaluated:
         return self._seen([self._looked(row, self._changes(row)) for row in values])
 
     def of_case(self) -> Floats:
-        """Figures (figures,) of the case as it is that are made small.
+        """Return the outputs (outputs,) to be minimised of the unchanged gearbox.
 
         Raises
         ------
@@ -203,19 +203,19 @@ class _Evaluated:
         if not np.isfinite(found).all():
             records = [self.records[name] for name, _ in looked.draws]
             reason = next((record.error for record in records if record.error), records[0].values)
-            raise OptimisationError(f"the case as it is gives no figures: {reason}")
+            raise OptimisationError(f"the case as it is gives no outputs: {reason}")
         return np.asarray(found)
 
     def minimised(self, points: Sequence[Looked]) -> Floats:
-        """Figures (points, figures) that are made small; infinite where a point failed."""
+        """Return the outputs (points, outputs) to be minimised; infinite where a point failed."""
         return self.criteria.minimised(self._figure, points)
 
     def violations(self, points: Sequence[Looked]) -> Floats:
         """How far points are beyond limits (points, limits), over the limit; negative within."""
         return self.criteria.violations(self._figure, points)
 
-    def _figure(self, looked: Looked, figure: str) -> Floats:
-        return np.array([number_of(self.records[name].values.get(figure)) for name, _ in looked.draws])
+    def _figure(self, looked: Looked, output: str) -> Floats:
+        return np.array([number_of(self.records[name].values.get(output)) for name, _ in looked.draws])
 
     def _changes(self, row: Floats) -> dict[str, Any]:
         parameters = self.study.file.parameters.values()
@@ -259,7 +259,7 @@ class _Evaluated:
 
 def optimise(
     study: Study, folder: str | Path, opens: Opens | None = None, *, progress: Progress | None = None
-) -> Swept:
+) -> StudyResult:
     """Search for the parameters of a study that has a section ``optimise``.
 
     Parameters
@@ -270,16 +270,16 @@ def optimise(
 
     Returns
     -------
-    Swept
-        Its dataset holds all points that were looked at; `on_front` says which of them no other beats in all figures,
+    StudyResult
+        Its dataset holds all points that were looked at; `on_front` says which of them no other beats in all outputs,
         `meets_limits` which keep the limits.
 
     Raises
     ------
     OptimisationError
-        The case as it is has no figures, or there is no such section.
+        The case as it is has no outputs, or there is no such section.
     ExecutorError, OSError
-        As `exugear.studies.sweep.sweep`.
+        As `exugear.studies.runner.run_study`.
     """
     wanted = study.file.optimise
     folder = Path(folder)
@@ -295,7 +295,7 @@ def optimise(
             scale = np.where(reference == 0.0, 1.0, np.abs(reference))
             _search(seen, weighed / scale, study.file.seed + number)
     dataset = searched_dataset(study, seen.criteria, list(seen.points.values()), seen.records)
-    return Swept(seen.records, seen.computed, write_study(folder, dataset), dataset)
+    return StudyResult(seen.records, seen.computed, write_study(folder, dataset), dataset)
 
 
 def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
@@ -305,8 +305,8 @@ def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
     wanted = seen.study.file.optimise
     assert wanted is not None
     limits = [parameter.uniform for parameter in seen.study.file.parameters.values()]
-    low = np.array([limit.least for limit in limits if limit is not None])
-    high = np.array([limit.most for limit in limits if limit is not None])
+    low = np.array([limit.min for limit in limits if limit is not None])
+    high = np.array([limit.max for limit in limits if limit is not None])
     begin = low + shares("latin_hypercube", wanted.population, len(low), seed) * (high - low)
     known = _best(seen, weights, wanted.population // 4)
     begin[: len(known)] = known
@@ -331,15 +331,15 @@ def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
     )
 
 
-def mixed(figures: Floats, weights: Floats) -> Floats:
-    """Bring figures (points, figures) into one number each: the largest when weighed, and a little of all.
+def mixed(outputs: Floats, weights: Floats) -> Floats:
+    """Bring outputs (points, outputs) into one number each: the largest when weighed, and a little of all.
 
     Examples
     --------
     >>> mixed(np.array([[1.0, 4.0], [2.0, 2.0]]), np.array([1.0, 1.0])).tolist()
     [4.25, 2.2]
     """
-    weighed = figures * np.where(weights == 0.0, 1e-12, weights)
+    weighed = outputs * np.where(weights == 0.0, 1e-12, weights)
     return np.asarray(weighed.max(axis=1) + BLEND * weighed.sum(axis=1))
 
 

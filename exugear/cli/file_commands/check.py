@@ -50,18 +50,18 @@ def check(
     case: CaseArgument,
     rating: RatingOption = False,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Read and check a gearbox file; sum up its gear pairs, bearings and load cases. Writes nothing."""
     with exit_codes():
         if rating:
-            _rate(case, out, files_below, as_json)
+            _rate(case, out, allow_dir, as_json)
             return
         from exugear.life.rating.lacks import lacks_of_life
         from exugear.system.readiness import lacking, remarks
 
-        gearbox = _read(case, files_below, as_json)
+        gearbox = _read(case, allow_dir, as_json)
         _tell_scripts(gearbox)
         pairs = [_pair_summary(gearbox, name) for name in gearbox.pairs]
         thicknesses = _thickness_summaries(gearbox)
@@ -128,14 +128,14 @@ def _tell_possibilities(
             say(f"{verb}: {line}")
 
 
-def _rate(case: Path, out: Path | None, files_below: Path | None, as_json: bool) -> None:
+def _rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -> None:
     """Print the rating of all gears; end with code 1 where one has less safety than is asked for."""
     from exugear.cli.rating_tables import tell_rating
     from exugear.cli.watched import WatchedProject
     from exugear.gearbox.choice import Choice
     from exugear.project import default_folder
 
-    gearbox = read_gearbox(case, files_below, tell=not as_json)
+    gearbox = read_gearbox(case, allow_dir, tell=not as_json)
     project = WatchedProject(gearbox, out or default_folder(case), Choice(Variant.bushing, "line_of_action"))
     sheet = project.rating()
     if as_json:
@@ -146,15 +146,15 @@ def _rate(case: Path, out: Path | None, files_below: Path | None, as_json: bool)
         raise FailedError("\n".join(["gears have less safety than is asked for:", *sheet.shortfalls]))
 
 
-def _read(case: Path, files_below: Path | None, as_json: bool) -> Gearbox:
+def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
     """Read the file; of one with faults print these as an object, too, if that is asked for."""
     from exugear.gearbox.reading import CaseError
 
     try:
-        return read_gearbox(case, files_below, tell=False)
+        return read_gearbox(case, allow_dir, tell=False)
     except BadInputError as error:
         if as_json and isinstance(error.__cause__, CaseError):
-            print_json({"case": str(case), "faults": list(error.__cause__.faults)})
+            print_json({"case": str(case), "errors": list(error.__cause__.faults)})
         raise
 
 
@@ -208,7 +208,7 @@ def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
         "overlap_ratio": pair.overlap_ratio,
         "torque_gear_1_N_m": spec.static_torque,
         "pitch_point_pressure_MPa": 1e-6 * margins.pitch_point_pressure,
-        "margin_to_form_circle": [None if math.isnan(margin) else margin for margin in margins.form],
+        "margin_to_form_diameter": [None if math.isnan(margin) else margin for margin in margins.form],
         "tip_thickness_in_modules": list(margins.tip_thickness),
         "backlash_um": [1e6 * play for play in backlash_range(gearbox, pair)],
         "normal_backlash_um": 1e6 * pair.normal_backlash,
@@ -227,7 +227,7 @@ def _pair_row(pair: dict[str, Any]) -> dict[str, str]:
 
 
 def _margin_row(pair: dict[str, Any]) -> dict[str, str]:
-    left = ("-" if margin is None else f"{100 * margin:.1f}" for margin in pair["margin_to_form_circle"])
+    left = ("-" if margin is None else f"{100 * margin:.1f}" for margin in pair["margin_to_form_diameter"])
     return {
         "pair": pair["pair"],
         "pressure at pitch\npoint, MPa": f"{pair['pitch_point_pressure_MPa']:.0f}",

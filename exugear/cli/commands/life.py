@@ -34,10 +34,10 @@ SHOWN_LIMITS = 8
 def life(
     case: CaseArgument,
     variant: VariantOption = Variant.bushing,
-    mesh_law: LawOption = USUAL_LAW,
+    mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -49,7 +49,7 @@ def life(
         from exugear.gearbox.choice import Choice
         from exugear.life.life_file import draw_life, summary
 
-        project = open_project(case, Choice(variant.value, mesh_law.value, inertias), out, files_below, scripts)
+        project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
         counted = project.checked_loads()
         make_results_folder(project.folder)
         data = project.life(counted=counted)

@@ -1,4 +1,4 @@
-"""The verb `sweep`: a study, many variations of one gearbox as one dataset."""
+"""The command `study`: many variations of one gearbox as one dataset."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from exugear.cli.case import FilesBelowOption, JsonOption, OutOption, ScriptsOption, check_choice, check_files_below
+from exugear.cli.case import FilesBelowOption, JsonOption, OutOption, ScriptsOption, check_allow_dir, check_choice
 from exugear.cli.console import (
     BadInputError,
     FailedError,
@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from exugear.studies.executors import Opens
+    from exugear.studies.runner import Shard, StudyResult
     from exugear.studies.sections import LimitSection
     from exugear.studies.study import Study
-    from exugear.studies.sweep import Shard, Swept
 
 SHOWN_FAILURES = 5
 SHOWN_OF_FRONT = 5
@@ -43,8 +43,8 @@ class Executor(StrEnum):
     dask = "dask"
 
 
-def sweep(
-    study: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.", show_default=False)],
+def study(
+    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.", show_default=False)],
     executor: Annotated[
         Executor, typer.Option(help="processes: on this machine; dask: on a Dask cluster.")
     ] = Executor.processes,
@@ -60,7 +60,7 @@ def sweep(
     merge: Annotated[bool, typer.Option("--merge", help="Compute nothing, put together what is finished.")] = False,
     retry: Annotated[bool, typer.Option("--retry-failed", help="Compute points again that failed before.")] = False,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -71,29 +71,29 @@ def sweep(
     """
     with exit_codes():
         from exugear.studies.executors import ExecutorError
-        from exugear.studies.sweep import OptimisationError
+        from exugear.studies.runner import OptimisationError
 
         part = _shard(shard, merge)
         opens = _executor(executor, workers, scheduler)
-        read = _read(study, files_below, scripts)
+        read = _read(file, allow_dir, scripts)
         if read.file.optimise is not None and (merge or retry or shard is not None):
             raise BadInputError(
-                f"{study}: a search follows from its points one after the other; "
+                f"{file}: a search follows from its points one after the other; "
                 "leave --shard, --merge and --retry-failed out"
             )
-        folder = out or _default_folder(read, study)
+        folder = out or _default_folder(read, file)
         check_choice(read.gearbox, read.choice, folder)
         make_results_folder(folder)
         try:
-            swept = _sweep(read, folder, opens, part, merge, retry)
+            result = _run(read, folder, opens, part, merge, retry)
         except (ExecutorError, OptimisationError) as error:
             raise FailedError(error) from error
-        pictures = _draw(read, folder, swept)
-        _tell(read, study, folder, swept, pictures, as_json)
+        pictures = _draw(read, folder, result)
+        _tell(read, file, folder, result, pictures, as_json)
 
 
 def _shard(text: str | None, merge: bool) -> Shard:
-    from exugear.studies.sweep import WHOLE, Shard
+    from exugear.studies.runner import WHOLE, Shard
 
     if text is None:
         return WHOLE
@@ -120,22 +120,22 @@ def _executor(executor: Executor, workers: int | None, scheduler: str | None) ->
     return processes(workers)
 
 
-def _read(path: Path, files_below: Path | None, scripts: bool) -> Study:
+def _read(path: Path, allow_dir: Path | None, scripts: bool) -> Study:
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.reading import CaseError
     from exugear.studies.sections import StudyError
     from exugear.studies.study import Study
     from exugear.system.readiness import check_parts
 
-    check_files_below(files_below)
+    check_allow_dir(allow_dir)
     try:
-        study = Study.from_toml(path, Permissions(scripts, files_below))
+        study = Study.from_toml(path, Permissions(scripts, allow_dir))
         check_parts(study.gearbox)
     except (StudyError, CaseError) as error:
         raise BadInputError(error) from error
-    if study.choice.mesh_law not in _laws():
+    if study.choice.mesh_model not in _laws():
         laws = ", ".join(_laws())
-        raise BadInputError(f"{path}: choice.mesh_law = {study.choice.mesh_law!r}: no such law; laws are {laws}")
+        raise BadInputError(f"{path}: choice.mesh_model = {study.choice.mesh_model!r}: no such law; laws are {laws}")
     return study
 
 
@@ -153,10 +153,9 @@ def _default_folder(study: Study, path: Path) -> Path:
     return default_folder(study.gearbox.source) / STUDIES / stem
 
 
-def _sweep(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> Swept:
+def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> StudyResult:
     """Carry the study out behind a progress bar."""
-    from exugear.studies.sweep import optimise
-    from exugear.studies.sweep import sweep as carry_out
+    from exugear.studies.runner import optimise, run_study
 
     with progress_bar() as bar:
         task = bar.add_task("points", total=None)
@@ -171,10 +170,10 @@ def _sweep(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, 
 
         if study.file.optimise is not None:
             return optimise(study, folder, opens, progress=show)
-        return carry_out(study, folder, opens, shard=shard, merge=merge, retry=retry, progress=show)
+        return run_study(study, folder, opens, shard=shard, merge=merge, retry=retry, progress=show)
 
 
-def _draw(study: Study, folder: Path, swept: Swept) -> list[Path]:
+def _draw(study: Study, folder: Path, swept: StudyResult) -> list[Path]:
     """Draw what was put together."""
     from exugear.studies.pictures import draw_study
 
@@ -185,7 +184,7 @@ def _draw(study: Study, folder: Path, swept: Swept) -> list[Path]:
     return draw_study(swept.dataset, folder, minimised)
 
 
-def _tell(study: Study, path: Path, folder: Path, swept: Swept, pictures: list[Path], as_json: bool) -> None:
+def _tell(study: Study, path: Path, folder: Path, swept: StudyResult, pictures: list[Path], as_json: bool) -> None:
     """Print what came of it; end with 1 if points failed, or are missing where all were asked for."""
     searched = study.file.optimise is not None
     total = len(swept.records if searched else study.design.points)
@@ -216,7 +215,7 @@ def _tell(study: Study, path: Path, folder: Path, swept: Swept, pictures: list[P
         raise FailedError(f"{missing} of {total} points are missing; run the study, or the shards that have not ended")
 
 
-def _print(study: Study, folder: Path, swept: Swept, summary: dict[str, Any]) -> None:
+def _print(study: Study, folder: Path, swept: StudyResult, summary: dict[str, Any]) -> None:
     from exugear.studies.dataset import slopes
     from exugear.studies.sampling import SIDE
 
@@ -230,7 +229,7 @@ def _print(study: Study, folder: Path, swept: Swept, summary: dict[str, Any]) ->
         return
     if SIDE in study.design.shape:
         ranked = sorted(slopes(swept.dataset), key=lambda entry: -abs(entry[2]))
-        rows = [{"parameter": p, "figure": f, "% a step": f"{100.0 * c:+.3f}"} for f, p, c in ranked]
+        rows = [{"parameter": p, "quantity": f, "% a step": f"{100.0 * c:+.3f}"} for f, p, c in ranked]
         if rows:
             print_table("What moves the figures most", rows, ("figure",))
     if study.file.optimise is not None:
@@ -245,7 +244,7 @@ def _judged(study: Study) -> list[str]:
     return [judged_name(study, name, side) for name, side in Criteria.of(study.file).sides]
 
 
-def _fail_if_beyond(study: Study, swept: Swept) -> None:
+def _fail_if_beyond(study: Study, swept: StudyResult) -> None:
     """End with code 1 where a search found no point within its limits."""
     from exugear.studies.dataset import EVALUATION
 
@@ -261,7 +260,7 @@ def _fail_if_beyond(study: Study, swept: Swept) -> None:
 
 
 def _in_words(limit: LimitSection) -> str:
-    bounds = (("from", limit.least), ("to", limit.most))
+    bounds = (("from", limit.min), ("to", limit.max))
     return " ".join(f"{word} {value:g}" for word, value in bounds if value is not None)
 
 

@@ -74,7 +74,7 @@ def ste(
         typer.Option("--grid", help="Over load, centre distance and misalignment too, with the axes of the file."),
     ] = False,
     out: OutOption = None,
-    files_below: FilesBelowOption = None,
+    allow_dir: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Compute the static transmission error of the gear pairs, with pictures.
@@ -90,7 +90,7 @@ def ste(
         from exugear.results.folder import time_noted
         from exugear.system.tooth_mesh.tables import stored_tables
 
-        gearbox = read_gearbox(case, files_below)
+        gearbox = read_gearbox(case, allow_dir)
         if (method or Method(gearbox.ste.method)) is Method.nonlinear:
             if grid:
                 raise BadInputError("--grid: the method nonlinear computes the static state alone; leave --grid out")

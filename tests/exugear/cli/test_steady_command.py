@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from exugear.cli.verbs.steady import Level
-from exugear.steady.settings import LEVELS
+from exugear.cli.commands.steady import Method
+from exugear.steady.settings import METHODS
 
 from ..cases.bearing import BEARING_CASE
 from ..cases.command import exugear
@@ -21,8 +21,8 @@ def steady(case, *more):
     return exugear("steady", case, "--out", case.parent / "out", *more)
 
 
-def test_the_levels_offered_are_those_of_the_library():
-    assert tuple(level.value for level in Level) == LEVELS
+def test_the_methods_offered_are_those_of_the_library():
+    assert tuple(method.value for method in Method) == METHODS
 
 
 @pytest.mark.validation
@@ -74,16 +74,16 @@ def test_loads_of_runs_and_responses_are_told_and_a_response_can_be_at_that_of_a
 def test_bearings_follow_their_elements_at_the_level_nonlinear(tmp_path):
     """The state, its report and what is said of it; other levels say that they do not."""
     case = tmp_path / "bearings.toml"
-    text = BEARING_CASE.replace("[bearings.roller.catalogue]", 'law = "iso16281"\n[bearings.roller.catalogue]')
+    text = BEARING_CASE.replace("[bearings.roller.catalogue]", 'model = "iso16281"\n[bearings.roller.catalogue]')
     case.write_text(text, encoding="utf-8")
     options = "--variant", "bushing", "--speeds", "1000:1100:3"
-    outcome = steady(case, *options, "--level", "nonlinear", "--json")
+    outcome = steady(case, *options, "--method", "nonlinear", "--json")
     assert outcome.exit_code == 0, outcome.stderr
     summary = json.loads(outcome.stdout)
     assert summary["bearings_in_time"] == "roller"
     assert summary["largest_energy_error"] < 1e-4
     assert "Bearings by their rolling elements: roller" in outcome.stderr
-    outcome = steady(case, *options, "--level", "linear")
+    outcome = steady(case, *options, "--method", "linear")
     assert outcome.exit_code == 0, outcome.stderr
     assert "linear about the static state" in outcome.stderr
     report = exugear("report", case.parent / "out")
@@ -92,7 +92,7 @@ def test_bearings_follow_their_elements_at_the_level_nonlinear(tmp_path):
 
 @pytest.mark.validation
 def test_the_range_of_the_load_case_is_the_usual_one(case):
-    outcome = steady(case, "--variant", "rigid", "--level", "linear", "--json")
+    outcome = steady(case, "--variant", "rigid", "--method", "linear", "--json")
     assert outcome.exit_code == 0, outcome.stderr
     assert json.loads(outcome.stdout)["speeds"] >= 399
 
@@ -100,11 +100,11 @@ def test_the_range_of_the_load_case_is_the_usual_one(case):
 @pytest.mark.sample
 @pytest.mark.parametrize("law", ["iso6336", "constant"])
 def test_a_law_without_a_wave_excites_nothing_and_says_so(case, law):
-    outcome = steady(case, "--variant", "bushing", "--mesh-law", law, "--speeds", "500:8000:20", "--json")
+    outcome = steady(case, "--variant", "bushing", "--mesh-model", law, "--speeds", "500:8000:20", "--json")
     assert outcome.exit_code == 0, outcome.stderr
     summary = json.loads(outcome.stdout)
     assert (summary["excited"], summary["speeds"], summary["peaks_of_overall_dte"]) == (False, 20, [])
-    assert f"Nothing excites the gearbox: by the mesh law {law}" in outcome.stderr
+    assert f"Nothing excites the gearbox: by the mesh model {law}" in outcome.stderr
     assert Path(summary["file"]).exists()
 
 
@@ -116,7 +116,7 @@ def test_harmonics_are_told_and_may_be_asked_for(case):
     outcome = steady(case, *options, "--harmonics", "3", "--json")
     summary = json.loads(outcome.stdout)
     assert summary["harmonics"] == 3
-    assert summary["left_out_of_compliance"]["spur"] > usual["left_out_of_compliance"]["spur"]
+    assert summary["truncation_of_compliance"]["spur"] > usual["truncation_of_compliance"]["spur"]
     assert summary["change_with_more_harmonics"] > usual["change_with_more_harmonics"]
     assert "3 harmonics of each mesh frequency leave out" in outcome.stderr
 
@@ -130,8 +130,8 @@ def test_harmonics_are_told_and_may_be_asked_for(case):
         (("--variant", "rigid", "--speeds", "-5:5:10"), "change their sense"),
         (("--variant", "rigid", "--speeds", "0:1e6:10"), "wheels of steel burst"),
         (("--variant", "rigid", "--speeds", "0:1e300:10"), "wheels of steel burst"),
-        (("--variant", "rigid", "--mesh-law", "rigid"), "nothing vibrates"),
-        (("--variant", "rigid", "--mesh-law", "table"), "its teeth may part"),
+        (("--variant", "rigid", "--mesh-model", "kinematic"), "nothing vibrates"),
+        (("--variant", "rigid", "--mesh-model", "table"), "its teeth may part"),
     ],
 )
 def test_what_cannot_be_answered_is_one_sentence_and_code_2(case, options, said):

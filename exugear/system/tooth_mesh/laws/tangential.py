@@ -1,4 +1,4 @@
-"""Mesh law `seed`: the published tangential law, deflection along the pitch circle.
+"""Mesh law `tangential`: the published tangential law, deflection along the pitch circle.
 
 The deflection is tangential, at the pitch point; the force on gear 1 is T = (1, tan phi_n / cos beta, -tan beta) times
 k delta, with radial and axial parts that the deflection does not see. So it is not conservative.
@@ -18,7 +18,7 @@ from exugear.system.tooth_mesh.placement import MeshGeometry, pitch_point_of, wr
 from fe_ste.tools.arrays import Floats
 
 
-class Seed(LineOfAction):
+class Tangential(LineOfAction):
     """Tangential deflection, force with radial and axial parts.
 
     As it was published, teeth do not resist misalignment, and load over deflection is a straight line.
@@ -32,7 +32,7 @@ class Seed(LineOfAction):
         geometry = MeshGeometry.of(mesh)
         axial = np.array([0.0, 0.0, 1.0])
         pitch_point = pitch_point_of(mesh, geometry, nodes)
-        pressure, helix = seed_angles(mesh, angles)
+        pressure, helix = tangential_angles(mesh, angles)
         tangent = flank * geometry.tangential
         pushing = tangent + math.tan(pressure) * geometry.radial - flank * math.tan(helix) * axial
         return wrench_row(tangent, pitch_point, nodes), wrench_row(pushing, pitch_point, nodes)
@@ -43,11 +43,11 @@ class Seed(LineOfAction):
         k = F_tt / (STE / cos phi) with F_tt = F_bt cos phi, so it is cos^2 phi times the table's; the moment
         F_tt r_w is that of F_bt = F_tt / cos a with the operating angle a.
         """
-        pressure, _ = seed_angles(mesh, angles)
+        pressure, _ = tangential_angles(mesh, angles)
         return math.cos(pressure) ** 2 * line_of_action, 1.0 / math.cos(MeshGeometry.of(mesh).pressure_angle)
 
 
-def seed_angles(mesh: Mesh, angles: Angles) -> tuple[float, float]:
+def tangential_angles(mesh: Mesh, angles: Angles) -> tuple[float, float]:
     """Transverse pressure angle and helix angle of gear 1 that the law uses, rad."""
     pinion = mesh.pair.pinion
     if angles == "reference":
@@ -56,4 +56,4 @@ def seed_angles(mesh: Mesh, angles: Angles) -> tuple[float, float]:
     return pressure, math.atan(math.tan(pinion.base_helix_angle) / math.cos(pressure))
 
 
-LAW = Seed()
+LAW = Tangential()

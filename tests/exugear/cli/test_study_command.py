@@ -15,18 +15,18 @@ from ..cases.study import written_case
 STUDY = """
 name = "seats"
 case = "spur.toml"
-choice = { variant = "rigid", mesh_law = "iso6336" }
+choice = { variant = "rigid", mesh_model = "iso6336" }
 
 [parameters.seat]
 path = "damping.mesh_time_s"
 values = [1e-6, 2e-6, 4e-6]
 
-[figures.frequency]
-figure = "frequencies"
+[outputs.frequency]
+quantity = "frequencies"
 count = 1
 
-[figures.damping]
-figure = "nearest_damping"
+[outputs.damping]
+quantity = "nearest_damping"
 near_Hz = 2000.0
 """
 
@@ -40,7 +40,7 @@ def study(tmp_path):
 
 
 def sweep(study, *more):
-    return exugear("sweep", study, "--out", study.parent / "out", *more)
+    return exugear("study", study, "--out", study.parent / "out", *more)
 
 
 def replaced(study, old, new):
@@ -65,14 +65,14 @@ def test_sweep_writes_a_dataset_and_sums_it_up(study):
 
 def test_without_a_folder_results_lie_beside_those_of_the_case(study, monkeypatch):
     monkeypatch.chdir(study.parent)
-    outcome = exugear("sweep", study.name, "--workers", "1")
+    outcome = exugear("study", study.name, "--workers", "1")
     assert outcome.exit_code == 0, outcome.stderr
     folder = study.parent / "results" / study.parent.name / "studies" / "seats"
     assert (folder / "study.nc").is_file()
 
 
 def test_failed_points_end_with_1_and_their_errors(study):
-    replaced(study, "values = [1e-6, 2e-6, 4e-6]", "uniform = { least = 0.0, most = 0.02 }")
+    replaced(study, "values = [1e-6, 2e-6, 4e-6]", "uniform = { min = 0.0, max = 0.02 }")
     replaced(study, "[parameters.seat]", "samples = 4\n[parameters.seat]")
     outcome = sweep(study, "--workers", 1)
     assert outcome.exit_code == 1
@@ -93,11 +93,11 @@ def test_what_is_missing_after_a_merge_ends_with_1(study):
     [
         ("damping.mesh_time_s", "damping.mesh_tim_s", "did you mean damping.mesh_time_s"),
         ("[1e-6, 2e-6, 4e-6]", "[1e-6, 1e-6]", "values 1 and 2 are one and the same point, damping.mesh_time_s"),
-        ("figures.frequency", "figures.memory", "this name is that of what is told of each point"),
+        ("outputs.frequency", "outputs.memory", "this name is that of what is told of each point"),
         ('"iso6336"', '"iso"', "no such law; laws are"),
         ('"rigid"', '"rigid", load_case = "none"', "no load case 'none'; load cases are run_up"),
         ('"spur.toml"', '"spu.toml"', "spu.toml"),
-        ("[figures.frequency]", "[figures.frequency", "not valid TOML"),
+        ("[outputs.frequency]", "[outputs.frequency", "not valid TOML"),
     ],
 )
 def test_bad_input_is_told_and_nothing_written(study, old, new, words):
@@ -137,10 +137,10 @@ def test_options_that_do_not_go_together_are_refused(study, options, words):
 def test_a_report_shows_the_studies_of_its_folder(study, monkeypatch):
     monkeypatch.setattr("exugear.system.tooth_mesh.tables.TableInput", COARSE_INPUT)
     results = study.parent / "results"
-    swept = exugear("sweep", study, "--workers", "1", "--out", results / "studies" / "seats")
+    swept = exugear("study", study, "--workers", "1", "--out", results / "studies" / "seats")
     assert swept.exit_code == 0, swept.stderr
     case = str(study.parent / "spur.toml")
-    modes = exugear("modes", case, "--variant", "rigid", "--mesh-law", "iso6336", "--out", results)
+    modes = exugear("modes", case, "--variant", "rigid", "--mesh-model", "iso6336", "--out", results)
     assert modes.exit_code == 0, modes.stderr
     outcome = exugear("report", results)
     assert outcome.exit_code == 0, outcome.stderr
