@@ -21,8 +21,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile --durations 20
 
 # Tests and docstrings of one package, such as steady or transmission_error.
-PACKAGE ?=
-$(if $(ROOM),$(error ROOM was renamed to PACKAGE: make $(MAKECMDGOALS) PACKAGE=$(ROOM)))
+PACKAGE ?= $(ROOM)
 OF_PACKAGE = $(or $(wildcard exugear/$(PACKAGE) fe_ste/$(PACKAGE) tests/exugear/$(PACKAGE) tests/fe_ste/$(PACKAGE)),$(error no package $(PACKAGE)))
 
 CASE := cases/grc750/gearbox.toml

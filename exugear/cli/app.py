@@ -8,6 +8,7 @@ from __future__ import annotations
 import gc
 import importlib
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Annotated
@@ -21,6 +22,7 @@ COMMANDS = (
     "file_commands.new",
     "file_commands.import_",
     "file_commands.schema",
+    "file_commands.migrate",
     "file_commands.check",
     "commands.ste",
     "commands.bearings",
@@ -40,6 +42,18 @@ has a line after it, which the command line leaves out."""
 OBJECTS_OF_A_START = 300_000
 """New objects after which Python looks for garbage: more than a start makes, less than would be felt in memory."""
 
+RENAMED = {
+    "sweep": "study",
+    "--mesh-law": "--mesh-model",
+    "--level": "--method",
+    "--branches": "--continuation",
+    "--files-below": "--allow-dir",
+}
+"""Commands and options of earlier versions, which are refused with the new names."""
+RENAMED_VARIABLE = "EXUGEAR_FILES_BELOW"
+"""Environment variable of earlier versions."""
+
+
 app = typer.Typer(
     help="Transmission error of gear pairs by finite elements, and gearbox dynamics in Exudyn.",
     no_args_is_help=True,
@@ -53,11 +67,31 @@ def main() -> None:
 
     BLAS keeps to one thread: its idle threads wait actively and slow the compiled kernels beside them severalfold.
     """
+    if message := old_name(sys.argv[1:]):
+        typer.echo(f"Error: {message}", err=True)
+        sys.exit(2)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     leave_out_dask()
     say_what_is_logged()
     with garbage_seldom_looked_for(), standard_streams():
         app()
+
+
+def old_name(arguments: list[str]) -> str:
+    """Return a message about the first old name on the command line; empty if there is none.
+
+    Examples
+    --------
+    >>> old_name(["steady", "my.toml", "--level=linear"])
+    '--level was renamed to --method'
+    """
+    if RENAMED_VARIABLE in os.environ:
+        return f"{RENAMED_VARIABLE} was renamed to EXUGEAR_ALLOW_DIR"
+    for number, argument in enumerate(arguments):
+        name = argument.split("=")[0]
+        if name in RENAMED and (number == 0 or name.startswith("--")):
+            return f"{name} was renamed to {RENAMED[name]}"
+    return ""
 
 
 @contextmanager

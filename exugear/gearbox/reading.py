@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from exugear.gearbox.named_files import LARGEST_CASE, NamedFileError, Permissions, check_regular, named_file
+from exugear.gearbox.renames import GEARBOX_RENAMES, new_name, renamed_hint
 from exugear.gearbox.sections.bodies import BodySection
 from exugear.gearbox.sections.case import CaseFile
 from exugear.gearbox.sections.entries import GROUND
@@ -186,7 +187,8 @@ def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:
     locations = {fault["loc"] for fault in faults}
     for fault in faults:
         if fault["type"] == "extra_forbidden":
-            meant.add((*fault["loc"][:-1], _nearest(fault["loc"])))
+            renamed = new_name([str(part) for part in fault["loc"]], GEARBOX_RENAMES)
+            meant.add((*fault["loc"][:-1], renamed or _nearest(fault["loc"])))
     for fault in faults:
         path = _path(fault["loc"], content)
         key = ".".join(_key(part) for part in path)
@@ -221,6 +223,8 @@ _TYPES = {
 def _remedy(fault: Any) -> str:
     """Say what would be right."""
     if fault["type"] == "extra_forbidden":
+        if hint := renamed_hint([str(part) for part in fault["loc"]], GEARBOX_RENAMES):
+            return hint
         near = _nearest(fault["loc"])
         known = ", ".join(_known_keys(fault["loc"]))
         if near:

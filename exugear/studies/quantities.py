@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.units import RPM
 from exugear.steady.peaks import line_name, peaks
 from exugear.studies.point_results import PointError, PointResults
@@ -631,6 +632,9 @@ def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Qu
     kept = {}
     for name, section in sections.items():
         options = dict(section)
+        for key in options:
+            if hint := renamed_hint(["outputs", name, key], STUDY_RENAMES):
+                raise OutputError(f"outputs.{name}.{key}: {hint}")
         wanted = str(options.pop("quantity", ""))
         if wanted not in known:
             near = difflib.get_close_matches(wanted[:100], known, n=1)

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from exugear.gearbox.reading import fault_line, parsed, shortened
+from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.sections.entries import Name, Text
 from exugear.gearbox.variant import Variant
 from fe_ste.tools.files import FileError, read_text
@@ -378,6 +379,8 @@ def _described(fault: Any) -> str:
     location = [str(part) for part in fault["loc"] if part not in ("[key]", "int", "float", "str", "bool")]
     key = ".".join(location) or "the file"
     if fault["type"] == "extra_forbidden":
+        if hint := renamed_hint(location, STUDY_RENAMES):
+            return f"{key}: {hint}"
         known = _known_keys(location[:-1])
         near = difflib.get_close_matches(location[-1][:100], known, n=1)
         return f"{key}: unknown key; " + (

@@ -1,0 +1,257 @@
+"""Keys of gearbox and study files that had another name in earlier versions, and how an old file is rewritten.
+
+Old names are refused with the new ones. `migrated` replaces them in the text of a file and keeps everything else as it
+is: comments, order, spacing.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Rename:
+    """A key with its old and its new name, or values of a key that are called otherwise now."""
+
+    table: str
+    """Table of the key with its old names, such as ``bearings.*.damping``; empty at the top."""
+    old: str
+    new: str
+    values: Mapping[str, str] = field(default_factory=dict)
+    """Old and new values."""
+
+    def fits(self, path: Sequence[str]) -> bool:
+        """Return whether this is the key at a path of old names."""
+        tables = self.table.split(".") if self.table else []
+        return (
+            len(path) == len(tables) + 1
+            and path[-1] == self.old
+            and all(fnmatchcase(part, pattern) for part, pattern in zip(path, tables, strict=False))
+        )
+
+
+def _damping(connectors: str) -> tuple[Rename, ...]:
+    """Keys of viscous damping, whose unit was stated as that of a stiffness."""
+    names = {"N_per_m": ("radial", "axial"), "N_m_per_rad": ("tilt", "torsion")}
+    true_units = {"N_per_m": "N_s_per_m", "N_m_per_rad": "N_m_s_per_rad"}
+    return tuple(
+        Rename(f"{connectors}.*.damping", f"{direction}_{unit}", f"{direction}_{true_units[unit]}")
+        for unit, directions in names.items()
+        for direction in directions
+    )
+
+
+def _limits(table: str) -> tuple[Rename, ...]:
+    return Rename(table, "least", "min"), Rename(table, "most", "max")
+
+
+GEARBOX_RENAMES: tuple[Rename, ...] = (
+    Rename("bearings.*", "law", "model", {"stiffness": "linear"}),
+    Rename("bearings.*.catalogue", "holds_towards", "locates_towards"),
+    *_damping("bearings"),
+    *_damping("mounts"),
+    Rename("bodies.*", "wheels_z_mm", "gears_z_mm"),
+    *(Rename("rating", f"least_{name}", f"minimum_{name}") for name in ("S_H", "S_F", "S_0", "dynamic_factor")),
+)
+STUDY_RENAMES: tuple[Rename, ...] = (
+    Rename("", "figures", "outputs"),
+    Rename("figures.*", "figure", "quantity"),
+    Rename("outputs.*", "figure", "quantity"),
+    Rename("figures.*", "by", "by", {"least": "minimum"}),
+    Rename("choice", "mesh_law", "mesh_model", {"seed": "tangential", "rigid": "kinematic"}),
+    Rename("steady", "level", "method"),
+    *_limits("parameters.*.uniform"),
+    *_limits("parameters.*.normal"),
+    *_limits("tolerances.*.uniform"),
+    *_limits("tolerances.*.normal"),
+    *_limits("optimise.limits.*"),
+)
+
+
+def new_name(path: Sequence[str], renames: Sequence[Rename]) -> str | None:
+    """Return the new name of the key at a path, None if its name is not an old one.
+
+    Examples
+    --------
+    >>> new_name(["bearings", "left", "law"], GEARBOX_RENAMES)
+    'model'
+    """
+    return next((rename.new for rename in renames if rename.fits(path) and rename.new != rename.old), None)
+
+
+def renamed_hint(path: Sequence[str], renames: Sequence[Rename]) -> str:
+    """Return what a message says of a key with an old name; empty for other keys."""
+    new = new_name(path, renames)
+    if new is None:
+        return ""
+    return f"was renamed to {new}; `exugear migrate FILE.toml` rewrites the file"
+
+
+class MigrationError(ValueError):
+    """A file that cannot be rewritten."""
+
+
+def migrated(text: str) -> tuple[str, list[str]]:
+    r"""Replace old names of keys and values in the text of a gearbox or study file.
+
+    Returns
+    -------
+    text : the same text with the new names
+    changes : a line for each of them, with the number of its line
+
+    Raises
+    ------
+    MigrationError
+        The text is not valid TOML, or an old and a new name are next to each other.
+
+    Examples
+    --------
+    >>> migrated('[bearings.left]\nlaw = "stiffness"  # linear\n')
+    ('[bearings.left]\nmodel = "linear"  # linear\n', ['line 2: law -> model', 'line 2: "stiffness" -> "linear"'])
+    """
+    try:
+        before = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise MigrationError(f"not valid TOML: {error}") from None
+    renames = STUDY_RENAMES if "case" in before and "parameters" in before else GEARBOX_RENAMES
+    pieces: list[str] = []
+    changes: list[str] = []
+    end = 0
+    for token in _Scanner(text).tokens():
+        new = _replacement(token, renames)
+        if new is None:
+            continue
+        pieces += [text[end : token.start], new]
+        end = token.end
+        changes.append(f"line {text.count(chr(10), 0, token.start) + 1}: {text[token.start : token.end]} -> {new}")
+    result = "".join([*pieces, text[end:]])
+    try:
+        after = tomllib.loads(result)
+    except tomllib.TOMLDecodeError as error:
+        raise MigrationError(f"holds the old and the new name of a key; remove one of them ({error})") from None
+    if _count(before) != _count(after):
+        raise MigrationError("cannot be rewritten without loss; rename the keys by hand")
+    return result, changes
+
+
+def _replacement(token: _Token, renames: Sequence[Rename]) -> str | None:
+    """Return what replaces a key or a string, None where nothing does."""
+    if token.is_key:
+        new = new_name(token.path, renames)
+        if new is None and renames is STUDY_RENAMES and "." in token.path[-1]:
+            dotted = _dotted(token.path[-1])
+            new = None if dotted is None else f'"{dotted}"'
+        return new
+    for rename in renames:
+        if rename.fits(token.path) and token.value in rename.values:
+            return f'"{rename.values[token.value]}"'
+    if renames is STUDY_RENAMES:
+        dotted = _dotted(token.value)
+        return None if dotted is None else f'"{dotted}"'
+    return None
+
+
+def _dotted(path: str) -> str | None:
+    """Return the new form of a dotted path of the gearbox file that a study varies."""
+    parts = path.split(".")
+    new = new_name(parts, GEARBOX_RENAMES)
+    return None if new is None else ".".join([*parts[:-1], new])
+
+
+def _count(content: Any) -> int:
+    """Count the values in all tables and lists."""
+    if isinstance(content, Mapping):
+        return sum(map(_count, content.values()))
+    if isinstance(content, list):
+        return sum(map(_count, content))
+    return 1
+
+
+# Where keys and strings are in the text of a valid TOML file
+
+
+@dataclass(frozen=True)
+class _Token:
+    """A part of a key, or a string that is a value."""
+
+    path: tuple[str, ...]
+    """Names down to this key, or to that of the value."""
+    start: int
+    end: int
+    """Place in the text, quotes included."""
+    value: str = ""
+    is_key: bool = True
+
+
+_SPACE = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
+_KEY = re.compile(r'[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|\'[^\']*\'')
+_STRING = re.compile(r'"""(?:[^\\]|\\.)*?"{3,5}|\'\'\'.*?\'{3,5}|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'', re.DOTALL)
+_OTHER = re.compile(r"[^,\]}\n#]+")
+
+
+class _Scanner:
+    """Finds keys and strings of a text that is known to be valid."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.place = 0
+
+    def tokens(self) -> Iterator[_Token]:
+        table: tuple[str, ...] = ()
+        while self._skip() < len(self.text):
+            if self.text[self.place] == "[":
+                self.place += 2 if self.text.startswith("[[", self.place) else 1
+                table = yield from self._key(())
+                self.place = self.text.index("]", self.place) + 1
+                self.place += self.text.startswith("]", self.place)
+            else:
+                yield from self._assignment(table)
+
+    def _skip(self) -> int:
+        found = _SPACE.match(self.text, self.place)
+        assert found is not None
+        self.place = found.end()
+        return self.place
+
+    def _key(self, table: tuple[str, ...]) -> Generator[_Token, None, tuple[str, ...]]:
+        path = table
+        while True:
+            self._skip()
+            found = _KEY.match(self.text, self.place)
+            assert found is not None
+            path = (*path, found[0].strip("\"'"))
+            yield _Token(path, *found.span())
+            self.place = found.end()
+            if self.text[self._skip()] != ".":
+                return path
+            self.place += 1
+
+    def _assignment(self, table: tuple[str, ...]) -> Iterator[_Token]:
+        path = yield from self._key(table)
+        self.place = self.text.index("=", self.place) + 1
+        yield from self._value(path)
+
+    def _value(self, path: tuple[str, ...]) -> Iterator[_Token]:
+        first = self.text[self._skip()]
+        if first in "[{":
+            self.place += 1
+            while self.text[self._skip()] not in "]}":
+                if self.text[self.place] == ",":
+                    self.place += 1
+                elif first == "[":
+                    yield from self._value(path)
+                else:
+                    yield from self._assignment(path)
+            self.place += 1
+        elif found := _STRING.match(self.text, self.place):
+            yield _Token(path, *found.span(), found[0].strip("\"'"), is_key=False)
+            self.place = found.end()
+        else:
+            found = _OTHER.match(self.text, self.place)
+            assert found is not None
+            self.place = found.end()
