@@ -16,7 +16,7 @@ from typing import Any
 from timing import CASE, ROOT, say
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.studies.executors import Kept, Opens, processes
+from exugear.studies.executors import Opens, PersistentPool, processes
 from exugear.studies.point_results import PointResults, Shared
 from exugear.studies.runner import run_study, task_of
 from exugear.studies.sampling import changed
@@ -87,7 +87,7 @@ def efficiency(name: str, of: Study, warm: Study) -> dict[str, Any]:
     walls = {}
     for workers in (0, 1, 2):
         opens = _in_processes(workers) if workers else processes(1)
-        with tempfile.TemporaryDirectory() as folder, Kept(opens) as kept:
+        with tempfile.TemporaryDirectory() as folder, PersistentPool(opens) as kept:
             run_study(warm, Path(folder) / "warm", kept.opened)
             start = time.perf_counter()
             swept = run_study(of, Path(folder) / "out", kept.opened)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from exugear.exchange.rexs.to_case.conversion import to_case
     from exugear.gearbox.choice import Choice
     from exugear.gearbox.gearbox import Gearbox
-    from exugear.gearbox.reading import CaseError
+    from exugear.gearbox.reading import GearboxFileError
     from exugear.gearbox.templates.kinds import template
     from exugear.gearbox.variant import Variant
     from exugear.life.life import compute_life
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 #: Public names and the modules they stand in.
 _HOMES = {
-    "CaseError": "exugear.gearbox.reading",
+    "GearboxFileError": "exugear.gearbox.reading",
     "Choice": "exugear.gearbox.choice",
     "Gearbox": "exugear.gearbox.gearbox",
     "Modes": "exugear.system.modes",
@@ -70,7 +70,7 @@ _HOMES = {
 }
 
 __all__ = [
-    "CaseError",
+    "GearboxFileError",
     "Choice",
     "Gearbox",
     "Modes",

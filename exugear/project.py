@@ -16,7 +16,7 @@ import numpy as np
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import OFFERED, Variant, VariantError
 from exugear.results.folder import (
     bearings_path,
@@ -29,7 +29,7 @@ from exugear.results.folder import (
     write_duties,
 )
 from exugear.results.run_file import FINAL_NAME
-from exugear.system.bearings.duty import BearingDuty
+from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.build import assemble
@@ -37,7 +37,7 @@ from exugear.system.modes import Modes, kept_modes, modes_of
 from exugear.system.operating_points import bearing_duties, mesh_duties
 from exugear.system.statics import BalanceError, static_state
 from exugear.system.system import Assembly, input_hash
-from exugear.system.tooth_mesh.contact_state import MeshDuty
+from exugear.system.tooth_mesh.contact_state import MeshLoadState
 from exugear.system.tooth_mesh.element import MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
@@ -52,7 +52,7 @@ from exugear.system.tooth_mesh.tables import (
 )
 from exugear.transient.outcome import Run
 from exugear.transient.runup import simulate
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.stores import Store
 from fe_ste.transmission_error.table import MeshTable
 
@@ -71,7 +71,7 @@ Figures = dict[tuple[str, str, str], dict[str, float]]
 
 
 @dataclass(frozen=True)
-class Project(Displayed):
+class Project(ReprMixin):
     """A gearbox with the folder of its results and the choices made.
 
     Tables, elastic bodies, modes, steady responses and lives are kept in the folder, and taken as they are where they
@@ -110,7 +110,7 @@ class Project(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             Anything wrong with the file.
         """
         gearbox = Gearbox.from_toml(case, permissions)
@@ -124,7 +124,7 @@ class Project(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             The folder holds no results, or what it says of its case cannot be used.
         """
         return cls(kept_case(Path(folder), permissions), Path(folder), choice or Choice())
@@ -297,7 +297,7 @@ class Project(Displayed):
 
         return steady_path(self.folder, self.choice, settings)
 
-    def duties(self) -> tuple[tuple[BearingDuty, ...], tuple[MeshDuty, ...]]:
+    def duties(self) -> tuple[tuple[BearingLoadState, ...], tuple[MeshLoadState, ...]]:
         """Find what catalogue bearings and meshes bear at the static load, written to `bearings_path`."""
         assembly = self.assembly()
         duties = bearing_duties(assembly)
@@ -306,11 +306,11 @@ class Project(Displayed):
         write_duties(self.bearings_path, duties, meshes, input_hash(assembly))
         return duties, meshes
 
-    def bearings(self) -> tuple[BearingDuty, ...]:
+    def bearings(self) -> tuple[BearingLoadState, ...]:
         """Find what catalogue bearings bear at the static load: see `duties`."""
         return self.duties()[0]
 
-    def meshes(self) -> tuple[MeshDuty, ...]:
+    def meshes(self) -> tuple[MeshLoadState, ...]:
         """Find how gears stand at the static load, and how evenly their teeth bear: see `duties`."""
         return self.duties()[1]
 
@@ -336,7 +336,7 @@ class Project(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             Loads that cannot be used, or that go far beyond the tables; strengths that do not fit the gears.
         """
         from exugear.life.life import check_reach, checked_loads
@@ -410,7 +410,7 @@ class Project(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             No section `[rating]`, loads that cannot be used, or strengths that do not fit the gears.
         """
         from exugear.life.rating.sheet import RATED_AS, balanced, rated, rated_loads
@@ -444,7 +444,7 @@ class Project(Displayed):
             return None, ""
         try:
             data = self.stored_life(counted)
-        except (BalanceError, MeshError, BearingError, VariantError, CaseError) as error:
+        except (BalanceError, MeshError, BearingError, VariantError, GearboxFileError) as error:
             return None, str(error)
         if data is None:
             return None, f"{self.life_path} was computed from another input"

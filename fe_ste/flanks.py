@@ -40,13 +40,13 @@ from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.geometry.involute import involute
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
 # Flank topography: material removed over a grid of radii and axial positions, as a gear measuring machine gives it
 
 
 @dataclass(frozen=True)
-class FlankTopography(Displayed):
+class FlankTopography(ReprMixin):
     """Material removed over a grid, linear between its points in roll length and axial position.
 
     Beyond the grid the values of its edge go on.
@@ -217,7 +217,7 @@ class Relief:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FlankModification(Displayed):
+class FlankModification(ReprMixin):
     """Modification of both flanks of every tooth of a gear.
 
     Raises

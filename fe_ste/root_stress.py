@@ -26,7 +26,7 @@ from fe_ste.elasticity.condensation import Chain, flank_functionals, ring_faces,
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import one_dense_thread
 
 # Strain gauges on the root of a tooth: surface strains as linear read-outs of a sector's displacements
@@ -36,7 +36,7 @@ COMPONENTS = 3
 
 
 @dataclass(frozen=True)
-class GaugePlaces(Displayed, line=": {edges!n} edges"):
+class GaugePlaces(ReprMixin, line=": {edges!n} edges"):
     """Where gauges lie."""
 
     edges: Integers
@@ -139,7 +139,7 @@ REACH = 3
 
 
 @dataclass(frozen=True)
-class RootGauges(Displayed, line=" of {gear.name!r}: {places.edges!n} edges, {axial!n} layers"):
+class RootGauges(ReprMixin, line=" of {gear.name!r}: {places.edges!n} edges, {axial!n} layers"):
     """Stress at the root of the teeth of a gear under loads on the flank of one tooth."""
 
     gear: Gear
@@ -246,7 +246,7 @@ PITCH_ZONE = 0.05
 
 
 @dataclass(frozen=True)
-class MeshCycleStress(Displayed, line=": {torque!n} torques, {misalignment!n} misalignments"):
+class MeshCycleStress(ReprMixin, line=": {torque!n} torques, {misalignment!n} misalignments"):
     """Largest stresses of a pair over the mesh cycle, by torque and misalignment."""
 
     torque: Floats

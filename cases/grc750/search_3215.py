@@ -32,7 +32,7 @@ import scipy.linalg
 from one_variant import grc_project
 
 from exugear import Choice, Gearbox, Project, assemble
-from exugear.steady.excitation import Gearset
+from exugear.steady.excitation import HarmonicBalanceModel
 from exugear.steady.mean_system.mean_system import MeanSystem
 from exugear.steady.point_solver import gearset_of
 from exugear.steady.response import transmission_errors
@@ -123,7 +123,7 @@ def varied(gearbox: Gearbox, own: Mapping[str, Any], radial: float) -> Gearbox:
     return gearbox.varied(changes)
 
 
-def gearset_with(given: Given, own: Mapping[str, Any], radial: float, variant: str) -> Gearset:
+def gearset_with(given: Given, own: Mapping[str, Any], radial: float, variant: str) -> HarmonicBalanceModel:
     """Mean system and meshes of a variant."""
     choice = Choice(variant, inertias=own["inertias"])
     assembly = assemble(varied(given.gearbox, own, radial), choice, given.stiffness, contact=given.contact)
@@ -140,7 +140,7 @@ class Between:
     low: float
     high: float
     soft: MeanSystem
-    stiff: Gearset
+    stiff: HarmonicBalanceModel
 
     @classmethod
     def of(cls, given: Given, own: Mapping[str, Any]) -> Between:
@@ -177,7 +177,7 @@ def tuned(between: Between) -> list[float]:
     return kept
 
 
-def amplitudes(gearset: Gearset, system: MeanSystem) -> dict[str, np.ndarray]:
+def amplitudes(gearset: HarmonicBalanceModel, system: MeanSystem) -> dict[str, np.ndarray]:
     """Peak amplitude of the overall transmission error along `FREQUENCIES` by mesh order, m; NaN beyond the speeds."""
     speed = 0.5 * FASTEST
     ports = gearset.ports_at(speed)
@@ -206,7 +206,7 @@ def peak_of(amplitude: np.ndarray, within: float) -> dict[str, float] | None:
     return best
 
 
-def peaks_of(gearset: Gearset, system: MeanSystem, within: float) -> dict[str, dict[str, float]]:
+def peaks_of(gearset: HarmonicBalanceModel, system: MeanSystem, within: float) -> dict[str, dict[str, float]]:
     """Peaks by mesh order."""
     found = {name: peak_of(values, within) for name, values in amplitudes(gearset, system).items()}
     return {name: peak for name, peak in found.items() if peak is not None and peak["rise_dB"] >= TOLD_FROM}

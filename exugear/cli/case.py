@@ -25,7 +25,7 @@ def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = Fals
     """Read a gearbox file for a verb, with what the user permits it, and try all its parts; tell what is unusual."""
     from exugear.gearbox.gearbox import Gearbox
     from exugear.gearbox.named_files import Permissions
-    from exugear.gearbox.reading import CaseError, read_toml
+    from exugear.gearbox.reading import GearboxFileError, read_toml
     from exugear.system.readiness import check_parts, faults_of_bearings, remarks
 
     check_allow_dir(allow_dir)
@@ -33,10 +33,10 @@ def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = Fals
         content = read_toml(case)
         try:
             gearbox = Gearbox.from_dict(content, str(case), Permissions(scripts, allow_dir))
-        except CaseError as error:
-            raise CaseError(*error.faults, *faults_of_bearings(content, str(case))) from None
+        except GearboxFileError as error:
+            raise GearboxFileError(*error.faults, *faults_of_bearings(content, str(case))) from None
         check_parts(gearbox)
-    except CaseError as error:
+    except GearboxFileError as error:
         raise BadInputError(error) from error
     for line in counted([f"Warning: {line}" for line in remarks(gearbox)]) if tell else ():
         note(line, style="yellow")

@@ -302,7 +302,7 @@ def _told_to_the_user(error: Exception) -> Exception | None:
     if not type(error).__module__.startswith("exugear."):
         return None
     # Imported after the fact: a verb that goes well need not load them.
-    from exugear.gearbox.reading import CaseError
+    from exugear.gearbox.reading import GearboxFileError
     from exugear.gearbox.variant import VariantError
     from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
     from exugear.steady.mean_system.rotating_frame import SteadyError
@@ -310,7 +310,7 @@ def _told_to_the_user(error: Exception) -> Exception | None:
     from exugear.system.statics import BalanceError
     from exugear.system.tooth_mesh.placement import MeshError
 
-    if isinstance(error, (CaseError, VariantError, MeshError, BearingError, SteadyError)):
+    if isinstance(error, (GearboxFileError, VariantError, MeshError, BearingError, SteadyError)):
         return BadInputError(error)
     if isinstance(error, (BalanceError, HarmonicBalanceError)):
         return FailedError(error)
@@ -395,7 +395,7 @@ def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
     return [doubt for name, table in tables.items() for doubt in doubts_about_table(name, table)]
 
 
-def refuse_unsolved(meshes: Sequence[str]) -> None:
+def refuse_not_converged(meshes: Sequence[str]) -> None:
     """End with code 1 where meshes read their tables beside states that are not solved."""
     if meshes:
         raise FailedError(

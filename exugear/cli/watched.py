@@ -17,15 +17,15 @@ from exugear.cli.console import (
     note,
     tell_of_tables,
 )
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.project import Project
 from exugear.results.folder import time_noted
-from exugear.system.bearings.duty import BearingDuty
+from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.modes import Modes
 from exugear.system.system import Assembly
-from exugear.system.tooth_mesh.contact_state import MeshDuty
+from exugear.system.tooth_mesh.contact_state import MeshLoadState
 from exugear.system.tooth_mesh.tables import TableRequest
 from exugear.transient.outcome import Progress, Run
 from fe_ste.elimination import FactorisationError
@@ -88,7 +88,7 @@ class WatchedProject(Project):
 
             try:
                 return super().bodies(show)
-            except CaseError as error:  # a mesh that only reading shows to be none: the work has begun
+            except GearboxFileError as error:  # a mesh that only reading shows to be none: the work has begun
                 raise FailedError(error) from error
 
     def assembly(self) -> Assembly:
@@ -107,7 +107,7 @@ class WatchedProject(Project):
             note(f"{name}: {unknowns} unknowns reduced to {body.reduced.size} coordinates in {took:.1f} s")
         return modes
 
-    def duties(self) -> tuple[tuple[BearingDuty, ...], tuple[MeshDuty, ...]]:
+    def duties(self) -> tuple[tuple[BearingLoadState, ...], tuple[MeshLoadState, ...]]:
         """Find what catalogue bearings and meshes bear."""
         with self.bars.row():
             return super().duties()

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # Units as load files write them, and what they are worth in SI
 
@@ -116,7 +116,7 @@ class LoadFileError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Channels(Displayed):
+class Channels(ReprMixin):
     """Channels over time."""
 
     path: Path

@@ -9,7 +9,7 @@ from exugear.gearbox.named_files import LARGEST_TABLE
 from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase, PointForce
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
-from exugear.gearbox.sections.case import CaseFile, ForceSection, LoadCaseSection
+from exugear.gearbox.sections.case import ForceSection, GearboxFile, LoadCaseSection
 from exugear.gearbox.sections.connections import (
     BearingSection,
     ConnectorDampingSection,
@@ -47,7 +47,7 @@ def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A body lacks the inertia set, or has no place.
     """
     return tuple(
@@ -129,7 +129,7 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
     )
 
 
-def blank_places(case: CaseFile, family: str) -> dict[str, float]:
+def blank_places(case: GearboxFile, family: str) -> dict[str, float]:
     """Where a blank may sit on the shape of a body, by the name of what holds it, mm along the axis.
 
     These are the gears, bearings, mounts and forces of the body and the place where torques act, as far as they stand
@@ -212,7 +212,7 @@ def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[f
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         Errors of what is no planet.
     """
 
@@ -233,7 +233,7 @@ def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         Loads on a body that does not turn, a torque series that is not there or may not be read.
     """
 
@@ -277,7 +277,7 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A joint of the ground, of unknown bodies, or between sets of different size.
     """
 
@@ -311,7 +311,7 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A bearing of the ground, of unknown bodies, or between sets of different size.
     """
 
@@ -394,7 +394,7 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A mount of what is no enabled body with a place of its own.
     """
 
@@ -429,7 +429,7 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A force on the ground, a planet, a body without a place, or one that is not there.
     """
 
@@ -456,7 +456,7 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A coupling of bodies that do not turn, or at a seat that is no bearing.
     """
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from exugear.gearbox.body_parts import blank_places
 from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, Mesh, PointForce, connector_matrix
-from exugear.gearbox.reading import CaseError, shortened
-from exugear.gearbox.sections.case import CaseFile, OverallSection
+from exugear.gearbox.reading import GearboxFileError, shortened
+from exugear.gearbox.sections.case import GearboxFile, OverallSection
 from exugear.gearbox.sections.connections import BearingSection, ConnectorDampingSection, StiffnessSection
 from exugear.gearbox.sections.entries import GROUND
 from fe_ste.geometry.gears import Gear
@@ -38,7 +38,7 @@ class Check:
 
     name: str
     run: Callable[[], object]
-    """Raises `CaseError` where something is wrong."""
+    """Raises `GearboxFileError` where something is wrong."""
     needs: tuple[str, ...] = ()
     """Checks without which this one makes no sense."""
 
@@ -48,7 +48,7 @@ def check(checks: Iterable[Check]) -> None:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         All faults that are found.
 
     Examples
@@ -57,7 +57,7 @@ def check(checks: Iterable[Check]) -> None:
     """
     faults = faults_of(checks)
     if faults:
-        raise CaseError(*faults)
+        raise GearboxFileError(*faults)
 
 
 def faults_of(checks: Iterable[Check]) -> list[str]:
@@ -70,13 +70,13 @@ def faults_of(checks: Iterable[Check]) -> list[str]:
             continue
         try:
             one.run()
-        except CaseError as error:
+        except GearboxFileError as error:
             faults += error.faults
             failed.add(one.name)
     return faults
 
 
-def faults_of_bodies(case: CaseFile) -> Iterator[str]:
+def faults_of_bodies(case: GearboxFile) -> Iterator[str]:
     """Tell names that are taken, carriers that cannot be, wheels that are no gears."""
     if GROUND in case.bodies:
         yield f"bodies.{GROUND}: {GROUND} is the name of what stands still; choose another"
@@ -94,7 +94,7 @@ def faults_of_bodies(case: CaseFile) -> Iterator[str]:
             yield from _faults_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
 
 
-def faults_of_blanks(case: CaseFile) -> Iterator[str]:
+def faults_of_blanks(case: GearboxFile) -> Iterator[str]:
     """Tell blanks of stepped shafts that sit nowhere, where the inertia follows from the shape and would lack them.
 
     Beside an inertia that is stated they matter to the elastic shaft alone, which refuses them.
@@ -109,7 +109,7 @@ def faults_of_blanks(case: CaseFile) -> Iterator[str]:
                 yield f"bodies.{family}.shape.blanks.{blank}: no such seat on the body; seats are {known}"
 
 
-def _faults_of_carrier(case: CaseFile, key: str, name: str) -> Iterator[str]:
+def _faults_of_carrier(case: GearboxFile, key: str, name: str) -> Iterator[str]:
     carrier = case.bodies.get(name)
     if carrier is None:
         yield f"{key}: no such body; bodies are {', '.join(case.bodies)}"
@@ -187,7 +187,7 @@ def _coupled(couplings: Sequence[Coupling], body: str) -> set[str]:
 
 
 def faults_of_repetition(
-    case: CaseFile, deviations: Collection[tuple[str, str]], pin_offsets: Collection[str]
+    case: GearboxFile, deviations: Collection[tuple[str, str]], pin_offsets: Collection[str]
 ) -> Iterator[str]:
     """Tell errors of a wheel or a pin that are given twice: a second section would replace the first."""
     if len(deviations) < len(case.deviations):
@@ -196,7 +196,7 @@ def faults_of_repetition(
         yield "pins: two of them are of one planet; give its errors together"
 
 
-def faults_of_mass_properties(case: CaseFile) -> Iterator[str]:
+def faults_of_mass_properties(case: GearboxFile) -> Iterator[str]:
     """Tell mass properties that are missing."""
     for family, section in case.bodies.items():
         for inertias, values in section.inertia.items():
@@ -231,7 +231,7 @@ def faults_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body
 
 
 def faults_of_planets(
-    case: CaseFile, bodies: Iterable[Body], gears: Mapping[str, Gear], meshes: Sequence[Mesh]
+    case: GearboxFile, bodies: Iterable[Body], gears: Mapping[str, Gear], meshes: Sequence[Mesh]
 ) -> Iterator[str]:
     """Tell planets that run into each other, of one set or of several on a carrier, and such as cannot be assembled."""
     planets = [body for body in bodies if body.planet_of is not None]
@@ -250,7 +250,7 @@ def faults_of_planets(
         yield from _faults_of_assembly(family, [body for body in planets if body.family == family], others, meshes)
 
 
-def _collisions(case: CaseFile, planet: Body, other: Body, gears: Mapping[str, Gear]) -> Iterator[str]:
+def _collisions(case: GearboxFile, planet: Body, other: Body, gears: Mapping[str, Gear]) -> Iterator[str]:
     """Tell wheels of two planets that share a place along the axis and overlap."""
     gap = math.dist(planet.axis, other.axis)
     for wheel, other_wheel in itertools.product(planet.wheels, other.wheels):
@@ -304,7 +304,7 @@ def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
 
 
 def faults_of_connection(
-    case: CaseFile,
+    case: GearboxFile,
     bodies: Iterable[Body],
     meshes: Iterable[Mesh],
     couplings: Iterable[Coupling],
@@ -331,7 +331,7 @@ def faults_of_connection(
 
 
 def bodies_apart(
-    case: CaseFile, bodies: Iterable[Body], meshes: Iterable[Mesh], couplings: Iterable[Coupling]
+    case: GearboxFile, bodies: Iterable[Body], meshes: Iterable[Mesh], couplings: Iterable[Coupling]
 ) -> tuple[str, ...]:
     """Bodies that can move and that no mesh, coupling or carrier joins to the overall input."""
     bodies = tuple(bodies)
@@ -375,7 +375,7 @@ def faults_of_torsion(
             return
 
 
-def faults_of_supports(case: CaseFile) -> Iterator[str]:
+def faults_of_supports(case: GearboxFile) -> Iterator[str]:
     """Tell stiffness and damping that no support has: unsymmetric, indefinite, or none at all."""
     for table, sections in (("bearings", case.bearings), ("mounts", case.mounts)):
         for name, section in sections.items():

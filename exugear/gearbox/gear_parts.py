@@ -33,7 +33,7 @@ from fe_ste.flanks import (
     radius_at_roll_length_from_root,
     radius_at_roll_length_from_tip,
 )
-from fe_ste.geometry.gear_relations import ROUNDING, UncheckedGear
+from fe_ste.geometry.gear_relations import ROUNDING, GearInputs
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair, Material
 from fe_ste.geometry.involute import PinionCutter
 from fe_ste.geometry.pair_relations import (
@@ -60,7 +60,7 @@ def gears(origin: Origin) -> dict[str, Gear]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A gear that cannot be made, with its key.
     """
     plain = {name: _unchecked(name, section) for name, section in origin.case.gears.items()}
@@ -82,7 +82,7 @@ def gears(origin: Origin) -> dict[str, Gear]:
     return part_of_each(of_section, origin.case.gears)
 
 
-def with_usual_rounding(section: GearSection, gear: UncheckedGear) -> UncheckedGear:
+def with_usual_rounding(section: GearSection, gear: GearInputs) -> GearInputs:
     """Gear with no larger radius at the tip of its tool than fits, where the file leaves the radius to the default.
 
     At 25 degrees and a dedendum of 1.25 that is 0.318 normal modules; one that the file gives is refused instead.
@@ -118,7 +118,7 @@ def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSec
     return {name: section for name, section in origin.case.gears.items() if getattr(section, key)}
 
 
-def _pairs_of(origin: Origin, gears: Mapping[str, UncheckedGear], name: str) -> Iterator[tuple[str, UncheckedPair]]:
+def _pairs_of(origin: Origin, gears: Mapping[str, GearInputs], name: str) -> Iterator[tuple[str, UncheckedPair]]:
     """Pairs of a gear by name, gear 1 being the external or smaller one."""
     for pair, section in origin.case.pairs.items():
         both = [gears[one] for one in (section.pinion, section.gear) if one in gears]
@@ -128,7 +128,7 @@ def _pairs_of(origin: Origin, gears: Mapping[str, UncheckedGear], name: str) -> 
             yield pair, UncheckedPair(name=pair, pinion=first, gear=second, centre_distance=distance)
 
 
-def _with_shift(origin: Origin, gears: Mapping[str, UncheckedGear], name: str, section: GearSection) -> UncheckedGear:
+def _with_shift(origin: Origin, gears: Mapping[str, GearInputs], name: str, section: GearSection) -> GearInputs:
     """Gear with the profile shift that leaves no backlash at the centre distance of its first pair."""
     key = f"gears.{name}.profile_shift_from_centre_distance"
     for pair_name, pair in _pairs_of(origin, gears, name):
@@ -163,7 +163,7 @@ def _rounding(value: float) -> float:
     return 0.5 * 10.0 ** min(int(exponent), -FEWEST_DECIMALS)
 
 
-def _without_rounded_overlaps(origin: Origin, gears: Mapping[str, UncheckedGear]) -> dict[str, UncheckedGear]:
+def _without_rounded_overlaps(origin: Origin, gears: Mapping[str, GearInputs]) -> dict[str, GearInputs]:
     """Gears whose teeth are thinned by what profile shifts and centre distances as printed let flanks overlap.
 
     Published values are rounded in their last digit: two that leave no backlash may then overlap by some nanometres.
@@ -201,9 +201,7 @@ def rounded_overlaps(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str]
             )
 
 
-def _with_fitted_tip(
-    origin: Origin, gears: Mapping[str, UncheckedGear], name: str, section: GearSection
-) -> UncheckedGear:
+def _with_fitted_tip(origin: Origin, gears: Mapping[str, GearInputs], name: str, section: GearSection) -> GearInputs:
     """Gear with its tip shortened as far as all of its mates ask for."""
     gear = gears[name]
     try:
@@ -218,9 +216,9 @@ def _with_fitted_tip(
     return replace(gear, tip_diameter=max(tips) if gear.internal else min(tips))
 
 
-def _unchecked(name: str, section: GearSection) -> UncheckedGear:
+def _unchecked(name: str, section: GearSection) -> GearInputs:
     """Gear from its section: millimetres to metres, degrees to radians."""
-    return UncheckedGear(
+    return GearInputs(
         name=name,
         teeth=section.teeth,
         normal_module=section.normal_module_mm * MM,
@@ -289,7 +287,7 @@ def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankM
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A modification that does not fit its gear, or a topography that cannot be read.
     """
 
@@ -354,7 +352,7 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A pair of unknown gears, or of such as cannot run together.
     """
 
@@ -425,7 +423,7 @@ def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A stiffness that is not above zero somewhere in the cycle.
     """
 
@@ -462,7 +460,7 @@ def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, B
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         Unknown pairs or bodies, a body without the gear, faces that do not overlap, angles that contradict positions.
     """
 
@@ -552,7 +550,7 @@ def deviations(
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         Errors of an unknown body or gear, not one for each tooth, or deeper than teeth are.
     """
 

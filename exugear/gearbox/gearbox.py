@@ -29,15 +29,15 @@ from exugear.gearbox.parts import (
     WheelDeviation,
     connector_matrix,
 )
-from exugear.gearbox.reading import CaseError, Origin, parse_case, read_toml, readable, shortened
-from exugear.gearbox.sections.case import NAMED_TABLES, CaseFile, SteSection, labels_in_use
+from exugear.gearbox.reading import GearboxFileError, Origin, parse_case, read_toml, readable, shortened
+from exugear.gearbox.sections.case import NAMED_TABLES, GearboxFile, SteSection, labels_in_use
 from exugear.gearbox.sections.entries import unusual_values
-from exugear.gearbox.train import Tie, Train
+from exugear.gearbox.train import SpinConstraint, Train
 from exugear.gearbox.units import UM
 from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.standards import iso6336
-from fe_ste.tools.display import Displayed, TitledRows
+from fe_ste.tools.display import ReprMixin, TitledRows
 
 BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "lubricant", "operation", "rating", "report", "ste")
 """Tables of the file that change nothing in the equations: words and speeds for pages, what acts over a life, how parts
@@ -46,7 +46,7 @@ own."""
 
 
 @dataclass(frozen=True)
-class Gearbox(Displayed):
+class Gearbox(ReprMixin):
     """A checked gearbox. Build one with :meth:`from_toml` or :meth:`from_dict`.
 
     Examples
@@ -58,7 +58,7 @@ class Gearbox(Displayed):
     ['high_speed', 'intermediate', 'ring_planet', 'sun_planet']
     """
 
-    case: CaseFile
+    case: GearboxFile
     """The file as it is written."""
     source: str
     """Its path or name."""
@@ -77,7 +77,7 @@ class Gearbox(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             Anything wrong with the file: one message with file, key, value and what would be right.
         """
         return cls.from_dict(read_toml(path), str(path), permissions)
@@ -90,14 +90,14 @@ class Gearbox(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             Anything wrong with the content, as in :meth:`from_toml`.
         """
         try:
             case = parse_case(dict(content), source)
-        except CaseError as error:
+        except GearboxFileError as error:
             rest = cls(readable(content), source, content, permissions)
-            raise CaseError(*error.faults, *checks.faults_of(_checks_of_entries(rest))) from None
+            raise GearboxFileError(*error.faults, *checks.faults_of(_checks_of_entries(rest))) from None
         gearbox = cls(case, source, content, permissions)
         checks.check(_checks_of(gearbox))
         return gearbox
@@ -109,7 +109,7 @@ class Gearbox(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             A path through what is no section, or anything wrong with the new gearbox; where a path made an entry that
             the file does not have, the nearest path that it has.
 
@@ -132,7 +132,7 @@ class Gearbox(Displayed):
         content["labels"] = labels_in_use(content)
         try:
             return Gearbox.from_dict(content, self.source, self.permissions)
-        except CaseError as error:
+        except GearboxFileError as error:
             if not made:
                 raise
             near = difflib.get_close_matches(made[0], list(_paths(self.content)), 1, 0.0)
@@ -140,7 +140,7 @@ class Gearbox(Displayed):
                 f"{made[0]}: no entry of this name is in the file, and a new one lacks keys; did you mean {near[0]}?"
             ) from error
 
-    def fault(self, text: str) -> CaseError:
+    def fault(self, text: str) -> GearboxFileError:
         """Error that names the file before `text` (key, value and what would be right)."""
         return self._origin.fault(text)
 
@@ -149,7 +149,7 @@ class Gearbox(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             The file is not there or may not be read, as `exugear.gearbox.named_files.named_file` says.
         """
         return self._origin.file(key, name, largest)
@@ -169,7 +169,7 @@ class Gearbox(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             None is given, or two.
         """
         sections = (self.case.lubricant, self.case.rating)
@@ -239,7 +239,7 @@ class Gearbox(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             No such inertia set.
         """
         inertias = inertias or self.case.default_inertias
@@ -252,7 +252,7 @@ class Gearbox(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             No such body or inertia set.
         """
         bodies = {body.name: body for body in self.bodies(inertias)}
@@ -361,7 +361,7 @@ class Gearbox(Displayed):
         )
 
     @cached_property
-    def held_by_torsion(self) -> dict[str, Tie]:
+    def held_by_torsion(self) -> dict[str, SpinConstraint]:
         """What holds bodies that can turn by torsion on what stands, such as a ring on a torque arm, by their names.
 
         The train rolls without them. One that holds the input or the output of the train is no part of how it rolls.
@@ -369,7 +369,7 @@ class Gearbox(Displayed):
         ends = (self.case.overall.input, self.case.overall.output)
         mounts = tuple(mount for mount in self.mounts if mount.body in self.apart)
         return {
-            bearing.body: Tie(bearing.on, bearing.body)
+            bearing.body: SpinConstraint(bearing.on, bearing.body)
             for bearing in (*self.bearings, *mounts)
             if connector_matrix(bearing.stiffness)[5, 5]
             and bearing.body in self.spinning
@@ -400,7 +400,7 @@ class Gearbox(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             Its speeds contradict each other.
         """
         return self.train.rolling({self.case.overall.input: case.start_speed, **case.start_speeds})
@@ -439,7 +439,7 @@ class Gearbox(Displayed):
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             The gears cannot run at one of them.
         """
         static = self.gear_pairs[pair]
@@ -546,7 +546,7 @@ def _refuse(gearbox: Gearbox, faults: Iterable[str]) -> None:
     """Raise all faults together, a line each."""
     lines = [line for text in faults for line in gearbox.fault(text).faults]
     if lines:
-        raise CaseError(*lines)
+        raise GearboxFileError(*lines)
 
 
 def _check_inertia_sets(gearbox: Gearbox) -> None:
@@ -564,9 +564,9 @@ def _check_train(gearbox: Gearbox) -> None:
     for case in gearbox.load_cases.values():
         try:
             gearbox.start_speeds(case)
-        except CaseError as error:
+        except GearboxFileError as error:
             key = f"load_cases.{case.name}.start_speeds_rpm"
-            raise CaseError(*(f"{fault}; see {key}" for fault in error.faults)) from None
+            raise GearboxFileError(*(f"{fault}; see {key}" for fault in error.faults)) from None
 
 
 def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling | PointForce]]:

@@ -17,12 +17,12 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import LoadCase
-from exugear.gearbox.reading import CaseError, fault_line, shortened
+from exugear.gearbox.reading import GearboxFileError, fault_line, shortened
 from exugear.gearbox.train import UNLOADED
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
 # Torques over time of a load case, from a CSV file beside the gearbox file
 
@@ -38,14 +38,14 @@ def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, F
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A file that cannot be read, unknown columns, text where numbers belong, times that do not grow.
     """
     if case.torque_series is None:
         return {}
 
-    def fault(text: str) -> CaseError:
-        return CaseError(fault_line(str(case.torque_series), text))
+    def fault(text: str) -> GearboxFileError:
+        return GearboxFileError(fault_line(str(case.torque_series), text))
 
     try:
         with case.torque_series.open(newline="", encoding="utf-8-sig") as file:
@@ -94,7 +94,7 @@ INSTANTS = 2001
 
 
 @dataclass(frozen=True)
-class LoadSummary(Displayed, line=" {name!r}: net torque {net_torque:g} N m, {start_speed:g} to {end_speed:g} rad/s"):
+class LoadSummary(ReprMixin, line=" {name!r}: net torque {net_torque:g} N m, {start_speed:g} to {end_speed:g} rad/s"):
     """A load case in figures, of the rolling train."""
 
     name: str
@@ -161,7 +161,7 @@ def summarise_loads(
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         The torque series cannot be used, or the train is not fixed by the speed of its input.
 
     Examples
@@ -230,14 +230,14 @@ def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
     return tuple(doubts)
 
 
-def doubt_about_bearings(gearbox: Gearbox, loads: LoadSummary, variant: str) -> str:
+def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) -> str:
     """Say where linear bearings are led far from the static load that their law is of, and the remedy; empty if not.
 
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> loads = summarise_loads(gearbox, gearbox.load_cases["reference"])
-    >>> doubt_about_bearings(gearbox, loads, "bushing")
+    >>> bearing_range_warning(gearbox, loads, "bushing")
     ''
     """
     led = [
@@ -257,7 +257,7 @@ def doubt_about_bearings(gearbox: Gearbox, loads: LoadSummary, variant: str) -> 
     )
 
 
-def doubt_about_tables(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool = True) -> str:
+def other_load_warning(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool = True) -> str:
     """Say which meshes carry another load than the static one, which tables over the mesh cycle are of; empty if none.
 
     Parameters
@@ -268,7 +268,7 @@ def doubt_about_tables(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool =
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> half = gearbox.varied({"load_cases.reference.torques_N_m": {"carrier": 120e3, "hss": -1500.0}})
-    >>> doubt_about_tables(half, summarise_loads(half, half.load_cases["reference"]))
+    >>> other_load_warning(half, summarise_loads(half, half.load_cases["reference"]))
     'other load: sun_planet 50 %, ring_planet 50 %, intermediate 50 %, high_speed 50 % of the static load ...
     """
     told = []
@@ -286,16 +286,16 @@ def doubt_about_tables(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool =
     )
 
 
-def doubt_about_band(loads: LoadSummary, band: float) -> str:
+def band_warning(loads: LoadSummary, band: float) -> str:
     """Say which mesh frequencies a run does not keep, and which band (Hz) does; empty if all are kept.
 
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> loads = summarise_loads(gearbox, gearbox.load_cases["reference"])
-    >>> doubt_about_band(loads, 6400.0)
+    >>> band_warning(loads, 6400.0)
     ''
-    >>> doubt_about_band(loads, 5000.0)
+    >>> band_warning(loads, 5000.0)
     'beyond the band: the run keeps frequencies up to 5000 Hz, and meshes reach high_speed 6411 Hz; exugear ...
     """
     beyond = {name: found for name, found in loads.mesh_frequencies.items() if found > BEYOND_BAND * band}
@@ -343,7 +343,7 @@ def at_load_of(gearbox: Gearbox, case: LoadCase) -> Gearbox:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         The load case has no torque but on bodies that hold the static load, or the torques are none to be held.
 
     Examples

@@ -15,11 +15,11 @@ from exugear.gearbox.units import RPM
 from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
 
 @dataclass(frozen=True)
-class Body(Displayed, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 about its axis"):
+class Body(ReprMixin, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 about its axis"):
     """A rigid body, its place at zero angles and its mass properties (about the centre of mass)."""
 
     name: str
@@ -83,7 +83,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Bearing(Displayed):
+class Bearing(ReprMixin):
     """Compliant support: a 6x6 stiffness in the axes of `on`, order x y z rx ry rz."""
 
     name: str
@@ -160,7 +160,7 @@ class Coupling:
 
 
 @dataclass(frozen=True)
-class Mesh(Displayed):
+class Mesh(ReprMixin):
     """A gear pair at work."""
 
     name: str
@@ -204,7 +204,7 @@ class Mesh(Displayed):
 
 
 @dataclass(frozen=True)
-class WheelDeviation(Displayed):
+class WheelDeviation(ReprMixin):
     """Errors of one wheel that return with each of its revolutions."""
 
     teeth: int
@@ -230,7 +230,7 @@ class WheelDeviation(Displayed):
 
 
 @dataclass(frozen=True)
-class LoadCase(Displayed, line=" {name!r}: {duration:g} s, {_drive}, torques on {torques!n} bodies"):
+class LoadCase(ReprMixin, line=" {name!r}: {duration:g} s, {_drive}, torques on {torques!n} bodies"):
     """Loads of a run."""
 
     name: str
@@ -270,7 +270,7 @@ class LoadCase(Displayed, line=" {name!r}: {duration:g} s, {_drive}, torques on 
 
 
 @dataclass(frozen=True)
-class PairSpec(Displayed):
+class PairSpec(ReprMixin):
     """What the STE table of a pair needs."""
 
     name: str

@@ -17,10 +17,10 @@ from pydantic import BaseModel, ValidationError
 from exugear.gearbox.named_files import LARGEST_CASE, NamedFileError, Permissions, check_regular, named_file
 from exugear.gearbox.renames import GEARBOX_RENAMES, new_name, renamed_hint
 from exugear.gearbox.sections.bodies import BodySection
-from exugear.gearbox.sections.case import CaseFile
+from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.entries import GROUND
 from fe_ste.geometry.checks import GeometryError
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 SHOWN_FAULTS = 24
 """Most faults that one message shows; the error has all."""
@@ -28,7 +28,7 @@ LONGEST_FAULT = 280
 """Characters of a fault after the name of the file."""
 
 
-class CaseError(ValueError):
+class GearboxFileError(ValueError):
     """A gearbox file that cannot be used: a line for each fault says file, key, value and what would be right.
 
     Attributes
@@ -57,22 +57,22 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         No regular file, nothing in it, far too much in it, or not TOML (with line and column).
     """
     path = Path(path)
     try:
         check_regular(path, LARGEST_CASE)
     except NamedFileError as error:
-        raise CaseError(f"{path}: {error}; expected a gearbox file such as cases/grc750/gearbox.toml") from None
+        raise GearboxFileError(f"{path}: {error}; expected a gearbox file such as cases/grc750/gearbox.toml") from None
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise CaseError(f"{path}: not UTF-8 text at byte {error.start}; expected TOML") from None
+        raise GearboxFileError(f"{path}: not UTF-8 text at byte {error.start}; expected TOML") from None
     except OSError as error:
-        raise CaseError(f"{path}: cannot be read ({error.strerror}); expected a gearbox file") from None
+        raise GearboxFileError(f"{path}: cannot be read ({error.strerror}); expected a gearbox file") from None
     if not text.strip():
-        raise CaseError(f"{path}: the file is empty; expected sections such as [gears.sun]")
+        raise GearboxFileError(f"{path}: the file is empty; expected sections such as [gears.sun]")
     return parsed(lambda: tomllib.loads(text), str(path), "TOML")
 
 
@@ -88,19 +88,21 @@ def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         The text is not of this form.
     """
     try:
         return parse()
     except RecursionError:
-        raise CaseError(fault_line(source, f"not valid {form}: nested too deep; a gearbox needs 6 levels")) from None
+        raise GearboxFileError(
+            fault_line(source, f"not valid {form}: nested too deep; a gearbox needs 6 levels")
+        ) from None
     except ValueError as error:
         why = "a whole number of thousands of digits" if "set_int_max_str_digits" in str(error) else error
-        raise CaseError(fault_line(source, f"not valid {form}: {why}")) from None
+        raise GearboxFileError(fault_line(source, f"not valid {form}: {why}")) from None
 
 
-def parse_case(content: dict[str, Any], source: str) -> CaseFile:
+def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
     """Validate raw content; each fault becomes a line of the message.
 
     Examples
@@ -108,18 +110,18 @@ def parse_case(content: dict[str, Any], source: str) -> CaseFile:
     >>> parse_case({"name": 3}, "x.toml")
     Traceback (most recent call last):
     ...
-    exugear.gearbox.reading.CaseError: x.toml: name = 3: must be text in quotes
+    exugear.gearbox.reading.GearboxFileError: x.toml: name = 3: must be text in quotes
     x.toml: default_inertias: this key is missing
     ...
     """
     try:
-        return CaseFile.model_validate(content)
+        return GearboxFile.model_validate(content)
     except ValidationError as error:
         faults = error.errors(include_url=False)
-    raise CaseError(*(fault_line(source, text) for text in _described(faults, content)))
+    raise GearboxFileError(*(fault_line(source, text) for text in _described(faults, content)))
 
 
-def readable(content: Mapping[str, Any]) -> CaseFile:
+def readable(content: Mapping[str, Any]) -> GearboxFile:
     """Entries of faulty content that can be judged all the same: valid by themselves, and so is what they rest on.
 
     A gear whose shift or tip follows from its pairs rests on these; a pair on its gears, a body on its gears and its
@@ -163,7 +165,7 @@ def readable(content: Mapping[str, Any]) -> CaseFile:
             if (not lost["gears"] or set(body.gears_z_mm) <= known)
             and (not lost["bodies"] or body.carrier is None or body.carrier in carriers)
         }
-    return CaseFile.model_construct(None, **found)
+    return GearboxFile.model_construct(None, **found)
 
 
 _JUDGED = ("gears", "pairs", "bodies", "bearings", "mounts")
@@ -172,7 +174,7 @@ _JUDGED = ("gears", "pairs", "bodies", "bearings", "mounts")
 
 def _valid_entries(content: Mapping[str, Any], table: str) -> dict[str, Any]:
     """Entries of a table that are valid by themselves."""
-    model = _inner(_inner(CaseFile, table), "")
+    model = _inner(_inner(GearboxFile, table), "")
     entries = content.get(table, {})
     found = {}
     for name, entry in entries.items() if isinstance(entries, Mapping) else ():
@@ -295,7 +297,7 @@ def _nearest(location: tuple[int | str, ...]) -> str:
 
 def _known_keys(location: tuple[int | str, ...]) -> list[str]:
     """Keys of the section that holds an unknown one."""
-    section: Any = CaseFile
+    section: Any = GearboxFile
     for part in location[:-1]:
         section = _inner(section, part)
     if isinstance(section, type) and issubclass(section, BaseModel):
@@ -324,10 +326,10 @@ Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
-class Origin(Displayed):
+class Origin(ReprMixin):
     """A gearbox file as the builders of parts see it."""
 
-    case: CaseFile
+    case: GearboxFile
     source: str
     """Path or name of the file; files that it names lie beside it."""
     permissions: Permissions
@@ -335,16 +337,16 @@ class Origin(Displayed):
     def _line(self) -> str:
         return f" {shortened(self.source)}"
 
-    def fault(self, text: str) -> CaseError:
+    def fault(self, text: str) -> GearboxFileError:
         """Error that names the file before `text` (key, value and what would be right)."""
-        return CaseError(fault_line(self.source, text))
+        return GearboxFileError(fault_line(self.source, text))
 
     def file(self, key: str, name: str, largest: int) -> Path:
         """Path of a file of at most `largest` bytes that the gearbox file names under a key.
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             The file is not there or may not be read, as `exugear.gearbox.named_files.named_file` says.
         """
         try:
@@ -395,7 +397,7 @@ def part_of_each(build: Callable[[str, Entry], Part], sections: Mapping[str, Ent
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         The faults of all sections together.
     """
     parts: dict[str, Part] = {}
@@ -403,10 +405,10 @@ def part_of_each(build: Callable[[str, Entry], Part], sections: Mapping[str, Ent
     for name, section in sections.items():
         try:
             parts[name] = build(name, section)
-        except CaseError as error:
+        except GearboxFileError as error:
             faults += error.faults
     if faults:
-        raise CaseError(*faults)
+        raise GearboxFileError(*faults)
     return parts
 
 

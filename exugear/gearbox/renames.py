@@ -27,12 +27,8 @@ class Rename:
 
     def fits(self, path: Sequence[str]) -> bool:
         """Return whether this is the key at a path of old names."""
-        tables = self.table.split(".") if self.table else []
-        return (
-            len(path) == len(tables) + 1
-            and path[-1] == self.old
-            and all(fnmatchcase(part, pattern) for part, pattern in zip(path, tables, strict=False))
-        )
+        own = [part for part in self.table.split(".") if part] + [self.old]
+        return len(path) == len(own) and all(map(fnmatchcase, path, own))
 
 
 def _damping(connectors: str) -> tuple[Rename, ...]:
@@ -118,7 +114,9 @@ def migrated(text: str) -> tuple[str, list[str]]:
         before = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise MigrationError(f"not valid TOML: {error}") from None
-    renames = STUDY_RENAMES if "case" in before and "parameters" in before else GEARBOX_RENAMES
+    renames = GEARBOX_RENAMES
+    if "case" in before and "parameters" in before:
+        renames = STUDY_RENAMES
     pieces: list[str] = []
     changes: list[str] = []
     end = 0
@@ -141,26 +139,22 @@ def migrated(text: str) -> tuple[str, list[str]]:
 
 def _replacement(token: _Token, renames: Sequence[Rename]) -> str | None:
     """Return what replaces a key or a string, None where nothing does."""
+    varied = token.value
     if token.is_key:
         new = new_name(token.path, renames)
-        if new is None and renames is STUDY_RENAMES and "." in token.path[-1]:
-            dotted = _dotted(token.path[-1])
-            new = None if dotted is None else f'"{dotted}"'
-        return new
-    for rename in renames:
-        if rename.fits(token.path) and token.value in rename.values:
-            return f'"{rename.values[token.value]}"'
-    if renames is STUDY_RENAMES:
-        dotted = _dotted(token.value)
-        return None if dotted is None else f'"{dotted}"'
+        if new is not None:
+            return new
+        varied = token.path[-1]
+    else:
+        for rename in renames:
+            if rename.fits(token.path) and token.value in rename.values:
+                return f'"{rename.values[token.value]}"'
+    # Studies vary keys of the gearbox file by their dotted paths.
+    path = varied.split(".")
+    new = new_name(path, GEARBOX_RENAMES)
+    if renames is STUDY_RENAMES and new is not None:
+        return '"' + ".".join([*path[:-1], new]) + '"'
     return None
-
-
-def _dotted(path: str) -> str | None:
-    """Return the new form of a dotted path of the gearbox file that a study varies."""
-    parts = path.split(".")
-    new = new_name(parts, GEARBOX_RENAMES)
-    return None if new is None else ".".join([*parts[:-1], new])
 
 
 def _count(content: Any) -> int:

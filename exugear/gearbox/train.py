@@ -12,7 +12,7 @@ import numpy as np
 
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed, TitledRows
+from fe_ste.tools.display import ReprMixin, TitledRows
 
 # How a gear train rolls: rows that say how meshes close and couplings twist, and the motions that do neither
 
@@ -57,7 +57,7 @@ class CoupledBodies(Protocol):
 
 
 @dataclass(frozen=True)
-class Tie:
+class SpinConstraint:
     """Two bodies that roll at one speed; a name that is no spin stands still."""
 
     first: str
@@ -176,7 +176,7 @@ def without_round_off(forces: Floats, largest_torque: float, smallest_radius: fl
 
 @dataclass(frozen=True, eq=False)
 class Train(
-    Displayed, line=" from {input!r} to {output!r}: {spins!n} spins, {meshes!n} meshes, {couplings!n} couplings"
+    ReprMixin, line=" from {input!r} to {output!r}: {spins!n} spins, {meshes!n} meshes, {couplings!n} couplings"
 ):
     """Bodies that turn about fixed or orbiting axes, tied by rigid meshes and couplings.
 

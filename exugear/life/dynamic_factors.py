@@ -28,7 +28,7 @@ from exugear.steady.mean_system.rotating_frame import PlanetSet, planet_sets
 from exugear.steady.steady_file import load_response, settings_of
 from exugear.system.system import Assembly, input_hash
 from fe_ste.tools.arrays import Complexes, Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.files import FileError
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ WITHIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class DynamicFactor(Displayed):
+class DynamicFactor(ReprMixin):
     """K_v over the speed of the loaded body."""
 
     speed: Floats
@@ -89,7 +89,7 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         No run there, one of another input, or one that is sampled too coarsely for its meshes.
     """
     gearbox = assembly.gearbox
@@ -174,7 +174,7 @@ def factors(assembly: Assembly, rating: RatingSection, folder: Path, body: str) 
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         See `factors_of_response` and `exugear.life.dynamic_factors.factors_of_run`.
     """
     if rating.dynamic_factor is not None:
@@ -216,7 +216,7 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         No response there, or one of another input.
     """
     gearbox = assembly.gearbox

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import RatingSection, StrengthSection
 from exugear.gearbox.units import MPA, UM
 from exugear.gearbox.versions import LIFE
@@ -129,7 +129,7 @@ def check_strengths(
                 f"rating.gears.{name}.mean_stress_factor: this key is missing; teeth of {name} bend both ways"
             ).faults
     if faults:
-        raise CaseError(*faults)
+        raise GearboxFileError(*faults)
 
 
 def beyond_tables(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import LubricantSection, RatingSection
 from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import LIFE
@@ -23,7 +23,7 @@ from exugear.life.load_spectrum.sources import Progress, section_of
 from exugear.life.static_balance import ActingLoads, AngleStore, StaticBalance, acting_loads, static_balance
 from exugear.system.system import Assembly, input_hash
 from fe_ste.root_stress import MeshCycleStress
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # What a life comes to: parts that fail, that fall short of what is asked for, and pairs that need relief
 
@@ -53,7 +53,7 @@ def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, fl
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         Loads above `LARGEST_REACH` times the largest torque of a table.
     """
     largest = max(max(source.largest, -source.least) for source in counted.sources)
@@ -174,7 +174,7 @@ TOLD_SHARING = 1.0005
 
 
 @dataclass(frozen=True, eq=False)
-class Life(Displayed, line=" of {variant}: {flanks!n} flanks, {bearings!n} bearings"):
+class Life(ReprMixin, line=" of {variant}: {flanks!n} flanks, {bearings!n} bearings"):
     """What a gearbox bears over its life."""
 
     variant: str
@@ -208,7 +208,7 @@ def rating_of(gearbox: Gearbox) -> RatingSection:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         There is none.
     """
     if gearbox.case.rating is None:
@@ -228,7 +228,7 @@ def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> Counted
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         Loads that cannot be used, or strengths that do not fit the gears.
     """
     check_keys(gearbox)
@@ -242,14 +242,14 @@ def check_keys(gearbox: Gearbox) -> None:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         Sections or keys that are missing, or a load case that is none.
     """
     faults: list[str] = []
     for asked in (rating_of, section_of, lambda given: given.viscosity_40):
         try:
             asked(gearbox)
-        except CaseError as error:
+        except GearboxFileError as error:
             faults += error.faults
     rating = gearbox.case.rating
     named = rating and rating.dynamic_factor_run
@@ -257,7 +257,7 @@ def check_keys(gearbox: Gearbox) -> None:
         known = ", ".join(gearbox.load_cases) or "none"
         faults += gearbox.fault(f"rating.dynamic_factor_run = {named!r}: load cases are {known}").faults
     if faults:
-        raise CaseError(*faults)
+        raise GearboxFileError(*faults)
 
 
 def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str], run: str = "") -> str:

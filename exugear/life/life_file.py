@@ -13,7 +13,7 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.versions import LIFE
 from exugear.life.bearing_life import BearingLife
 from exugear.life.dynamic_factors import source_hash
@@ -235,7 +235,7 @@ def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], A
             source = source_hash(assembly, rating_of(gearbox), folder)
             tables = {request.name: request.wanted.hash for request in life_requests(assembly, counted, folder)}
             digest = life_hash(assembly, counted, tables, source)
-        except (FileError, CaseError, BalanceError, KeyError) as error:
+        except (FileError, GearboxFileError, BalanceError, KeyError) as error:
             yield StoredLife(path, None, str(error))
             continue
         fits = data.attrs["input_hash"] == digest

@@ -29,7 +29,7 @@ from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from exugear.system.tooth_mesh.tables import TableRequest, requested_tables
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.stores import Arrays, Store
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
@@ -52,7 +52,7 @@ class Response:
 
 
 @dataclass(frozen=True, eq=False)
-class StaticBalance(Displayed, line=": {torque!n} torques, {angle!n} angles, linear: {linear}"):
+class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, linear: {linear}"):
     """Forces over torques and angles."""
 
     torque: Floats
@@ -340,7 +340,7 @@ def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
 # Solved angles of a static balance, kept until the life is there: what was stopped goes on with the same bits
 
 
-class KeptAngles(Displayed):
+class KeptAngles(ReprMixin):
     """Solved angles in one file, written anew with each.
 
     Parameters

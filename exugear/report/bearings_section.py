@@ -14,16 +14,16 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import choice_of, words_of
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Material, Part, only_for
+from exugear.report.material import Part, ReportData, only_for
 from exugear.report.web import html as pieces
 from exugear.report.web.html import Cell
 from exugear.steady.peaks import line_name
-from exugear.system.bearings.duty import BearingDuty
+from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.operating_points import bearing_duties, mesh_duties
 from exugear.system.statics import BalanceError
 from exugear.system.system import Assembly
-from exugear.system.tooth_mesh.contact_state import MeshDuty
+from exugear.system.tooth_mesh.contact_state import MeshLoadState
 
 LIFTS = 1.0
 """Swing over the mean force from which a linear bearing is said to have to lift off."""
@@ -49,7 +49,7 @@ QUIET = 1e-3
 """Share of the largest acceleration below which none is listed."""
 
 
-def bearings_section(material: Material) -> Part:
+def bearings_section(material: ReportData) -> Part:
     """List forces at bearings by source, accelerations by steady response, and duties by model."""
     forces = [
         only_for(_forces(material, data, group, variant), group.name, variant)
@@ -67,7 +67,7 @@ def bearings_section(material: Material) -> Part:
     return Part(html, {}, "At the bearings", "bearings")
 
 
-def _forces(material: Material, data: Mapping[str, Any], group: RunGroup, variant: str) -> str:
+def _forces(material: ReportData, data: Mapping[str, Any], group: RunGroup, variant: str) -> str:
     own = data["variants"][variant]
     loudest = {name: figures for name, figures in own["loudest"].items() if figures["amplitude"] is not None}
     if not loudest:
@@ -139,7 +139,7 @@ def _without_noise(value: float, mean: float) -> float:
     return 0.0
 
 
-def _accelerations(material: Material, data: xr.Dataset) -> str:
+def _accelerations(material: ReportData, data: xr.Dataset) -> str:
     """Largest accelerations of seats in a steady response, over all its lines and speeds."""
     signals = [str(name) for name in data["signal"].to_numpy()]
     places = [place for place, name in enumerate(signals) if name.startswith("seat_acceleration ")]
@@ -173,18 +173,18 @@ def _accelerations(material: Material, data: xr.Dataset) -> str:
     return pieces.element("h3", pieces.text(title)) + pieces.paragraph(words, "note") + table
 
 
-def _line_words(material: Material, data: xr.Dataset, line: int) -> str:
+def _line_words(material: ReportData, data: xr.Dataset, line: int) -> str:
     bases = tuple(str(name) for name in data["base"].to_numpy())
     return material.words.told(line_name(tuple(int(n) for n in data["index"][line].to_numpy()), bases))
 
 
-def _seat_words(material: Material, signal: str) -> str:
+def _seat_words(material: ReportData, signal: str) -> str:
     """Words for a signal such as ``seat_acceleration hss_a x``."""
     _, name, *rest = signal.split(" ")
     return " ".join([material.words.of(name), *rest])
 
 
-def _duties(material: Material, assembly: Assembly) -> str:
+def _duties(material: ReportData, assembly: Assembly) -> str:
     if not assembly.variant.on_bearings or not any(support.catalogue for support in assembly.supports):
         return ""
     name = words_of(assembly.choice)
@@ -211,7 +211,7 @@ def _duties(material: Material, assembly: Assembly) -> str:
     return pieces.folded(f"Bearings at the static load: {name}", content)
 
 
-def _meshes(material: Material, assembly: Assembly) -> str:
+def _meshes(material: ReportData, assembly: Assembly) -> str:
     """How gears stand under the static load, and how evenly their teeth bear; nothing where no contact was solved."""
     if not assembly.contacts.contacts:
         return ""
@@ -229,7 +229,7 @@ def _meshes(material: Material, assembly: Assembly) -> str:
     return pieces.paragraph(words, "note") + table
 
 
-def _mesh_row(material: Material, duty: MeshDuty) -> dict[str, object]:
+def _mesh_row(material: ReportData, duty: MeshLoadState) -> dict[str, object]:
     def shown(value: float, form: str) -> str:
         if math.isnan(value):
             return "–"
@@ -246,7 +246,7 @@ def _mesh_row(material: Material, duty: MeshDuty) -> dict[str, object]:
     }
 
 
-def _duty_row(material: Material, duty: BearingDuty) -> dict[str, object]:
+def _duty_row(material: ReportData, duty: BearingLoadState) -> dict[str, object]:
     if duty.ratings.estimated:
         sign = "*"
     elif duty.ratings.makers:

@@ -9,7 +9,7 @@ import numpy as np
 
 from exugear.report.findings.context import HARMONICS, PairExcitation, excitations
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Axis, Curve, Material, Part, chart
+from exugear.report.material import Axis, Curve, Part, ReportData, chart
 from exugear.report.web import html as pieces
 from exugear.report.web.html import Cell
 
@@ -20,7 +20,7 @@ PRESSURE = (
 """What pressures of tables are of."""
 
 
-def gears_section(material: Material) -> Part:
+def gears_section(material: ReportData) -> Part:
     """Show what excites: each pair's transmission error, its harmonics and stiffness; and the gears' geometry."""
     found = excitations(material.context, material.results)
     charts: dict[str, Any] = {}
@@ -51,7 +51,7 @@ def _swing(excitation: PairExcitation) -> float:
     return 1e6 * float(np.ptp(excitation.error))
 
 
-def _row(material: Material, excitation: PairExcitation) -> dict[str, object]:
+def _row(material: ReportData, excitation: PairExcitation) -> dict[str, object]:
     return {
         "pair": material.words.of(excitation.pair),
         "torque on gear 1 / N m": f"{excitation.torque:.1f}",
@@ -64,7 +64,7 @@ def _row(material: Material, excitation: PairExcitation) -> dict[str, object]:
     }
 
 
-def _harmonics_row(material: Material, excitation: PairExcitation) -> dict[str, object]:
+def _harmonics_row(material: ReportData, excitation: PairExcitation) -> dict[str, object]:
     largest = max(float(excitation.harmonics.max()), 1e-300)
     cells = {
         f"{n + 1}.": Cell(figure_text(1e6 * float(value), 2), float(value), bar=float(value) / largest)
@@ -73,7 +73,7 @@ def _harmonics_row(material: Material, excitation: PairExcitation) -> dict[str, 
     return {"pair": material.words.of(excitation.pair), **cells}
 
 
-def _gear_rows(material: Material) -> list[dict[str, object]]:
+def _gear_rows(material: ReportData) -> list[dict[str, object]]:
     gearbox = material.context.gearbox
     rows = []
     for name, gear in gearbox.gears.items():

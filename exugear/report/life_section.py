@@ -12,13 +12,13 @@ from typing import Any
 
 import xarray as xr
 
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import VariantError
 from exugear.life.life_file import draw_life, limits, stored_lives
 from exugear.life.rating.sheet import RATED_AS, FlankKey, balanced, of_life, rated, rated_loads
 from exugear.report.findings.context import choice_of, words_of
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Material, Part
+from exugear.report.material import Part, ReportData
 from exugear.report.web import html as pieces
 from exugear.report.web.html import Cell
 from exugear.results.folder import StoredStudy, stored_studies
@@ -42,7 +42,7 @@ WIDTH = 850
 """Of the picture, pixels."""
 
 
-def life_section(material: Material) -> Part:
+def life_section(material: ReportData) -> Part:
     """List what parts bear over the life, for each variant that was rated; with the rating sheet as data."""
     context = material.context
     found: dict[FlankKey, dict[str, float]] = {}
@@ -70,7 +70,7 @@ def life_section(material: Material) -> Part:
     return Part(html, data, "How long it lasts", "life")
 
 
-def _rating(material: Material, beside: Mapping[FlankKey, Mapping[str, float]]) -> dict[str, Any]:
+def _rating(material: ReportData, beside: Mapping[FlankKey, Mapping[str, float]]) -> dict[str, Any]:
     """Rating sheet by ISO 6336 under the key ``rating``, as `check --rating --json` has it, if it can be had."""
     context = material.context
     if context.gearbox.case.rating is None:
@@ -78,13 +78,13 @@ def _rating(material: Material, beside: Mapping[FlankKey, Mapping[str, float]]) 
     try:
         counted = rated_loads(context.gearbox)
         balance = balanced(context.assembled(RATED_AS.of(context.gearbox)), counted)
-    except (CaseError, BalanceError, VariantError, MeshError, BearingError) as error:
+    except (GearboxFileError, BalanceError, VariantError, MeshError, BearingError) as error:
         context.notes.left_out.append(f"rating by ISO 6336: {error}")
         return {}
     return {"rating": rated(context.gearbox, counted, balance, beside).summary()}
 
 
-def _of_variant(material: Material, data: xr.Dataset) -> str:
+def _of_variant(material: ReportData, data: xr.Dataset) -> str:
     told = material.words.told
     data = data.assign_coords({key: [told(str(own)) for own in data[key].to_numpy()] for key in ("flank", "bearing")})
     name = words_of(choice_of(data.attrs))
@@ -174,7 +174,7 @@ STUDY_WIDTH = 640
 """Of a picture, pixels."""
 
 
-def studies_section(material: Material) -> Part:
+def studies_section(material: ReportData) -> Part:
     """Show the pictures of the studies that the results folder holds."""
     found = list(stored_studies(material.context.folder, material.context.gearbox))
     if not found:

@@ -14,7 +14,7 @@ from exugear.gearbox.choice import Choice
 from exugear.report.findings.context import Context, StoredResults
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.verdicts import ModelVariations
-from exugear.report.findings.words import Words
+from exugear.report.findings.words import Labels
 from exugear.report.web import html as pieces
 from exugear.report.web.document import ArrayStore
 from exugear.report.web.html import element
@@ -22,12 +22,12 @@ from exugear.results.spectra.waterfall import OrderLine, order_lines
 
 
 @dataclass(frozen=True)
-class Material:
+class ReportData:
     """What all sections are made of."""
 
     context: Context
     results: StoredResults
-    words: Words
+    words: Labels
     groups: Sequence[RunGroup]
     """Those of run-ups first, then those of steady responses; of each the default inertia set first."""
     variations: Sequence[ModelVariations]

@@ -18,7 +18,7 @@ from exugear.report.findings.facts import best_words, levers_of, shift_text
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.verdicts import ModelVariations, best_change, guarded
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Axis, Curve, Material, Part, chart, model_name, only_for
+from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name, only_for
 from exugear.report.web import html as pieces
 from exugear.report.web.document import rounded
 from exugear.report.web.html import Cell
@@ -31,7 +31,7 @@ DEFORMED = 32
 """Modes in which elastic bodies deform in the page: those of resonances, and those that are seen most."""
 
 
-def modes_section(material: Material) -> Part:
+def modes_section(material: ReportData) -> Part:
     """Show the modes of all models."""
     modes = material.results.modes
     if not modes:
@@ -66,7 +66,7 @@ def _stage_alone() -> str:
     return pieces.element("div", stage_figure(), class_="scripts-only")
 
 
-def _model(material: Material, model: Choice, data: xr.Dataset) -> dict[str, Any]:
+def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, Any]:
     material.context.tell(f"bodies and modes of {words_of(model)}")
     assembly = material.context.assembled(model)
     reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
@@ -92,7 +92,7 @@ def _model(material: Material, model: Choice, data: xr.Dataset) -> dict[str, Any
     }
 
 
-def _fastest(material: Material, model: Choice) -> float:
+def _fastest(material: ReportData, model: Choice) -> float:
     """Highest speed (rpm) of the run-ups of a model, or of the load cases."""
     speeds = [
         float(group.runs[model.variant].spectra.speed.max())
@@ -106,7 +106,7 @@ def _fastest(material: Material, model: Choice) -> float:
     return max([*ends, RPM]) / RPM
 
 
-def _deformed(material: Material, model: Choice, data: xr.Dataset) -> set[int]:
+def _deformed(material: ReportData, model: Choice, data: xr.Dataset) -> set[int]:
     if not model.variant.is_elastic:
         return set()
     matched = {
@@ -122,7 +122,7 @@ def _deformed(material: Material, model: Choice, data: xr.Dataset) -> set[int]:
     return set(most[: max(DEFORMED, len(matched))])
 
 
-def _all_modes(material: Material, model: Choice, data: xr.Dataset) -> str:
+def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> str:
     reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
     rows = [
         {
@@ -169,7 +169,7 @@ class ModelMatch:
         return f"{self.match.parameter.label} = {self.match.value:.3g}"
 
 
-def near_section(material: Material) -> Part:
+def near_section(material: ReportData) -> Part:
     """Tell which modes lie near the target frequency, and which assumptions would bring one there."""
     target = material.context.target
     modes = material.results.modes
@@ -193,7 +193,7 @@ def near_section(material: Material) -> Part:
     return Part(html, {}, title, "target")
 
 
-def _row(material: Material, model: Choice, data: xr.Dataset, index: int, target: float) -> dict[str, object]:
+def _row(material: ReportData, model: Choice, data: xr.Dataset, index: int, target: float) -> dict[str, object]:
     mode = report_mode(data, index)
     return {
         "variant": model.variant,
@@ -226,7 +226,7 @@ def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: Mo
     )
 
 
-def _matches(material: Material, target: float) -> Iterator[str]:
+def _matches(material: ReportData, target: float) -> Iterator[str]:
     """Table of the assumptions that bring a mode to the target, or that none does."""
     modelmatchs = [
         ModelMatch(variation.choice, match)
@@ -249,7 +249,7 @@ def _matches(material: Material, target: float) -> Iterator[str]:
     yield pieces.table(rows, ("inertias", "assumption", "what moves"), caption="Assumptions", name="matches")
 
 
-def _match_row(material: Material, found: ModelMatch, target: float) -> dict[str, object]:
+def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[str, object]:
     match = found.match
     data = match.modes.to_dataset()
     mode = report_mode(data, match.index)
@@ -265,7 +265,7 @@ def _match_row(material: Material, found: ModelMatch, target: float) -> dict[str
     }
 
 
-def _reference_frequency(material: Material, found: ModelMatch, target: float) -> float:
+def _reference_frequency(material: ReportData, found: ModelMatch, target: float) -> float:
     """Frequency (Hz) of the nearest visible mode of the reference variant under the same assumption."""
     context = material.context
     match = found.match
@@ -285,7 +285,7 @@ LEVERS = 8
 """Levers of each kind in the table."""
 
 
-def change_section(material: Material) -> Part:
+def change_section(material: ReportData) -> Part:
     """Show what moves the loudest mode of each group of run-ups."""
     charts: dict[str, Any] = {}
     content = [only_for(_group(material, group, charts), group.name) for group in material.groups]
@@ -296,7 +296,7 @@ def change_section(material: Material) -> Part:
     )
 
 
-def _group(material: Material, group: RunGroup, charts: dict[str, Any]) -> str:
+def _group(material: ReportData, group: RunGroup, charts: dict[str, Any]) -> str:
     top = group.loudest
     modes = group.runs[group.main].modes
     if top is None or modes is None or top.finding.mode is None:
@@ -312,7 +312,7 @@ def _group(material: Material, group: RunGroup, charts: dict[str, Any]) -> str:
     return pieces.paragraph(scope, "note") + _levers(material, group, mode) + full
 
 
-def _levers(material: Material, group: RunGroup, mode: int) -> str:
+def _levers(material: ReportData, group: RunGroup, mode: int) -> str:
     modes = group.runs[group.main].modes
     assert modes is not None
     levers = levers_of(material.words, modes, mode)
@@ -338,7 +338,7 @@ def _levers(material: Material, group: RunGroup, mode: int) -> str:
 
 
 def _variations(
-    material: Material, group: RunGroup, variations: ModelVariations, frequency: float, charts: dict[str, Any]
+    material: ReportData, group: RunGroup, variations: ModelVariations, frequency: float, charts: dict[str, Any]
 ) -> str:
     figures = []
     told = []

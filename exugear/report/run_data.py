@@ -15,7 +15,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, channels_of, loudest_order
 from exugear.report.findings.loudness import TOP, ConstantSpeed
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Material, group_words, model_name
+from exugear.report.material import ReportData, group_words, model_name
 from exugear.report.web.document import rounded
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.results.spectra.waterfall import OrderLine, Waterfall
@@ -103,7 +103,7 @@ ALSO = 4
 """Further orders that are told to show a resonance."""
 
 
-def run_data(material: Material) -> dict[str, Any]:
+def run_data(material: ReportData) -> dict[str, Any]:
     """Gather what the scripts need of all run-ups and steady responses: ``lines`` and ``groups``."""
     return {
         "lines": [_line(material, line) for line in material.lines],
@@ -111,7 +111,7 @@ def run_data(material: Material) -> dict[str, Any]:
     }
 
 
-def _line(material: Material, line: OrderLine) -> dict[str, Any]:
+def _line(material: ReportData, line: OrderLine) -> dict[str, Any]:
     number, _, family = line.name.rpartition(" × ")
     return {
         "name": line.name,
@@ -123,7 +123,7 @@ def _line(material: Material, line: OrderLine) -> dict[str, Any]:
     }
 
 
-def _group(material: Material, group: RunGroup) -> dict[str, Any]:
+def _group(material: ReportData, group: RunGroup) -> dict[str, Any]:
     return {
         "name": group.name,
         "title": group.title,
@@ -134,7 +134,7 @@ def _group(material: Material, group: RunGroup) -> dict[str, Any]:
     }
 
 
-def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, Any]:
+def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str, Any]:
     material.context.tell(f"channels of {run.variant}, {group.source}, {group.inertias}")
     channels = [_overall(material, run.spectra)]
     loudest: dict[str, dict[str, Any] | None] = {}
@@ -154,14 +154,14 @@ def _variant(material: Material, group: RunGroup, run: VariantRun) -> dict[str, 
     }
 
 
-def _highest(material: Material, spectra: Waterfall) -> int:
+def _highest(material: ReportData, spectra: Waterfall) -> int:
     """Count the spectral lines that are drawn."""
     fundamental = max(material.context.gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=math.inf)
     top = TOP * fundamental * float(spectra.speed.max()) / (2.0 * math.pi)
     return max(4, int(np.searchsorted(spectra.frequency, min(top, float(spectra.frequency[-1])))))
 
 
-def _overall(material: Material, spectra: Waterfall) -> dict[str, Any]:
+def _overall(material: ReportData, spectra: Waterfall) -> dict[str, Any]:
     count = _highest(material, spectra)
     level = pooled(spectra.level[:, :count], spectra.speed, SPEEDS, 1)
     return {
@@ -173,7 +173,7 @@ def _overall(material: Material, spectra: Waterfall) -> dict[str, Any]:
     }
 
 
-def _channel(material: Material, channel: Channel) -> dict[str, Any]:
+def _channel(material: ReportData, channel: Channel) -> dict[str, Any]:
     spectra = channel.spectra
     count = _highest(material, spectra)
     level = pooled(spectra.level[:, :count], spectra.speed, CHANNEL_SPEEDS, CHANNEL_LINES)
@@ -193,7 +193,7 @@ def _floor(spectra: Waterfall, count: int) -> float:
 
 
 def _cells(
-    material: Material, level: Floats, spectra: Waterfall, floor: float, step: float, lines: int
+    material: ReportData, level: Floats, spectra: Waterfall, floor: float, step: float, lines: int
 ) -> dict[str, Any]:
     span = [float(spectra.speed.min()) / RPM, float(spectra.speed.max()) / RPM]
     return {
@@ -206,7 +206,7 @@ def _cells(
     }
 
 
-def _cuts(material: Material, spectra: Waterfall, every: int) -> dict[str, Any]:
+def _cuts(material: ReportData, spectra: Waterfall, every: int) -> dict[str, Any]:
     speeds = (spectra.speed[::every] / RPM).astype("f4")
     return {
         "cuts": material.arrays.add(cut_levels(spectra, material.lines)[::every].copy(), differences=True),
@@ -214,7 +214,7 @@ def _cuts(material: Material, spectra: Waterfall, every: int) -> dict[str, Any]:
     }
 
 
-def _constant(material: Material, speed: ConstantSpeed | None) -> dict[str, Any] | None:
+def _constant(material: ReportData, speed: ConstantSpeed | None) -> dict[str, Any] | None:
     """Levels along the orders at constant speed, for the cuts of the overall transmission error."""
     if speed is None:
         return None
@@ -237,7 +237,7 @@ def axial_of_shaft(gearbox: Gearbox, channel: Channel) -> float:
     return 0.0 - channel.axial
 
 
-def _loudest(material: Material, channel: Channel) -> dict[str, Any] | None:
+def _loudest(material: ReportData, channel: Channel) -> dict[str, Any] | None:
     """Figures of a bearing for its table."""
     order = loudest_order(channel.spectra, material.lines)
     return {
@@ -252,7 +252,7 @@ def _loudest(material: Material, channel: Channel) -> dict[str, Any] | None:
     }
 
 
-def _resonance(material: Material, group: RunGroup, run: VariantRun, own: RankedResonance) -> dict[str, Any]:
+def _resonance(material: ReportData, group: RunGroup, run: VariantRun, own: RankedResonance) -> dict[str, Any]:
     peak = own.peak
     resonance = own.finding.resonance
     return {
@@ -268,7 +268,7 @@ def _resonance(material: Material, group: RunGroup, run: VariantRun, own: Ranked
     }
 
 
-def _facts(material: Material, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> list[list[str]]:
+def _facts(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> list[list[str]]:
     """Terms and words of a resonance for the panel beside the waterfall."""
     words = material.words
     peak = resonance.peak
@@ -295,7 +295,7 @@ def _facts(material: Material, group: RunGroup, run: VariantRun, resonance: Rank
     return facts
 
 
-def _mode_facts(material: Material, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> list[list[str]]:
+def _mode_facts(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> list[list[str]]:
     mode = resonance.finding.mode
     modes = run.modes
     if resonance.finding.mode_name and modes is None:

@@ -10,15 +10,15 @@ import numpy as np
 import xarray as xr
 
 from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import Context, choice_of, words_of
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Axis, Curve, Material, Part, chart, model_name
+from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name
 from exugear.report.web import html as pieces
 from exugear.results.run_file import read_run
-from exugear.results.spectra.resonances import TOO_FAST, run_up_cut, sweep_rate, sweep_severity
+from exugear.results.spectra.resonances import MAX_SWEEP_RATIO, run_up_cut, sweep_rate, sweep_severity
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.results.spectra.waterfall import OrderLine, order_lines
 from exugear.steady.campbell import Campbell, campbell_from
@@ -45,7 +45,7 @@ SAME_SPEED = 0.02
 """Share of the speed within which a peak belongs to the crossing of its line with a mode."""
 
 
-def steady_section(material: Material) -> Part:
+def steady_section(material: ReportData) -> Part:
     """Show the steady responses, each with the run-ups of the same variant, law and inertia set over it."""
     if not material.results.steady:
         return Part("")
@@ -55,7 +55,7 @@ def steady_section(material: Material) -> Part:
     return Part(html, {"charts": charts}, "Steady response", "steady")
 
 
-def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> str:
+def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) -> str:
     context = material.context
     choice = choice_of(data.attrs)
     level = str(data.attrs["method"])
@@ -95,8 +95,8 @@ def _response(material: Material, data: xr.Dataset, charts: dict[str, Any]) -> s
         _sidebands_table(material, data, peaks(data)),
         pieces.paragraph(
             f"Slowest decay of a disturbance {-growth:.3g} 1/s. A run-up is called too fast for a resonance where "
-            f"f′ / (2π ζ² f²) is above {TOO_FAST:g}: the peak does not build up. f is the frequency of the peak, "
-            "f′ its rate in the run-up, ζ the damping of the mode that is met there; – where no mode is known.",
+            f"f′ / (2π ζ² f²) is above {MAX_SWEEP_RATIO:g}: the peak does not build up. f is the frequency of the "
+            "peak, f′ its rate in the run-up, ζ the damping of the mode that is met there; – where no mode is known.",
             "note",
         ),
     ]
@@ -111,7 +111,7 @@ def _other_load(run: VariantRun) -> str:
     )
 
 
-def _shared_lines(material: Material, data: xr.Dataset) -> str:
+def _shared_lines(material: ReportData, data: xr.Dataset) -> str:
     """Say which mesh frequencies share lines: what excites such a line cannot be told from its frequency."""
     shared = str(data.attrs["shared_lines"])
     if not shared:
@@ -141,7 +141,7 @@ def _remarks(data: xr.Dataset, name: str) -> str:
 
 
 def _order_charts(
-    material: Material, data: xr.Dataset, runs: Sequence[VariantRun], name: str, charts: dict[str, Any]
+    material: ReportData, data: xr.Dataset, runs: Sequence[VariantRun], name: str, charts: dict[str, Any]
 ) -> str:
     """Levels along the orders at steady speed, the same cut out of run-ups beside them; a figure for each order."""
     figures = []
@@ -166,7 +166,7 @@ def _order_charts(
     return pieces.paragraph(words, "note") + pieces.element("div", "".join(figures), class_="grid")
 
 
-def _contributions_table(material: Material, data: xr.Dataset, name: str) -> str:
+def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> str:
     """Table of what makes the strongest resonances at the level `linear`."""
     told = material.words.told
     bases = tuple(str(name) for name in data["base"].to_numpy())
@@ -199,7 +199,7 @@ def _contributions_table(material: Material, data: xr.Dataset, name: str) -> str
     )
 
 
-def _campbell(material: Material, data: xr.Dataset, name: str, label: str, charts: dict[str, Any]) -> str:
+def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, charts: dict[str, Any]) -> str:
     """Figure and table of the modes over speed, with the crossings that excite them."""
     diagram = campbell_from(data)
     if not diagram.names or len(diagram.speeds) < 2:
@@ -262,7 +262,7 @@ def _ranges(context: Context) -> dict[str, tuple[float, float]]:
     for name, case in context.gearbox.load_cases.items():
         try:
             loads = summarise_loads(context.gearbox, case)
-        except CaseError as error:
+        except GearboxFileError as error:
             context.notes.left_out.append(f"speeds of load case {name}: {error}")
             continue
         slowest = min(abs(loads.start_speed), abs(loads.end_speed))
@@ -271,7 +271,7 @@ def _ranges(context: Context) -> dict[str, tuple[float, float]]:
 
 
 def _mode_rows(
-    material: Material, diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
+    material: ReportData, diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
 ) -> list[dict[str, object]]:
     """Rows of the modes, those that are excited most first."""
     bases = tuple(str(name) for name in data["base"].to_numpy())
@@ -307,7 +307,7 @@ def _mode_rows(
     return rows
 
 
-def _sidebands_table(material: Material, data: xr.Dataset, found: Sequence[Peak]) -> str:
+def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Peak]) -> str:
     """Table of the lines beside the loudest peaks, each with its cause."""
     context = material.context
     told = material.words.told
@@ -445,7 +445,7 @@ def _whirl_text(whirl: float) -> str:
     return "forward" if whirl > 0.0 else "backward"
 
 
-def _row(material: Material, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
+def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
     damping = _damping(peak, data)
     row: dict[str, object] = {
         "line": material.words.told(peak.line),
@@ -455,7 +455,7 @@ def _row(material: Material, peak: Peak, data: xr.Dataset, rates: dict[str, floa
         "damping / %": "–" if damping is None else f"{100.0 * damping:.3f}",
     }
     for load_case, rate in rates.items():
-        too_fast = damping is not None and sweep_severity(peak.frequency, damping, rate * peak.order) > TOO_FAST
+        too_fast = damping is not None and sweep_severity(peak.frequency, damping, rate * peak.order) > MAX_SWEEP_RATIO
         if damping is None:
             row[f"run-up {load_case}"] = "–"
         elif too_fast:

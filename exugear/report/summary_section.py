@@ -8,19 +8,19 @@ from collections.abc import Sequence
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.facts import Fact, facts_of, facts_of_response
+from exugear.report.findings.facts import SummaryCard, facts_of, facts_of_response
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.loudness import Resonance
-from exugear.report.findings.verdicts import Verdict, verdicts_of
+from exugear.report.findings.verdicts import CheckResult, verdicts_of
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Material, Part, group_words, only_for, told_groups
+from exugear.report.material import Part, ReportData, group_words, only_for, told_groups
 from exugear.report.web import html as pieces
 from exugear.report.web.html import Cell
 from exugear.report.web.stage import stage_figure
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun
 
 
-def short_section(material: Material) -> Part:
+def short_section(material: ReportData) -> Part:
     """Tell the facts of each group of results as cards; the command line prints the same sentences.
 
     Those of steady responses are printed where there is no run-up, which else tells of both.
@@ -44,7 +44,7 @@ def short_section(material: Material) -> Part:
     return Part(pieces.section("In short", *content, name="short"), {}, "In short", "short")
 
 
-def _group(material: Material, group: RunGroup, facts: Sequence[Fact], verdicts: Sequence[Verdict]) -> str:
+def _group(material: ReportData, group: RunGroup, facts: Sequence[SummaryCard], verdicts: Sequence[CheckResult]) -> str:
     scope = (
         f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds are those of the "
         f"{material.input_words}, levels those of the overall transmission error, 0 dB = 1 µm."
@@ -56,7 +56,7 @@ def _group(material: Material, group: RunGroup, facts: Sequence[Fact], verdicts:
     )
 
 
-def _load_of(material: Material, group: RunGroup) -> str:
+def _load_of(material: ReportData, group: RunGroup) -> str:
     """Name the load of a group: that of its load case, or the static load."""
     static = static_load_in_words(material.context.gearbox)
     loads = {str(run.attributes.get("load", "")) for run in group.runs.values()}
@@ -65,7 +65,7 @@ def _load_of(material: Material, group: RunGroup) -> str:
     return f"{'; '.join(sorted(filter(None, loads)))} (tables and steady responses: static load, {static})"
 
 
-def _without_groups(material: Material) -> str:
+def _without_groups(material: ReportData) -> str:
     """Tell what branches and responses at few speeds know, and what tells more."""
     facts = [fact for data in material.results.steady for fact in facts_of_response(material.words, data)]
     material.context.notes.statements.extend(fact.line for fact in facts)
@@ -75,7 +75,7 @@ def _without_groups(material: Material) -> str:
     )
 
 
-def _card(fact: Fact) -> str:
+def _card(fact: SummaryCard) -> str:
     large = pieces.element(
         "p", pieces.text(fact.figure) + pieces.element("small", pieces.text(f" {fact.beside}")), class_="large"
     )
@@ -85,7 +85,7 @@ def _card(fact: Fact) -> str:
     )
 
 
-def verdict_list(verdicts: Sequence[Verdict]) -> str:
+def verdict_list(verdicts: Sequence[CheckResult]) -> str:
     """List what was passed and what to mind; words say which is which beside colours."""
     entries = []
     for verdict in verdicts:
@@ -104,14 +104,14 @@ def verdict_list(verdicts: Sequence[Verdict]) -> str:
 NO_MODES = "No modes are here: `exugear modes` computes them, and the page shows them move."
 
 
-def rings_section(material: Material) -> Part:
+def rings_section(material: ReportData) -> Part:
     """Draw the waterfalls of all run-ups and steady responses; the sentences stand in the ranking, too."""
     if not material.groups:
         return Part("")
     return Part(_html(material), material.run_data, "Where it rings", "rings")
 
 
-def _html(material: Material) -> str:
+def _html(material: ReportData) -> str:
     words = _in_words(material.groups)
     channel = pieces.element("label", "Signal " + pieces.element("select", "", id="channel"))
     views = pieces.element("div", "", class_="choices", id="view", role="group", aria_label="Model shown")
@@ -163,7 +163,7 @@ QUANTITIES = {
 AT_CONSTANT = "Constant speed / dB, Hz"
 
 
-def ranking_section(material: Material) -> Part:
+def ranking_section(material: ReportData) -> Part:
     """Rank the resonances of each run-up, and of each steady response, in a table."""
     in_operation = [only_for(_in_operation(material, group), group.name) for group in material.groups]
     tables = [
@@ -187,7 +187,7 @@ def ranking_section(material: Material) -> Part:
     return Part(html, {}, "Ranking", "ranking")
 
 
-def _in_operation(material: Material, group: RunGroup) -> str:
+def _in_operation(material: ReportData, group: RunGroup) -> str:
     """Table of the resonances of the main variant at constant speed, where the gearbox works, by three quantities."""
     ranking = group.in_operation
     if ranking is None or not ranking.resonances:
@@ -204,7 +204,7 @@ def _in_operation(material: Material, group: RunGroup) -> str:
     return pieces.element("h3", pieces.text(title)) + table + pieces.paragraph(note, "note")
 
 
-def _loud_row(material: Material, resonance: Resonance) -> dict[str, object]:
+def _loud_row(material: ReportData, resonance: Resonance) -> dict[str, object]:
     row: dict[str, object] = {
         "Excited by": material.words.told(resonance.line),
         "Speed / rpm": Cell(figure_text(abs(resonance.speed) / RPM, 4), abs(resonance.speed) / RPM),
@@ -252,7 +252,7 @@ def _rules() -> str:
     )
 
 
-def _table(material: Material, group: RunGroup, variant: str) -> str:
+def _table(material: ReportData, group: RunGroup, variant: str) -> str:
     run = group.runs[variant]
     ranked = group.ranked[variant]
     title = f"{Variant.of(variant).label.capitalize()}, inertias {group.inertias}, {group.source}"
@@ -277,7 +277,7 @@ def _others(group: RunGroup, variant: str) -> list[str]:
 
 
 def _row(
-    material: Material, group: RunGroup, run: VariantRun, number: int, resonance: RankedResonance
+    material: ReportData, group: RunGroup, run: VariantRun, number: int, resonance: RankedResonance
 ) -> dict[str, object]:
     finding = resonance.finding
     peak = resonance.peak
@@ -332,7 +332,7 @@ def _at_constant(resonance: RankedResonance, loudest: float) -> Cell:
     return Cell(f"{at.level:.1f}, {at.frequency:.0f} Hz", at.level, bar=1.0 - (loudest - at.level) / SHOWN_SPAN)
 
 
-def _story(material: Material, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> str:
+def _story(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> str:
     mode = resonance.finding.mode
     modes = run.modes
     if resonance.finding.mode_name and modes is None:
@@ -347,7 +347,7 @@ def _story(material: Material, group: RunGroup, run: VariantRun, resonance: Rank
     return f"{material.words.moves(modes, mode)}; {gives}"
 
 
-def _note_comparisons(material: Material, group: RunGroup) -> None:
+def _note_comparisons(material: ReportData, group: RunGroup) -> None:
     """Tell which resonances only one of two variants has; unsteady ones are not counted."""
     for variant, comparison in group.comparisons.items():
         reference = comparison.second.variant

@@ -15,7 +15,7 @@ from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import choice_of, words_of
 from exugear.report.findings.verdicts import run_figures
-from exugear.report.material import Axis, Curve, Material, Part, chart, model_name
+from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name
 from exugear.report.web import html as pieces
 from exugear.report.web.document import libraries, licences
 from exugear.results.folder import times_spent
@@ -64,7 +64,7 @@ GLOSSARY = {
 """Words of the field that the page uses."""
 
 
-def trust_section(material: Material) -> Part:
+def trust_section(material: ReportData) -> Part:
     """List what results rest on."""
     charts: dict[str, Any] = {}
     compared = "".join(_beside_exudyn(material, run, charts) for run in material.results.runs)
@@ -83,7 +83,7 @@ def trust_section(material: Material) -> Part:
     return Part(html, {"charts": charts}, "Trust", "trust")
 
 
-def _assumptions(material: Material) -> str:
+def _assumptions(material: ReportData) -> str:
     gearbox = material.context.gearbox
     case = material.context.gearbox.case
     acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
@@ -104,7 +104,7 @@ def _assumptions(material: Material) -> str:
     )
 
 
-def _elastic_words(material: Material) -> Iterator[str]:
+def _elastic_words(material: ReportData) -> Iterator[str]:
     """Say which bodies are elastic in the models of the report, and how finely."""
     context = material.context
     assembly = next((assembly for assembly in context.assemblies.values() if assembly.elastic_bodies), None)
@@ -123,7 +123,7 @@ def _elastic_words(material: Material) -> Iterator[str]:
         yield f"In the variant {assembly.variant} the elastic housing takes the place of the housing factor."
 
 
-def _runs(material: Material) -> str:
+def _runs(material: ReportData) -> str:
     rows = [_run_row(material, run) for run in material.results.runs]
     steady = [_response_row(data) for data in material.results.steady]
     tables = []
@@ -134,7 +134,7 @@ def _runs(material: Material) -> str:
     return "".join(tables) or pieces.paragraph("Nothing was run.")
 
 
-def _beside_exudyn(material: Material, run: VariantRun, charts: dict[str, Any]) -> str:
+def _beside_exudyn(material: ReportData, run: VariantRun, charts: dict[str, Any]) -> str:
     """Say how far the compiled solver is from Exudyn where the beginning of the run was integrated by both."""
     name = material.context.name_of(run.path)
     path = material.context.folder / EXUDYN_FOLDER / name
@@ -174,7 +174,7 @@ def _response_row(data: xr.Dataset) -> dict[str, object]:
     }
 
 
-def _run_row(material: Material, run: VariantRun) -> dict[str, object]:
+def _run_row(material: ReportData, run: VariantRun) -> dict[str, object]:
     figures = run_figures(run)
     times = zip(MESH_TIME_LABELS, figures.times, strict=True)
     return {
@@ -191,7 +191,7 @@ def _run_row(material: Material, run: VariantRun) -> dict[str, object]:
     }
 
 
-def _inputs(material: Material) -> str:
+def _inputs(material: ReportData) -> str:
     rows = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
     return pieces.table(rows, ("value",), caption="All inputs of the case", name="inputs")
 
@@ -211,7 +211,7 @@ def flat_keys(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
             yield f"{before}{key}", value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 
-def _provenance(material: Material) -> str:
+def _provenance(material: ReportData) -> str:
     results = material.results
     context = material.context
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
@@ -236,7 +236,7 @@ def _version(package: str) -> str:
         return "(not installed)"
 
 
-def _times(material: Material) -> str:
+def _times(material: ReportData) -> str:
     rows = [
         {"step": entry.step, "wall / s": f"{entry.seconds:.1f}", "peak memory / MB": f"{1e-6 * entry.memory:.0f}"}
         for entry in times_spent(material.context.folder)

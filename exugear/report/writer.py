@@ -16,10 +16,10 @@ from exugear.report.bearings_section import bearings_section
 from exugear.report.findings.context import Context, bytes_of_runs, stored_models, with_responses
 from exugear.report.findings.groups import groups_of
 from exugear.report.findings.verdicts import begin_variations, model_variations
-from exugear.report.findings.words import Words
+from exugear.report.findings.words import Labels
 from exugear.report.gears_section import gears_section
 from exugear.report.life_section import life_section, studies_section
-from exugear.report.material import Material, Part, lines_of
+from exugear.report.material import Part, ReportData, lines_of
 from exugear.report.modes_section import change_section, modes_section, near_section
 from exugear.report.run_data import run_data
 from exugear.report.steady_section import steady_section
@@ -33,7 +33,7 @@ from fe_ste.tools.files import write_file
 # What stands around the sections of the report: head, table of contents, controls of the whole page, foot
 
 
-def page_body(material: Material, parts: Sequence[Part]) -> str:
+def page_body(material: ReportData, parts: Sequence[Part]) -> str:
     """Put the sections together: warnings first, then what was found, then what is left out."""
     notes = material.context.notes
     warning = "Runs that are not to be trusted; what follows shows them all the same"
@@ -53,7 +53,7 @@ def page_body(material: Material, parts: Sequence[Part]) -> str:
     return skip + head + main + foot + live + tip
 
 
-def _headline(material: Material) -> str:
+def _headline(material: ReportData) -> str:
     gearbox = material.context.gearbox
     shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
     line = f"Where it rings, how loud, and why. Ratio {gearbox.train.ratio:.6f}"
@@ -83,7 +83,7 @@ def _contents(parts: Sequence[Part]) -> str:
     return html.element("nav", links, aria_label="Sections")
 
 
-def _sets(material: Material) -> str:
+def _sets(material: ReportData) -> str:
     """Choice of the group of results, where there are several: which source the figures are read from."""
     if len(material.groups) < 2:
         return ""
@@ -93,7 +93,7 @@ def _sets(material: Material) -> str:
 
 # The report of a results folder: one web page that needs nothing else
 
-SECTIONS: Final[tuple[Callable[[Material], Part], ...]] = (
+SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
     short_section,
     rings_section,
     ranking_section,
@@ -151,7 +151,7 @@ def write_report(
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         The folder holds no results.
     ReportError
         Neither tables nor modes nor runs in it belong to its case.
@@ -172,7 +172,7 @@ def write_report(
     return Report(path, tuple(context.notes.statements), tuple(context.notes.left_out))
 
 
-def _material(context: Context, executor: Executor | None) -> Material:
+def _material(context: Context, executor: Executor | None) -> ReportData:
     models = stored_models(context)
     begun = None
     if executor is not None and models.modes and bytes_of_runs(context) > WORTH_A_PROCESS:
@@ -182,14 +182,14 @@ def _material(context: Context, executor: Executor | None) -> Material:
         reasons = context.notes.left_out or ["no files"]
         raise ReportError("\n".join([f"{context.folder}: nothing here belongs to its case", *reasons]))
     groups = groups_of(context, results)
-    words = Words(context.gearbox)
-    material = Material(context, results, words, groups, (), lines_of(context), ArrayStore())
+    words = Labels(context.gearbox)
+    material = ReportData(context, results, words, groups, (), lines_of(context), ArrayStore())
     # Last what another process computes meanwhile.
     drawn = run_data(material)
     return replace(material, run_data=drawn, variations=model_variations(context, results.modes, begun))
 
 
-def _head_data(material: Material) -> dict[str, Any]:
+def _head_data(material: ReportData) -> dict[str, Any]:
     gearbox = material.context.gearbox
     return {
         "name": gearbox.name,

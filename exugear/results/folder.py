@@ -17,10 +17,10 @@ from typing import Any
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
-from exugear.gearbox.reading import CaseError, parsed
+from exugear.gearbox.reading import GearboxFileError, parsed
 from exugear.gearbox.versions import MODES, STUDY
-from exugear.system.bearings.duty import BearingDuty
-from exugear.system.tooth_mesh.contact_state import MeshDuty
+from exugear.system.bearings.duty import BearingLoadState
+from exugear.system.tooth_mesh.contact_state import MeshLoadState
 from fe_ste.tools.files import FileError, append_line, read_text, write_file
 from fe_ste.tools.stores import Layout, open_dataset
 
@@ -53,12 +53,14 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         The folder holds no results, or what it says of its case cannot be used.
     """
     path = folder / CASE_FILE
     if not path.is_file():
-        raise CaseError(f"{folder}: holds no results (no {CASE_FILE}); name the folder that `exugear run` wrote into")
+        raise GearboxFileError(
+            f"{folder}: holds no results (no {CASE_FILE}); name the folder that `exugear run` wrote into"
+        )
     try:
         kept = parsed(lambda: json.loads(read_text(path)), str(path), "JSON")
         if not isinstance(kept, dict):
@@ -71,7 +73,9 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
         source = kept["source"]
     # Whoever makes up a file with its checksum may write into it what he likes.
     except (FileError, ValueError, KeyError, TypeError, RecursionError) as error:
-        raise CaseError(f"{path}: cannot be used ({error}); run `exugear modes` into this folder again") from error
+        raise GearboxFileError(
+            f"{path}: cannot be used ({error}); run `exugear modes` into this folder again"
+        ) from error
     return Gearbox.from_dict(content, source, permissions)
 
 
@@ -91,7 +95,7 @@ def bodies_folder(folder: Path) -> Path:
 
 
 @dataclass(frozen=True)
-class Spent:
+class StepTiming:
     """What a step of the work took."""
 
     step: str
@@ -114,7 +118,7 @@ def peak_memory() -> float:
 
 def note_time(folder: Path, step: str, seconds: float) -> None:
     """Add a line to the folder's account of time; processes may do so at once."""
-    append_line(folder / TIMES_FILE, json.dumps(asdict(Spent(step, round(seconds, 2), peak_memory()))))
+    append_line(folder / TIMES_FILE, json.dumps(asdict(StepTiming(step, round(seconds, 2), peak_memory()))))
 
 
 @contextmanager
@@ -128,16 +132,16 @@ def time_noted(folder: Path, step: str) -> Iterator[None]:
         _log.warning("The time that it took is not noted: %s", error)
 
 
-def times_spent(folder: Path) -> tuple[Spent, ...]:
+def times_spent(folder: Path) -> tuple[StepTiming, ...]:
     """Last account of each step, in the order in which the steps were last done."""
-    last: dict[str, Spent] = {}
+    last: dict[str, StepTiming] = {}
     for entry in _lines(folder / TIMES_FILE):
         last.pop(entry.step, None)
         last[entry.step] = entry
     return tuple(last.values())
 
 
-def _lines(path: Path) -> Iterator[Spent]:
+def _lines(path: Path) -> Iterator[StepTiming]:
     try:
         lines = read_text(path).splitlines()
     except FileError:
@@ -145,7 +149,7 @@ def _lines(path: Path) -> Iterator[Spent]:
     for line in lines:
         try:
             values: dict[str, Any] = json.loads(line)
-            spent = Spent(str(values["step"]), float(values["seconds"]), float(values["memory"]))
+            spent = StepTiming(str(values["step"]), float(values["seconds"]), float(values["memory"]))
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
             continue  # a line cut short by a kill says nothing
         if math.isfinite(spent.seconds):
@@ -230,7 +234,7 @@ def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
 # The file of what bearings and meshes bear: JSON, units in the keys, hash of its input, version of its method
 
 
-def duty_summary(duty: BearingDuty) -> dict[str, Any]:
+def duty_summary(duty: BearingLoadState) -> dict[str, Any]:
     """Figures of a bearing by key, in the units that catalogues use; lives without end are None."""
     return {
         "bearing": duty.name,
@@ -257,7 +261,7 @@ def duty_summary(duty: BearingDuty) -> dict[str, Any]:
     }
 
 
-def mesh_summary(duty: MeshDuty) -> dict[str, Any]:
+def mesh_summary(duty: MeshLoadState) -> dict[str, Any]:
     """Figures of a mesh by key; what no contact was solved for is None."""
     return {
         "mesh": duty.name,
@@ -272,7 +276,7 @@ def mesh_summary(duty: MeshDuty) -> dict[str, Any]:
     }
 
 
-def duties_summary(duties: Iterable[BearingDuty], meshes: Iterable[MeshDuty]) -> dict[str, Any]:
+def duties_summary(duties: Iterable[BearingLoadState], meshes: Iterable[MeshLoadState]) -> dict[str, Any]:
     """Figures of all bearings and of all meshes."""
     return {"bearings": [*map(duty_summary, duties)], "meshes": [*map(mesh_summary, meshes)]}
 
@@ -300,7 +304,9 @@ def _finite(value: float) -> float | None:
     return None
 
 
-def write_duties(path: Path, duties: Iterable[BearingDuty], meshes: Iterable[MeshDuty], input_hash: str) -> Path:
+def write_duties(
+    path: Path, duties: Iterable[BearingLoadState], meshes: Iterable[MeshLoadState], input_hash: str
+) -> Path:
     """Write what bearings and meshes bear (atomically) and return the path."""
     content = {
         "input_hash": input_hash,

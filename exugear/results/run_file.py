@@ -83,7 +83,7 @@ class Checkpoint:
     mesh_times: Floats
     """(times, meshes) s, as in `exugear.system.signals.MESH_TIMES`."""
     judgement: Floats
-    """Running figures of an `exugear.transient.outcome.Judge`."""
+    """Running figures of an `exugear.transient.outcome.ValidityMonitor`."""
 
 
 @dataclass(frozen=True)

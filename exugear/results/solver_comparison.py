@@ -13,7 +13,7 @@ import numpy as np
 
 from exugear.results.run_file import load_run
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.files import FileError
 
 EXUDYN_FOLDER = "exudyn"
@@ -26,7 +26,7 @@ COMPARED = {
 
 
 @dataclass(frozen=True)
-class SolverComparison(Displayed, line=" of {exudyn}, {duration:.3g} s: {largest:.1e} apart"):
+class SolverComparison(ReprMixin, line=" of {exudyn}, {duration:.3g} s: {largest:.1e} apart"):
     """A run beside the same one by Exudyn, over the time that both have."""
 
     exudyn: str

@@ -34,7 +34,7 @@ from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY
 from exugear.system.modes import BODY_MOTIONS, kinetic_shares, mode_name
 from exugear.system.statics import linearise
 from fe_ste.tools.arrays import Complexes, Floats, Integers
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import side_by_side
 
 if TYPE_CHECKING:
@@ -322,7 +322,7 @@ SAME_FREQUENCY = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Campbell(Displayed, line=": {names!n} modes at {speeds!n} speeds"):
+class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
     """Modes over speed; n speeds, m modes."""
 
     speeds: Floats

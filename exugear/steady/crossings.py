@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from exugear.steady.campbell import ModeTracks
-from exugear.steady.excitation import Gearset, Interface
+from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.branches import NEIGHBOURS, predicted_top, standing_peaks
 from exugear.steady.mean_system.mean_system import MeanSystem, mean_modes
 from exugear.steady.mean_system.mesh_places import DEFLECTION
@@ -89,7 +89,7 @@ class Mode:
 
 
 def crossings(
-    gearset: Gearset, tracks: ModeTracks, forcing: Forcing, operation: tuple[float, float] | None = None
+    gearset: HarmonicBalanceModel, tracks: ModeTracks, forcing: Forcing, operation: tuple[float, float] | None = None
 ) -> tuple[Crossing, ...]:
     """Crossings of lines of single bases with modes over the speeds of these, the strongest first.
 
@@ -189,7 +189,7 @@ def missed_tops(
     return np.sort(np.array(tops))
 
 
-def _looked_at(gearset: Gearset) -> list[int]:
+def _looked_at(gearset: HarmonicBalanceModel) -> list[int]:
     """Lines of a single mesh frequency, and those beside it."""
     index = gearset.lines.index[:, : len(gearset.waves.base_orders)]
     return [int(line) for line in np.flatnonzero(np.count_nonzero(index, axis=1) == 1)]
@@ -219,7 +219,7 @@ def _followed(system: MeanSystem, tracks: ModeTracks, mode: int, speed: float) -
     return Mode(complex(tracks.eigenvalues[n, mode]), tracks.shapes[n, mode], left)
 
 
-def _peak(gearset: Gearset, tracks: ModeTracks, mode: int, speed: float, force: Complexes) -> Floats:
+def _peak(gearset: HarmonicBalanceModel, tracks: ModeTracks, mode: int, speed: float, force: Complexes) -> Floats:
     """Find what a mode makes at resonance of a line with forces (m, f) of the meshes, (signals,).
 
     Signals are the overall transmission error and the deflections of the meshes.
@@ -290,7 +290,7 @@ class Contributions:
     mean stiffness of the meshes and the excitation staying as they are."""
 
 
-def contributions(gearset: Gearset, speed: float, line: int) -> Contributions:
+def contributions(gearset: HarmonicBalanceModel, speed: float, line: int) -> Contributions:
     """Find what makes a line of the overall transmission error at a speed.
 
     Parameters
@@ -316,7 +316,7 @@ def contributions(gearset: Gearset, speed: float, line: int) -> Contributions:
     return Contributions(speed, abs(total), meshes, modes, supports, bodies)
 
 
-def loudest_near(gearset: Gearset, speed: float, width: float, line: int) -> float:
+def loudest_near(gearset: HarmonicBalanceModel, speed: float, width: float, line: int) -> float:
     """Speed (rad/s) within a share `width` of another at which a line is loudest at the level `linear`.
 
     There the height of a peak changes with a parameter as the amplitude does at that speed: its place then counts
@@ -335,7 +335,7 @@ def loudest_near(gearset: Gearset, speed: float, width: float, line: int) -> flo
     return speed * float(found.x)
 
 
-def _excitation(gearset: Gearset, speed: float, line: int) -> tuple[Complexes, Complexes]:
+def _excitation(gearset: HarmonicBalanceModel, speed: float, line: int) -> tuple[Complexes, Complexes]:
     """Generalized peak forces of each wave (size, m f) on a line, and their sum (size,)."""
     ports = gearset.ports_at(speed)
     excess = transmission_errors(gearset, ports, speed)[line]
@@ -349,7 +349,7 @@ def _share(part: complex, total: complex) -> float:
 
 
 def _modes(
-    gearset: Gearset, speed: float, frequency: float, loads: Complexes, row: Floats, total: complex
+    gearset: HarmonicBalanceModel, speed: float, frequency: float, loads: Complexes, row: Floats, total: complex
 ) -> tuple[tuple[float, float], ...]:
     """Shares of the modes of the mean system, those of negative frequency counted with their partners."""
     values, right, left = mean_modes(gearset.system, speed)
@@ -364,7 +364,7 @@ def _modes(
 
 
 def _derivatives(
-    gearset: Gearset, speed: float, frequency: float, adjoint: Complexes, motion: Complexes, total: complex
+    gearset: HarmonicBalanceModel, speed: float, frequency: float, adjoint: Complexes, motion: Complexes, total: complex
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Relative changes of the amplitude per relative change of bearings' stiffness and of bodies' inertia.
 

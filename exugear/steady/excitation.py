@@ -11,8 +11,8 @@ import numpy as np
 
 from exugear.steady.harmonics.lines import (
     Coupling,
-    Lattice,
     LineSet,
+    TorusSampling,
     beside,
     count_of_lines,
     joined,
@@ -36,8 +36,8 @@ from exugear.steady.mean_system.mesh_places import (
     POSITION,
     TILT,
     Family,
+    MeshInterface,
     MeshPlaces,
-    MeshPorts,
     Spectra,
     coupled,
     families,
@@ -76,7 +76,7 @@ class Interface:
     """(n,) angular frequencies of the lines, rad/s."""
     motion: Complexes
     """(n, size, m, f) motion under a unit of each force, the waves' weights in it."""
-    ports: MeshPorts
+    ports: MeshInterface
     """What the meshes read and push along."""
     rows: SignalRows
     """Signals from the motion."""
@@ -117,13 +117,13 @@ class Interface:
 
 
 @dataclass(frozen=True)
-class Reach:
+class HarmonicTruncation:
     """How far a set of lines reaches: harmonics of each mesh frequency, largest sum of multiples of several."""
 
     harmonics: int
     combinations: int
 
-    def around(self, lines: LineSet, bases: int, clear: bool) -> Reach:
+    def around(self, lines: LineSet, bases: int, clear: bool) -> HarmonicTruncation:
         """Return this one, doubled until it has lines of so many bases; combinations up to `MOST_LINES`.
 
         `clear` asks that none of them is at its edge.
@@ -141,10 +141,10 @@ class Reach:
             combinations = max((n for n in later if count_of_lines(bases, n) <= MOST_LINES), default=sooner)
             if combinations == sooner:
                 break
-        return Reach(harmonics, combinations)
+        return HarmonicTruncation(harmonics, combinations)
 
 
-class Gearset:
+class HarmonicBalanceModel:
     """A gearbox ready for the balance of lines at any speed within a range.
 
     Parameters
@@ -161,15 +161,15 @@ class Gearset:
     def __init__(self, waves: MeshWaves, harmonics: int, combinations: int) -> None:
         self.waves, self.harmonics = waves, 2 * harmonics
         # Lines of the larger set are kept apart where forces are evaluated in time.
-        self._usual = self._reach = Reach(2 * harmonics, 2 * combinations)
+        self._usual = self._reach = HarmonicTruncation(2 * harmonics, 2 * combinations)
         self.lines, self.larger = (
-            _lines_within(waves, Reach(harmonics, combinations)),
+            _lines_within(waves, HarmonicTruncation(harmonics, combinations)),
             _lines_within(waves, self._usual),
         )
         self._least = 0
         # Shared by all that differ in their lines alone.
-        self._lattices: dict[tuple[Reach, int, int], Lattice] = {}
-        self._one_by_one: dict[int, Gearset] = {}
+        self._lattices: dict[tuple[HarmonicTruncation, int, int], TorusSampling] = {}
+        self._one_by_one: dict[int, HarmonicBalanceModel] = {}
         self.parting = LAWS[waves.assembly.mesh_model].loses_contact
         self.bearings: BearingWaves | None = None
         self._bearing_means: tuple[BearingMean, ...] = ()
@@ -196,7 +196,7 @@ class Gearset:
         return self.parting or self.bearings is not None
 
     @cached_property
-    def with_bearings(self) -> Gearset:
+    def with_bearings(self) -> HarmonicBalanceModel:
         """The same with the laws of bearings that have rows of rolling elements; itself where none has."""
         other = self._copied()
         bearings = bearing_waves(self.waves)
@@ -249,7 +249,7 @@ class Gearset:
         return places_with_bearings(found, self.bearings, len(self.waves.base_orders), speed, angles)
 
     @cached_property
-    def lattice(self) -> Lattice:
+    def lattice(self) -> TorusSampling:
         """Samples on which forces are evaluated in time."""
         least = max(self._least, SAMPLES_PER_HARMONIC * self._reach.harmonics if self.bent else 0)
         key = self._reach, least, self.waves.passing
@@ -259,24 +259,24 @@ class Gearset:
         elif known is None:
             known = lattice(self.larger, self.larger, least)
         self._lattices[key] = known
-        return Lattice(self.lines, known.generator, known.samples)
+        return TorusSampling(self.lines, known.generator, known.samples)
 
     @cached_property
-    def denser(self) -> Gearset:
+    def denser(self) -> HarmonicBalanceModel:
         """The same on twice as many samples, on which other lines alias."""
         other = self._copied()
         other._least = 2 * self.lattice.samples
         return other
 
     @cached_property
-    def whole(self) -> Gearset:
+    def whole(self) -> HarmonicBalanceModel:
         """The same with all lines of the larger set, on the same samples."""
         other = self._copied()
         other.lines = self.larger
         return other
 
-    def with_lines(self, lines: LineSet, clear: bool) -> Gearset:
-        """Copy with other lines, and a larger set that has them; `clear` as `Reach.around` has it."""
+    def with_lines(self, lines: LineSet, clear: bool) -> HarmonicBalanceModel:
+        """Copy with other lines, and a larger set that has them; `clear` as `HarmonicTruncation.around` has it."""
         other = self._copied()
         reach = self._usual.around(lines, len(self.waves.base_orders), clear)
         other.lines = lines
@@ -286,7 +286,7 @@ class Gearset:
             other._reach, other.larger, other._least = reach, _lines_within(self.waves, reach), 0
         return other
 
-    def of(self, which: Booleans) -> Gearset:
+    def of(self, which: Booleans) -> HarmonicBalanceModel:
         """Copy with some of its lines, told by a flag for each (n,)."""
         other = self._copied()
         other.lines = self.lines.part(which)
@@ -297,27 +297,27 @@ class Gearset:
         """Harmonics of each mesh frequency among its usual lines."""
         return self._usual.harmonics // 2
 
-    def with_harmonics(self, harmonics: int) -> Gearset:
+    def with_harmonics(self, harmonics: int) -> HarmonicBalanceModel:
         """Copy with the usual lines of other harmonics of each mesh frequency."""
         other = self._copied()
         combinations = self._usual.combinations
         other.harmonics, other._least = 2 * harmonics, 0
-        other._usual = other._reach = Reach(2 * harmonics, combinations)
-        other.lines = _lines_within(self.waves, Reach(harmonics, combinations // 2))
+        other._usual = other._reach = HarmonicTruncation(2 * harmonics, combinations)
+        other.lines = _lines_within(self.waves, HarmonicTruncation(harmonics, combinations // 2))
         other.larger = _lines_within(self.waves, other._usual)
         return other
 
     @cached_property
-    def finer(self) -> Gearset:
+    def finer(self) -> HarmonicBalanceModel:
         """The same with twice the usual harmonics of each mesh frequency, and the usual combinations of several."""
         other = self._copied()
         usual = self._usual
-        other.lines = _lines_within(self.waves, Reach(usual.harmonics, usual.combinations // 2))
-        other._reach = Reach(2 * usual.harmonics, usual.combinations)
+        other.lines = _lines_within(self.waves, HarmonicTruncation(usual.harmonics, usual.combinations // 2))
+        other._reach = HarmonicTruncation(2 * usual.harmonics, usual.combinations)
         other.larger = _lines_within(self.waves, other._reach)
         return other
 
-    def _copied(self) -> Gearset:
+    def _copied(self) -> HarmonicBalanceModel:
         """Copy without what was derived from lines and ports."""
         other = copy.copy(self)
         for name, value in vars(type(self)).items():
@@ -325,7 +325,7 @@ class Gearset:
                 other.__dict__.pop(name, None)
         return other
 
-    def passing(self, strong: Booleans) -> Gearset | None:
+    def passing(self, strong: Booleans) -> HarmonicBalanceModel | None:
         """Copy with one more multiple of the passing of planets beside strong lines, told by a flag for each (n,).
 
         Planets tilt unequally under load, and tables tell that: each that passes then puts lines beside all others.
@@ -341,7 +341,7 @@ class Gearset:
         bases = len(waves.base_orders)
         if more not in self._one_by_one:
             travelling = mesh_waves(self.system, more)
-            self._one_by_one[more] = Gearset(travelling, usual.harmonics // 2, usual.combinations // 2)
+            self._one_by_one[more] = HarmonicBalanceModel(travelling, usual.harmonics // 2, usual.combinations // 2)
         other = self._one_by_one[more]._copied()
         slow = [own for _, own in other.waves.carriers]
         other._one_by_one, other._lattices, other._reach = self._one_by_one, self._lattices, self._reach
@@ -353,7 +353,7 @@ class Gearset:
         other.larger = joined(joined(beside(whole, slow, 1), beside(loud, slow, more + 1)), other.lines)
         return other
 
-    def places_in(self, other: Gearset) -> tuple[Integers, ...]:
+    def places_in(self, other: HarmonicBalanceModel) -> tuple[Integers, ...]:
         """Places of the lines (n,) among those of another, which has them all; those of waves follow if it has more."""
         index = self.lines.index
         more = np.zeros((len(index), other.lines.index.shape[1] - index.shape[1]), dtype=index.dtype)
@@ -447,7 +447,7 @@ class Gearset:
         bases = self.lines.index.shape[1]
         return Coupling(self.lines, tuple(group_of(family, self.harmonics, forces, bases) for family in self._families))
 
-    def coupled(self, spectra: Spectra, ports: MeshPorts, speed: float) -> list[Complexes]:
+    def coupled(self, spectra: Spectra, ports: MeshInterface, speed: float) -> list[Complexes]:
         """Functions of the mesh cycles, by their harmonics, as `coupling` takes them at a speed of the input."""
         return [coupled(self.waves, family, spectra, ports, speed, ports.forces.shape[1]) for family in self._families]
 
@@ -475,11 +475,11 @@ class Gearset:
         """Tell which waves' meshes (m,) run through their cycles forward at a speed of the input."""
         return np.array([wave.sense for wave in self.waves.waves]) * math.copysign(1.0, speed) > 0.0
 
-    def ports_at(self, speed: float) -> MeshPorts:
+    def ports_at(self, speed: float) -> MeshInterface:
         """Find what the meshes read and push along at a speed of the input, rad/s."""
-        return MeshPorts(**{name: self.system.at(values, speed) for name, values in self._ports.items()})
+        return MeshInterface(**{name: self.system.at(values, speed) for name, values in self._ports.items()})
 
-    def loads(self, ports: MeshPorts) -> Floats:
+    def loads(self, ports: MeshInterface) -> Floats:
         """Generalized forces (size, m f) of a unit of each force, in the frame."""
         weighted = ports.forces * self.weights[:, None, None]
         return np.asarray(weighted.reshape(-1, weighted.shape[2]).T)
@@ -525,13 +525,13 @@ class Gearset:
         return np.asarray(self.system.at(self._rows["by_place"], speed)[0])
 
 
-def _stacked(ports: list[MeshPorts]) -> dict[str, Floats]:
+def _stacked(ports: list[MeshInterface]) -> dict[str, Floats]:
     """Arrays of ports at several speeds (speeds, ...), by their names."""
-    by_name = {own.name: [getattr(port, own.name) for port in ports] for own in fields(MeshPorts)}
+    by_name = {own.name: [getattr(port, own.name) for port in ports] for own in fields(MeshInterface)}
     return {name: np.array(values) for name, values in by_name.items() if values[0] is not None}
 
 
-def _lines_within(waves: MeshWaves, reach: Reach) -> LineSet:
+def _lines_within(waves: MeshWaves, reach: HarmonicTruncation) -> LineSet:
     """Lines that reach so far; those that planets make that mesh out of phase stand beside them."""
     lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
     modulators = [own for _, own in waves.carriers]

@@ -17,10 +17,10 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.excitation import Gearset, Interface
+from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.branches import exponents, kicks_needed
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
-from exugear.steady.harmonics.lines import Lattice
+from exugear.steady.harmonics.lines import TorusSampling
 from exugear.steady.mean_system.bearing_waves import COMPONENTS
 from exugear.steady.mean_system.mean_system import mean_modes
 from exugear.steady.mean_system.mesh_places import BACK, DEFLECTION, FRONT, MISALIGNMENT, POSITION, MeshPlaces
@@ -50,12 +50,12 @@ SHORTEST = 1.0 / 64.0
 
 
 @dataclass(frozen=True, eq=False)
-class Balance:
+class HarmonicResidual:
     """The equations of all lines at one speed; n lines, m waves, r readings, f forces."""
 
-    gearset: Gearset
+    gearset: HarmonicBalanceModel
     interface: Interface
-    lattice: Lattice
+    lattice: TorusSampling
 
     @cached_property
     def static(self) -> Complexes:
@@ -345,7 +345,7 @@ class Balance:
 class Tangent:
     """How the balance follows small changes of the readings."""
 
-    balance: Balance
+    balance: HarmonicResidual
     sampled: LawSamples
 
     def __call__(self, step: Complexes) -> Complexes:
@@ -383,7 +383,7 @@ class Tangent:
 
 
 def nonlinear_response(
-    gearset: Gearset, interface: Interface, lattice: Lattice, start: Complexes | None = None
+    gearset: HarmonicBalanceModel, interface: Interface, lattice: TorusSampling, start: Complexes | None = None
 ) -> tuple[Response, Complexes]:
     """Response by the laws in time, and the readings (n, m, r), from which a neighbouring speed may start.
 
@@ -392,12 +392,12 @@ def nonlinear_response(
     HarmonicBalanceError
         Newton's method found no balance from this start.
     """
-    balance = Balance(gearset, interface, lattice)
+    balance = HarmonicResidual(gearset, interface, lattice)
     readings, products = solve_balance(balance, balance.static if start is None else start)
     return response_of_readings(balance, readings, products), readings
 
 
-def solve_balance(balance: Balance, readings: Complexes, enough: float = BALANCED) -> tuple[Complexes, int]:
+def solve_balance(balance: HarmonicResidual, readings: Complexes, enough: float = BALANCED) -> tuple[Complexes, int]:
     """Solve the balance by Newton's method from given readings; the number of products that it took.
 
     `enough` is the residual over the size of the deflections that counts as balanced.
@@ -434,7 +434,7 @@ def solve_balance(balance: Balance, readings: Complexes, enough: float = BALANCE
     )
 
 
-def response_of_readings(balance: Balance, readings: Complexes, products: int = 0) -> Response:
+def response_of_readings(balance: HarmonicResidual, readings: Complexes, products: int = 0) -> Response:
     """Response of a steady state whose readings (n, m, r) are known."""
     gearset = balance.gearset
     interface = balance.interface
@@ -457,7 +457,7 @@ def response_of_readings(balance: Balance, readings: Complexes, products: int = 
     return Response(interface, deflection, excess, force * waves.line_of_action, products, apart, free)
 
 
-def _free_shares(balance: Balance, whole: Floats) -> Floats:
+def _free_shares(balance: HarmonicResidual, whole: Floats) -> Floats:
     """Shares of time (b,) in which bearings have no force, which are whole (s, u, f) in all places; planets' mean."""
     bearings = balance.gearset.bearings
     m = balance.meshes
@@ -506,7 +506,7 @@ class Candidate:
     """Estimate of the fastest growth there, 1/s."""
 
 
-def candidates(gearset: Gearset, low: float, high: float) -> tuple[Candidate, ...]:
+def candidates(gearset: HarmonicBalanceModel, low: float, high: float) -> tuple[Candidate, ...]:
     """Find combination resonances between two speeds (rad/s), the fastest growing first, to first order."""
     middle = 0.5 * (low + high)
     values, right, left = mean_modes(gearset.system, middle)
@@ -546,7 +546,7 @@ def _between(felt: Complexes, tangents: Mapping[tuple[int, int], Complexes], see
     return np.asarray(np.sum(parts, axis=0))
 
 
-def growth_at(balance: Balance, readings: Complexes, base: int, least: int = SMOOTH_KICKS) -> float:
+def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: int = SMOOTH_KICKS) -> float:
     """Fastest growth of a disturbance of a steady state, 1/s, by Floquet exponents over one period of a base.
 
     Parameters
@@ -599,7 +599,7 @@ def growth_at(balance: Balance, readings: Complexes, base: int, least: int = SMO
     return float(np.delete(found, rolling).real.max())
 
 
-def growth_of_state(balance: Balance, readings: Complexes, parted: bool) -> float:
+def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool) -> float:
     """Fastest growth of a disturbance of a steady state over the bases, 1/s.
 
     Parameters as of `growth_at`; `parted` tells whether its teeth part. NaN where planets mesh out of phase: the
@@ -611,7 +611,7 @@ def growth_of_state(balance: Balance, readings: Complexes, parted: bool) -> floa
     return max(growth_at(balance, readings, base, least) for base in range(len(balance.gearset.waves.base_orders)))
 
 
-def mean_growth(gearset: Gearset) -> float:
+def mean_growth(gearset: HarmonicBalanceModel) -> float:
     """Fastest growth of the mean system over its speeds, 1/s; free rolling left out."""
     rates = []
     for speed in gearset.system.speeds:

@@ -216,7 +216,7 @@ def _signed(words: str) -> str:
 
 
 @dataclass(frozen=True)
-class Pull:
+class TensileMesh:
     """A mesh whose teeth would have to pull: they part, which a law without contact loss does not know."""
 
     mesh: str
@@ -229,7 +229,7 @@ class Pull:
     """Of the time there."""
 
 
-def pulls(data: xr.Dataset) -> tuple[Pull, ...]:
+def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
     """Find the meshes whose force changes its sign about its mean, the static force, that longest pulling first.
 
     The lines of a speed are summed up at angles of the input drawn at random (`DRAWN`, the same each time). Of planets
@@ -249,7 +249,7 @@ def pulls(data: xr.Dataset) -> tuple[Pull, ...]:
         shares = _pulling(data, own)
         most = int(np.argmax(shares))
         if shares[most] > 0.0:
-            found.append(Pull(mesh, int((shares > 0.0).sum()), float(data["speed"][most]), float(shares[most])))
+            found.append(TensileMesh(mesh, int((shares > 0.0).sum()), float(data["speed"][most]), float(shares[most])))
     return tuple(sorted(found, key=lambda pull: -pull.share))
 
 
@@ -271,7 +271,7 @@ def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
 
 
 @dataclass(frozen=True)
-class BearingSwing:
+class BearingLoadExcursion:
     """A linear bearing whose load swings so far about the static one that its rows are no straight line there."""
 
     bearing: str
@@ -283,7 +283,7 @@ class BearingSwing:
     """Of the static load that the vibration takes away at most there; from 1 on the bearing comes free."""
 
 
-def bearing_swings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
+def bearing_swings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
     """Find linear bearings whose vibration takes `STRAINED` of the static load or more, the worst first.
 
     The lines of a speed are added up as if they met, along the static load. Planets' bearings, whose load turns in
@@ -303,7 +303,7 @@ def bearing_swings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
         most = int(np.nanargmax(shares))
         if shares[most] >= STRAINED:
             count = int((shares >= STRAINED).sum())
-            swings.append(BearingSwing(bearing, count, float(data["speed"][most]), float(shares[most])))
+            swings.append(BearingLoadExcursion(bearing, count, float(data["speed"][most]), float(shares[most])))
     return tuple(sorted(swings, key=lambda swing: -swing.share))
 
 

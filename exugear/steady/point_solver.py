@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from exugear.steady.excitation import Gearset, Interface
+from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
-from exugear.steady.harmonics.lines import Lattice, LineSet, joined, largest
+from exugear.steady.harmonics.lines import LineSet, TorusSampling, joined, largest
 from exugear.steady.mean_system.mean_system import mean_system
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.mesh_waves import FEWEST, mesh_waves
 from exugear.steady.nonlinear import (
     CHECKED,
-    Balance,
+    HarmonicResidual,
     candidates,
     growth_at,
     growth_of_state,
@@ -32,7 +32,7 @@ from exugear.steady.nonlinear import (
 )
 from exugear.steady.response import Response, linear_response, parametric_response, signals, transmission_errors
 from exugear.steady.settings import SteadySettings
-from exugear.steady.settling import Leg, SettlingRun, cannot_settle
+from exugear.steady.settling import SettlingRun, SettlingSegment, cannot_settle
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Complexes, Floats
@@ -41,19 +41,19 @@ LEFT_OUT = 2e-4
 """What lines that are left out may have together, over the vibration."""
 ALIASED = 2e-4
 """The same of the residual on other samples, up to which those of the balance do where something parts."""
-HARDLY = 2e-5
+DROP_LINE_TOL = 2e-5
 """The same of lines that a state has, up to which the next speed begins without them."""
 ROUGH = 1e-5
 """Residual of the balance over the size of the deflections up to which it is solved before lines are added."""
 UNEQUAL = 5e-4
 """What passing planets put beside all lines, over the vibration, from which they are looked at one by one."""
-BESIDE = 1e-4
+SIDEBAND_TOL = 1e-4
 """What a line has, over the vibration, from which others are looked for beside it; what those left out may have."""
-PASSED = 1e-4
+SIDEBAND_RESIDUAL = 1e-4
 """Residual over the vibration up to which lines beside others count as found that passing planets make."""
-MOST_PASSED = 3
+MOST_SIDEBANDS = 3
 """Multiples of the passing of planets whose lines are looked at, at most."""
-TOLD = 0.05
+SIDEBAND_WARNING = 0.05
 """Share of the overall transmission error in lines beside others from which it is remarked on."""
 MOST_REFINED = 5
 """Times that lines are added at most."""
@@ -61,29 +61,31 @@ MOST_DENSER = 2
 """Times that samples are doubled at most."""
 LEGS = 4
 """Legs of a run in time, after each of which Newton's method is tried."""
-NEAR = 0.1
+SAME_STATE_TOL = 0.1
 """Difference of amplitudes from those of a run in time, over the vibration, up to which both are one state."""
 GROWING = 0.02
 """Growth in a period of the slowest base above which a state does not last: below it a run shows little of it."""
-PUSHED = 1.02
+PERTURBATION = 1.02
 """Factor on the motion of an unstable state from which a run begins."""
 
 
-def gearset_of(assembly: Assembly, speeds: Floats, harmonics: int | None = None, combinations: int = 3) -> Gearset:
-    """Gearset of an assembly for speeds of the input (rad/s), with lines as `SteadySettings` says; bearings linear.
+def gearset_of(
+    assembly: Assembly, speeds: Floats, harmonics: int | None = None, combinations: int = 3
+) -> HarmonicBalanceModel:
+    """Build the model of an assembly for speeds of the input (rad/s), with the lines of `SteadySettings`; linear bearings.
 
     Where teeth may part, each state takes the lines that it needs: then it begins with few.
     """
     waves = mesh_waves(mean_system(assembly, speeds))
     usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
-    return Gearset(waves, usual if harmonics is None else harmonics, combinations)
+    return HarmonicBalanceModel(waves, usual if harmonics is None else harmonics, combinations)
 
 
 @dataclass(frozen=True, eq=False)
-class PartingState:
+class ContactLossState:
     """A steady state of a gearbox whose teeth may part."""
 
-    gearset: Gearset
+    gearset: HarmonicBalanceModel
     """With the lines that it took."""
     readings: Complexes
     """(n, m, r) what the laws read."""
@@ -92,10 +94,10 @@ class PartingState:
     """Fastest growth of a disturbance, 1/s."""
     remark: str = ""
     """What is to be said of it, empty if nothing."""
-    averaged: PartingState | None = None
+    averaged: ContactLossState | None = None
     """The state with planets at their mean over a turn of the carrier, where this one has lines beside those of it."""
 
-    def on(self, gearset: Gearset, interface: Interface | None = None) -> PartingState:
+    def on(self, gearset: HarmonicBalanceModel, interface: Interface | None = None) -> ContactLossState:
         """Return the state in the lines of another gearset, which are some of its own."""
         if gearset is self.gearset:
             return self
@@ -120,14 +122,14 @@ class PointSolver:
     gearset : with linear bearings; the level `nonlinear` takes them by their laws
     """
 
-    def __init__(self, gearset: Gearset, settings: SteadySettings) -> None:
+    def __init__(self, gearset: HarmonicBalanceModel, settings: SteadySettings) -> None:
         self.linear, self._level = gearset, settings.method
         self.gearset = gearset.with_bearings if settings.method == "nonlinear" else gearset
         self._last: Complexes | None = None
-        self.state: PartingState | None = None
+        self.state: ContactLossState | None = None
 
     @property
-    def lattice(self) -> Lattice:
+    def lattice(self) -> TorusSampling:
         """Samples of the level `nonlinear`."""
         return self.gearset.lattice
 
@@ -135,7 +137,7 @@ class PointSolver:
         """Find the forces of the meshes (lines, m, f) that vary in the static state, N, bearings being linear."""
         if not self.linear.parting:
             return transmission_errors(self.linear, interface.ports, interface.speed)
-        balance = Balance(self.linear, interface, self.linear.lattice)
+        balance = HarmonicResidual(self.linear, interface, self.linear.lattice)
         return balance.forces(balance.static)[0]
 
     def growth(self, low: float, high: float) -> float:
@@ -144,7 +146,7 @@ class PointSolver:
         found = [mean_growth(gearset)]
         unknown = gearset.parting or gearset.waves.carriers
         for candidate in () if unknown else candidates(gearset, low, high)[:CHECKED]:
-            balance = Balance(gearset, gearset.at(candidate.speed), gearset.lattice)
+            balance = HarmonicResidual(gearset, gearset.at(candidate.speed), gearset.lattice)
             found.append(growth_at(balance, balance.static, candidate.base))
         return max(found)
 
@@ -167,8 +169,8 @@ class PointSolver:
         return self._in_time(interface)
 
     @property
-    def branch_gearset(self) -> Gearset:
-        """Gearset whose lines a branch has: twice the harmonics where teeth may part."""
+    def branch_gearset(self) -> HarmonicBalanceModel:
+        """HarmonicBalanceModel whose lines a branch has: twice the harmonics where teeth may part."""
         if self.gearset.bent:
             return self.gearset.finer
         return self.gearset
@@ -187,10 +189,10 @@ class PointSolver:
         gearset = self.branch_gearset
         interface = self.gearset.at(speed)
         own = gearset.at(speed) if gearset is not self.gearset else interface
-        response = response_of_readings(Balance(gearset, own, gearset.lattice), readings)
+        response = response_of_readings(HarmonicResidual(gearset, own, gearset.lattice), readings)
         if gearset is self.gearset:
             return response
-        return PartingState(gearset, readings, response, np.nan).on(self.gearset, interface).response
+        return ContactLossState(gearset, readings, response, np.nan).on(self.gearset, interface).response
 
     def _in_time(self, interface: Interface) -> Response:
         try:
@@ -201,7 +203,7 @@ class PointSolver:
             found, self._last = nonlinear_response(self.gearset, interface, self.lattice)
         return found
 
-    def _parting(self, speed: float) -> PartingState:
+    def _parting(self, speed: float) -> ContactLossState:
         """Find the state at a speed: that near the last one if it is stable, else where a run in time settles."""
         last = self._last_averaged
         found = None
@@ -217,7 +219,7 @@ class PointSolver:
         self.state = found
         return found
 
-    def _from_rest(self, speed: float) -> PartingState | None:
+    def _from_rest(self, speed: float) -> ContactLossState | None:
         """Find the state near the static one where the last one is of no help although all touched in it.
 
         Bearings bend their forces so that a state of a far speed is a bad start. Where something parts, a run in time
@@ -231,13 +233,13 @@ class PointSolver:
         return None
 
     @property
-    def _last_averaged(self) -> PartingState | None:
+    def _last_averaged(self) -> ContactLossState | None:
         """The last state with planets at their mean."""
         if self.state:
             return self.state.averaged or self.state
         return None
 
-    def _settled(self, speed: float, unstable: PartingState | None, reason: str) -> PartingState:
+    def _settled(self, speed: float, unstable: ContactLossState | None, reason: str) -> ContactLossState:
         """Find the state to which a run in time settles that begins at the last one, or at an unstable one."""
         begin = unstable or self._last_averaged
         gearset = begin.gearset if begin else self.gearset
@@ -246,7 +248,7 @@ class PointSolver:
         if not verdict:
             motion = np.zeros((len(gearset.lines.orders), gearset.system.size), dtype=complex)
             if begin is not None:
-                motion = PUSHED * begin.response.motion
+                motion = PERTURBATION * begin.response.motion
             rows = interface.ports.readings[:, DEFLECTION]
             run = SettlingRun(gearset.system, gearset.lines, rows, gearset.waves.base_orders, speed, motion)
             for _ in range(LEGS):
@@ -264,34 +266,34 @@ class PointSolver:
         grows = f"unstable, a disturbance grows by {unstable.growth:.3g} 1/s"
         return replace(unstable, remark=f"{grows}; {verdict}")
 
-    def _grows(self, state: PartingState) -> bool:
+    def _grows(self, state: ContactLossState) -> bool:
         """Tell whether a disturbance of a state grows within a run in time."""
         slowest = abs(state.response.interface.speed) * float(self.gearset.waves.base_orders.min())
         return state.growth * 2.0 * np.pi / slowest > GROWING
 
 
-def _with_passing(state: PartingState) -> PartingState:
+def _with_passing(state: ContactLossState) -> ContactLossState:
     """Look at planets one by one: a state with the lines that their passing puts beside others, where they count."""
     found = state
     speed = state.response.interface.speed
     size = float(np.linalg.norm(state.readings[1:, :, DEFLECTION]))
-    for _ in range(MOST_PASSED):
-        gearset = found.gearset.passing(np.linalg.norm(found.readings[..., DEFLECTION], axis=1) > BESIDE * size)
+    for _ in range(MOST_SIDEBANDS):
+        gearset = found.gearset.passing(np.linalg.norm(found.readings[..., DEFLECTION], axis=1) > SIDEBAND_TOL * size)
         if gearset is None:
             break
-        balance = Balance(gearset, gearset.at(speed), gearset.lattice)
+        balance = HarmonicResidual(gearset, gearset.at(speed), gearset.lattice)
         start = readings_in(found.gearset, found.readings, gearset)
         known = found.gearset.places_in(gearset)[0].ravel()
         new = np.linalg.norm(balance.missing(start)[..., DEFLECTION], axis=1)
         new[known] = 0.0
-        wanted = largest(new, BESIDE * size)
+        wanted = largest(new, SIDEBAND_TOL * size)
         if not wanted.any() or (found is state and float(np.linalg.norm(new)) < UNEQUAL * size):
             break
         wanted[known] = True
         gearset = gearset.of(wanted)
-        balance = Balance(gearset, gearset.at(speed), gearset.lattice)
+        balance = HarmonicResidual(gearset, gearset.at(speed), gearset.lattice)
         start = readings_in(found.gearset, found.readings, gearset)
-        enough = PASSED * size / float(np.linalg.norm(balance.static[..., DEFLECTION]))
+        enough = SIDEBAND_RESIDUAL * size / float(np.linalg.norm(balance.static[..., DEFLECTION]))
         try:
             readings, products = solve_balance(balance, start, enough)
         except HarmonicBalanceError:
@@ -303,18 +305,18 @@ def _with_passing(state: PartingState) -> PartingState:
     overall = np.abs(signals(found.gearset, found.response)[1:, 0])
     bases = len(found.gearset.waves.base_orders)
     share = float(np.linalg.norm(overall[found.gearset.lines.index[1:, bases:].any(axis=1)]) / np.linalg.norm(overall))
-    if share < TOLD:
+    if share < SIDEBAND_WARNING:
         return found
     return _remarked(
         found, f"passing planets put {100.0 * share:.2g} % of the overall transmission error beside these lines"
     )
 
 
-def _remarked(state: PartingState, remark: str) -> PartingState:
+def _remarked(state: ContactLossState, remark: str) -> ContactLossState:
     return replace(state, remark="; ".join(filter(None, (state.remark, remark))))
 
 
-def _near(gearset: Gearset, interface: Interface, leg: Leg) -> PartingState | None:
+def _near(gearset: HarmonicBalanceModel, interface: Interface, leg: SettlingSegment) -> ContactLossState | None:
     """Find the state near what a run in time settled to."""
     ports = interface.ports
     moved = leg.motion.copy()
@@ -328,14 +330,14 @@ def _near(gearset: Gearset, interface: Interface, leg: Leg) -> PartingState | No
     own = found.on(gearset)
     # Phases hang on the last of the damping, to which the drive of the run adds.
     difference = np.linalg.norm((np.abs(own.readings) - np.abs(readings))[1:, :, DEFLECTION])
-    if difference < NEAR * np.linalg.norm(readings[1:, :, DEFLECTION]):
+    if difference < SAME_STATE_TOL * np.linalg.norm(readings[1:, :, DEFLECTION]):
         return found
     return None
 
 
-def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> PartingState:
+def _refined(gearset: HarmonicBalanceModel, speed: float, start: Complexes | None) -> ContactLossState:
     """Solve at a speed, from given readings or the static state, with those lines more that it lacks."""
-    balance = Balance(gearset, gearset.at(speed), gearset.lattice)
+    balance = HarmonicResidual(gearset, gearset.at(speed), gearset.lattice)
     readings = balance.static if start is None else start
     products = 0
     for _ in range(MOST_REFINED):
@@ -348,7 +350,7 @@ def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> Parting
         kinks = _parted(response_of_readings(balance, readings))
         before = balance.gearset
         lines = balance.gearset.with_lines(joined(balance.gearset.lines, lacking), kinks)
-        balance = Balance(lines, lines.at(speed), lines.lattice)
+        balance = HarmonicResidual(lines, lines.at(speed), lines.lattice)
         readings = readings_in(before, readings, lines)
     readings, took = solve_balance(balance, readings)
     products += took
@@ -357,7 +359,7 @@ def _refined(gearset: Gearset, speed: float, start: Complexes | None) -> Parting
         balance, readings, took = _without_aliases(balance, readings)
         response = response_of_readings(balance, readings, products + took)
     growth = growth_of_state(balance, readings, _parted(response))
-    return PartingState(balance.gearset, readings, response, growth)
+    return ContactLossState(balance.gearset, readings, response, growth)
 
 
 def _parted(response: Response) -> bool:
@@ -365,13 +367,13 @@ def _parted(response: Response) -> bool:
     return bool(response.apart.any() or response.free.any())
 
 
-def _without_aliases(balance: Balance, readings: Complexes) -> tuple[Balance, Complexes, int]:
+def _without_aliases(balance: HarmonicResidual, readings: Complexes) -> tuple[HarmonicResidual, Complexes, int]:
     """Solve on more samples until the balance holds on twice as many; with the products that it took."""
     size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
     products = 0
     for _ in range(MOST_DENSER):
         denser = balance.gearset.denser
-        ahead = Balance(denser, balance.interface, denser.lattice)
+        ahead = HarmonicResidual(denser, balance.interface, denser.lattice)
         if float(np.linalg.norm(ahead.missing(readings)[..., DEFLECTION])) < ALIASED * size:
             break
         balance = ahead
@@ -380,14 +382,14 @@ def _without_aliases(balance: Balance, readings: Complexes) -> tuple[Balance, Co
     return balance, readings, products
 
 
-def _lacking(balance: Balance, readings: Complexes) -> LineSet | None:
+def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
     """Lines of the larger set that a state lacks, None where those that it has do.
 
     Their forces are those on the samples that the state has; what each line answers by itself is taken for its size.
     """
     whole = balance.gearset.whole
     size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
-    ahead = Balance(whole, whole.at(balance.interface.speed), whole.lattice)
+    ahead = HarmonicResidual(whole, whole.at(balance.interface.speed), whole.lattice)
     start = readings_in(balance.gearset, readings, whole)
     excess, tangent, _ = ahead.forces(start)
     missing = tangent.alone(ahead.answer(excess) + ahead.static - start)
@@ -399,12 +401,12 @@ def _lacking(balance: Balance, readings: Complexes) -> LineSet | None:
     return None
 
 
-def _thinned(state: PartingState, usual: Gearset) -> tuple[Gearset, Complexes]:
+def _thinned(state: ContactLossState, usual: HarmonicBalanceModel) -> tuple[HarmonicBalanceModel, Complexes]:
     """Lines of a state, without those beyond the usual ones that it hardly has, and its readings in them."""
     sizes = np.linalg.norm(state.readings[..., DEFLECTION], axis=1)
     needed = np.isin(np.arange(len(sizes)), usual.places_in(state.gearset)[0])
     sizes[needed] = 0.0
-    kept = needed | largest(sizes, HARDLY * float(np.linalg.norm(state.readings[1:, :, DEFLECTION])))
+    kept = needed | largest(sizes, DROP_LINE_TOL * float(np.linalg.norm(state.readings[1:, :, DEFLECTION])))
     gearset = state.gearset
     if kept.all():
         return gearset, state.readings
@@ -412,7 +414,7 @@ def _thinned(state: PartingState, usual: Gearset) -> tuple[Gearset, Complexes]:
     return thinner, readings_in(gearset, state.readings, thinner)
 
 
-def readings_in(gearset: Gearset, readings: Complexes, other: Gearset) -> Complexes:
+def readings_in(gearset: HarmonicBalanceModel, readings: Complexes, other: HarmonicBalanceModel) -> Complexes:
     """Enter readings (n, m, r) in the lines of another gearset; what only one of both has is left out."""
     found = np.zeros((len(other.lines.orders), *other.lengths.shape), dtype=complex)
     places = gearset.places_in(other)

@@ -18,12 +18,12 @@ from functools import cached_property
 
 import numpy as np
 
-from exugear.steady.excitation import Gearset, Interface
+from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.linear_solvers import solve_lines
 from exugear.steady.harmonics.lines import Group, add_answered, flat
-from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, MeshPorts, Spectra
+from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, MeshInterface, Spectra
 from fe_ste.tools.arrays import Complexes, Floats
-from fe_ste.tools.inner_kernels import kept_bundle
+from fe_ste.tools.inner_kernels import cached_struct
 from fe_ste.tools.octets import SIZE
 
 TOLERANCE = 1e-9
@@ -64,7 +64,7 @@ class Response:
         return self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
 
 
-def linear_response(gearset: Gearset, interface: Interface) -> Response:
+def linear_response(gearset: HarmonicBalanceModel, interface: Interface) -> Response:
     """Response to the static transmission errors as given displacements, of first order in the variation of stiffness.
 
     F = -k_mean e with e = s - mean of s, the transmission error under the static force F_0; of a curve k_mean is the
@@ -77,7 +77,7 @@ def linear_response(gearset: Gearset, interface: Interface) -> Response:
     return _response(gearset, interface, deflection, excess, 0)
 
 
-def transmission_errors(gearset: Gearset, ports: MeshPorts, speed: float) -> Complexes:
+def transmission_errors(gearset: HarmonicBalanceModel, ports: MeshInterface, speed: float) -> Complexes:
     """Find the forces (n, m, f) that static transmission errors make of the mean stiffness, and moments, N and N m."""
     mean = gearset.waves.mean_stiffness[:, None]
     compliances, ways = (_varying(own) for own in (gearset.cycle_compliances, gearset.cycle_ways))
@@ -96,7 +96,7 @@ def transmission_errors(gearset: Gearset, ports: MeshPorts, speed: float) -> Com
     return found
 
 
-def _everywhere(gearset: Gearset, shape: tuple[int, ...]) -> Complexes:
+def _everywhere(gearset: HarmonicBalanceModel, shape: tuple[int, ...]) -> Complexes:
     """Values (n, m, f) of one at all times in all places: what these have alike is what the mean wave has."""
     ones = np.zeros(shape, dtype=complex)
     ones[0, :, DEFLECTION] = [wave.wave == 0 for wave in gearset.waves.waves]
@@ -108,13 +108,15 @@ def _varying(cycle: Complexes) -> Complexes:
     return np.asarray(cycle * (np.arange(cycle.shape[1]) > 0))
 
 
-def _products(gearset: Gearset, spectra: Spectra, ports: MeshPorts, speed: float, values: Complexes) -> Complexes:
+def _products(
+    gearset: HarmonicBalanceModel, spectra: Spectra, ports: MeshInterface, speed: float, values: Complexes
+) -> Complexes:
     """Products (n, m, f) of values (n, m, f) with functions of the mesh cycles."""
     functions = gearset.coupled(spectra, ports, speed)
     return gearset.coupling.of(functions, values.reshape(len(values), -1)).reshape(values.shape)
 
 
-def parametric_response(gearset: Gearset, interface: Interface) -> Response:
+def parametric_response(gearset: HarmonicBalanceModel, interface: Interface) -> Response:
     """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed alone.
 
     The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y.
@@ -131,7 +133,7 @@ def parametric_response(gearset: Gearset, interface: Interface) -> Response:
 
     def apply(readings: Complexes) -> Complexes:
         out = np.empty_like(readings)
-        add_answered(kept_bundle(coupling.terms), *parts, readings, *memory, octets, out)
+        add_answered(cached_struct(coupling.terms), *parts, readings, *memory, octets, out)
         return out
 
     given = given_forces(gearset, interface).reshape(shape[0], -1)
@@ -142,8 +144,8 @@ def parametric_response(gearset: Gearset, interface: Interface) -> Response:
     return _response(gearset, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
 
 
-def _beyond_the_mean(gearset: Gearset, interface: Interface) -> list[Complexes]:
-    """Slopes of the forces along a row beyond those of the mean system, as `Gearset.coupled` has functions."""
+def _beyond_the_mean(gearset: HarmonicBalanceModel, interface: Interface) -> list[Complexes]:
+    """Return the slopes of the forces along a row beyond the averaged system, like `HarmonicBalanceModel.coupled`."""
     functions = gearset.coupled(gearset.cycle_tangents, interface.ports, interface.speed)
     forces = interface.ports.forces.shape[1]
     for group, function in zip(gearset.coupling.groups, functions, strict=True):
@@ -158,7 +160,7 @@ def _of_group(values: Floats, group: Group) -> Floats:
     return values[group.begin : group.begin + group.size]
 
 
-def given_forces(gearset: Gearset, interface: Interface) -> Complexes:
+def given_forces(gearset: HarmonicBalanceModel, interface: Interface) -> Complexes:
     """Find the forces (n, m, f) of tangents without deflection beyond those of the mean system: of curves alone."""
     waves = gearset.waves
     ports = interface.ports
@@ -181,7 +183,7 @@ def _answer(interface: Interface, excess: Complexes) -> Complexes:
 
 
 def _response(
-    gearset: Gearset, interface: Interface, deflection: Complexes, excess: Complexes, products: int
+    gearset: HarmonicBalanceModel, interface: Interface, deflection: Complexes, excess: Complexes, products: int
 ) -> Response:
     """Complete a response with the whole forces of its meshes, those of mean stiffness and damping among them."""
     waves = gearset.waves
@@ -192,7 +194,7 @@ def _response(
     return Response(interface, deflection, excess, force, products, np.zeros(len(waves.waves)), np.zeros(0))
 
 
-def rates_of(gearset: Gearset, interface: Interface, values: Complexes) -> Complexes:
+def rates_of(gearset: HarmonicBalanceModel, interface: Interface, values: Complexes) -> Complexes:
     """Rates (n, m, ...) of what meshes read (n, m, ...), as the meshes see it that travel through the waves."""
     frequencies = interface.frequencies.reshape(-1, *(1,) * (values.ndim - 1))
     partners = gearset.partners[: values.shape[1], : values.shape[1]]
@@ -200,8 +202,8 @@ def rates_of(gearset: Gearset, interface: Interface, values: Complexes) -> Compl
     return np.asarray(1j * frequencies * values + interface.speed * carried)
 
 
-def signals(gearset: Gearset, response: Response) -> Complexes:
-    """Coefficients (n, signals) of all signals of a response, in the order of `Gearset.signal_names`."""
+def signals(gearset: HarmonicBalanceModel, response: Response) -> Complexes:
+    """Coefficients (n, signals) of all signals of a response, in the order of `HarmonicBalanceModel.signal_names`."""
     interface = response.interface
     of_motion = interface.rows.of(response.motion, interface.frequencies)
     # Rows have the bearings of the mean system; what non-linear ones have beyond it acts on their bodies, too.
@@ -216,7 +218,7 @@ def signals(gearset: Gearset, response: Response) -> Complexes:
     return np.concatenate([of_motion, deflection, response.force], axis=1)
 
 
-def dissipated_and_given(gearset: Gearset, response: Response) -> tuple[float, float]:
+def dissipated_and_given(gearset: HarmonicBalanceModel, response: Response) -> tuple[float, float]:
     """Mean power that damping takes from the vibration, and that varying meshes give to it, W.
 
     Both are equal in a steady state.

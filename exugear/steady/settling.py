@@ -86,7 +86,7 @@ REPEATING = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Leg:
+class SettlingSegment:
     """What a leg of a run ended in."""
 
     motion: Complexes
@@ -150,7 +150,7 @@ class SettlingRun:
         self._slowest, self._speed, self._done = slowest, speed, 0
         self._state, self._held = (q, v), HELD
 
-    def leg(self) -> Leg | None:
+    def leg(self) -> SettlingSegment | None:
         """Run on, and fit the lines over the second half; None where the motion is not finite."""
         assembly = self._system.frame.assembly
         pinned = self._system.pinned
@@ -177,7 +177,7 @@ class SettlingRun:
         self._held = HELD_LATER
         return self._fitted(time, states[half:])
 
-    def _fitted(self, time: Floats, states: Floats) -> Leg:
+    def _fitted(self, time: Floats, states: Floats) -> SettlingSegment:
         """Lines of the motion in given states (s, size)."""
         spin = states[:, self._system.pinned]
         speed, start = np.polyfit(time, spin, 1)
@@ -199,7 +199,7 @@ class SettlingRun:
             doubled = float(np.linalg.norm(_fit(np.hstack([turned, between]), u)[1] @ self._rows.T)) / size
         motion = np.zeros((len(lines.orders), u.shape[1]), dtype=complex)
         motion[0], motion[seen] = found[0], found[1:]
-        return Leg(motion, outside, doubled)
+        return SettlingSegment(motion, outside, doubled)
 
 
 def _fit(angles: Floats, values: Floats) -> tuple[Complexes, Floats]:

@@ -20,10 +20,10 @@ from exugear.steady.campbell import LAYOUT
 from exugear.steady.mean_system.signals import carried_seats
 from exugear.steady.peaks import line_name
 from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
-from exugear.steady.steady_response import Solved, SteadyResponse, response_of
+from exugear.steady.steady_response import SolvedPoints, SteadyResponse, response_of
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.build import assemble
-from exugear.system.statics import beside_unsolved_states
+from exugear.system.statics import near_unconverged_states
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshData
 from fe_ste.tools.stores import Layout, Store, load_dataset
@@ -139,7 +139,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "mesh_contact": assembly.contacts.in_words,
         "bearings_in_time": ", ".join(response.bearing_names),
         "growth_rate": response.growth_rate,
-        "beside_unsolved_states": ", ".join(beside_unsolved_states(assembly)),
+        "near_unconverged_states": ", ".join(near_unconverged_states(assembly)),
         "planet_spread": response.planet_spread,
         "stiffness_variation": response.stiffness_variation,
         "operating_range": json.dumps(operating_range(assembly.gearbox)),
@@ -264,7 +264,7 @@ def stored_or_computed(
         response = response_of(
             assembly,
             settings,
-            known=points.read(lambda arrays: Solved(**arrays)),
+            known=points.read(lambda arrays: SolvedPoints(**arrays)),
             progress=progress,
             keep=lambda solved: points.write(vars(solved)),
         )

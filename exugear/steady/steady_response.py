@@ -23,20 +23,20 @@ from exugear.steady.crossings import (
     missed_tops,
     with_crossings,
 )
-from exugear.steady.excitation import Gearset
+from exugear.steady.excitation import HarmonicBalanceModel
 from exugear.steady.harmonics.branches import Branch, Scales, standing_peaks, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.harmonics.lines import LineSet
 from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.mean_system.signals import Quantity, SignalName, quantities_of
-from exugear.steady.nonlinear import Balance, Tangent, growth_of_state
+from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, check_speeds
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers, SingleComplexes, Texts
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 from fe_ste.tools.threads import one_dense_thread
 
 # Branches of steady states over speed, through their folds, with the stability of every point
@@ -46,7 +46,7 @@ LONGEST = 0.4
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyBranch(Displayed):
+class SteadyBranch(ReprMixin):
     """Steady states along a branch; n points."""
 
     speed: Floats
@@ -95,8 +95,8 @@ def follow_branch(
             "cause beside the mesh cycle, whose stability is not looked at; leave branches out"
         )
 
-    def balance_at(speed: float) -> Balance:
-        return Balance(gearset, gearset.at(speed), gearset.lattice)
+    def balance_at(speed: float) -> HarmonicResidual:
+        return HarmonicResidual(gearset, gearset.at(speed), gearset.lattice)
 
     # The unknowns are lengths: a mesh cycle and a radian count as a base pitch.
     lengths = gearset.lengths
@@ -149,7 +149,7 @@ def _ended(branch: Branch, last: float) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class SolvedPoints:
     """Points of a steady response as they are solved and kept."""
 
     speed: Floats
@@ -173,19 +173,19 @@ class Solved:
     remark: Texts
     """(points,) what is to be said of a point, or why there is none: its numbers are NaN then."""
 
-    def part(self, which: slice | Booleans | Integers) -> Solved:
+    def part(self, which: slice | Booleans | Integers) -> SolvedPoints:
         """Take some of the points."""
-        return Solved(**{own.name: getattr(self, own.name)[which] for own in fields(self)})
+        return SolvedPoints(**{own.name: getattr(self, own.name)[which] for own in fields(self)})
 
-    def joined_with(self, other: Solved) -> Solved:
+    def joined_with(self, other: SolvedPoints) -> SolvedPoints:
         """Put the points of another behind these."""
-        return Solved(
+        return SolvedPoints(
             **{own.name: np.concatenate([getattr(self, own.name), getattr(other, own.name)]) for own in fields(self)}
         )
 
 
 @dataclass(frozen=True, eq=False)
-class SteadyResponse(Displayed):
+class SteadyResponse(ReprMixin):
     """Steady response over speed."""
 
     assembly: Assembly
@@ -200,7 +200,7 @@ class SteadyResponse(Displayed):
     signals: tuple[SignalName, ...]
     bearing_names: tuple[str, ...]
     """Bearings whose law was evaluated in time; all others are linear about the static state."""
-    solved: Solved
+    solved: SolvedPoints
     """Points in ascending order of speed, or along a branch."""
     unsolved: tuple[tuple[float, str], ...]
     """Speeds at which no steady state was found, rad/s, and why."""
@@ -274,14 +274,14 @@ SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
 LONGEST_REMARK = 300
 """Letters of a remark."""
-Kept = Callable[[Solved], None]
+Kept = Callable[[SolvedPoints], None]
 
 
 @one_dense_thread()
 def response_of(
     assembly: Assembly,
     settings: SteadySettings,
-    known: Solved | None = None,
+    known: SolvedPoints | None = None,
     progress: Callable[[int, int], None] | None = None,
     keep: Kept | None = None,
     keep_every: float = 10.0,
@@ -350,7 +350,7 @@ def _of_mean_system(
     return explained, solver.growth(float(speeds.min()), float(speeds.max())), campbell_of(gearset.system, tracks)
 
 
-def _tracks(gearset: Gearset, speeds: Floats) -> ModeTracks:
+def _tracks(gearset: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
     """Follow modes that a mesh or one of its harmonics may reach; of elastic bodies, those that their band holds."""
     assembly = gearset.waves.assembly
     low = float(speeds.min())
@@ -365,7 +365,7 @@ def _tracks(gearset: Gearset, speeds: Floats) -> ModeTracks:
 class _Work:
     """What goes beside the solution of points: what is known of them, who is told, and who keeps them."""
 
-    known: Solved | None
+    known: SolvedPoints | None
     progress: Callable[[int, int], None]
     keep: Kept | None
     keep_every: float
@@ -373,7 +373,7 @@ class _Work:
 
 def _solve(
     solver: PointSolver, settings: SteadySettings, found: tuple[Crossing, ...], tops: bool, work: _Work
-) -> Solved:
+) -> SolvedPoints:
     """Solve even speeds and those of crossings, then those of tops between them if wanted; in ascending order."""
     speeds = with_crossings(settings.speeds.values, found)
     solved = _continued(_empty(solver.gearset, speeds), 0, lambda: solver, work)
@@ -382,7 +382,7 @@ def _solve(
     return solved.part(np.argsort(solved.speed, kind="stable"))
 
 
-def _with_tops(solver: PointSolver, settings: SteadySettings, solved: Solved, work: _Work) -> Solved:
+def _with_tops(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints, work: _Work) -> SolvedPoints:
     """Solve where neighbours tell that peaks are higher than at any speed yet, until none is.
 
     Each such state begins anew: it hangs on no other, so that what is stopped goes on to the same numbers.
@@ -406,7 +406,7 @@ def _with_tops(solver: PointSolver, settings: SteadySettings, solved: Solved, wo
 
 
 def _missed(
-    solved: Solved, quantities: tuple[Quantity, ...], operation: tuple[float, float] | None, tops: KnownTops
+    solved: SolvedPoints, quantities: tuple[Quantity, ...], operation: tuple[float, float] | None, tops: KnownTops
 ) -> Floats:
     """Speeds of tops between those of solved points, which stand in any order."""
     there = np.flatnonzero(np.isfinite(solved.drive_torque))
@@ -415,7 +415,7 @@ def _missed(
     return missed_tops(known.speed, known.amplitude, smooth, quantities, operation, tops)
 
 
-def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: Solved) -> float:
+def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints) -> float:
     """Find the largest relative change of the loudest peaks of the transmission error by more harmonics."""
     gearset = solver.gearset
     if gearset.bent or settings.branches:
@@ -443,7 +443,7 @@ def _tops_of(values: Floats) -> Integers:
     return np.array([np.argmax(values)])
 
 
-def _continued(out: Solved, first: int, solver: Callable[[], PointSolver], work: _Work) -> Solved:
+def _continued(out: SolvedPoints, first: int, solver: Callable[[], PointSolver], work: _Work) -> SolvedPoints:
     """Solve all points from one on, but for those that are known."""
     count = first
     known = work.known
@@ -454,7 +454,7 @@ def _continued(out: Solved, first: int, solver: Callable[[], PointSolver], work:
             count = _in_contact(known, count)
             if count:
                 own.response(float(out.speed[count - 1]))
-        for field in fields(Solved):
+        for field in fields(SolvedPoints):
             getattr(out, field.name)[first:count] = getattr(known, field.name)[first:count]
     kept = time.monotonic()
     done = count
@@ -473,7 +473,7 @@ def _continued(out: Solved, first: int, solver: Callable[[], PointSolver], work:
     return out
 
 
-def _solve_one(out: Solved, n: int, solver: PointSolver) -> None:
+def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
     """Solve point n, or enter why it has no steady state; the others do not suffer from that."""
     try:
         _fill(out, n, solver.gearset, solver.response(float(out.speed[n])))
@@ -486,7 +486,7 @@ def _solve_one(out: Solved, n: int, solver: PointSolver) -> None:
         out.growth[n], out.remark[n] = solver.state.growth, solver.state.remark[:LONGEST_REMARK]
 
 
-def _contributions(gearset: Gearset, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
+def _contributions(gearset: HarmonicBalanceModel, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
     """Find what makes the lines at the strongest crossings, each where it is loudest."""
     explained = []
     for crossing in found[:EXPLAINED]:
@@ -497,7 +497,7 @@ def _contributions(gearset: Gearset, found: tuple[Crossing, ...]) -> tuple[tuple
 
 def _along_branch(
     solver: PointSolver, first: float, last: float, progress: Callable[[int, int], None]
-) -> tuple[Solved, tuple[float, ...], str]:
+) -> tuple[SolvedPoints, tuple[float, ...], str]:
     """Points along a branch between two speeds (rad/s), its folds, and why it ended before the last.
 
     Progress counts in hundredths of the range.
@@ -514,10 +514,10 @@ def _along_branch(
     return out, branch.folds, branch.ended
 
 
-def _empty(gearset: Gearset, speeds: Floats) -> Solved:
+def _empty(gearset: HarmonicBalanceModel, speeds: Floats) -> SolvedPoints:
     points = len(speeds)
     shape = (points, len(gearset.lines.orders), len(gearset.signal_names))
-    return Solved(
+    return SolvedPoints(
         speed=speeds,
         amplitude=np.zeros(shape, dtype=np.complex64),
         drive_torque=np.zeros(points),
@@ -530,7 +530,7 @@ def _empty(gearset: Gearset, speeds: Floats) -> Solved:
     )
 
 
-def _fill(out: Solved, n: int, gearset: Gearset, response: Response) -> None:
+def _fill(out: SolvedPoints, n: int, gearset: HarmonicBalanceModel, response: Response) -> None:
     """Enter the response at one speed as point n."""
     found = signals(gearset, response)
     found[1:] *= 2.0
@@ -541,7 +541,7 @@ def _fill(out: Solved, n: int, gearset: Gearset, response: Response) -> None:
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
 
 
-def _in_contact(known: Solved, count: int) -> int:
+def _in_contact(known: SolvedPoints, count: int) -> int:
     """Count the known points up to the last at which all touches: states hang on those before, from there anew."""
     parted = known.apart[:count].any(axis=1) | known.free[:count].any(axis=1)
     touching = np.isfinite(known.drive_torque[:count]) & ~parted

@@ -198,7 +198,7 @@ Side = Literal["high", "low"]
 
 
 @dataclass(frozen=True, eq=False)
-class Looked:
+class EvaluatedPoint:
     """A point that a search looked at."""
 
     row: Floats
@@ -212,7 +212,7 @@ class Looked:
         return self.draws[0][0]
 
 
-Quantity = Callable[[Looked, str], Floats]
+Quantity = Callable[[EvaluatedPoint, str], Floats]
 """Gives a output of all draws of a point; NaN where one failed."""
 
 
@@ -254,12 +254,12 @@ class Criteria:
             return filled[..., 0]
         return percentile_of(filled, self.percent(side))
 
-    def minimised(self, quantity: Quantity, points: Sequence[Looked]) -> Floats:
+    def minimised(self, quantity: Quantity, points: Sequence[EvaluatedPoint]) -> Floats:
         """Return the outputs (points, outputs) to be minimised; infinite where a point failed."""
         found = [[float(self.over_draws(quantity(point, name), "high")) for name in self.outputs] for point in points]
         return np.array(found).reshape(len(points), len(self.outputs))
 
-    def violations(self, quantity: Quantity, points: Sequence[Looked]) -> Floats:
+    def violations(self, quantity: Quantity, points: Sequence[EvaluatedPoint]) -> Floats:
         """How far points are beyond limits (points, limits), over the size of the limit; negative within."""
         found = [
             [
@@ -304,7 +304,7 @@ def on_front(outputs: Floats) -> Booleans:
 
 
 def searched_dataset(
-    study: Study, criteria: Criteria, points: Sequence[Looked], records: Mapping[str, Record]
+    study: Study, criteria: Criteria, points: Sequence[EvaluatedPoint], records: Mapping[str, Record]
 ) -> xr.Dataset:
     """All points that a search looked at, in their order, with the percentiles that they were judged by.
 
@@ -346,7 +346,7 @@ def _judged(dataset: xr.Dataset, study: Study, criteria: Criteria, name: str, si
     return xr.DataArray(criteria.over_draws(values, side), dims=(EVALUATION,), attrs=attributes)
 
 
-def _design(study: Study, points: Sequence[Looked]) -> Design:
+def _design(study: Study, points: Sequence[EvaluatedPoint]) -> Design:
     """Points over evaluations, and over the draws of tolerances."""
     rows = np.array([point.row for point in points])
     tolerances = study.tolerances

@@ -33,7 +33,7 @@ from threadpoolctl import threadpool_limits
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.results.folder import peak_memory
 from exugear.studies.point_results import PointResults, PointSettings, Shared
 from exugear.studies.quantities import Output, Values
@@ -282,13 +282,13 @@ def _built(task: Task, work: Work) -> Gearbox:
         gearbox = Gearbox.from_dict(changed(task.content, work.changes), task.source, task.permissions)
         check_parts(gearbox)
         return gearbox
-    except CaseError as error:
+    except GearboxFileError as error:
         own = [
             f"parameters.{task.parameters.get(path, '?')}: {path} = {value!r}"[:LONGEST_VALUE]
             for path, value in work.changes.items()
         ]
         more = [f"and {len(own) - SHOWN_VALUES} more"] if len(own) > SHOWN_VALUES else []
-        raise CaseError(*("; ".join([*own[:SHOWN_VALUES], *more]) for _ in own[:1]), *error.faults) from None
+        raise GearboxFileError(*("; ".join([*own[:SHOWN_VALUES], *more]) for _ in own[:1]), *error.faults) from None
 
 
 def _told(values: Values) -> Any:
@@ -401,7 +401,7 @@ def given(executor: Submits, workers: int | None = None) -> Opens:
     return opened
 
 
-class Kept:
+class PersistentPool:
     """Workers that stay for several calls, and are started anew only after they were lost.
 
     Parameters

@@ -89,7 +89,7 @@ class Shared:
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             The pair carries no load.
         SharedTableError
             It is not to be trusted.
@@ -157,7 +157,7 @@ def life_loads(gearbox: Gearbox, choice: Choice) -> CountedLoads:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         Loads that cannot be used, or that go far beyond the tables; strengths that do not fit the gears.
     """
     counted = checked_loads(gearbox)
@@ -184,7 +184,7 @@ def point_life(
 
     Raises
     ------
-    CaseError, BalanceError
+    GearboxFileError, BalanceError
         See `exugear.life.life.compute_life`.
     """
     gearbox = assembly.gearbox
@@ -376,7 +376,7 @@ class PointResults:
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             No loads or strengths, or such as cannot be used.
         BalanceError
             A static state that is not held.

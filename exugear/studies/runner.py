@@ -18,10 +18,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from exugear.studies.dataset import Criteria, Looked, dataset_of, searched_dataset, write_study
+from exugear.studies.dataset import Criteria, EvaluatedPoint, dataset_of, searched_dataset, write_study
 from exugear.studies.executors import (
-    Kept,
     Opens,
+    PersistentPool,
     Record,
     Task,
     Work,
@@ -176,7 +176,7 @@ class _Evaluated:
     task: Task
     opens: Opens
     tell: Progress | None
-    points: dict[str, Looked] = field(default_factory=dict)
+    points: dict[str, EvaluatedPoint] = field(default_factory=dict)
     records: dict[str, Record] = field(default_factory=dict)
     computed: int = 0
 
@@ -185,7 +185,7 @@ class _Evaluated:
         """What points are judged by."""
         return Criteria.of(self.study.file)
 
-    def look_at(self, values: Floats) -> list[Looked]:
+    def look_at(self, values: Floats) -> list[EvaluatedPoint]:
         """Compute what is not known yet of parameters (points, parameters)."""
         return self._seen([self._looked(row, self._changes(row)) for row in values])
 
@@ -206,15 +206,15 @@ class _Evaluated:
             raise OptimisationError(f"the case as it is gives no outputs: {reason}")
         return np.asarray(found)
 
-    def minimised(self, points: Sequence[Looked]) -> Floats:
+    def minimised(self, points: Sequence[EvaluatedPoint]) -> Floats:
         """Return the outputs (points, outputs) to be minimised; infinite where a point failed."""
         return self.criteria.minimised(self._figure, points)
 
-    def violations(self, points: Sequence[Looked]) -> Floats:
+    def violations(self, points: Sequence[EvaluatedPoint]) -> Floats:
         """How far points are beyond limits (points, limits), over the limit; negative within."""
         return self.criteria.violations(self._figure, points)
 
-    def _figure(self, looked: Looked, output: str) -> Floats:
+    def _figure(self, looked: EvaluatedPoint, output: str) -> Floats:
         return np.array([number_of(self.records[name].values.get(output)) for name, _ in looked.draws])
 
     def _changes(self, row: Floats) -> dict[str, Any]:
@@ -225,12 +225,12 @@ class _Evaluated:
             for path in parameter.targets
         }
 
-    def _looked(self, row: Floats, changes: dict[str, Any]) -> Looked:
+    def _looked(self, row: Floats, changes: dict[str, Any]) -> EvaluatedPoint:
         tolerances = self.study.tolerances
         all_changes = [changes] if tolerances is None else tolerances.produced(self.study.gearbox, changes)
-        return Looked(row, tuple((self.study.hash_of(all_change), all_change) for all_change in all_changes))
+        return EvaluatedPoint(row, tuple((self.study.hash_of(all_change), all_change) for all_change in all_changes))
 
-    def _seen(self, wanted: list[Looked]) -> list[Looked]:
+    def _seen(self, wanted: list[EvaluatedPoint]) -> list[EvaluatedPoint]:
         self.points |= {looked.key: looked for looked in wanted}
         draws = {name: changes for looked in wanted for name, changes in looked.draws}
         unknown = [name for name in draws if name not in self.records]
@@ -285,7 +285,7 @@ def optimise(
     folder = Path(folder)
     if wanted is None:
         raise OptimisationError("the study has no section [optimise]")
-    with Kept(opens or processes()) as workers:
+    with PersistentPool(opens or processes()) as workers:
         seen = _Evaluated(study, task_of(study, folder), workers.opened, progress)
         reference = seen.of_case()
         pair = len(wanted.minimise) == 2

@@ -17,7 +17,7 @@ from exugear.exchange.series_files import file_digest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
-from exugear.gearbox.reading import CaseError, fault_line
+from exugear.gearbox.reading import GearboxFileError, fault_line
 from exugear.gearbox.variant import Variant
 from exugear.gearbox.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
 from exugear.results.folder import case_digest, read_content
@@ -52,7 +52,7 @@ from exugear.studies.sections import StudyError, StudyFile, parse_study, read_st
 from exugear.system.bearings.stiffness import elastic_names, mounts_at_work
 from exugear.system.signals import signals_of
 from exugear.system.tooth_mesh.laws.registry import LAWS
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.versions import TABLE
 
 # What speaks against a study before any point is computed: names taken, equal points, options out of range
@@ -288,7 +288,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 @dataclass(frozen=True)
-class Study(Displayed):
+class Study(ReprMixin):
     """What is varied, computed and kept. Build one with `from_toml` or `from_dict`.
 
     Examples
@@ -336,7 +336,7 @@ class Study(Displayed):
 
         Raises
         ------
-        StudyError, CaseError
+        StudyError, GearboxFileError
             Anything wrong with either file.
         """
         path = Path(path)
@@ -369,7 +369,7 @@ class Study(Displayed):
             kept = outputs_of(file.outputs, quantities)
             settings = _settings(file)
         except (PathError, OutputError, SteadyError, ValueError) as error:
-            if isinstance(error, CaseError | StudyError):
+            if isinstance(error, GearboxFileError | StudyError):
                 raise
             raise StudyError(fault_line(source, str(error))) from None
         choice = Choice(**file.choice.model_dump()).of(gearbox)

@@ -24,12 +24,12 @@ from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY, UZ, ReducedB
 from exugear.system.build import assemble
 from exugear.system.kernels.coordinates import SPIN
 from exugear.system.kernels.meshes import STIFFNESS, TILT_COLUMNS, TILT_STIFFNESS
-from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, beside_unsolved_states, linearise, static_state
+from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, linearise, near_unconverged_states, static_state
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.element import Angles, MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed, TitledRows
+from fe_ste.tools.display import ReprMixin, TitledRows
 from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ SHOWN_MODES = 12
 
 
 @dataclass(frozen=True)
-class Modes(Displayed):
+class Modes(ReprMixin):
     """Eigenmodes in order of frequency; n modes, in the variant `flexible` those in the band of its elastic bodies."""
 
     assembly: Assembly
@@ -229,7 +229,7 @@ class Modes(Displayed):
             "bearing_laws": assembly.bearing_laws,
             "mesh_contact": assembly.contacts.in_words,
             "growth_rate": self.growth_rate,
-            "beside_unsolved_states": ", ".join(beside_unsolved_states(assembly)),
+            "near_unconverged_states": ", ".join(near_unconverged_states(assembly)),
         }
         return xr.Dataset(variables, coordinates, attributes)
 

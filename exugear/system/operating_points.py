@@ -22,7 +22,7 @@ import numpy as np
 
 from exugear.gearbox.parts import Bearing, Body
 from exugear.gearbox.units import KN
-from exugear.system.bearings.duty import BearingDuty, OperatingPoint, duty_of, operating_point
+from exugear.system.bearings.duty import BearingLoadState, OperatingPoint, duty_of, operating_point
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.contact import bearing_load, equilibrium, row_contacts
 from exugear.system.bearings.rolling.rows import BearingOfRows
@@ -48,7 +48,7 @@ from exugear.system.kernels.coordinates import BODY_SIZE, TILT
 from exugear.system.kernels.meshes import FORCE
 from exugear.system.statics import BalanceError, locked_equilibrium, rolled_coordinates, static_state
 from exugear.system.system import Assembly
-from exugear.system.tooth_mesh.contact_state import MeshDuty, MeshPlace, static_contacts, with_contact
+from exugear.system.tooth_mesh.contact_state import MeshLoadState, MeshPlace, static_contacts, with_contact
 from fe_ste.tools.arrays import Floats
 
 _log = logging.getLogger(__name__)
@@ -330,7 +330,7 @@ def _stated_point(bearing: Bearing) -> OperatingPoint:
     return replace(operating_point(bearing, displacement, False), stiffness=catalogue_stiffness(bearing.catalogue))
 
 
-def bearing_duties(assembly: Assembly) -> tuple[BearingDuty, ...]:
+def bearing_duties(assembly: Assembly) -> tuple[BearingLoadState, ...]:
     """Find what all catalogue bearings of an assembly bear under the static load of its gearbox file.
 
     Raises
@@ -359,7 +359,7 @@ def reaction_loads(assembly: Assembly) -> dict[str, Floats]:
     return dict(zip(assembly.connector_names, loads, strict=True))
 
 
-def mesh_duties(assembly: Assembly) -> tuple[MeshDuty, ...]:
+def mesh_duties(assembly: Assembly) -> tuple[MeshLoadState, ...]:
     """Find how the gears of all meshes stand under the static load, and how evenly their teeth bear there.
 
     Each mesh has its own contact here, over more of the mesh cycle than its law needs.
@@ -376,7 +376,7 @@ def mesh_duties(assembly: Assembly) -> tuple[MeshDuty, ...]:
         assembly.elements, state.assembly.gear_positions(state.q), state.mesh_force, strict=True
     ):
         mesh = element.mesh
-        duty = MeshDuty(
+        duty = MeshLoadState(
             name=mesh.name,
             force=float(force),
             misalignment=float(misalignment),

@@ -15,7 +15,7 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import torque_series
 from exugear.gearbox.parts import Bearing, Body
-from exugear.gearbox.reading import CaseError, fault_line, readable
+from exugear.gearbox.reading import GearboxFileError, fault_line, readable
 from exugear.gearbox.variant import Variant
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.rows import BearingError
@@ -148,7 +148,7 @@ def check_parts(gearbox: Gearbox) -> None:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         All that is wrong: bearings, teeth that do not fit, shapes and solids with their seats, axes of tables, series.
     """
     families = {bearing.family: bearing for bearing in gearbox.bearings}
@@ -161,10 +161,10 @@ def check_parts(gearbox: Gearbox) -> None:
     for attempt in attempts:
         try:
             attempt()
-        except CaseError as error:
+        except GearboxFileError as error:
             faults += error.faults
     if faults:
-        raise CaseError(*faults)
+        raise GearboxFileError(*faults)
 
 
 def faults_of_bearings(content: Mapping[str, Any], source: str) -> Iterator[str]:
@@ -198,7 +198,7 @@ def _misfits(gearbox: Gearbox, variant: Variant) -> str:
     for name in elastic_names(gearbox) if variant.is_elastic else ():
         try:
             _build_elastic_body(gearbox, name)
-        except CaseError as error:
+        except GearboxFileError as error:
             return error.faults[0].removeprefix(f"{gearbox.source}: ")
     return ""
 

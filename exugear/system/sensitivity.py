@@ -18,7 +18,7 @@ from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import ContactState
 from exugear.system.tooth_mesh.element import MeshData
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 FRACTIONS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """Parts of the default value that a parameter without a natural range takes."""
@@ -45,7 +45,7 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class ParameterVariation(Displayed):
+class ParameterVariation(ReprMixin):
     """Modes over a parameter; n values, m modes, each followed by its shape."""
 
     parameter: Parameter
@@ -251,7 +251,7 @@ def scaled_bearings(assembly: Assembly, numbers: Sequence[int], factor: float) -
 
 
 @dataclass(frozen=True)
-class FrequencyMatch(Displayed, line=" {parameter.label} = {value:.3g}: {frequency:.5g} Hz"):
+class FrequencyMatch(ReprMixin, line=" {parameter.label} = {value:.3g}: {frequency:.5g} Hz"):
     """An assumption that brings a mode to a frequency."""
 
     parameter: Parameter

@@ -25,7 +25,7 @@ from exugear.system.kernels.table_law import GUESSED
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # Equations of motion linearised about a state, and their undamped modes
 
@@ -38,7 +38,7 @@ RIGID_BODY_LIMIT = 0.1
 
 
 @dataclass(frozen=True)
-class Linearised(Displayed, line=": {mass!n} coordinates, {stiffness!n} elements"):
+class Linearised(ReprMixin, line=": {mass!n} coordinates, {stiffness!n} elements"):
     """Mass, and stiffness and damping by element, about a state; each matrix (size, size)."""
 
     mass: Floats
@@ -192,7 +192,7 @@ class _Solve(Protocol):
 
 
 @dataclass(frozen=True)
-class StartState(Displayed, line=": {q!n} coordinates, drive torque {drive_torque:.4g} N m"):
+class StartState(ReprMixin, line=": {q!n} coordinates, drive torque {drive_torque:.4g} N m"):
     """Coordinates and velocities at the start of a run, with the spin rates (rad/s2) it starts with."""
 
     q: Floats
@@ -315,7 +315,7 @@ def locked_equilibrium(
             return np.asarray(-free.T @ stiffness @ free)
 
         def search(share: float) -> Floats:
-            held = assembly.eased(share)
+            held = assembly.with_added_stiffness(share)
             scale = np.full(start.size, _load_scale(loads))
             return _newton(residual, partial(derivative, held), start, scale, "static state")
 
@@ -353,7 +353,7 @@ def rolled_coordinates(assembly: Assembly, body: str, angle: float) -> Floats:
 
 
 @dataclass(frozen=True)
-class StaticState(Displayed):
+class StaticState(ReprMixin):
     """A variant at rest under the static load of its gearbox file, mesh stiffness at its mean over the cycle."""
 
     assembly: Assembly
@@ -409,7 +409,7 @@ def static_state(assembly: Assembly) -> StaticState:
     return StaticState(resting, locked_equilibrium(resting, torques, gearbox.locked, resting.mean_meshes))
 
 
-def beside_unsolved_states(assembly: Assembly) -> tuple[str, ...]:
+def near_unconverged_states(assembly: Assembly) -> tuple[str, ...]:
     """Meshes that, at the static load, read their table beside states that are not solved; see `SteSurface.guessed`."""
     if not any(
         element.table is not None and element.table.surface.guessed is not None for element in assembly.elements
@@ -467,7 +467,7 @@ def _from_linear(
         for share in CLOSING_SHARES:
             x = solve(linear, x, meshes, _Beside(share, teeth) if share else None)
     for share in EASING_SHARES if assembly.has_rows else ():
-        x = solve(assembly.eased(share), x, meshes)
+        x = solve(assembly.with_added_stiffness(share), x, meshes)
     return x
 
 

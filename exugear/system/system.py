@@ -57,12 +57,12 @@ from exugear.system.tooth_mesh.element import MeshElement
 from exugear.system.tooth_mesh.laws.mesh_forces import add_mesh_forces, add_mesh_jacobian, mesh_state
 from exugear.system.tooth_mesh.laws.stiffness import pack
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.transmission_error.surface import SteSurface
 
 
 @dataclass(frozen=True)
-class Assembly(Displayed):
+class Assembly(ReprMixin):
     """Equations of motion of a gearbox variant."""
 
     gearbox: Gearbox
@@ -207,7 +207,7 @@ class Assembly(Displayed):
         )
         return replace(self, connectors=linear)
 
-    def eased(self, share: float) -> Assembly:
+    def with_added_stiffness(self, share: float) -> Assembly:
         """Let a share of the stiffness of non-linear bearings act beside their rows."""
         stiffness = self.connectors.stiffness + share * self._of_rows
         if self.has_rows:

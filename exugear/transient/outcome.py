@@ -21,7 +21,7 @@ from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, LoadSummary, rim_radi
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed, TitledRows
+from fe_ste.tools.display import ReprMixin, TitledRows
 
 
 class RunError(RuntimeError):
@@ -83,7 +83,7 @@ class ProgressMeter:
 
 
 @dataclass(frozen=True)
-class Run(Displayed):
+class Run(ReprMixin):
     """A finished or stopped run.
 
     Examples
@@ -133,7 +133,7 @@ class Run(Displayed):
 # What a run may claim: limits beyond which its numbers say nothing of a gearbox, judged while it goes on
 
 ENERGY, RIM, SPEED, DEFLECTION, ACCOUNT = range(5)
-"""Rows of the running figures of a `Judge`; the last holds what the account of energy began with, and its scale."""
+"""Rows of the values of a `ValidityMonitor`; the last holds the initial energy and its scale."""
 LARGEST, SINCE, WHERE = range(3)
 """Columns of these: largest value so far; time (s) and number of the body or mesh first beyond a limit."""
 AT_START, SCALE = range(2)
@@ -212,7 +212,7 @@ def energy_left_over(lines: Floats, start: float, scale: float) -> tuple[Floats,
     return np.abs(lines[:, WORK_OF_LOADS] - explained) / scales, scales
 
 
-class Judge:
+class ValidityMonitor:
     """What a run has reached so far, against the limits.
 
     Parameters

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import LoadCase
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.versions import RUN
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME
 from exugear.system.signals import AXES, SignalLayout, bodies_of_forces, signals_of
@@ -47,7 +47,7 @@ def rate_for(band: float) -> float:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A band that is no frequency, or beyond what any step is chosen for.
 
     Examples
@@ -56,7 +56,7 @@ def rate_for(band: float) -> float:
     (20000.0, 40000.0)
     """
     if not 0.0 < band <= HIGHEST_BAND:
-        raise CaseError(f"--band {band:g}: must be above 0 and at most {HIGHEST_BAND:g} Hz")
+        raise GearboxFileError(f"--band {band:g}: must be above 0 and at most {HIGHEST_BAND:g} Hz")
     return SAMPLE_RATE * max(1, math.ceil(band / (STORED_BAND * SAMPLE_RATE) - 1e-9))
 
 
@@ -69,10 +69,10 @@ def check_duration(
     """
     total, key = _span(gearbox, case, duration)
     if not math.isfinite(total):
-        raise CaseError(f"{key} = {total:g}: give a finite number of seconds")
+        raise GearboxFileError(f"{key} = {total:g}: give a finite number of seconds")
     least = (TAPS_PER_FACTOR + LEAST_SAMPLES) / sample_rate
     if total < least:
-        raise CaseError(
+        raise GearboxFileError(
             f"{key} = {total:g}: too short for a spectrum, since filtering takes {TAPS_PER_FACTOR / sample_rate:.3g} s "
             f"at the ends; give {least:.3g} s or more"
         )
@@ -93,7 +93,7 @@ def check_disk(
     needed = total * sample_rate * sample_bytes
     free = shutil.disk_usage(there).free
     if needed > free:
-        raise CaseError(
+        raise GearboxFileError(
             f"{key} = {total:g}: {total * sample_rate:.3g} samples take {1e-9 * needed:.3g} GB, and {there} has "
             f"{1e-9 * free:.3g} GB free; give at most {free / (sample_rate * sample_bytes):.3g} s"
         )

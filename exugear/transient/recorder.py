@@ -96,7 +96,7 @@ FLUSH_FACTOR = {"compiled": 2, "exudyn": 1}
 """How many times this interval each solver goes without: a piece costs as much as 2000 compiled steps."""
 
 
-class Room(NamedTuple):
+class RowBuffer(NamedTuple):
     """Rows of a `StateBuffer`: coordinates and velocities (n, size), signals (n, columns), energies, powers (n, 7)."""
 
     q: Floats
@@ -122,14 +122,14 @@ class StateBuffer:
         self.filled = self.observed = 0
         self._times = np.empty(rows)
         widths = (size, size, columns, len(ENERGIES) + len(POWERS))
-        self._rows = Room._make(np.empty((rows, width)) for width in widths)
+        self._rows = RowBuffer._make(np.empty((rows, width)) for width in widths)
 
     @property
     def full(self) -> bool:
         """Whether no state fits in any more."""
         return self.filled == len(self._times)
 
-    def room(self, most: int) -> Room:
+    def room(self, most: int) -> RowBuffer:
         """Rows of the next states, up to so many, for a solver to fill."""
         return self._between(self.filled, min(self.filled + most, len(self._times)))
 
@@ -139,7 +139,7 @@ class StateBuffer:
         self._times[self.filled : end] = times
         self.filled = end
 
-    def states(self, first: int = 0) -> tuple[Floats, Room]:
+    def states(self, first: int = 0) -> tuple[Floats, RowBuffer]:
         """Return times (n,) and rows of the states in it, from a number on."""
         return self._times[first : self.filled], self._between(first, self.filled)
 
@@ -147,8 +147,8 @@ class StateBuffer:
         """Forget all states."""
         self.filled = self.observed = 0
 
-    def _between(self, first: int, end: int) -> Room:
-        return Room._make(rows[first:end] for rows in self._rows)
+    def _between(self, first: int, end: int) -> RowBuffer:
+        return RowBuffer._make(rows[first:end] for rows in self._rows)
 
 
 class Recorder:
@@ -307,7 +307,7 @@ class Recorder:
         stride = max(1, round(FLUSH_INTERVAL / self._plan.step))
         return np.unique(np.append(np.arange(0, count, stride), count - 1))
 
-    def _checkpoint(self, time: float, rows: Room, past: Floats) -> Checkpoint:
+    def _checkpoint(self, time: float, rows: RowBuffer, past: Floats) -> Checkpoint:
         """State to go on from: the last of these rows, at a time (s)."""
         return Checkpoint(
             step=round(time / self._plan.step),

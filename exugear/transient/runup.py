@@ -217,7 +217,7 @@ def simulate(
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A load case or a duration that cannot be run: too short, too long for the disk, or with a motion so fast that
         it asks for an absurd step.
     RunError

@@ -11,12 +11,12 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import (
-    doubt_about_band,
-    doubt_about_bearings,
-    doubt_about_tables,
+    band_warning,
+    bearing_range_warning,
     drive_rate,
     driven_start_speed,
     load_in_words,
+    other_load_warning,
     summarise_loads,
     torque_series,
 )
@@ -36,7 +36,7 @@ from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, POWERS, SignalLayo
 from exugear.system.statics import accelerating_start
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
-from exugear.transient.outcome import Judge, RunError
+from exugear.transient.outcome import RunError, ValidityMonitor
 from exugear.transient.plan import EXPECTATIONS, RunPlan
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError, exclusive
@@ -115,7 +115,7 @@ class RunStart:
     """State to start from."""
     pieces: RunPieces
     """What is written so far, and where the rest goes."""
-    judge: Judge
+    judge: ValidityMonitor
     resumed: bool
     """Whether the state is that of a run that was stopped, which is in the file already."""
 
@@ -133,7 +133,7 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     gearbox = assembly.gearbox
     series = torque_series(gearbox, case)
     summary = summarise_loads(gearbox, case, assembly.inertias, plan.duration, series)
-    judge = Judge(assembly, summary)
+    judge = ValidityMonitor(assembly, summary)
     layout = signal_layout(assembly)
     if resume:
         pieces = _pieces_to_resume(plan, layout)
@@ -143,10 +143,10 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
     else:
         state = _first_state(assembly, case, series, layout, judge)
         (plan.directory / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
-        doubt = doubt_about_bearings(gearbox, summary, assembly.variant)
-        other = doubt_about_tables(gearbox, summary, LAWS[assembly.mesh_model].of_one_load)
+        doubt = bearing_range_warning(gearbox, summary, assembly.variant)
+        other = other_load_warning(gearbox, summary, LAWS[assembly.mesh_model].of_one_load)
         load = load_in_words(case)
-        beyond = doubt_about_band(summary, plan.band)
+        beyond = band_warning(summary, plan.band)
         doubts = {"bearing_doubt": doubt, "table_doubt": other, "band_doubt": beyond}
         told = {**doubts, "load": load, "duration": plan.duration}
         pieces = RunPieces(plan.partial_path, layout, {**plan.attributes(), **told})
@@ -167,7 +167,7 @@ def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
     return pieces
 
 
-def _take_over_judgement(plan: RunPlan, judge: Judge, state: Checkpoint) -> None:
+def _take_over_judgement(plan: RunPlan, judge: ValidityMonitor, state: Checkpoint) -> None:
     judge.figures = state.judgement
     if judge.stop:
         reasons = judge.reasons(state.mesh_times, state.step * plan.step)
@@ -179,7 +179,7 @@ def _first_state(
     case: LoadCase,
     series: Mapping[str, tuple[Floats, Floats]],
     layout: SignalLayout,
-    judge: Judge,
+    judge: ValidityMonitor,
 ) -> Checkpoint:
     """State at the start in balance; a drive is ahead by the angle at which it carries its torque."""
     torques = {**case.torques, **{name: float(values[0]) for name, (_, values) in series.items()}}

@@ -15,7 +15,7 @@ from scipy.linalg.lapack import dpotrf
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import compiled
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 #: Changes of the active set that a factor is carried over, as a part of its size: a border of k cells costs k / 3 n of
 #: a new factor in arithmetic, and more in calls.
@@ -23,7 +23,7 @@ _BORDER = 0.15
 
 
 @dataclass(frozen=True)
-class ContactSolution(Displayed):
+class ContactSolution(ReprMixin):
     """Forces on the cells of one position.
 
     Notes

@@ -25,7 +25,7 @@ from fe_ste.elasticity.halfspace import rectangle_integral
 from fe_ste.geometry.profile import cubic_coefficients, cubic_knots, cubic_values
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled, summing, summing_kernel
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 if TYPE_CHECKING:
     from fe_ste.elasticity.flank import FlankCompliance
@@ -251,7 +251,7 @@ _FOUR = np.uintp(4)
 
 
 @dataclass(frozen=True)
-class RegularCompliance(Displayed):
+class RegularCompliance(ReprMixin):
     """Regular compliance of one gear: coefficients of cubic splines over profile and face width."""
 
     table: Floats

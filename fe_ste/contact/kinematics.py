@@ -37,7 +37,7 @@ import numpy as np
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 from fe_ste.tools.compilation import compiled
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 if TYPE_CHECKING:
     from fe_ste.elasticity.flank import FlankCompliance
@@ -257,7 +257,7 @@ def _lay_cells(
 
 
 @dataclass(frozen=True)
-class Cells(Displayed):
+class Cells(ReprMixin):
     """Contact cells of one position."""
 
     tooth: Integers

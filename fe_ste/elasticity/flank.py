@@ -32,7 +32,7 @@ from fe_ste.elasticity.halfspace import tent_integrals, tent_means, wedge_images
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, sector_mesh
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed, TitledRows
+from fe_ste.tools.display import ReprMixin, TitledRows
 from fe_ste.tools.stores import Arrays, Cache
 from fe_ste.tools.threads import both, one_dense_thread, side_by_side
 
@@ -41,7 +41,7 @@ TOOTH_REACH = 4
 
 
 @dataclass(frozen=True)
-class FlankCompliance(Displayed):
+class FlankCompliance(ReprMixin):
     """Compliance of one flank of every tooth of a gear whose hub (or outer rim) is held.
 
     Attributes

@@ -22,7 +22,7 @@ from fe_ste.elasticity.condensation import Chain, chain_of, sector_halves, turn_
 from fe_ste.elasticity.hexmesh import MeshSettings, SectorMesh, refined_sector_mesh, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 #: Corners of the six faces of a hexahedron in VTK order, counter-clockwise seen from outside.
 HEXAHEDRON_FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
@@ -118,7 +118,7 @@ class OtherTeeth:
 
 
 @dataclass(frozen=True)
-class GearMesh(Displayed):
+class GearMesh(ReprMixin):
     """Bricks of some neighbouring teeth of one gear, in its place in the pair, and its other teeth condensed."""
 
     points: Floats

@@ -20,7 +20,7 @@ from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import Gear
 from fe_ste.geometry.profile import ToothProfile, tooth_profile
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 #: Tangent angle to the tooth centre line at which the fillet is split between tooth core and rim.
 _FILLET_SPLIT_ANGLE = np.radians(50.0)
@@ -80,7 +80,7 @@ class MeshSettings:
 
 
 @dataclass(frozen=True)
-class SectionMesh(Displayed, line=": {points!n} nodes, {quads!n} quadrilaterals"):
+class SectionMesh(ReprMixin, line=": {points!n} nodes, {quads!n} quadrilaterals"):
     """Quadrilaterals of the transverse section of one tooth, centred on the +x axis."""
 
     points: Floats
@@ -110,7 +110,7 @@ class SectionMesh(Displayed, line=": {points!n} nodes, {quads!n} quadrilaterals"
 
 
 @dataclass(frozen=True)
-class SectorMesh(Displayed, line=" of {gear.name!r}: {points!n} nodes, {hexahedra!n} hexahedra"):
+class SectorMesh(ReprMixin, line=" of {gear.name!r}: {points!n} nodes, {hexahedra!n} hexahedra"):
     """Hexahedra of one tooth sector; node ``layer * section nodes + section node``."""
 
     gear: Gear

@@ -10,7 +10,7 @@ import numbers
 
 import numpy as np
 
-from fe_ste.geometry.gear_relations import ROUNDING, UncheckedGear, root_fillet
+from fe_ste.geometry.gear_relations import ROUNDING, GearInputs, root_fillet
 from fe_ste.geometry.involute import PinionCutter, involute
 from fe_ste.geometry.pair_relations import (
     FILLET_TOLERANCE,
@@ -39,7 +39,7 @@ class GeometryError(ValueError):
     """A gear or gear pair that cannot be made or cannot run."""
 
 
-def check_gear(gear: UncheckedGear) -> None:
+def check_gear(gear: GearInputs) -> None:
     """Refuse a gear that cannot be made.
 
     Parameters
@@ -91,7 +91,7 @@ def check_gear_pair(pair: UncheckedPair) -> None:
         _check_tips_pass(pair)
 
 
-def _refuse_gear(gear: UncheckedGear, key: str, value: str, remedy: str) -> GeometryError:
+def _refuse_gear(gear: GearInputs, key: str, value: str, remedy: str) -> GeometryError:
     return GeometryError(f"gear '{gear.name}': {key} = {value} {remedy}")
 
 
@@ -122,7 +122,7 @@ def _is_number(value: object) -> bool:
     return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _check_values(gear: UncheckedGear) -> None:
+def _check_values(gear: GearInputs) -> None:
     """Check each number by itself: finite, of the right sign, within the range of the relations."""
     teeth: object = gear.teeth
     if not isinstance(teeth, numbers.Integral) or isinstance(teeth, bool) or teeth < LEAST_TEETH:
@@ -152,7 +152,7 @@ def _check_values(gear: UncheckedGear) -> None:
     _check_ranges(gear)
 
 
-def _check_ranges(gear: UncheckedGear) -> None:
+def _check_ranges(gear: GearInputs) -> None:
     least, most = PRESSURE_ANGLE_RANGE
     angle = gear.normal_pressure_angle
     if not _is_number(angle) or not least <= angle <= most:
@@ -168,7 +168,7 @@ def _check_ranges(gear: UncheckedGear) -> None:
         raise _refuse_gear(gear, "material.poissons_ratio", f"{ratio!r}", "must be at least 0 and below 0.5")
 
 
-def _check_circles(gear: UncheckedGear) -> None:
+def _check_circles(gear: GearInputs) -> None:
     """Refuse teeth or spaces of no width at the reference circle, and tips that are not beyond the root."""
     if not 0.0 < gear.reference_half_angle < 0.5 * gear.angular_pitch:
         what = "tooth" if gear.reference_half_angle <= 0.0 else "tooth space"
@@ -183,7 +183,7 @@ def _check_circles(gear: UncheckedGear) -> None:
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * tip), remedy)
 
 
-def _check_generating_rack(gear: UncheckedGear) -> None:
+def _check_generating_rack(gear: GearInputs) -> None:
     """Refuse a rounding that does not fit on the rack's tooth."""
     if gear.rack_tip_half_land >= -LENGTH_TOLERANCE * gear.normal_module:
         return
@@ -196,7 +196,7 @@ def _check_generating_rack(gear: UncheckedGear) -> None:
     raise _refuse_gear(gear, "rack.tip_radius", f"{radius:g}", remedy)
 
 
-def _check_flank(gear: UncheckedGear) -> None:
+def _check_flank(gear: GearInputs) -> None:
     """Refuse a tooth that its root, undercut or not, leaves no flank, and one that undercut leaves too thin a neck."""
     if gear.is_undercut:
         neck = _neck_thickness(gear) / gear.normal_module
@@ -214,12 +214,12 @@ def _check_flank(gear: UncheckedGear) -> None:
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
 
 
-def _neck_thickness(gear: UncheckedGear) -> float:
+def _neck_thickness(gear: GearInputs) -> float:
     """Least thickness of an external tooth below its flank, transverse section, m."""
     return 2.0 * float(np.min(np.abs(root_fillet(gear, np.linspace(0.0, 1.0, 201))[:, 1])))
 
 
-def _check_form_circles(gear: UncheckedGear) -> None:
+def _check_form_circles(gear: GearInputs) -> None:
     """Refuse form circles that are given beyond the flank, or that leave none."""
     tolerance = LENGTH_TOLERANCE * gear.normal_module
     out = gear.outward
@@ -239,7 +239,7 @@ def _check_form_circles(gear: UncheckedGear) -> None:
         raise _refuse_gear(gear, "tip_form_diameter", _mm(2.0 * gear.tip_form_radius), remedy)
 
 
-def _check_cutter(gear: UncheckedGear, cutter: PinionCutter) -> None:
+def _check_cutter(gear: GearInputs, cutter: PinionCutter) -> None:
     """Refuse a cutter that cannot make the gear, or that spoils its tips."""
     if not gear.internal:
         raise _refuse_gear(gear, "cutter", f"{cutter!r}", "is for internal gears: that of external ones is the rack")
@@ -262,7 +262,7 @@ def _check_cutter(gear: UncheckedGear, cutter: PinionCutter) -> None:
     _check_trimmed_tips(gear)
 
 
-def _check_cutter_tooth(gear: UncheckedGear, cutter: PinionCutter) -> None:
+def _check_cutter_tooth(gear: GearInputs, cutter: PinionCutter) -> None:
     """Refuse a cutter whose tip is below its involute or pointed, and a rounding that does not fit on it."""
     cut = gear.cutter_tip_cut
     module = gear.normal_module
@@ -278,7 +278,7 @@ def _check_cutter_tooth(gear: UncheckedGear, cutter: PinionCutter) -> None:
         raise _refuse_gear(gear, "cutter.tip_radius", f"{cutter.tip_radius:g}", remedy)
 
 
-def _check_flank_of_ring(gear: UncheckedGear) -> None:
+def _check_flank_of_ring(gear: GearInputs) -> None:
     """Refuse tips inside the base circle, and a cutter that leaves no involute."""
     _check_tip_outside_base(gear)
     if gear.form_radius <= gear.tip_radius:
@@ -286,7 +286,7 @@ def _check_flank_of_ring(gear: UncheckedGear) -> None:
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
 
 
-def _check_trimmed_tips(gear: UncheckedGear) -> None:
+def _check_trimmed_tips(gear: GearInputs) -> None:
     """Refuse a cutter that takes something off the tips: below its involute, or beside the line of action."""
     cut = gear.cutter_tip_cut
     tip = gear.tip_radius
@@ -304,14 +304,14 @@ def _check_trimmed_tips(gear: UncheckedGear) -> None:
         raise _refuse_gear(gear, "cutter.teeth", f"{count}", remedy)
 
 
-def _check_tip_outside_base(gear: UncheckedGear) -> None:
+def _check_tip_outside_base(gear: GearInputs) -> None:
     if gear.tip_radius <= gear.base_radius:
         base = _mm(2.0 * gear.base_radius)
         remedy = f"lies inside the base circle, where no involute is: it must be above {base}"
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
 
 
-def _check_internal_space(gear: UncheckedGear) -> None:
+def _check_internal_space(gear: GearInputs) -> None:
     """Refuse a tip without involute, a space closed at the root, a fillet higher than the tooth."""
     _check_tip_outside_base(gear)
     if gear.half_angle(gear.root_radius) >= 0.5 * gear.angular_pitch:
@@ -323,7 +323,7 @@ def _check_internal_space(gear: UncheckedGear) -> None:
         raise _refuse_gear(gear, "rack.tip_radius", f"{gear.rack.tip_radius:g}", remedy)
 
 
-def _check_tip_thickness(gear: UncheckedGear) -> None:
+def _check_tip_thickness(gear: GearInputs) -> None:
     thickness = gear.tip_thickness / gear.normal_module
     if thickness < LEAST_TIP_THICKNESS:
         word = "larger" if gear.internal else "smaller"
@@ -334,7 +334,7 @@ def _check_tip_thickness(gear: UncheckedGear) -> None:
         raise _refuse_gear(gear, "tip_diameter", _mm(2.0 * gear.tip_radius), remedy)
 
 
-def _check_held_diameter(gear: UncheckedGear) -> None:
+def _check_held_diameter(gear: GearInputs) -> None:
     root = 2.0 * gear.root_radius
     if (root - gear.held_diameter) * gear.outward <= 0.0:
         word = "above" if gear.internal else "below"

@@ -63,7 +63,7 @@ class Material:
 
 
 @dataclass(frozen=True, kw_only=True)
-class UncheckedGear:
+class GearInputs:
     """Inputs of a gear that may be impossible, with all that follows from them; for the inputs see `Gear`."""
 
     name: str
@@ -416,7 +416,7 @@ class UncheckedGear:
 # Root fillet of a tooth in the transverse section
 
 
-def root_fillet(gear: UncheckedGear, parameter: Floats) -> Floats:
+def root_fillet(gear: GearInputs, parameter: Floats) -> Floats:
     """Points of the fillet on the counter-clockwise side of a tooth centred on the +x axis.
 
     Parameters
@@ -435,13 +435,13 @@ def root_fillet(gear: UncheckedGear, parameter: Floats) -> Floats:
     return _internal_fillet(gear, parameter)
 
 
-def _generated_fillet(gear: UncheckedGear, parameter: Floats) -> Floats:
+def _generated_fillet(gear: GearInputs, parameter: Floats) -> Floats:
     """Curve that the rounded tip of a rack cuts, from the flank (0) to the root circle (1)."""
     start = gear.fillet_start
     return cartesian(*gear.rack_tip_cut.polar(start + parameter * (1.0 - start)))
 
 
-def _internal_fillet(gear: UncheckedGear, parameter: Floats) -> Floats:
+def _internal_fillet(gear: GearInputs, parameter: Floats) -> Floats:
     """Arc that touches the flank (0) and the root circle (1) of an internal gear."""
     radius = gear.fillet_radius
     centre_angle = gear.fillet_centre_angle

@@ -10,16 +10,16 @@ import math
 from dataclasses import dataclass
 
 from fe_ste.geometry.checks import check_gear, check_gear_pair
-from fe_ste.geometry.gear_relations import BasicRack, Material, UncheckedGear
+from fe_ste.geometry.gear_relations import BasicRack, GearInputs, Material
 from fe_ste.geometry.involute import PinionCutter
 from fe_ste.geometry.pair_relations import UncheckedPair
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
 __all__ = ["BasicRack", "Gear", "GearPair", "Material", "PinionCutter"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Gear(UncheckedGear, Displayed):
+class Gear(GearInputs, ReprMixin):
     """One cylindrical involute gear, external or internal, spur or helical.
 
     Parameters
@@ -109,7 +109,7 @@ class Gear(UncheckedGear, Displayed):
 
 
 @dataclass(frozen=True, kw_only=True)
-class GearPair(UncheckedPair, Displayed):
+class GearPair(UncheckedPair, ReprMixin):
     """Two gears on parallel axes.
 
     Parameters

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from fe_ste.geometry.gear_relations import UncheckedGear, root_fillet
+from fe_ste.geometry.gear_relations import GearInputs, root_fillet
 from fe_ste.geometry.involute import inverse_involute, involute
 
 
@@ -19,8 +19,8 @@ class UncheckedPair:
     """Two gears that may not fit, with all that follows for their mesh; for the inputs see `GearPair`."""
 
     name: str
-    pinion: UncheckedGear
-    gear: UncheckedGear
+    pinion: GearInputs
+    gear: GearInputs
     centre_distance: float
     common_face_width: float | None = None
 
@@ -63,7 +63,7 @@ class UncheckedPair:
         base = self.reference_centre_distance * math.cos(self.pinion.transverse_pressure_angle)
         return math.acos(base / self.centre_distance)
 
-    def working_radius(self, gear: UncheckedGear) -> float:
+    def working_radius(self, gear: GearInputs) -> float:
         """Radius of the working circle of either gear of the pair, m."""
         return self.centre_distance * gear.teeth / abs(self._signed_teeth_sum)
 
@@ -170,7 +170,7 @@ FILLET_TOLERANCE = 1e-5
 """Error of the fillet as a polygon when a tip corner is led past it, in normal modules."""
 
 
-def corner_to_fillet_gap(pair: UncheckedPair, tip: UncheckedGear, mate: UncheckedGear) -> float:
+def corner_to_fillet_gap(pair: UncheckedPair, tip: GearInputs, mate: GearInputs) -> float:
     """Least gap between the way of a tip's corners and the mate's root fillet.
 
     The corner leaves the line of action at the end of the path of contact and goes deeper than there. The
@@ -196,7 +196,7 @@ def corner_to_fillet_gap(pair: UncheckedPair, tip: UncheckedGear, mate: Unchecke
 
 
 def _corner_gap(
-    pair: UncheckedPair, tip: UncheckedGear, mate: UncheckedGear, radius: float, half_angle_of_corner: float
+    pair: UncheckedPair, tip: GearInputs, mate: GearInputs, radius: float, half_angle_of_corner: float
 ) -> float:
     distance = pair.centre_distance
     # Origin on the tip's axis, x along the line of centres to the pitch point; x as the mate sees it is
@@ -230,7 +230,7 @@ LEAST_CLEARANCE = 0.1
 """Tip clearance that a fitted tip keeps at least, in normal modules."""
 
 
-def shift_sum(one: UncheckedGear, other: UncheckedGear, centre_distance: float) -> float | None:
+def shift_sum(one: GearInputs, other: GearInputs, centre_distance: float) -> float | None:
     """Profile shifts that leave no backlash at a centre distance: x1 + x2, of an internal pair x1 - x2.
 
     ISO 21771: sum = (z1 + z2) (inv alpha_wt - inv alpha_t) / (2 tan alpha_n), teeth of a ring negative.
@@ -246,7 +246,7 @@ def shift_sum(one: UncheckedGear, other: UncheckedGear, centre_distance: float) 
 
     Examples
     --------
-    >>> gear = UncheckedGear(name="", teeth=25, normal_module=4e-3, face_width=20e-3, held_diameter=50e-3)
+    >>> gear = GearInputs(name="", teeth=25, normal_module=4e-3, face_width=20e-3, held_diameter=50e-3)
     >>> round(shift_sum(gear, gear, 102e-3), 4)
     0.5354
     """
@@ -258,7 +258,7 @@ def shift_sum(one: UncheckedGear, other: UncheckedGear, centre_distance: float) 
     return teeth * (involute(math.acos(cosine)) - involute(transverse)) / (2.0 * math.tan(one.normal_pressure_angle))
 
 
-def shift_beside(mate: UncheckedGear, gear: UncheckedGear, centre_distance: float) -> float | None:
+def shift_beside(mate: GearInputs, gear: GearInputs, centre_distance: float) -> float | None:
     """Profile shift of a gear that leaves no backlash beside its mate; None if there is none."""
     total = shift_sum(gear, mate, centre_distance)
     if total is None:
@@ -270,7 +270,7 @@ def shift_beside(mate: UncheckedGear, gear: UncheckedGear, centre_distance: floa
     return total - mate.profile_shift
 
 
-def root_margin(pair: UncheckedPair, tip: UncheckedGear) -> float:
+def root_margin(pair: UncheckedPair, tip: GearInputs) -> float:
     """Roll length, m, by which a gear's tip keeps above the form circle of its mate; infinite above a relieved root."""
     if (pair.pinion if tip is pair.gear else pair.gear).has_relieved_root:
         return math.inf
@@ -279,7 +279,7 @@ def root_margin(pair: UncheckedPair, tip: UncheckedGear) -> float:
     return pair.pinion_roll_length(pair.gear.form_roll_length) - tip.tip_form_roll_length
 
 
-def clear_tip_diameter(pair: UncheckedPair, tip: UncheckedGear, margin: float) -> float:
+def clear_tip_diameter(pair: UncheckedPair, tip: GearInputs, margin: float) -> float:
     """Tip diameter, m, at which a gear keeps above its mate's form circle by a roll length (m); its own if it does.
 
     A chamfer keeps its height.
@@ -292,7 +292,7 @@ def clear_tip_diameter(pair: UncheckedPair, tip: UncheckedGear, margin: float) -
     return 2.0 * (math.hypot(tip.base_radius, roll) + chamfer)
 
 
-def fitted_tip_diameter(pair: UncheckedPair, tip: UncheckedGear) -> float:
+def fitted_tip_diameter(pair: UncheckedPair, tip: GearInputs) -> float:
     """Tip diameter, m, shortened as far as the mate asks for: the clearance of the rack, and room above the fillet.
 
     ISO 21771 calls the shortening of the tip that keeps the clearance at profile shifts the tip alteration k m_n.
@@ -318,15 +318,15 @@ def fitted_tip_diameter(pair: UncheckedPair, tip: UncheckedGear) -> float:
     return corner_clear_tip_diameter(beside, shorter) or fitted
 
 
-def with_tip_diameter(gear: UncheckedGear, diameter: float) -> UncheckedGear:
+def with_tip_diameter(gear: GearInputs, diameter: float) -> GearInputs:
     """Return a gear with another tip diameter (m), unchecked; a chamfer keeps its height."""
-    inputs = {field.name: getattr(gear, field.name) for field in fields(UncheckedGear)}
+    inputs = {field.name: getattr(gear, field.name) for field in fields(GearInputs)}
     if gear.tip_form_diameter is not None:
         inputs["tip_form_diameter"] = gear.tip_form_diameter + diameter - 2.0 * gear.tip_radius
-    return UncheckedGear(**inputs | {"tip_diameter": diameter})
+    return GearInputs(**inputs | {"tip_diameter": diameter})
 
 
-def _with_gear(pair: UncheckedPair, before: UncheckedGear, after: UncheckedGear) -> UncheckedPair:
+def _with_gear(pair: UncheckedPair, before: GearInputs, after: GearInputs) -> UncheckedPair:
     """Return the pair with one of its gears replaced; unchecked, whatever the pair was."""
     first, second = (after if gear is before else gear for gear in (pair.pinion, pair.gear))
     return UncheckedPair(
@@ -338,7 +338,7 @@ def _with_gear(pair: UncheckedPair, before: UncheckedGear, after: UncheckedGear)
     )
 
 
-def corner_clear_tip_diameter(pair: UncheckedPair, tip: UncheckedGear) -> float | None:
+def corner_clear_tip_diameter(pair: UncheckedPair, tip: GearInputs) -> float | None:
     """Tip diameter, m, at which the corners of a gear pass the fillet of its mate.
 
     The least change of the tip does, rounded to hundredths of a millimetre on the side that clears; None where the

@@ -12,14 +12,14 @@ import numpy as np
 from fe_ste.geometry.gear_relations import cartesian, root_fillet
 from fe_ste.geometry.gears import Gear
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 _FILLET_POINTS = 201
 _OVERSAMPLING = 10
 
 
 @dataclass(frozen=True)
-class ToothProfile(Displayed):
+class ToothProfile(ReprMixin):
     """Counter-clockwise side of a tooth centred on the +x axis."""
 
     gear: Gear

@@ -14,7 +14,7 @@ from fe_ste.elasticity.gear_mesh import GearMesh, whole_ring
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats, Integers, Pixels
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.drawing import (
     drawing_style,
     finish_figure,
@@ -42,7 +42,7 @@ _PRESSURE_MAP: Final = "inferno_r"
 
 
 @dataclass(frozen=True)
-class HexahedraMesh(Displayed, line=": {points!n} nodes, {hexahedra!n} hexahedra"):
+class HexahedraMesh(ReprMixin, line=": {points!n} nodes, {hexahedra!n} hexahedra"):
     """Hexahedra of one body."""
 
     points: Floats

@@ -22,7 +22,7 @@ from fe_ste.elasticity.bricks import brick_gradients, brick_values
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import side_by_side
 
 _POINTS = 8
@@ -292,7 +292,7 @@ class BrickTangent:
 
 
 @dataclass(frozen=True)
-class Bricks(Displayed):
+class Bricks(ReprMixin):
     """8-node bricks with incompatible modes, ready to be evaluated at any displacement."""
 
     nodes: Integers

@@ -16,7 +16,7 @@ import scipy.sparse
 
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 #: Facets whose common part is smaller than this part of the first one are not integrated over.
 _LEAST_OVERLAP = 1e-10
@@ -51,7 +51,7 @@ def summed(numbers: Integers, values: Floats, count: int) -> Floats:
 
 
 @dataclass(frozen=True)
-class Surface(Displayed, line=": {facets!n} facets"):
+class Surface(ReprMixin, line=": {facets!n} facets"):
     """Quadrilaterals of a boundary.
 
     Examples

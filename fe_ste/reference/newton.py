@@ -19,7 +19,7 @@ from fe_ste.elimination import FactorisationError, factorise
 from fe_ste.reference.finite_deformation import Bricks, BrickTangent, InvertedElementError
 from fe_ste.reference.mortar import Surface, WeightedGap, facing_pairs, summed, weighted_gap
 from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.threads import one_dense_thread
 
 # Elastic bodies in contact as data: what is asked, and the equilibrium that answers it
@@ -51,7 +51,7 @@ class CondensedPart:
 
 
 @dataclass(frozen=True)
-class ContactModel(Displayed):
+class ContactModel(ReprMixin):
     """Elastic bodies, what holds and loads them, and where they may touch."""
 
     bricks: Bricks
@@ -104,7 +104,7 @@ class Iteration:
 
 
 @dataclass(frozen=True)
-class Equilibrium(Displayed):
+class Equilibrium(ReprMixin):
     """Bodies in equilibrium."""
 
     displacement: Floats

@@ -35,7 +35,7 @@ from fe_ste.reference.newton import (
     solve_contact,
 )
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.contact_stress import contact_line_stress, mean_over_contact_line
 from fe_ste.transmission_error.search import flank_radii, hertz_half_width, least_contact_length, normal_load
@@ -53,7 +53,7 @@ _ALLOWED_OVERLAP = 2e-3
 
 
 @dataclass(frozen=True)
-class NonlinearSettings(Displayed):
+class NonlinearSettings(ReprMixin):
     """How a position is analysed."""
 
     teeth: int | None = None
@@ -88,7 +88,7 @@ class NonlinearSettings(Displayed):
 
 
 @dataclass(frozen=True)
-class NonlinearPosition(Displayed):
+class NonlinearPosition(ReprMixin):
     """One position solved."""
 
     pair: GearPair
@@ -289,7 +289,7 @@ _CANDIDATES = 100
 
 
 @dataclass(frozen=True)
-class StressField(Displayed):
+class StressField(ReprMixin):
     """Both gears at one position, deformed.
 
     Attributes

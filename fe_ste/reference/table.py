@@ -27,7 +27,7 @@ from fe_ste.reference.finite_deformation import von_mises
 from fe_ste.reference.newton import EquilibriumError, Iteration, convergence_table
 from fe_ste.reference.position import Modifications, NonlinearPosition, NonlinearSettings, nonlinear_position
 from fe_ste.tools.arrays import Integers
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 from fe_ste.tools.files import FileError
 from fe_ste.tools.stores import Layout, load_dataset, write_dataset
 from fe_ste.tools.versions import NONLINEAR_TABLE
@@ -74,7 +74,7 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
-class NonlinearInput(Displayed, line=" of {pair.name!r}: {positions} positions, torque {torque:g} N m"):
+class NonlinearInput(ReprMixin, line=" of {pair.name!r}: {positions} positions, torque {torque:g} N m"):
     """All that the numbers of a table depend on.
 
     Examples
@@ -116,7 +116,7 @@ class NonlinearInput(Displayed, line=" of {pair.name!r}: {positions} positions, 
 
 
 @dataclass(frozen=True)
-class NonlinearTable(Displayed):
+class NonlinearTable(ReprMixin):
     """Static transmission error of a pair over the mesh cycle by the reference analysis."""
 
     dataset: xr.Dataset

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
 # Mesh stiffness by ISO 6336-1 method B, for comparison with the finite elements
 
@@ -32,7 +32,7 @@ _MEASURED_TO_THEORETICAL = 0.8
 
 
 @dataclass(frozen=True)
-class MethodBStiffness(Displayed):
+class MethodBStiffness(ReprMixin):
     """Stiffness of a gear pair by ISO 6336-1 method B."""
 
     theoretical_single_stiffness: float

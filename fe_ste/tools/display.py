@@ -29,7 +29,7 @@ class _Fields(Formatter):
         return value
 
 
-class Displayed:
+class ReprMixin:
     """Shows itself as one line of text, and in a notebook as a small table.
 
     A class states its line, or computes it in `_line`; one with a table gives its title and rows in `_table`.
@@ -42,7 +42,7 @@ class Displayed:
 
     Examples
     --------
-    >>> class Shafts(Displayed, line=" of {gearbox!r}: {names!n} shafts, {mass:.1f} kg"):
+    >>> class Shafts(ReprMixin, line=" of {gearbox!r}: {names!n} shafts, {mass:.1f} kg"):
     ...     gearbox, names, mass = "GRC <1>", ("low", "high"), 812.345
     >>> Shafts()
     <Shafts of 'GRC <1>': 2 shafts, 812.3 kg>
@@ -59,7 +59,7 @@ class Displayed:
             cls._stated_line = line
         # A dataclass keeps what its own class has and replaces what it inherits.
         if "__repr__" not in vars(cls):
-            type.__setattr__(cls, "__repr__", Displayed.__repr__)
+            type.__setattr__(cls, "__repr__", ReprMixin.__repr__)
 
     def __repr__(self) -> str:
         """Return one short line."""

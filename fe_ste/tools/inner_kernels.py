@@ -228,7 +228,7 @@ def bundle(given: Given) -> Given:
     return cast(Given, _Bundle(given))
 
 
-def kept_bundle(given: Given) -> Given:
+def cached_struct(given: Given) -> Given:
     """Return the bundle of a named tuple, the same one for the same tuple while it is among the latest.
 
     For functions that Python calls often: to make a bundle takes longer than many of them.

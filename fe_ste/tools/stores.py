@@ -27,7 +27,7 @@ from typing import IO, TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.files import FileError, open_regular, replacement, write_all
 
 if TYPE_CHECKING:
@@ -404,7 +404,7 @@ FOLDER_VARIABLE = "EXUGEAR_FLANKS"
 Value = TypeVar("Value")
 
 
-class Cache(Displayed, Generic[Value]):
+class Cache(ReprMixin, Generic[Value]):
     """Values by key, those used least lately removed.
 
     Parameters

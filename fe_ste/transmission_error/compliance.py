@@ -19,7 +19,7 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 from fe_ste.tools.threads import one_dense_thread
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class PairCompliance(Displayed):
+class PairCompliance(ReprMixin):
     """A gear pair with the compliance of both loaded flanks: all that does not depend on position or load."""
 
     pair: GearPair

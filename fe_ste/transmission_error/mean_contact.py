@@ -27,7 +27,7 @@ from fe_ste.contact.kinematics import ContactError, ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.stores import Arrays, Cache
 from fe_ste.tools.threads import one_dense_thread, side_by_side
 from fe_ste.tools.versions import MEAN_CONTACT
@@ -104,7 +104,7 @@ _SHARED_PAIRS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class MeanContact(Displayed):
+class MeanContact(ReprMixin):
     """Contact of a pair over its mesh cycle under one force, at two misalignments.
 
     Lengths and forces are along the transverse line of action. Arrays are over the misalignments.

@@ -18,7 +18,7 @@ from fe_ste.contact.complementarity import ContactSolution
 from fe_ste.contact.kinematics import Cells, ContactError
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Booleans, Floats, Integers
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 from fe_ste.transmission_error.compliance import PairCompliance
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class ContactState(Displayed):
+class ContactState(ReprMixin):
     """Solved contact at one position."""
 
     pmc: float
@@ -68,7 +68,7 @@ class SearchStart:
 
 
 @dataclass(frozen=True)
-class StateAxes(Displayed):
+class StateAxes(ReprMixin):
     """Axes of a grid of states."""
 
     positions: int
@@ -191,7 +191,7 @@ def cut_off_variable(values: Floats) -> xr.Variable:
 
 
 @dataclass
-class StateResults(Displayed):
+class StateResults(ReprMixin):
     """Results of states over (pmc, torque, centre_distance, misalignment); those that failed are not a number."""
 
     teeth: Integers

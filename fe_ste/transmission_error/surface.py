@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fe_ste.tools.arrays import Booleans, Floats, Integers
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -246,7 +246,7 @@ def _slope_matrix(x: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class SteSurface(Displayed):
+class SteSurface(ReprMixin):
     """Static transmission error s(pmc, centre distance, misalignment, force) of one loaded flank."""
 
     centre_distance: Floats

@@ -24,7 +24,7 @@ from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flanks import FlankModification
 from fe_ste.geometry.gear_relations import inputs_that_are_given
 from fe_ste.geometry.gears import GearPair
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 from fe_ste.tools.files import FileError
 from fe_ste.tools.stores import Layout, load_dataset, write_dataset
 from fe_ste.tools.threads import Workers
@@ -55,7 +55,7 @@ class TableError(FileError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TableInput(Displayed):
+class TableInput(ReprMixin):
     """All that the numbers of a table depend on.
 
     Examples
@@ -115,7 +115,7 @@ class TableInput(Displayed):
 
 
 @dataclass(frozen=True)
-class MeshTable(Displayed):
+class MeshTable(ReprMixin):
     """Static transmission error of a pair over its axes."""
 
     dataset: xr.Dataset

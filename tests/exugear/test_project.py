@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exugear import CaseError, Choice, Gearbox, Modes, Project, Run
+from exugear import Choice, Gearbox, GearboxFileError, Modes, Project, Run
 from exugear.gearbox.variant import VariantError
 from exugear.project import default_folder
 from exugear.results.run_file import load_run
@@ -96,12 +96,12 @@ def test_its_folder_can_be_taken_up_again_and_reported(project: Project) -> None
 
 
 def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(CaseError, match="holds no results"):
+    with pytest.raises(GearboxFileError, match="holds no results"):
         Project.from_folder(tmp_path)
 
 
 def test_an_unknown_load_case_is_refused_and_nothing_is_written(project: Project) -> None:
-    with pytest.raises(CaseError, match="no load case 'storm'"):
+    with pytest.raises(GearboxFileError, match="no load case 'storm'"):
         project.chosen(load_case="storm").run()
     assert not project.chosen(load_case="storm").run_directory.exists()
 

@@ -21,8 +21,8 @@ from exugear.cli.console import BadInputError, exit_codes, note, print_json, pri
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
-    from exugear.system.bearings.duty import BearingDuty
-    from exugear.system.tooth_mesh.contact_state import MeshDuty
+    from exugear.system.bearings.duty import BearingLoadState
+    from exugear.system.tooth_mesh.contact_state import MeshLoadState
 
 
 AXIAL_SIGN = "Axial loads are those of the shaft on the inner ring, positive along +z"
@@ -88,7 +88,7 @@ def bearings(
                 note(f"meshes.{mesh.name}: {mesh.remark}", style="yellow")
 
 
-def _load_row(duty: BearingDuty) -> dict[str, str]:
+def _load_row(duty: BearingLoadState) -> dict[str, str]:
     return {
         "bearing": duty.name,
         "radial\nkN": f"{1e-3 * duty.radial_load:.4g}",
@@ -100,7 +100,7 @@ def _load_row(duty: BearingDuty) -> dict[str, str]:
     }
 
 
-def _life_row(duty: BearingDuty) -> dict[str, str]:
+def _life_row(duty: BearingLoadState) -> dict[str, str]:
     if duty.ratings.estimated:
         sign = "*"
     elif duty.ratings.makers:
@@ -118,7 +118,7 @@ def _life_row(duty: BearingDuty) -> dict[str, str]:
     }
 
 
-def _mesh_row(duty: MeshDuty) -> dict[str, str]:
+def _mesh_row(duty: MeshLoadState) -> dict[str, str]:
     def shown(value: float, form: str) -> str:
         if math.isnan(value):
             return "-"

@@ -110,7 +110,7 @@ def run(
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
-        from exugear.gearbox.reading import CaseError
+        from exugear.gearbox.reading import GearboxFileError
         from exugear.results.folder import time_noted
 
         choice = Choice(variant.value, mesh_model.value, inertias, load_case)
@@ -126,7 +126,7 @@ def run(
         if compared is not None:
             try:
                 _check_extent(project, compared, kept["sample_rate"], out or Path("results"))
-            except CaseError as error:
+            except GearboxFileError as error:
                 raise BadInputError(f"--compare-exudyn: {error}") from error
             _check_solver(project.gearbox, variant, Solver.compiled)
         if integrator and solver is Solver.exudyn:
@@ -252,10 +252,10 @@ def _duration_to_resume(project: Project, duration: float | None) -> float | Non
 def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
     """Say what looks like the wrong sign of a torque, or leads bearings or meshes far from the load they are of."""
     from exugear.gearbox.load_cases import (
-        doubt_about_band,
-        doubt_about_bearings,
-        doubt_about_tables,
+        band_warning,
+        bearing_range_warning,
         doubts_about,
+        other_load_warning,
         summarise_loads,
     )
     from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -263,9 +263,9 @@ def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
     load_case = _load_case(project)
     law = LAWS[project.choice.mesh_model]
     loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
-    of_bearings = doubt_about_bearings(project.gearbox, loads, project.choice.variant)
-    of_tables = doubt_about_tables(project.gearbox, loads, law.of_one_load)
-    for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, doubt_about_band(loads, band))):
+    of_bearings = bearing_range_warning(project.gearbox, loads, project.choice.variant)
+    of_tables = other_load_warning(project.gearbox, loads, law.of_one_load)
+    for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, band_warning(loads, band))):
         note(f"load_cases.{load_case.name}: {doubt}", style="yellow")
 
 

@@ -32,7 +32,7 @@ from exugear.cli.console import (
     note,
     print_json,
     print_table,
-    refuse_unsolved,
+    refuse_not_converged,
     say,
 )
 
@@ -43,9 +43,9 @@ if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
     from exugear.project import Project
     from exugear.report.findings.loudness import Ranking, Resonance
-    from exugear.steady.peaks import BearingSwing, Peak, Pull
+    from exugear.steady.peaks import BearingLoadExcursion, Peak, TensileMesh
     from exugear.steady.settings import SteadySettings
-    from exugear.system.tooth_mesh.tables import WanderingLoad
+    from exugear.system.tooth_mesh.tables import Shuttling
 
 LEAST_AMPLITUDE = 1e-12
 """Amplitude of the overall transmission error below which a peak is round-off, m."""
@@ -149,11 +149,11 @@ def _at_load_of(project: WatchedProject, load_case: str) -> WatchedProject:
 
 def _tell_of_other_loads(gearbox: Gearbox) -> None:
     """Say which load cases load meshes otherwise than the static load does, which the response is at."""
-    from exugear.gearbox.load_cases import doubt_about_tables, load_in_words, static_load_in_words, summarise_loads
+    from exugear.gearbox.load_cases import load_in_words, other_load_warning, static_load_in_words, summarise_loads
 
     static = static_load_in_words(gearbox)
     for name, load_case in gearbox.load_cases.items():
-        if doubt_about_tables(gearbox, summarise_loads(gearbox, load_case)):
+        if other_load_warning(gearbox, summarise_loads(gearbox, load_case)):
             note(
                 f"The response is at the static load ({static}), the load case {name} at another one "
                 f"({load_in_words(load_case)}): --load-case {name} responds there",
@@ -232,7 +232,7 @@ def _whole_summary(
     settings: SteadySettings,
     data: xr.Dataset,
     ranking: Ranking,
-    pulling: tuple[Pull, ...],
+    pulling: tuple[TensileMesh, ...],
     excited: bool,
 ) -> dict[str, Any]:
     from exugear.gearbox.load_cases import static_load_in_words
@@ -296,21 +296,21 @@ def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
 
     Likewise where teeth read tables beside states that are not solved, and where a branch is not whole.
     """
-    refuse_unsolved([mesh for mesh in str(data.attrs["beside_unsolved_states"]).split(", ") if mesh])
+    refuse_not_converged([mesh for mesh in str(data.attrs["near_unconverged_states"]).split(", ") if mesh])
     if data.attrs["branch_ended"]:
         raise FailedError(f"the branch is not whole: {data.attrs['branch_ended']}")
     if growth > 0.0 and not bool(data["growth"].notnull().any()):
         raise FailedError(f"the steady response is not to be trusted: disturbances grow by up to {growth:.3g} 1/s")
 
 
-def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
+def _tell_of_pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
     """Say which meshes would have to pull, where the law does not let their teeth part."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import pulls
     from exugear.system.tooth_mesh.laws.registry import LAWS
 
     law = str(data.attrs["mesh_model"])
-    found: tuple[Pull, ...] = () if LAWS[law].loses_contact else pulls(data)
+    found: tuple[TensileMesh, ...] = () if LAWS[law].loses_contact else pulls(data)
     for pull in found:
         note(
             f"{pull.mesh}: teeth would have to pull at {pull.count} of {data.sizes['point']} speeds, longest at "
@@ -321,7 +321,7 @@ def _tell_of_pulls(data: xr.Dataset) -> tuple[Pull, ...]:
     return found
 
 
-def _pull_summary(pull: Pull) -> dict[str, Any]:
+def _pull_summary(pull: TensileMesh) -> dict[str, Any]:
     from exugear.gearbox.units import RPM
 
     return {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
@@ -342,7 +342,7 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
         note(f"Unstable: disturbances grow by up to {growth:.3g} 1/s{where}; no steady state lasts", style="yellow")
 
 
-def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
+def _tell_of_wandering_loads(project: Project) -> tuple[Shuttling, ...]:
     """Say where the load moves along the face so far that its moment counts, if the law leaves it out."""
     from exugear.system.tooth_mesh.laws.registry import LAWS
     from exugear.system.tooth_mesh.tables import wandering_loads
@@ -361,7 +361,7 @@ def _tell_of_wandering_loads(project: Project) -> tuple[WanderingLoad, ...]:
     return found
 
 
-def _wandering_summary(load: WanderingLoad) -> dict[str, Any]:
+def _wandering_summary(load: Shuttling) -> dict[str, Any]:
     return {"pair": load.pair, "load_centroid_m": load.amplitude, "over_transmission_error": load.over_error}
 
 
@@ -390,7 +390,7 @@ def _tell_of_harmonics(data: xr.Dataset) -> None:
     note(f"{said}; with half as many again the ten loudest peaks change by up to {100.0 * change:.2g} %", style=style)
 
 
-def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
+def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
     """Say how non-linear bearings were taken, what unequal loads of planets leave out, and which loads swing far."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import STRAINED, bearing_swings
@@ -422,7 +422,7 @@ def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingSwing, ...]:
     return swinging
 
 
-def _swing_summary(swing: BearingSwing) -> dict[str, Any]:
+def _swing_summary(swing: BearingLoadExcursion) -> dict[str, Any]:
     from exugear.gearbox.units import RPM
 
     return {

@@ -122,7 +122,7 @@ def _executor(executor: Executor, workers: int | None, scheduler: str | None) ->
 
 def _read(path: Path, allow_dir: Path | None, scripts: bool) -> Study:
     from exugear.gearbox.named_files import Permissions
-    from exugear.gearbox.reading import CaseError
+    from exugear.gearbox.reading import GearboxFileError
     from exugear.studies.sections import StudyError
     from exugear.studies.study import Study
     from exugear.system.readiness import check_parts
@@ -131,7 +131,7 @@ def _read(path: Path, allow_dir: Path | None, scripts: bool) -> Study:
     try:
         study = Study.from_toml(path, Permissions(scripts, allow_dir))
         check_parts(study.gearbox)
-    except (StudyError, CaseError) as error:
+    except (StudyError, GearboxFileError) as error:
         raise BadInputError(error) from error
     if study.choice.mesh_model not in _laws():
         laws = ", ".join(_laws())

@@ -63,7 +63,7 @@ def view(
 
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
     """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
-    from exugear.report.findings.words import Words
+    from exugear.report.findings.words import Labels
     from exugear.report.pictures.shapes import bodies_of, motions_of
     from exugear.report.web.stage import write_mode_page
 
@@ -77,7 +77,7 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
     if not places:
         raise BadInputError(f"{found.label}: no elastic mode to show")
     shown = places.index(first) if first in places else 0
-    words = Words(assembly.gearbox)
+    words = Labels(assembly.gearbox)
     modes = found.to_dataset()
     page = write_mode_page(
         assembly,

@@ -148,12 +148,12 @@ def _rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -
 
 def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
     """Read the file; of one with faults print these as an object, too, if that is asked for."""
-    from exugear.gearbox.reading import CaseError
+    from exugear.gearbox.reading import GearboxFileError
 
     try:
         return read_gearbox(case, allow_dir, tell=False)
     except BadInputError as error:
-        if as_json and isinstance(error.__cause__, CaseError):
+        if as_json and isinstance(error.__cause__, GearboxFileError):
             print_json({"case": str(case), "errors": list(error.__cause__.faults)})
         raise
 
@@ -360,10 +360,10 @@ def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
 def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
     from exugear.gearbox.load_cases import (
-        doubt_about_band,
-        doubt_about_bearings,
-        doubt_about_tables,
+        band_warning,
+        bearing_range_warning,
         doubts_about,
+        other_load_warning,
         summarise_loads,
     )
     from exugear.gearbox.units import RPM
@@ -391,9 +391,9 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                 "reversed_flanks": list(loads.reversed_flanks),
                 "doubts": [
                     *doubts_about(loads),
-                    *filter(None, [doubt_about_bearings(gearbox, loads, Variant.bushing)]),
-                    *filter(None, [doubt_about_tables(gearbox, loads)]),
-                    *filter(None, [doubt_about_band(loads, BAND)]),
+                    *filter(None, [bearing_range_warning(gearbox, loads, Variant.bushing)]),
+                    *filter(None, [other_load_warning(gearbox, loads)]),
+                    *filter(None, [band_warning(loads, BAND)]),
                 ],
             }
         )

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # Names and units over the versions of REXS: what a thing is called today, and what its unit is worth
 
@@ -129,7 +129,7 @@ class RexsError(ValueError):
         super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
 
 
-class Faults(Displayed, line=": {_found!n}"):
+class Faults(ReprMixin, line=": {_found!n}"):
     """Faults gathered over several attempts."""
 
     def __init__(self) -> None:
@@ -332,7 +332,7 @@ class LoadCase:
 
 
 @dataclass(frozen=True)
-class Model(Displayed, line=" REXS {version}: {components!n} components, {relations!n} relations"):
+class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relations!n} relations"):
     """All of a REXS file."""
 
     version: str

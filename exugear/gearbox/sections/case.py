@@ -250,7 +250,7 @@ def labels_in_use(content: Mapping[str, Any]) -> dict[str, Any]:
     return {name: words for name, words in content.get("labels", {}).items() if name in known}
 
 
-class CaseFile(Section):
+class GearboxFile(Section):
     """The whole gearbox file."""
 
     name: Annotated[Text, Field(max_length=200)]
@@ -309,7 +309,7 @@ class CaseFile(Section):
     """The oil."""
 
     @model_validator(mode="after")
-    def _labels_of_entries(self) -> CaseFile:
+    def _labels_of_entries(self) -> GearboxFile:
         known = {name for table in NAMED_TABLES for name in getattr(self, table)}
         for name in self.labels:
             if name not in known:
@@ -321,4 +321,4 @@ class CaseFile(Section):
         tables = ("gears", "pairs", "bodies", "meshes", "bearings", "load_cases")
         counts = ", ".join(f"{len(getattr(self, table))} {table}" for table in tables)
         title = self.name if len(self.name) <= LONGEST_VALUE else f"{self.name[: LONGEST_VALUE - 1]}…"
-        return f"<CaseFile {title!r}: {counts}>"
+        return f"<GearboxFile {title!r}: {counts}>"

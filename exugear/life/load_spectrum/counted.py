@@ -28,7 +28,7 @@ from exugear.life.load_spectrum.sources import (
     section_of,
     told,
 )
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
 from fe_ste.tools.files import write_file
 
@@ -128,7 +128,7 @@ def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         The body is one of those that hold the static load.
     """
     if body in gearbox.case.static_load.locked:
@@ -144,7 +144,7 @@ EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
 
 
 @dataclass(frozen=True, eq=False)
-class CountedLoads(Displayed, line=" on {body!r}: {sources!n} sources, {distribution!r}"):
+class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribution!r}"):
     """Loads of a gearbox, counted."""
 
     body: str
@@ -256,7 +256,7 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A source that cannot be used: see `exugear.life.load_spectrum.sources.load_sources`.
     """
     loads = section_of(gearbox)

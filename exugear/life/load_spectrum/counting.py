@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 
 @dataclass(frozen=True, eq=False)
-class DurationDistribution(Displayed):
+class DurationDistribution(ReprMixin):
     """Hours and revolutions over bins of torque; empty bins are left out."""
 
     lower: Floats
@@ -86,7 +86,7 @@ def load_duration(
 
 
 @dataclass(frozen=True, eq=False)
-class LoadPoints(Displayed):
+class LoadPoints(ReprMixin):
     """Torques with what acts beside them: the bins of a distribution, split where other loads differ."""
 
     torque: Floats
@@ -199,7 +199,7 @@ def reversals(series: Floats) -> Floats:
     return np.asarray(points[np.unique(np.concatenate([[0], inner, [len(points) - 1]]))])
 
 
-class Rainflow(Displayed):
+class Rainflow(ReprMixin):
     """Cycles of a series that comes in pieces, counted as `rainflow` counts them; the series itself is not kept.
 
     Examples

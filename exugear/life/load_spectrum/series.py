@@ -21,7 +21,7 @@ from exugear.gearbox.sections.loads import SourceSection
 from exugear.gearbox.units import RPM
 from exugear.life.load_spectrum.counting import Rainflow, equivalent_range
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # Samples of load put together while they are read: files of any length and number become some ten thousand points
 
@@ -40,7 +40,7 @@ FINE, COARSE = 42, 47
 
 
 @dataclass(frozen=True, eq=False)
-class Samples(Displayed):
+class Samples(ReprMixin):
     """Loads that last."""
 
     torque: Floats
@@ -201,7 +201,7 @@ LEAST_BEFORE_DROPOUT = 0.1
 
 
 @dataclass(frozen=True)
-class Taken:
+class ReadSummary:
     """What was taken of a file."""
 
     skipped: float
@@ -228,14 +228,14 @@ class SeriesReader:
         """Whether channels of a hub are named."""
         return self.source.hub_forces is not None or self.source.hub_moments is not None
 
-    def take(self, path: Path, pool: Pool) -> Taken:
+    def take(self, path: Path, pool: Pool) -> ReadSummary:
         """Read a file into a pool.
 
         Raises
         ------
         LoadFileError
             A file that cannot be used.
-        CaseError
+        GearboxFileError
             Keys that do not fit the file.
         """
         series = read_channels(path)
@@ -262,7 +262,7 @@ class SeriesReader:
                 f"{self.key}.skip_s = {self.source.skip_s:g}: leaves nothing of a series of {length:g} s ({path.name})"
             )
         found = wind / lasting_wind if lasting_wind else math.nan
-        return Taken(first - begin, last - first, found, counts)
+        return ReadSummary(first - begin, last - first, found, counts)
 
     def _components(self) -> list[bool]:
         forces = self.source.hub_forces or (None,) * 3

@@ -41,7 +41,7 @@ from exugear.life.load_spectrum.series import (
     together,
 )
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # Hours of files by the wind that they were simulated in: a Weibull distribution over bins of wind speed
 
@@ -148,7 +148,7 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
-class LoadSource(Displayed):
+class LoadSource(ReprMixin):
     """Samples of one source over the life of the gearbox."""
 
     name: str
@@ -212,7 +212,7 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         No section [loads], a body that does not turn, more hours than a year has, or a file that cannot be used.
     """
     loads = section_of(gearbox)
@@ -246,7 +246,7 @@ def section_of(gearbox: Gearbox) -> LoadsSection:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         There is none.
     """
     if gearbox.case.loads is None:

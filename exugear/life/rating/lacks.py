@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from exugear.exchange.series_files import LARGEST_SERIES
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.life.gear_life import check_strengths
 from exugear.life.life import check_keys, checked_loads, rating_of
 from exugear.life.load_spectrum.counted import count_loads, tooth_exposures
@@ -39,7 +39,7 @@ def lacks_of_life(gearbox: Gearbox) -> dict[str, tuple[str, ...]]:
 def _faults(gearbox: Gearbox, check: Callable[[Gearbox], object]) -> tuple[str, ...]:
     try:
         check(gearbox)
-    except CaseError as error:
+    except GearboxFileError as error:
         return tuple(fault.removeprefix(f"{gearbox.source}: ") for fault in error.faults)
     return ()
 
@@ -60,6 +60,6 @@ def _are_quick(gearbox: Gearbox) -> bool:
             return False
         try:
             size += gearbox.file(f"loads.sources.{name}.file", source.file, LARGEST_SERIES).stat().st_size
-        except CaseError:
+        except GearboxFileError:
             return True
     return size <= QUICK

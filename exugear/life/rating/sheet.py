@@ -35,7 +35,7 @@ from exugear.system.system import Assembly
 from fe_ste.root_stress import MeshCycleStress
 from fe_ste.standards.pitting import tangential_force
 from fe_ste.standards.tooth_root import root_stress_factors
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,7 +78,7 @@ class FlankSheet:
 
 
 @dataclass(frozen=True, eq=False)
-class RatingSheet(Displayed, line=" by {edition}: {flanks!n} flanks"):
+class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
     """All flanks that are loaded, under what, and what is left out."""
 
     edition: str
@@ -349,7 +349,7 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         No rated speed, or a static load on several bodies.
     """
     overall = gearbox.case.overall
@@ -431,7 +431,7 @@ def rated_loads(gearbox: Gearbox) -> CountedLoads:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         No section `[rating]`, loads that cannot be used, or strengths that do not fit the gears.
     """
     if gearbox.case.loads is not None:

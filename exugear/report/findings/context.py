@@ -12,7 +12,7 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import Variant, VariantError
 from exugear.results.folder import bodies_folder
 from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run, verdict_of
@@ -109,7 +109,7 @@ class Context:
 # Results in the folder that belong to its case: tables, modes and runs
 
 OTHER_INPUT = "was computed from another input; compute it again"
-_UNFIT = (CaseError, MeshError, VariantError, BearingError, BalanceError, KeyError)
+_UNFIT = (GearboxFileError, MeshError, VariantError, BearingError, BalanceError, KeyError)
 """What the case of the folder may say to the choice that a file was computed of."""
 
 
@@ -233,7 +233,7 @@ def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
     load_case = attributes.get("load_case")
     try:
         if load_case is not None and load_case not in context.gearbox.load_cases:
-            raise CaseError(f"the case has no load case {load_case!r}")
+            raise GearboxFileError(f"the case has no load case {load_case!r}")
         if input_hash(context.assembled(choice_of(attributes)), load_case) == attributes.get("input_hash"):
             return True
         reason = OTHER_INPUT

@@ -14,7 +14,7 @@ from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_o
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.loudness import Loudness, Ranking
 from exugear.report.findings.verdicts import GAIN, BestChange, ModelVariations, best_change
-from exugear.report.findings.words import Words, figure_text
+from exugear.report.findings.words import Labels, figure_text
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
 
@@ -27,7 +27,7 @@ LEAST_SHIFT = 5e-4
 
 
 @dataclass(frozen=True)
-class Lever:
+class Sensitivity:
     """Something that moves a mode."""
 
     what: str
@@ -56,14 +56,14 @@ def shift_of(frequency: float, share: float, kind: str, step: float = STEP) -> f
     return frequency * (math.pow(1.0 + step * share, power) - 1.0)
 
 
-def levers_of(words: Words, modes: xr.Dataset, index: int) -> tuple[Lever, ...]:
+def levers_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[Sensitivity, ...]:
     """List what moves a mode, stiffnesses first, each kind by its effect; copies of a planet set change together."""
     frequency = float(modes["frequency"][index])
     kinetic = modes["kinetic_energy_share"].isel(mode=index).sum("motion").to_numpy()
     bodies = words.gathered(dict(zip(map(str, modes["body"].to_numpy()), map(float, kinetic), strict=True)))
     parts = [("stiffness", words.gives(modes, index)), ("inertia", bodies)]
     levers = [
-        Lever(what, kind, share, shift_of(frequency, share, kind))
+        Sensitivity(what, kind, share, shift_of(frequency, share, kind))
         for kind, shares in parts
         for what, share in shares.items()
     ]
@@ -86,7 +86,7 @@ LOUDER = 1.0
 
 
 @dataclass(frozen=True)
-class Fact:
+class SummaryCard:
     """A fact for a card of the page and a line of the command line."""
 
     kind: str
@@ -127,14 +127,14 @@ def frequency_text(frequency: float) -> str:
 
 
 def facts_of(
-    context: Context, words: Words, group: RunGroup, variations: Sequence[ModelVariations]
-) -> tuple[Fact, ...]:
+    context: Context, words: Labels, group: RunGroup, variations: Sequence[ModelVariations]
+) -> tuple[SummaryCard, ...]:
     """Tell the facts of a group of run-ups; those that it has nothing for are left out."""
     facts = [_loudest(context, words, group), _compliance(group), _lever(words, group, variations)]
     return tuple(fact for fact in facts if fact is not None)
 
 
-def facts_of_response(words: Words, response: xr.Dataset) -> tuple[Fact, ...]:
+def facts_of_response(words: Labels, response: xr.Dataset) -> tuple[SummaryCard, ...]:
     """Tell the fact of a steady response that no run-up of its choice stands beside.
 
     Parameters
@@ -150,10 +150,10 @@ def facts_of_response(words: Words, response: xr.Dataset) -> tuple[Fact, ...]:
         f"({figure_text(level)} dB) at constant speed."
     )
     beside = f"at {speed_text(top.speed)}, {Variant.of(choice_of(response.attrs).variant).label}"
-    return (Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "steady"),)
+    return (SummaryCard("Loudest resonance", frequency_text(top.frequency), beside, said, "steady"),)
 
 
-def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
+def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | None:
     if group.in_operation is not None:
         return _in_operation(words, group, group.in_operation)
     top = group.loudest
@@ -161,7 +161,7 @@ def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
         highest = max(float(run.spectra.speed.max()) for run in group.runs.values())
         with_all = "" if group.responses else " with every window"
         said = f"No resonance stands out up to {speed_text(highest)}{with_all}."
-        return Fact("Loudest resonance", "none", "that stands out", said, "ranking")
+        return SummaryCard("Loudest resonance", "none", "that stands out", said, "ranking")
     unseen = _unseen(context, words, group, top)
     if unseen is not None:
         return unseen
@@ -171,10 +171,10 @@ def _loudest(context: Context, words: Words, group: RunGroup) -> Fact | None:
         f"{_against_rated(context, group)}"
     )
     beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
-    return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
+    return SummaryCard("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
 
 
-def _moves(words: Words, group: RunGroup, resonance: RankedResonance) -> str:
+def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
     """Tell what moves in the mode of a resonance, after a colon; nothing where none is known."""
     modes = group.runs[group.main].modes
     if resonance.finding.mode is not None and modes is not None:
@@ -184,12 +184,12 @@ def _moves(words: Words, group: RunGroup, resonance: RankedResonance) -> str:
     return ""
 
 
-def _in_operation(words: Words, group: RunGroup, ranking: Ranking) -> Fact:
+def _in_operation(words: Labels, group: RunGroup, ranking: Ranking) -> SummaryCard:
     """Tell the resonance that comes first by any of three quantities at constant speed, where the gearbox works."""
     low, high = (speed_text(speed) for speed in ranking.speeds)
     where = f"from {low} to {high}" + ("" if ranking.whole else ", the speeds of operation")
     if not ranking.resonances:
-        return Fact("Loudest resonance", "none", "that stands out", f"No peak stands out {where}.", "ranking")
+        return SummaryCard("Loudest resonance", "none", "that stands out", f"No peak stands out {where}.", "ranking")
     top = ranking.resonances[0]
     parts = [quantity_text(words, name, own, ranking) for name, own in top.loudness.items()]
     near = (own for own in group.ranked[group.main] if abs(own.frequency / top.frequency - 1.0) < SAME_MODE)
@@ -197,10 +197,10 @@ def _in_operation(words: Words, group: RunGroup, ranking: Ranking) -> Fact:
     mode = f" What moves{moves}." if moves else ""
     said = f"Excited by {words.told(top.line)}. At constant speed, {where}: {'; '.join(parts)}.{mode}"
     beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
-    return Fact("Loudest resonance", frequency_text(top.frequency), beside, said, "ranking")
+    return SummaryCard("Loudest resonance", frequency_text(top.frequency), beside, said, "ranking")
 
 
-def quantity_text(words: Words, name: str, loudness: Loudness, ranking: Ranking) -> str:
+def quantity_text(words: Labels, name: str, loudness: Loudness, ranking: Ranking) -> str:
     """Amplitude of a resonance in one of the three quantities, with its place and where it is largest."""
     count = sum(other.loudness[name].place is not None for other in ranking.resonances)
     place = "no peak of its own" if loudness.place is None else f"place {loudness.place} of {count}"
@@ -214,7 +214,7 @@ def quantity_text(words: Words, name: str, loudness: Loudness, ranking: Ranking)
     )
 
 
-def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonance) -> Fact | None:
+def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonance) -> SummaryCard | None:
     """Tell of a resonance that is louder at constant speed than all that the run-up tells apart, if there is one."""
     levels = group.constant.get(group.main)
     found = None if levels is None else levels.highest(order_lines(context.gearbox))
@@ -227,7 +227,7 @@ def _unseen(context: Context, words: Words, group: RunGroup, top: RankedResonanc
         f"loudest there is {frequency_text(top.finding.resonance.frequency)} with {amplitude_text(top.peak.level)}."
     )
     beside = f"at {speed_text(at.speed)}, {Variant.of(group.main).label}"
-    return Fact("Loudest resonance", frequency_text(at.frequency), beside, said, "steady")
+    return SummaryCard("Loudest resonance", frequency_text(at.frequency), beside, said, "steady")
 
 
 def _how(group: RunGroup, resonance: RankedResonance) -> str:
@@ -262,7 +262,7 @@ def _is_near_rated(resonance: RankedResonance, rated: float) -> bool:
     return resonance.speed / RPM <= AROUND_RATED * rated
 
 
-def _compliance(group: RunGroup) -> Fact | None:
+def _compliance(group: RunGroup) -> SummaryCard | None:
     """Tell what compliance does, against the stiff reference."""
     reference = group.ranked.get(REFERENCE_VARIANT)
     top = group.loudest
@@ -283,7 +283,7 @@ def _compliance(group: RunGroup) -> Fact | None:
     )
     sign = "−" if change < 0.0 else "+"
     kind = "What elastic bodies do" if Variant.of(group.main).is_elastic else "What the bearings do"
-    return Fact(kind, f"{sign}{figure_text(abs(change), 2)} dB", "at the loudest peak", said, "ranking")
+    return SummaryCard(kind, f"{sign}{figure_text(abs(change), 2)} dB", "at the loudest peak", said, "ranking")
 
 
 def _resonances(count: int) -> str:
@@ -292,7 +292,7 @@ def _resonances(count: int) -> str:
     return f"{count} resonances appear"
 
 
-def _lever(words: Words, group: RunGroup, variations: Sequence[ModelVariations]) -> Fact | None:
+def _lever(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]) -> SummaryCard | None:
     """Tell what moves the loudest resonance, and whether any change makes it quieter."""
     top = group.loudest
     modes = group.runs[group.main].modes
@@ -307,22 +307,26 @@ def _lever(words: Words, group: RunGroup, variations: Sequence[ModelVariations])
     if heaviest is not None:
         said += f" 10 % more inertia of {heaviest.what}: {shift_text(heaviest)}."
     said += _quieter(words, group, modes, top.finding.mode, variations)
-    return Fact("What moves it", shift_text(stiffest), f"for 10 % more stiffness of {stiffest.what}", said, "change")
+    return SummaryCard(
+        "What moves it", shift_text(stiffest), f"for 10 % more stiffness of {stiffest.what}", said, "change"
+    )
 
 
-def shift_text(lever: Lever) -> str:
+def shift_text(lever: Sensitivity) -> str:
     """Shift of a lever with its sign and unit.
 
     Examples
     --------
-    >>> shift_text(Lever("carrier", "inertia", 0.4, -13.8))
+    >>> shift_text(Sensitivity("carrier", "inertia", 0.4, -13.8))
     '−14 Hz'
     """
     sign = "−" if lever.shift < 0.0 else "+"
     return f"{sign}{figure_text(abs(lever.shift), 2)} Hz"
 
 
-def _quieter(words: Words, group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence[ModelVariations]) -> str:
+def _quieter(
+    words: Labels, group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence[ModelVariations]
+) -> str:
     own = next((one.variations for one in variations if one.choice == group.choice(group.main)), ())
     if not own:
         return ""
@@ -338,7 +342,7 @@ def _quieter(words: Words, group: RunGroup, modes: xr.Dataset, mode: int, variat
     )
 
 
-def best_words(words: Words, best: BestChange) -> str:
+def best_words(words: Labels, best: BestChange) -> str:
     """Say whether the best change of a parameter is worth it."""
     change = words.change(best.label, best.value, best.default)
     if best.gain < NO_GAIN:

@@ -31,7 +31,7 @@ from exugear.report.findings.loudness import (
     truest_of,
     truest_response,
 )
-from exugear.report.findings.words import Words
+from exugear.report.findings.words import Labels
 from exugear.results.run_file import read_run
 from exugear.results.spectra.line_spectra import line_peaks
 from exugear.results.spectra.resonances import Pick, pick_resonances
@@ -319,7 +319,7 @@ class LoudestOrder:
     """rad/s, Hz."""
 
 
-def channels_of(run: VariantRun, words: Words, response: xr.Dataset | None) -> Iterator[Channel]:
+def channels_of(run: VariantRun, words: Labels, response: xr.Dataset | None) -> Iterator[Channel]:
     """Compute the channels of a run-up, or of the steady response that it was made of, bearings and joints first."""
     if response is not None:
         yield from _lines(response, words, float(run.spectra.frequency[-1]))
@@ -329,7 +329,7 @@ def channels_of(run: VariantRun, words: Words, response: xr.Dataset | None) -> I
     yield from _meshes(data, run, words)
 
 
-def _supports(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
+def _supports(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channel]:
     force = data["support_force"]
     names = [str(name) for name in data["support"]]
     sample = force[::SAMPLED]
@@ -347,7 +347,7 @@ def _supports(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel
         yield Channel(names[place], "support", told, copies, mean, float(middle[:, 2].mean()), whole)
 
 
-def _meshes(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
+def _meshes(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channel]:
     force = data["mesh_force"]
     names = [str(name) for name in data["mesh"]]
     for place, copies in _standing_for(names, force[::SAMPLED].std(axis=0), words):
@@ -357,7 +357,7 @@ def _meshes(data: _Signals, run: VariantRun, words: Words) -> Iterator[Channel]:
         yield Channel(names[place], "mesh", f"mesh {told}", copies, mean, math.nan, _waterfall(own, data, run))
 
 
-def _lines(response: xr.Dataset, words: Words, highest: float) -> Iterator[Channel]:
+def _lines(response: xr.Dataset, words: Labels, highest: float) -> Iterator[Channel]:
     supports: dict[str, list[str]] = {}
     meshes: dict[str, list[str]] = {}
     for name in map(str, response["signal"].to_numpy()):
@@ -375,7 +375,7 @@ def _lines(response: xr.Dataset, words: Words, highest: float) -> Iterator[Chann
             yield Channel(place, kind, told, 1, math.nan, math.nan, spectra)
 
 
-def _standing_for(names: Sequence[str], swings: Floats, words: Words) -> list[tuple[int, int]]:
+def _standing_for(names: Sequence[str], swings: Floats, words: Labels) -> list[tuple[int, int]]:
     """Place of the channel that stands for each family, and how many there are."""
     families: dict[str, list[int]] = {}
     for place, name in enumerate(names):

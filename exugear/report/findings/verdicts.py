@@ -49,7 +49,7 @@ BEYOND_RATED = 1.3
 
 
 @dataclass(frozen=True)
-class Verdict:
+class CheckResult:
     """A check that was passed, or a thing to mind."""
 
     passed: bool
@@ -80,7 +80,7 @@ def run_figures(run: VariantRun) -> RunFigures:
     return RunFigures(energy_residual(data), times, float(data["time"][-1]))
 
 
-def verdicts_of(context: Context, group: RunGroup) -> tuple[Verdict, ...]:
+def verdicts_of(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
     """Judge the main variant of a group; what was passed comes first."""
     case = context.gearbox.case
     run = group.runs[group.main]
@@ -88,90 +88,98 @@ def verdicts_of(context: Context, group: RunGroup) -> tuple[Verdict, ...]:
     own = _of_run(run, run_figures(run)) if response is None else _of_response(response)
     verdicts = [*own, *_of_resonances(group)]
     verdicts.append(
-        Verdict(False, f"damping is assumed (meshes {1e6 * case.damping.mesh_time_s:g} µs): levels are only as good")
+        CheckResult(
+            False, f"damping is assumed (meshes {1e6 * case.damping.mesh_time_s:g} µs): levels are only as good"
+        )
     )
     sets = context.gearbox.inertia_sets
     if len(sets) > 1:
-        verdicts.append(Verdict(False, f"inertias are one of {len(sets)} sets ({', '.join(sets)}): see the others"))
+        verdicts.append(CheckResult(False, f"inertias are one of {len(sets)} sets ({', '.join(sets)}): see the others"))
     rated = case.operation.rated_speed_rpm
     fastest = float(run.spectra.speed.max()) / RPM
     if rated is None:
-        verdicts.append(Verdict(False, "the case names no rated speed ([operation] rated_speed_rpm)"))
+        verdicts.append(CheckResult(False, "the case names no rated speed ([operation] rated_speed_rpm)"))
     elif fastest > BEYOND_RATED * rated:
-        verdicts.append(Verdict(False, f"speeds go to {figure_text(fastest / rated, 2)} times the rated one"))
+        verdicts.append(CheckResult(False, f"speeds go to {figure_text(fastest / rated, 2)} times the rated one"))
     return tuple(sorted(verdicts, key=lambda own: not own.passed))
 
 
-def _of_run(run: VariantRun, figures: RunFigures) -> list[Verdict]:
+def _of_run(run: VariantRun, figures: RunFigures) -> list[CheckResult]:
     residual, (pulling, apart, outside, _) = abs(figures.residual), figures.times
     verdicts = (
         []
         if math.isnan(residual)
-        else [Verdict(residual < ENERGY, f"the balance of energy closes within {100.0 * residual:.1g} %")]
+        else [CheckResult(residual < ENERGY, f"the balance of energy closes within {100.0 * residual:.1g} %")]
     )
     doubtful = verdict_of(run.attributes)
     if doubtful:
-        verdicts.append(Verdict(False, f"the run is not to be trusted: {doubtful}"))
+        verdicts.append(CheckResult(False, f"the run is not to be trusted: {doubtful}"))
     for doubt in ("table_doubt", "band_doubt", "bearing_doubt"):
         if run.attributes.get(doubt):
-            verdicts.append(Verdict(False, str(run.attributes[doubt])))
+            verdicts.append(CheckResult(False, str(run.attributes[doubt])))
     if pulling > 0.0:
-        verdicts.append(Verdict(False, f"teeth had to pull for {figure_text(pulling)} s: they would have parted"))
+        verdicts.append(CheckResult(False, f"teeth had to pull for {figure_text(pulling)} s: they would have parted"))
     if apart > 0.0:
-        verdicts.append(Verdict(True, f"teeth were apart for {figure_text(apart)} s, and the law knows it"))
+        verdicts.append(CheckResult(True, f"teeth were apart for {figure_text(apart)} s, and the law knows it"))
     if not pulling and not apart:
-        verdicts.append(Verdict(True, f"no tooth had to pull, {Variant.of(run.variant).label}"))
+        verdicts.append(CheckResult(True, f"no tooth had to pull, {Variant.of(run.variant).label}"))
     if outside > 0.0:
-        verdicts.append(Verdict(False, f"a mesh was outside its table for {figure_text(outside)} s"))
+        verdicts.append(CheckResult(False, f"a mesh was outside its table for {figure_text(outside)} s"))
     if not int(run.attributes["complete"]):
-        verdicts.append(Verdict(False, f"the run was stopped at {figure_text(figures.end)} s"))
+        verdicts.append(CheckResult(False, f"the run was stopped at {figure_text(figures.end)} s"))
     return verdicts
 
 
-def _of_response(response: xr.Dataset) -> list[Verdict]:
+def _of_response(response: xr.Dataset) -> list[CheckResult]:
     error = float(np.nanmax(response["energy_error"]))
     growth = float(response.attrs["growth_rate"])
     verdicts = [
-        Verdict(error < STEADY_ENERGY, f"what damping takes is what the meshes give within {100.0 * error:.1g} %"),
-        Verdict(growth <= 0.0, f"disturbances {'decay' if growth <= 0.0 else 'grow: the steady state does not last'}"),
+        CheckResult(error < STEADY_ENERGY, f"what damping takes is what the meshes give within {100.0 * error:.1g} %"),
+        CheckResult(
+            growth <= 0.0, f"disturbances {'decay' if growth <= 0.0 else 'grow: the steady state does not last'}"
+        ),
     ]
     unsolved = json.loads(response.attrs["not_converged"])
     if unsolved:
-        verdicts.append(Verdict(False, f"no steady state was found at {len(unsolved)} speeds, which are left blank"))
+        verdicts.append(
+            CheckResult(False, f"no steady state was found at {len(unsolved)} speeds, which are left blank")
+        )
     remarks = [str(words) for words in response["remark"].to_numpy() if str(words)]
     if remarks:
-        verdicts.append(Verdict(False, f"speeds with remarks: {len(remarks)}, the first: {remarks[0]}"))
+        verdicts.append(CheckResult(False, f"speeds with remarks: {len(remarks)}, the first: {remarks[0]}"))
     for pull in () if LAWS[str(response.attrs["mesh_model"])].loses_contact else pulls(response):
         where = f"{pull.count} of {response.sizes['point']} speeds, longest at {abs(pull.speed) / RPM:.4g} rpm"
         said = f"teeth of {pull.mesh} would have to pull at {where}: they would part, and levels there are not real"
-        verdicts.append(Verdict(False, said))
+        verdicts.append(CheckResult(False, said))
     for swing in bearing_swings(response):
         said = (
             f"vibration takes up to {100.0 * swing.share:.0f} % of the static load of the bearing {swing.bearing} (at "
             f"{abs(swing.speed) / RPM:.4g} rpm): linear bearings make levels there too high"
         )
-        verdicts.append(Verdict(False, said))
+        verdicts.append(CheckResult(False, said))
     apart = float(np.nanmax(response["contact_loss_fraction"], initial=0.0))
     if apart > 0.0:
         verdicts.append(
-            Verdict(True, f"teeth are apart for up to {100.0 * apart:.2g} % of the time, and the law knows")
+            CheckResult(True, f"teeth are apart for up to {100.0 * apart:.2g} % of the time, and the law knows")
         )
     return verdicts
 
 
-def _of_resonances(group: RunGroup) -> list[Verdict]:
+def _of_resonances(group: RunGroup) -> list[CheckResult]:
     loudest = group.ranked[group.main][:LOUDEST]
     if not loudest:
         return []
     count = len(loudest)
     steady = sum(own.steady for own in loudest)
-    verdicts: list[Verdict] = []
+    verdicts: list[CheckResult] = []
     if not group.responses:
-        verdicts.append(Verdict(steady == count, f"{steady} of the {count} loudest stay with windows of other lengths"))
+        verdicts.append(
+            CheckResult(steady == count, f"{steady} of the {count} loudest stay with windows of other lengths")
+        )
     if group.runs[group.main].modes is None and not group.responses:
-        return [*verdicts, Verdict(False, "no modes were computed (exugear modes): nothing tells what moves")]
+        return [*verdicts, CheckResult(False, "no modes were computed (exugear modes): nothing tells what moves")]
     matched = sum(bool(own.finding.mode_name) for own in loudest)
-    return [*verdicts, Verdict(matched >= MATCHED * count, f"{matched} of the {count} loudest match an eigenmode")]
+    return [*verdicts, CheckResult(matched >= MATCHED * count, f"{matched} of the {count} loudest match an eigenmode")]
 
 
 # How modes move with what was assumed, over whole ranges, and whether anything grows quieter by it

@@ -24,7 +24,7 @@ MOTIONS = {
     "deformation": ("deforms", "deform"),
 }
 """Motions of bodies as verbs, of one body and of several."""
-TOLD, LEAST_TOLD = 0.8, 0.1
+DESCRIBED_ENERGY, MIN_ENERGY = 0.8, 0.1
 """Share of the kinetic energy that is told of a mode, and the least share of what is told."""
 GIVES = 2
 """Elements that are told to give way."""
@@ -33,12 +33,12 @@ _OF = re.compile(r"(?<= of )\w+")
 _NAME = re.compile(r"\w+(?:-\w+)*")
 
 
-class Words:
+class Labels:
     """Words for the names of one gearbox.
 
     Examples
     --------
-    >>> words = Words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+    >>> words = Labels(Gearbox.from_toml("cases/grc750/gearbox.toml"))
     >>> words.of("hss_bc"), words.of("pl_b_2"), words.of("planet_1"), words.of("im_gear")
     ('high-speed bearing B/C', 'planet bearing B 2', 'planet 1', 'im gear')
     """
@@ -61,7 +61,7 @@ class Words:
 
         Examples
         --------
-        >>> words = Words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+        >>> words = Labels(Gearbox.from_toml("cases/grc750/gearbox.toml"))
         >>> words.told("2 x high_speed"), words.told("lss axial 94 %; strained: lss_bc 99 %")
         ('2 × high-speed', 'low-speed shaft axial 94 %; strained: low-speed bearing B/C 99 %')
         """
@@ -77,7 +77,7 @@ class Words:
 
         Examples
         --------
-        >>> words = Words(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+        >>> words = Labels(Gearbox.from_toml("cases/grc750/gearbox.toml"))
         >>> words.change("stiffness of planet bearings / default", 2.8, 1.0)
         '2.8 times the stiffness of planet bearings'
         >>> words.change("axial inertia of hss / kg m²", 0.05, 0.1)
@@ -161,7 +161,7 @@ class Words:
         told = 0.0
         verbs: dict[str, list[str]] = {}
         for (name, motion), share in sorted(shares.items(), key=lambda item: -item[1]):
-            if verbs and (told >= TOLD or share < LEAST_TOLD):
+            if verbs and (told >= DESCRIBED_ENERGY or share < MIN_ENERGY):
                 break
             verbs.setdefault(name, []).append(MOTIONS[motion][name == "planets"])
             told += share

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from exugear.gearbox.units import RPM
 from exugear.results.spectra.waterfall import OrderLine, Waterfall, overlapping_frames
 from fe_ste.tools.arrays import Complexes, Floats
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ def _pick_at(
 
 
 @dataclass(frozen=True)
-class Resonance(Displayed, line=" {_frequency_text}, {_highest_text}, {picks!n} peaks"):
+class Resonance(ReprMixin, line=" {_frequency_text}, {_highest_text}, {picks!n} peaks"):
     """Peaks of several order lines at one frequency."""
 
     frequency: float
@@ -217,7 +217,7 @@ def match_eigenfrequencies(
 
 
 @dataclass(frozen=True)
-class OrderCut(Displayed):
+class OrderCut(ReprMixin):
     """Amplitude and phase along an order."""
 
     line: OrderLine
@@ -304,7 +304,7 @@ def order_cut(
 
 # Run-ups as sweeps through resonances: orders cut as finely as their sweep allows, and what does not build up
 
-TOO_FAST = 0.3
+MAX_SWEEP_RATIO = 0.3
 """Severity of a sweep above which the peak of a resonance is told as lost: at 0.4 it lacks 8 %, at 20 two thirds."""
 FEWEST_SAMPLES = 16
 """Samples of the shortest window."""

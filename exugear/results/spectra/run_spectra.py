@@ -25,7 +25,7 @@ from exugear.results.spectra.resonances import (
 )
 from exugear.results.spectra.waterfall import OrderLine, Waterfall, sweep_matched_window, waterfall
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed, TitledRows
+from fe_ste.tools.display import ReprMixin, TitledRows
 
 # Eigenmodes in figures: what each one moves and strains, and how strongly the overall transmission error sees it
 
@@ -46,7 +46,7 @@ def mobility_shares(modes: xr.Dataset) -> Floats:
 
 
 @dataclass(frozen=True)
-class ModeReport(Displayed):
+class ModeReport(ReprMixin):
     """One eigenmode in figures."""
 
     index: int
@@ -127,7 +127,7 @@ _NAMES = ("time", "input_speed", "overall_dte")
 
 
 @dataclass(frozen=True)
-class RunSignals(Displayed, line=": {overall.size} samples at {rate:.6g} Hz"):
+class RunSignals(ReprMixin, line=": {overall.size} samples at {rate:.6g} Hz"):
     """What the waterfall of a run-up is made of."""
 
     path: Path
@@ -221,7 +221,7 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class VariantRun(Displayed):
+class VariantRun(ReprMixin):
     """A run-up with its spectra, resonances and modes."""
 
     path: Path
@@ -367,7 +367,7 @@ def _is_absent(pick: Pick, other: Waterfall, peaks: Sequence[Pick], rule: Absenc
 
 
 @dataclass(frozen=True)
-class Comparison(Displayed):
+class Comparison(ReprMixin):
     """Run-ups of two variants under the same law, inertia set and load case."""
 
     first: VariantRun

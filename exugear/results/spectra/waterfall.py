@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed, TitledRows, value_range
+from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
 # Order lines: what turns with a gearbox excites a fixed number of times per turn of the reference shaft
 
@@ -162,7 +162,7 @@ def sweep_matched_window(sweep_rate: float) -> float:
 
 
 @dataclass(frozen=True)
-class Waterfall(Displayed, line=": {time.size} spectra of {frequency.size} lines, {_spans}, {description}"):
+class Waterfall(ReprMixin, line=": {time.size} spectra of {frequency.size} lines, {_spans}, {description}"):
     """Spectra over the speed of the reference shaft."""
 
     time: Floats

@@ -29,8 +29,8 @@ import numpy as np
 
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 from fe_ste.tools.compilation import kernel
-from fe_ste.tools.display import Displayed
-from fe_ste.tools.inner_kernels import kept_bundle
+from fe_ste.tools.display import ReprMixin
+from fe_ste.tools.inner_kernels import cached_struct
 from fe_ste.tools.octets import SIZE, all_eight, eight, put
 
 LARGEST_RATIO = 40
@@ -40,7 +40,7 @@ SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class LineSet(Displayed, line=": {index!n} lines of {index.shape[1]} bases"):
+class LineSet(ReprMixin, line=": {index!n} lines of {index.shape[1]} bases"):
     r"""Lines of a real signal x = x_0 + sum_k (c_k e^(i k . theta) + its conjugate).
 
     Arrays of a signal have the coefficients c along their first axis; the first one, the mean, is real. The peak
@@ -329,7 +329,7 @@ class LatticeError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class Lattice(Displayed, line=": {samples} samples for {lines.index!n} lines"):
+class TorusSampling(ReprMixin, line=": {samples} samples for {lines.index!n} lines"):
     """Samples of quasi-periodic signals."""
 
     lines: LineSet
@@ -377,7 +377,7 @@ class Lattice(Displayed, line=": {samples} samples for {lines.index!n} lines"):
         return np.asarray(found)
 
 
-def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = False) -> Lattice:
+def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = False) -> TorusSampling:
     """Find a lattice on which all lines of a larger set have slots of their own.
 
     Parameters
@@ -414,7 +414,7 @@ def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = Fals
             generator = lines.units @ np.append(1, rng.integers(2, samples, size=independent - 1)).astype(np.int64)
             taken = np.bincount((whole @ generator) % samples, minlength=samples)
             if (taken[(apart @ generator) % samples] == 1).all():
-                return Lattice(lines, generator, samples)
+                return TorusSampling(lines, generator, samples)
         samples = _smooth(int(samples * GROWTH) + 2)
     raise LatticeError(f"no lattice was found for {len(whole)} lines")
 
@@ -520,7 +520,7 @@ class Coupling:
         values : (n, k)
         """
         real, imaginary = self.memory()
-        take_in(kept_bundle(self.terms), *flat(functions), np.ascontiguousarray(values, complex), real, imaginary)
+        take_in(cached_struct(self.terms), *flat(functions), np.ascontiguousarray(values, complex), real, imaginary)
         whole = (real + 1j * imaginary).reshape(len(values), -1)
         ends = np.cumsum(self.terms.room)
         return np.hstack(

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from exugear.steady.mean_system.mean_system import PLACE_STEP, PLACES, RATE_STEP, MeanSystem
-from exugear.steady.mean_system.mesh_places import POSITION, MeshPlaces, MeshPorts, wave_shapes
+from exugear.steady.mean_system.mesh_places import POSITION, MeshInterface, MeshPlaces, wave_shapes
 from exugear.steady.mean_system.mesh_waves import WAVES, MeshWaves, wave_name
 from exugear.steady.mean_system.rotating_frame import PlanetSet, SteadyError
 from exugear.steady.mean_system.sampled_laws import sample_rolling
@@ -238,7 +238,7 @@ def bearing_waves(meshes: MeshWaves) -> BearingWaves | None:
     return BearingWaves(meshes.system, tuple(waves), carriers)
 
 
-def ports_with_bearings(ports: MeshPorts, bearings: BearingMean) -> MeshPorts:
+def ports_with_bearings(ports: MeshInterface, bearings: BearingMean) -> MeshInterface:
     """Ports of meshes and behind them those of bearings.
 
     Laws with fewer readings or forces have rows of zeros; the first reading of a mesh is the first here, the last the
@@ -257,7 +257,7 @@ def ports_with_bearings(ports: MeshPorts, bearings: BearingMean) -> MeshPorts:
     pushed[:count, : ports.forces.shape[1]] = ports.forces
     read[count:, :COMPONENTS], rates[count:, :COMPONENTS] = bearings.readings, bearings.rates
     static[count:, :COMPONENTS], pushed[count:, :COMPONENTS] = bearings.static, bearings.pushes
-    return MeshPorts(read, static, pushed, ports.positions, ports.levers, rates)
+    return MeshInterface(read, static, pushed, ports.positions, ports.levers, rates)
 
 
 def places_with_bearings(

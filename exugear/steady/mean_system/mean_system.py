@@ -26,7 +26,7 @@ from exugear.system.bearings.stiffness import load_stands_still, planet_supports
 from exugear.system.statics import RIGID_BODY_LIMIT, BalanceError, static_state
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 PLACE_STEP, RATE_STEP = 1e-6, 1e-3
 """Steps of central differences by u and u'; forces are all but linear in the latter."""
@@ -61,7 +61,7 @@ LEAST_ENERGY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class MeanSystem(Displayed):
+class MeanSystem(ReprMixin):
     """Mean system of an assembly over speed."""
 
     frame: RotatingFrame

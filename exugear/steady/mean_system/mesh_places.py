@@ -117,7 +117,7 @@ FRONT, BACK, CENTRE, TILT, BACK_TILT = range(5)
 
 
 @dataclass(frozen=True, eq=False)
-class MeshPorts:
+class MeshInterface:
     """Rows of all mesh waves at one speed; m waves, r readings, f forces."""
 
     readings: Floats
@@ -135,7 +135,7 @@ class MeshPorts:
     """(m, r, size) rows of what the law reads by the rates of the coordinates; non-linear bearings have some."""
 
 
-def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
+def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshInterface:
     """Rows of all mesh waves at a speed of the input (rad/s); `parting` for the law `table`."""
     meshes = waves.assembly.meshes
     rows, offsets = _table_rows(meshes) if parting else _row_rows(meshes, waves.wander)
@@ -149,7 +149,7 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshPorts:
     forces = readings[:-1] if parting else [waves.gradients(meshes.force - levers, speed), *readings[1:-1]]
     shift = meshes.tilt[:, TILT_LEVER] * (meshes.table.nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST])
     beside = waves.values(levers, speed) + means * shift[firsts]
-    return MeshPorts(
+    return MeshInterface(
         readings=np.stack(readings, axis=1),
         static=np.stack([*static, ahead], axis=1),
         forces=np.stack(forces, axis=1),
@@ -248,7 +248,7 @@ def group_of(family: Family, harmonics: int, forces: int, bases: int) -> Group:
 
 
 def coupled(
-    waves: MeshWaves, family: Family, spectra: Spectra, ports: MeshPorts, speed: float, forces: int
+    waves: MeshWaves, family: Family, spectra: Spectra, ports: MeshInterface, speed: float, forces: int
 ) -> Complexes:
     """Coefficients (q, forces of waves, readings of waves) at the harmonics of `group_of`, at a speed (rad/s).
 
@@ -268,7 +268,7 @@ def coupled(
     return np.asarray(found.reshape(-1, family.count * forces, family.count * forces))
 
 
-def _between_waves(family: Family, cycles: Complexes, ports: MeshPorts, speed: float) -> Complexes:
+def _between_waves(family: Family, cycles: Complexes, ports: MeshInterface, speed: float) -> Complexes:
     """Coefficients (f, h + 1, 1, waves, waves) of each wave with itself, and of the mean wave to others."""
     orders = 2j * math.pi * np.arange(cycles.shape[1])
     turned = cycles * np.exp(orders * ports.positions[family.first])
@@ -278,7 +278,7 @@ def _between_waves(family: Family, cycles: Complexes, ports: MeshPorts, speed: f
     return found
 
 
-def _between_places(family: Family, cycles: Complexes, ports: MeshPorts, speed: float) -> Complexes:
+def _between_places(family: Family, cycles: Complexes, ports: MeshInterface, speed: float) -> Complexes:
     """Coefficients (f, h + 1, turns, waves, waves) by all places, each as far ahead as the static state has it."""
     samples = SAMPLED * family.turns if family.carrier >= 0 else 1
     theta = 2.0 * math.pi * np.arange(samples) / samples

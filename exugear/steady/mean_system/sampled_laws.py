@@ -38,10 +38,10 @@ from exugear.system.kernels.table_law import (
     surface_law,
     surface_tangent,
 )
-from exugear.system.tooth_mesh.laws.line_of_action import STRAIGHT
+from exugear.system.tooth_mesh.laws.line_of_action import LINEAR_BELOW
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import compiled, kernel
-from fe_ste.tools.inner_kernels import kept_bundle
+from fe_ste.tools.inner_kernels import cached_struct
 
 TOUCHING = 0.25e-6
 """Approach over which the damping of teeth that touch sets in, m.
@@ -114,8 +114,8 @@ def sample_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
     deflection, moved = readings.T
     (k, k_slope), (n, n_slope) = _moved(curve[:3], moved), _moved(curve[3:], moved)
     pressed = k * np.abs(deflection) / load
-    bent = pressed > STRAIGHT
-    level = np.log(np.where(bent, pressed, STRAIGHT))
+    bent = pressed > LINEAR_BELOW
+    level = np.log(np.where(bent, pressed, LINEAR_BELOW))
     force = k * np.exp(n * level) * deflection
     tangent = k * np.exp(n * level) * (1.0 + bent * n)
     by_position = force * (n_slope * level + (1.0 + bent * n) * k_slope / k)
@@ -272,7 +272,9 @@ def sample_rolling(rolling: RollingArrays, law: int, readings: Floats) -> tuple[
     """
     force = np.empty(readings.shape)
     slope = np.empty((*readings.shape, readings.shape[1]))
-    _fill(law, np.ascontiguousarray(readings), np.zeros(6), kept_bundle(rolling), rolling_memory(rolling), force, slope)
+    _fill(
+        law, np.ascontiguousarray(readings), np.zeros(6), cached_struct(rolling), rolling_memory(rolling), force, slope
+    )
     return force, slope
 
 

@@ -41,7 +41,7 @@ from exugear.system.bearings.rolling.ratings import (
 from exugear.system.bearings.rolling.rows import BearingError, BearingOfRows, RollingRow, is_rib
 from exugear.system.bearings.stiffness import LEAST_LOAD, holding_force, holds_one_way, law_in_words
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # The state that a bearing works in: what it carries, how its rings stand, and how stiff its rows are there
 
@@ -50,7 +50,7 @@ CAGE_POSITIONS = 4
 
 
 @dataclass(frozen=True)
-class OperatingPoint(Displayed):
+class OperatingPoint(ReprMixin):
     """A catalogue bearing under the static load of its gearbox."""
 
     bearing: Bearing
@@ -177,7 +177,7 @@ class Sensitivity:
 
 
 @dataclass(frozen=True)
-class BearingDuty:
+class BearingLoadState:
     """What a catalogue bearing bears."""
 
     name: str
@@ -246,7 +246,7 @@ def _two_designs(section: CatalogueSection, taken: KnownRating) -> str:
     )
 
 
-def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDuty:
+def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingLoadState:
     """Find what a bearing bears at its operating point.
 
     Parameters
@@ -265,7 +265,7 @@ def duty_of(point: OperatingPoint, reaction: Floats | None = None) -> BearingDut
     radial = point.radial_load
     axial = float(point.load[2])
     equivalent = equivalent_load(rows, section.type, radial, abs(axial), ratings.static)
-    return BearingDuty(
+    return BearingLoadState(
         name=bearing.name,
         family=bearing.family,
         kind=section.type,

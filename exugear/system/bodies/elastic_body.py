@@ -16,13 +16,13 @@ import numpy as np
 from exugear.system.bodies.reduction import ReducedBody, ReductionError, RigidInertia
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from fe_ste.tools.arrays import Complexes, Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # An elastic body as modes in a frame that floats with it: what the reduction gives and Exudyn takes
 
 
 @dataclass(frozen=True)
-class FloatingBody(Displayed, line=" {name}: {seats!n} seats, {stiffness!n} modes, {mass:.4g} kg"):
+class FloatingBody(ReprMixin, line=" {name}: {seats!n} seats, {stiffness!n} modes, {mass:.4g} kg"):
     """A solid as modes in its own frame; n coordinates of the reduced body, k modes, s seats."""
 
     name: str
@@ -81,7 +81,7 @@ class FloatingBody(Displayed, line=" {name}: {seats!n} seats, {stiffness!n} mode
 
 
 @dataclass(frozen=True)
-class ElasticBody(Displayed):
+class ElasticBody(ReprMixin):
     """A reduced body of a gearbox."""
 
     reduced: ReducedBody

@@ -91,7 +91,7 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         The body has no shape, or a shape that its gears and bearings do not fit on.
     """
     body = gearbox.body(name)
@@ -251,7 +251,7 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         The body has no solid, its file is not there, in no format that is read, or lies where it may not, or a seat of
         something on it is missing or not known well enough.
     """
@@ -423,7 +423,7 @@ def solids_of(gearbox: Gearbox) -> Iterator[tuple[str, SolidModel]]:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         As `solid_body`.
     """
     for name in elastic_names(gearbox):
@@ -441,7 +441,7 @@ def check_solids(gearbox: Gearbox, folder: Path) -> None:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A script that may not run, or as `solid_body`.
     """
     for key, model in solids_of(gearbox):
@@ -466,7 +466,7 @@ def reduced_bodies(
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A shape or solid that cannot be, or that its gears and bearings do not fit on.
     """
     bodies = {}
@@ -509,7 +509,7 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A shape or solid that cannot be, a solid whose file is not there, seats that do not fit.
     """
     family = gearbox.body(name).family

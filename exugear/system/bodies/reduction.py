@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from exugear.system.kernels.coordinates import AXIAL, BODY_SIZE, TILT
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.stores import Store
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ class ReductionSummary:
 
 @dataclass(frozen=True)
 class ReducedBody(
-    Displayed,
+    ReprMixin,
     line=" {name}: {seats!n} seats, {modal_groups!n} modal coordinates, {rigid_inertia.mass:.4g} kg, frame {frame}",
 ):
     """A reduced elastic body; n coordinates.

@@ -144,7 +144,7 @@ def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, 
 
 
 @kernel
-def way_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float, float, float]:
+def shuttling_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float, float, float]:
     """Way (m) and moment (N m) of coefficients (n, 8), each with its slope per cycle, as `stiffness_at`."""
     scaled = (pmc - math.floor(pmc)) * pieces
     piece = piece_at(scaled, pieces)
@@ -253,7 +253,7 @@ def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float, floa
     """Way w (m) of the load of mesh m at a position in its cycle, its slope; moment F0 (c - w) (N m), its slope."""
     if meshes.way_pieces[m] == 0:
         return 0.0, 0.0, 0.0, 0.0
-    return way_at(meshes.way[m], meshes.way_pieces[m], pmc)
+    return shuttling_at(meshes.way[m], meshes.way_pieces[m], pmc)
 
 
 @kernel

@@ -31,7 +31,7 @@ import numpy as np
 from fe_ste.contact.kinematics import ContactError
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.transmission_error.mean_contact import POSITIONS, MeanContact, contact_input, known_contacts
 from fe_ste.transmission_error.table import TableInput
 
@@ -267,7 +267,7 @@ with ten by 1 %."""
 
 
 @dataclass(frozen=True)
-class MeshDuty(Displayed):
+class MeshLoadState(ReprMixin):
     """A mesh under the static load."""
 
     name: str
@@ -291,7 +291,7 @@ class MeshDuty(Displayed):
         return f" of {self.name!r}: open by {1e6 * self.opening:.3g} um, K_Hbeta {self.face_load_factor:.3g}"
 
 
-def with_contact(duty: MeshDuty, place: MeshPlace | None, flank: int) -> MeshDuty:
+def with_contact(duty: MeshLoadState, place: MeshPlace | None, flank: int) -> MeshLoadState:
     """Add what finite-element contact tells of a mesh.
 
     Parameters

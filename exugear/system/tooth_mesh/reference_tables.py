@@ -50,7 +50,7 @@ def requested_references(
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A pair that is not in the file, or that carries no load in its static state.
 
     Examples

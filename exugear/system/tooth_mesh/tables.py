@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import UM
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.geometry.gears import GearPair
@@ -188,7 +188,7 @@ def requested_tables(
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         A pair that is not in the file, or that carries no load in its static state.
 
     Examples
@@ -201,7 +201,7 @@ def requested_tables(
     for name in chosen:
         if name not in gearbox.pairs:
             known = ", ".join(gearbox.pairs)
-            raise CaseError(f"{gearbox.source}: no gear pair {name!r}; the pairs are {known}")
+            raise GearboxFileError(f"{gearbox.source}: no gear pair {name!r}; the pairs are {known}")
         if not gearbox.pairs[name].static_torque > 0.0 or name in gearbox.stated_stiffness:
             raise gearbox.fault(without_table(gearbox, [name]))
     grid = grid or gearbox.ste.grid
@@ -246,7 +246,7 @@ def wanted_table(
 
     Raises
     ------
-    CaseError
+    GearboxFileError
         If the gears cannot run at a centre distance of the axes.
     """
     spec = gearbox.pairs[name]
@@ -507,12 +507,12 @@ LEAST_PUSH = 1e-6
 
 
 @dataclass(frozen=True)
-class WanderingLoad:
+class Shuttling:
     """Way of the load along the face, in its first harmonic.
 
     Examples
     --------
-    >>> WanderingLoad("helical", 1.8e-3, 4.3).in_words
+    >>> Shuttling("helical", 1.8e-3, 4.3).in_words
     'helical: the load moves by +-1.8 mm along the face in each mesh cycle'
     """
 
@@ -529,7 +529,7 @@ class WanderingLoad:
         return f"{self.pair}: the load moves by +-{1e3 * self.amplitude:.2g} mm along the face in each mesh cycle"
 
 
-def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[WanderingLoad, ...]:
+def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[Shuttling, ...]:
     """Way of the load of each pair that has a table, at the static load, that which counts most first.
 
     Parameters
@@ -546,7 +546,7 @@ def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[WanderingLoad, ...]
     return tuple(sorted(loads, key=lambda own: -own.over_error))
 
 
-def _way(name: str, point: xr.Dataset, width: float) -> WanderingLoad:
+def _way(name: str, point: xr.Dataset, width: float) -> Shuttling:
     centre, error, stiffness = (
         np.asarray(point[key].to_numpy(), dtype=np.float64).reshape(-1)
         for key in ("load_centroid", "ste", "mesh_stiffness")
@@ -554,7 +554,7 @@ def _way(name: str, point: xr.Dataset, width: float) -> WanderingLoad:
     force = float(point["line_of_action_force"].mean())
     at_ends = force * _first_harmonic(centre) / (0.5 * width)
     pushed = max(stiffness.mean() * _first_harmonic(error), LEAST_PUSH * force)
-    return WanderingLoad(name, _first_harmonic(centre), float(at_ends / pushed))
+    return Shuttling(name, _first_harmonic(centre), float(at_ends / pushed))
 
 
 def _first_harmonic(values: Floats) -> float:

@@ -26,7 +26,7 @@ from exugear.system.modes import coordinate_labels
 from exugear.system.statics import Linearised, linearise
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats, Integers
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # Methods of time integration: their coefficients, and what they make of free and forced motions
 
@@ -53,10 +53,10 @@ LIGHTEST_DAMPING = 2e-3
 FOLLOWED_CLOSELY = 1e-2
 """Motions that turn by less than this in a step (rad) are followed to 1e-9 by all methods: round-off is larger."""
 LATEST, KNOWN = range(2)
-"""Entries of `Past.counts`."""
+"""Entries of `StepHistory.counts`."""
 
 
-class Past(NamedTuple):
+class StepHistory(NamedTuple):
     """Accelerations that a run has passed, as the compiled loop keeps them."""
 
     accelerations: Floats
@@ -68,7 +68,7 @@ class Past(NamedTuple):
     """(2,) row of the latest, and how many are known."""
 
     @classmethod
-    def of(cls, method: Method, accelerations: Floats) -> Past:
+    def of(cls, method: Method, accelerations: Floats) -> StepHistory:
         """Memory for a method; accelerations (n, size) that are known at the steps before, the latest last."""
         rows = max(1, method.points)
         known = accelerations[-rows:]
@@ -342,7 +342,7 @@ MOST_DIVISIONS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class Integration(Displayed):
+class Integration(ReprMixin):
     """How a run is integrated."""
 
     method: Method

@@ -34,7 +34,7 @@ from exugear.transient.compiled.integrator import (
     PREDICT_VELOCITY,
     RUNGE_KUTTA,
     Method,
-    Past,
+    StepHistory,
 )
 from exugear.transient.compiled.packing import Equations, Work, equations_of, work_for
 from exugear.transient.compiled.sampling import Columns, columns_of, take_sample
@@ -59,7 +59,7 @@ def take(q: Floats, v: Floats, work: Work) -> None:
 
 
 @kernel
-def predict(step: float, method: Method, past: Past, work: Work) -> None:
+def predict(step: float, method: Method, past: StepHistory, work: Work) -> None:
     """Fill the stage's state with the one a step ahead and `past.sums[0]` with its acceleration, both extrapolated."""
     weights = method.weights
     ahead = past.sums[0]
@@ -82,7 +82,7 @@ def predict(step: float, method: Method, past: Past, work: Work) -> None:
 
 
 @kernel
-def correct(step: float, method: Method, past: Past, work: Work) -> None:
+def correct(step: float, method: Method, past: StepHistory, work: Work) -> None:
     """Take the predicted state over, corrected by how far the acceleration there is from the extrapolated one."""
     of_v = step * method.correction[CORRECT_VELOCITY]
     of_q = step * step * method.correction[CORRECT_POSITION]
@@ -93,7 +93,7 @@ def correct(step: float, method: Method, past: Past, work: Work) -> None:
 
 
 @kernel
-def corrected_by(i: int, past: Past, work: Work) -> float:
+def corrected_by(i: int, past: StepHistory, work: Work) -> float:
     """Difference of the acceleration of coordinate i from the extrapolated one; one that is missing has none."""
     if i < past.sums.shape[1]:
         return float(work.rate[i] - past.sums[0, i])
@@ -101,7 +101,7 @@ def corrected_by(i: int, past: Past, work: Work) -> float:
 
 
 @kernel
-def correct_spinning_meshes(step: float, method: Method, past: Past, meshes: Meshes, work: Work) -> None:
+def correct_spinning_meshes(step: float, method: Method, past: StepHistory, meshes: Meshes, work: Work) -> None:
     """Carry what meshes of gears that only spin do on to the corrected state, to first order: two products each.
 
     Rows of other meshes would take a tenth of a step; `exugear.transient.filters` puts their signals right.
@@ -122,7 +122,7 @@ def correct_spinning_meshes(step: float, method: Method, past: Past, meshes: Mes
 
 
 @kernel
-def runge_kutta_stage(stage: int, step: float, past: Past, work: Work) -> None:
+def runge_kutta_stage(stage: int, step: float, past: StepHistory, work: Work) -> None:
     """Fill the stage's state, after the first with the accelerations of the one before, which are in `work.rate`.
 
     The first acceleration is that of the state itself, the latest of the past. In the last stage the step is over: the
@@ -153,7 +153,7 @@ def runge_kutta_stage(stage: int, step: float, past: Past, work: Work) -> None:
 
 
 @kernel
-def keep_acceleration(as_new: bool, work: Work, past: Past) -> None:
+def keep_acceleration(as_new: bool, work: Work, past: StepHistory) -> None:
     """Make the accelerations in `work.rate` the latest of the past, in place of the latest one if not as new."""
     if as_new:
         past.counts[LATEST] = (past.counts[LATEST] + 1) % past.accelerations.shape[0]
@@ -189,7 +189,7 @@ def advance(
     method: Method,
     equations: Equations,
     work: Work,
-    past: Past,
+    past: StepHistory,
     columns: Columns,
     stride: int,
     out_q: Floats,
@@ -322,7 +322,7 @@ class CompiledSystem:
         parting = LAWS[assembly.mesh_model].signals_positions
         interval = POWER_INTERVAL_PARTING if parting else POWER_INTERVAL
         self._stride = max(1, int(interval / step + 1e-9))
-        self._past = Past.of(method, np.zeros((0, assembly.size)) if past is None else past)
+        self._past = StepHistory.of(method, np.zeros((0, assembly.size)) if past is None else past)
         self._past_b, self._method_b = bundle(self._past), bundle(method)
 
     @property

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel
 
-from exugear.gearbox.sections.case import CaseFile
+from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.entries import Range
 
 from .box import write_plate
@@ -366,7 +366,7 @@ def _bare(kind: Any) -> Any:
 
 def _known_key(content: Any, rng: random.Random) -> str:
     """Set a key that the model knows, there or not, to a value that its range allows, or to one of its ends."""
-    path, model = rng.choice(list(_model_tables(content, CaseFile, ())))
+    path, model = rng.choice(list(_model_tables(content, GearboxFile, ())))
     name = rng.choice(list(model.model_fields))
     field = model.model_fields[name]
     return _put(content, (*path, name), _valid(field.annotation, tuple(field.metadata), content, rng))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from exugear.cli.console import BadInputError, Bars, FailedError, exit_codes, files_read, model_errors
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError
 
@@ -47,7 +47,7 @@ def test_an_error_closes_the_display_and_the_next_work_has_its_own():
 @pytest.mark.parametrize(
     ("error", "code"),
     [
-        (CaseError("gearbox.toml: bodies: missing"), 2),
+        (GearboxFileError("gearbox.toml: bodies: missing"), 2),
         (MeshError("a mesh that cannot be"), 2),
         (BalanceError("no state at rest"), 1),
         (BadInputError("bad"), 2),
@@ -68,7 +68,7 @@ def test_an_error_of_the_program_keeps_its_traceback():
 
 
 def test_who_looks_at_an_error_gets_that_of_the_command_line_with_its_cause():
-    cause = CaseError("one", "two")
+    cause = GearboxFileError("one", "two")
     with pytest.raises(BadInputError) as told, model_errors():
         raise cause
     assert told.value.__cause__ is cause

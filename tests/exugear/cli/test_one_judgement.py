@@ -12,7 +12,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.project import Project
 from exugear.studies.executors import processes
 from exugear.studies.runner import run_study
@@ -161,7 +161,7 @@ def test_what_reaches_too_far_across_a_shoulder_every_verb_refuses_alike(tmp_pat
         out = () if verb == "check" else ("--out", folder)
         result = exugear(verb, case, *options, *out)
         assert result.exit_code == 2 and fault in one_line(result.stderr), (verb, result.output)
-    with pytest.raises(CaseError, match=fault):
+    with pytest.raises(GearboxFileError, match=fault):
         check_parts(Gearbox.from_dict(shafted()).varied(content))
     assert not folder.exists()
 

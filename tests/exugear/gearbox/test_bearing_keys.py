@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.connections import TYPES_OF_KEYS
 from exugear.system.readiness import check_parts
 
@@ -38,7 +38,7 @@ def with_keys(content: Content, keys: dict[str, Any], bearing: dict[str, Any]) -
 
 
 def refusal(content: Content, keys: dict[str, Any], bearing: dict[str, Any] | None = None) -> str:
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         check_parts(with_keys(content, keys, bearing or {}))
     message = str(caught.value)
     assert "\n" not in message
@@ -142,5 +142,7 @@ def test_two_bearings_at_one_place_are_refused_by_name(content: Content, distanc
     if said is None:  # side by side
         Gearbox.from_dict(case, str(folder / "case.toml"))
         return
-    with pytest.raises(CaseError, match=f"case.toml: bearings.bearing_3.z_mm.*is where bearings.bearing_2 is, {said}"):
+    with pytest.raises(
+        GearboxFileError, match=f"case.toml: bearings.bearing_3.z_mm.*is where bearings.bearing_2 is, {said}"
+    ):
         Gearbox.from_dict(case, str(folder / "case.toml"))

@@ -13,7 +13,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import summarise_loads
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.system.modes import eigenmodes
 from exugear.system.readiness import check_parts, lacking, remarks
 from exugear.system.statics import locked_equilibrium
@@ -136,7 +136,7 @@ def test_a_differential_has_modes_and_runs_and_no_steady_response(
 ) -> None:
     static = {"static_load": {"torques_N_m": torques, "locked": locked}}
     if locked == ["shaft"]:  # nothing says which of the two stands
-        with pytest.raises(CaseError, match="2 degrees of freedom"):
+        with pytest.raises(GearboxFileError, match="2 degrees of freedom"):
             case("planetary", **DIFFERENTIAL, **static)
         return
     gearbox = case("planetary", **DIFFERENTIAL, **static)
@@ -178,7 +178,7 @@ def test_a_held_carrier_of_a_train_that_turns_has_modes(case: Any) -> None:
     ],
 )  # fmt: skip
 def test_trains_that_do_not_work_are_named(case: Any, base: str, changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         case(base, **changes)
     assert said in str(caught.value)
 
@@ -214,7 +214,7 @@ PLAIN = (2e7, 2e7, 1e8, 1e6, 1e6, 0.0)
     ],
 )
 def test_matrices_that_no_bearing_has_are_named(case: Any, changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         case("spur", **{f"bearings__bearing_1__{key}": value for key, value in changes.items()})
     assert "bearings.bearing_1." in str(caught.value)
     assert said in str(caught.value)
@@ -245,7 +245,7 @@ def test_a_matrix_symmetric_to_its_printed_digits_is_taken(case: Any) -> None:
 def test_values_that_nothing_has_are_refused_in_one_line_with_the_key(
     case: Any, base: str, key: str, value: Any
 ) -> None:
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         case(base, **{key: value})
     (line,) = str(caught.value).splitlines()
     assert key.replace("__", ".") in line
@@ -253,14 +253,16 @@ def test_values_that_nothing_has_are_refused_in_one_line_with_the_key(
 
 
 def test_a_relief_deeper_than_half_a_module_is_refused(case: Any) -> None:
-    with pytest.raises(CaseError, match=r"tip_relief_um = 1600: must be at most 1500, half a normal module"):
+    with pytest.raises(GearboxFileError, match=r"tip_relief_um = 1600: must be at most 1500, half a normal module"):
         case("modified", gears__pinion__modification__tip_relief_um=1600.0)
 
 
 def test_a_topography_deeper_than_half_a_module_is_refused(case: Any, cases: Any) -> None:
     deep = "radius_mm,-7.0,7.0\n29.0,1601.0,0.0\n31.0,0.0,2.0\n"
     (cases[0].parent / "deep.csv").write_text(deep, encoding="utf-8")
-    with pytest.raises(CaseError, match=r"pinion.modification.topography, removed_um = 1601: must be at most 1500"):
+    with pytest.raises(
+        GearboxFileError, match=r"pinion.modification.topography, removed_um = 1601: must be at most 1500"
+    ):
         case("modified", gears__pinion__modification__topography="deep.csv")
 
 
@@ -275,7 +277,7 @@ def test_what_carries_nothing_in_the_static_load_is_told(case: Any) -> None:
 
 
 def test_more_locks_than_freedoms_are_refused(case: Any) -> None:
-    with pytest.raises(CaseError, match=r"static_load.locked = .*: more bodies than the train has freedoms, 1"):
+    with pytest.raises(GearboxFileError, match=r"static_load.locked = .*: more bodies than the train has freedoms, 1"):
         case("spur", static_load={"torques_N_m": {"shaft_1": 100.0}, "locked": ["shaft_1", "shaft_2"]})
 
 
@@ -384,7 +386,7 @@ def test_axes_that_follow_from_the_static_state_stay_where_the_gears_run(case: A
 
 
 def test_each_fault_has_a_line_and_there_is_an_end_to_them(case: Any) -> None:
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         case("spur", gears__pinion__teeth="20", gears__wheel__internal=1, pairs__spur__table="yes", ste__positions=50.0,
              gears__wheel__theeth=3, name=True)  # fmt: skip
     lines = str(caught.value).splitlines()
@@ -396,7 +398,7 @@ def test_each_fault_has_a_line_and_there_is_an_end_to_them(case: Any) -> None:
         "pairs.spur.table = 'yes': must be true or false",
         "ste.positions = 50.0: must be a whole number, without quotes and decimal point",
     ]
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         case("spur", gears={f"gear_{n}": {} for n in range(40)})
     assert len(str(caught.value).splitlines()) == 25
     assert str(caught.value).endswith("and 136 more faults")
@@ -416,7 +418,7 @@ def test_faults_that_have_nothing_to_do_with_each_other_are_told_at_once(tmp_pat
     told = ("gears.sun", "joints.sun", "overall.output")
     assert all(any(f": {key}" in fault for fault in faults) for key in told), faults
     assert all(fault in outcome.stderr for fault in faults)
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         Gearbox.from_toml(file)
     assert list(caught.value.faults) == faults
 
@@ -446,7 +448,7 @@ def test_faults_of_writing_hide_no_faults_of_what_could_be_read(tmp_path: Path) 
 
 
 def test_a_gear_that_follows_from_a_pair_is_left_alone_where_the_pair_cannot_be_read(case: Any) -> None:
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         case("spur", gears__pinion__profile_shift=0.0, gears__pinion__profile_shift_from_centre_distance=True,
              pairs__spur__centre_distance_mm="far")  # fmt: skip
     assert len(caught.value.faults) == 1
@@ -455,21 +457,21 @@ def test_a_gear_that_follows_from_a_pair_is_left_alone_where_the_pair_cannot_be_
 
 @pytest.mark.parametrize("gears", [3, {"pinion": 4}, {"pinion": {"teeth": []}}])
 def test_tables_that_are_none_are_told_and_nothing_more(case: Any, gears: Any) -> None:
-    with pytest.raises(CaseError, match="gears") as caught:
+    with pytest.raises(GearboxFileError, match="gears") as caught:
         case("spur", gears=gears)
     assert not any("no such gear" in fault for fault in caught.value.faults)
 
 
 def test_a_seat_beside_its_shaft_makes_the_variant_flexible_impossible() -> None:
     gearbox = Gearbox.from_dict(gear_trains.pair()).varied({"bodies.input.shape.start_z_mm": -20.0})
-    with pytest.raises(CaseError, match=r"bodies.input.shape: seat") as caught:
+    with pytest.raises(GearboxFileError, match=r"bodies.input.shape: seat") as caught:
         check_parts(gearbox)
     assert lacking(gearbox, "flexible") in str(caught.value)
     assert [lacking(gearbox, variant) for variant in ("rigid", "bushing")] == ["", ""]
 
 
 def test_faults_of_several_parts_are_told_together(case: Any) -> None:
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         case("spur", bearings__bearing_1__body="one", bearings__bearing_2__on="two", meshes__spur__pair="three")
     lines = str(caught.value).splitlines()
     assert ["one" in lines[0], "two" in lines[1], "three" in lines[2]] == [True] * 3

@@ -40,7 +40,7 @@ from exugear.system.tooth_mesh.tables import wanted_table
 from ..cases import gear_trains
 from ..cases.case_mutations import bases, toml_text
 
-ELSEWHERE = {f"CaseFile.{table}" for table in ("labels", "operation", "loads", "rating", "lubricant")}
+ELSEWHERE = {f"GearboxFile.{table}" for table in ("labels", "operation", "loads", "rating", "lubricant")}
 ELSEWHERE |= {"CatalogueSection.fatigue_load_limit_kN"}
 """Keys of pages and of a life, whose computation takes too long here: another test looks for them in the program."""
 FOR_PEOPLE = {

@@ -9,10 +9,10 @@ import pytest
 
 from exugear.gearbox.gear_parts import with_usual_rounding
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
-from exugear.gearbox.sections.case import CaseFile
+from exugear.gearbox.reading import GearboxFileError
+from exugear.gearbox.sections.case import GearboxFile
 from exugear.system.readiness import remarks
-from fe_ste.geometry.gear_relations import BasicRack, UncheckedGear
+from fe_ste.geometry.gear_relations import BasicRack, GearInputs
 
 from ..cases.spur import SPUR_CASE
 
@@ -34,7 +34,7 @@ def test_gears_of_25_degrees_have_the_largest_rounding_that_fits() -> None:
 
 @pytest.mark.parametrize("rack", [{"tip_radius": 0.38}, {"tip_radius": 0.32}])
 def test_a_radius_of_the_file_is_refused_where_it_does_not_fit(rack: dict[str, float]) -> None:
-    with pytest.raises(CaseError, match=r"rack.tip_radius = .* does not fit on the rack .* at most 0\.31"):
+    with pytest.raises(GearboxFileError, match=r"rack.tip_radius = .* does not fit on the rack .* at most 0\.31"):
         Gearbox.from_dict(content(normal_pressure_angle_deg=25.0, rack=rack), "case.toml")
 
 
@@ -47,9 +47,9 @@ def test_the_default_stays_where_it_fits(gears: dict[str, Any]) -> None:
 
 def test_a_ring_of_very_low_teeth_has_a_rounding_of_half_their_height() -> None:
     """Teeth of 0.3 normal modules in height have no room for 0.38."""
-    ring = UncheckedGear(
+    ring = GearInputs(
         name="ring", teeth=61, normal_module=3e-3, face_width=0.02, held_diameter=0.22, internal=True,
         rack=BasicRack(0.1, 0.2),
     )  # fmt: skip
-    section = CaseFile.model_validate(content(rack={"addendum": 0.1, "dedendum": 0.2})).gears["wheel"]
+    section = GearboxFile.model_validate(content(rack={"addendum": 0.1, "dedendum": 0.2})).gears["wheel"]
     assert with_usual_rounding(section, ring).rack.tip_radius == pytest.approx(0.15, abs=1e-3)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 
 CASE = Path(__file__).parents[3] / "cases" / "grc750" / "gearbox.toml"
 
@@ -76,7 +76,9 @@ def test_the_springs_that_stand_for_the_main_shaft_do_not_act_beside_it(grc: Gea
     assert [mount.name for mount in grc.mounts] == ["arm_left", "arm_right", "main_shaft_support"]
     assert [m.name for m in grc.varied({"bodies.main_shaft.enabled": True}).mounts] == ["arm_left", "arm_right"]
     # The body has its rotor: a second one has nothing left to hold on to.
-    with pytest.raises(CaseError, match="rotor are joined.*main_shaft stands aside while bodies.main_shaft is enabled"):
+    with pytest.raises(
+        GearboxFileError, match="rotor are joined.*main_shaft stands aside while bodies.main_shaft is enabled"
+    ):
         grc.varied({"bodies.main_shaft.enabled": True, "bodies.rotor.enabled": True})
 
 
@@ -85,12 +87,14 @@ def test_two_paths_of_torsion_are_named(grc: Gearbox) -> None:
     hub = {"bodies": ["main_shaft", "rotor"], "stiffness_N_m_per_rad": 1e9}
     joined = {"bodies": ["rotor", "carrier"], "stiffness_N_m_per_rad": 8e7}
     with pytest.raises(
-        CaseError,
+        GearboxFileError,
         match="couplings hub, shrink_disc_torsion, main_shaft form a loop: rotor and carrier are joined twice",
     ):
         order = {name: grc.content["couplings"][name] for name in ("brake_coupling", "shrink_disc_torsion")}
         grc.varied({**both, "couplings": {**order, "hub": hub, "main_shaft": joined}})
-    with pytest.raises(CaseError, match="torsion 1e\\+09 N m/rad between carrier and main_shaft, which both turn"):
+    with pytest.raises(
+        GearboxFileError, match="torsion 1e\\+09 N m/rad between carrier and main_shaft, which both turn"
+    ):
         grc.varied({"bodies.main_shaft.enabled": True, "bearings.shrink_disc.stiffness": {"torsion_N_m_per_rad": 1e9}})
 
 
@@ -134,7 +138,7 @@ def _set(content: dict, dotted: str, value: object) -> dict:
     ],
 )
 def test_wrong_input_is_named(content: dict, dotted: str, value: object, words: list[str]) -> None:
-    with pytest.raises(CaseError) as caught:
+    with pytest.raises(GearboxFileError) as caught:
         Gearbox.from_dict(_set(content, dotted, value), "case.toml")
     message = str(caught.value)
     assert message.startswith("case.toml: ")
@@ -144,7 +148,7 @@ def test_wrong_input_is_named(content: dict, dotted: str, value: object, words: 
 
 def test_incomplete_inertia_set_is_named(content: dict) -> None:
     del content["bodies"]["ims"]["inertia"]["gears"]
-    with pytest.raises(CaseError, match="bodies.ims.inertia: no set 'gears'"):
+    with pytest.raises(GearboxFileError, match="bodies.ims.inertia: no set 'gears'"):
         Gearbox.from_dict(content)
 
 
@@ -155,15 +159,15 @@ def test_incomplete_inertia_set_is_named(content: dict) -> None:
 def test_unreadable_files_are_one_clear_message(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "broken.toml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(CaseError, match=words) as caught:
+    with pytest.raises(GearboxFileError, match=words) as caught:
         Gearbox.from_toml(path)
     assert str(path) in str(caught.value)
 
 
 def test_missing_and_binary_files_are_one_clear_message(tmp_path: Path) -> None:
-    with pytest.raises(CaseError, match="no such file"):
+    with pytest.raises(GearboxFileError, match="no such file"):
         Gearbox.from_toml(tmp_path / "nowhere.toml")
     binary = tmp_path / "binary.toml"
     binary.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(CaseError, match="not UTF-8"):
+    with pytest.raises(GearboxFileError, match="not UTF-8"):
         Gearbox.from_toml(binary)

@@ -16,7 +16,7 @@ import pytest
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import LARGEST_TABLE, Permissions
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.system.bodies.solid_elements import SolidError
 from exugear.system.bodies.solid_files import mesh_geometry, read_solid
 
@@ -293,12 +293,12 @@ def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, kind: str, k
     case = with_files(tmp_path, **{kind: "pipe.csv"})
     code = "import sys; from exugear.gearbox.gearbox import Gearbox; Gearbox.from_toml(sys.argv[1])"
     found = subprocess.run([sys.executable, "-c", code, case], capture_output=True, text=True, timeout=60)
-    assert f"CaseError: {case}: {key} = 'pipe.csv': a pipe or device" in found.stderr
+    assert f"GearboxFileError: {case}: {key} = 'pipe.csv': a pipe or device" in found.stderr
     for name, reason in (("folder.csv", "a folder"), ("large.csv", "100 MB; at most 100 MB")):
         outcome = exugear("check", with_files(tmp_path, **{kind: name}))
         assert outcome.exit_code == 2
         assert f"{key} = '{name}': {reason}" in said(outcome)
-    with pytest.raises(CaseError, match="a pipe or device"):
+    with pytest.raises(GearboxFileError, match="a pipe or device"):
         Gearbox.from_toml(with_files(tmp_path, **{kind: "/dev/zero"}), Permissions(below=Path("/dev")))
 
 

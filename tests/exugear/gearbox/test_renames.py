@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from exugear.gearbox.reading import CaseError, parse_case
+from exugear.gearbox.reading import GearboxFileError, parse_case
 from exugear.gearbox.renames import GEARBOX_RENAMES, STUDY_RENAMES, MigrationError, Rename, migrated, new_name
 from exugear.studies.sections import StudyError, parse_study
 
@@ -103,7 +103,7 @@ def _example(rename: Rename) -> dict:
 
 @pytest.mark.parametrize("rename", GEARBOX_RENAMES, ids=lambda rename: f"{rename.table}.{rename.old}")
 def test_an_old_key_of_a_gearbox_is_refused_with_the_new_one(rename):
-    with pytest.raises(CaseError, match=rf"{rename.old}.*was renamed to {rename.new}; `exugear migrate FILE"):
+    with pytest.raises(GearboxFileError, match=rf"{rename.old}.*was renamed to {rename.new}; `exugear migrate FILE"):
         parse_case(_example(rename), "my.toml")
 
 
@@ -160,7 +160,7 @@ def test_damaged_files_are_rewritten_right_or_refused():
         text = list(GEARBOX)
         for _ in range(drawn.randint(1, 4)):
             place = drawn.randrange(len(text))
-            text[place] = drawn.choice(["", text[place] * 2, drawn.choice('[]{}"\'#=.,\n\\ a')])
+            text[place] = drawn.choice(["", text[place] * 2, drawn.choice("[]{}\"'#=.,\n\\ a")])
         damaged = "".join(text)
         try:
             new, _ = migrated(damaged)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.templates.kinds import template
 
 from ..cases.command import exugear
@@ -54,14 +54,14 @@ def test_an_addendum_is_the_tip_diameter_of_the_same_cutter():
     ],
 )
 def test_cutters_that_cannot_be_are_refused(cutter: dict[str, Any], changes: dict[str, Any], message: str):
-    with pytest.raises(CaseError, match=message):
+    with pytest.raises(GearboxFileError, match=message):
         gearbox_of(cutter, **changes)
 
 
 def test_a_cutter_of_an_external_gear_is_refused():
     content = tomllib.loads(template("planetary"))
     content["gears"]["sun"]["cutter"] = {"teeth": 30, "tip_radius": 0.2}
-    with pytest.raises(CaseError, match=r"gears.sun: a cutter makes rings \(internal = true\)"):
+    with pytest.raises(GearboxFileError, match=r"gears.sun: a cutter makes rings \(internal = true\)"):
         Gearbox.from_dict(content, "case.toml")
 
 

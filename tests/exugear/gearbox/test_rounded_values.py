@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.system.readiness import remarks
 
 from ..cases.spur import SPUR_CASE
@@ -63,7 +63,7 @@ def test_an_overlap_beyond_the_rounding_is_refused_with_digits_that_tell_it() ->
         if not refused:
             Gearbox.from_dict(found, "case.toml")
             continue
-        with pytest.raises(CaseError, match=r"overlap by .* at least 91\.5\d+ mm is needed") as caught:
+        with pytest.raises(GearboxFileError, match=r"overlap by .* at least 91\.5\d+ mm is needed") as caught:
             Gearbox.from_dict(found, "case.toml")
         assert "91.5000 mm is needed" not in str(caught.value)
 
@@ -74,7 +74,9 @@ def test_digits_that_are_given_count() -> None:
     found["gears"]["pinion"]["profile_shift"] = 0.8533001
     found["gears"]["wheel"]["profile_shift"] = -0.5000001
     found["pairs"]["spur"]["centre_distance_mm"] = 91.5000001
-    with pytest.raises(CaseError, match=r"centre_distance = 91\.5000\d* mm is too small.* overlap by 0\.39\d um"):
+    with pytest.raises(
+        GearboxFileError, match=r"centre_distance = 91\.5000\d* mm is too small.* overlap by 0\.39\d um"
+    ):
         Gearbox.from_dict(found, "case.toml")
 
 

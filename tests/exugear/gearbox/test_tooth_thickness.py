@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.templates.kinds import template
 from exugear.system.plausibility import backlash_range, thickness_range
 
@@ -124,12 +124,12 @@ def test_check_tells_thickness_span_and_backlash(tmp_path: Path):
     ],
 )
 def test_allowances_that_cannot_be_are_refused(thickness: dict[str, float], message: str):
-    with pytest.raises(CaseError, match=message):
+    with pytest.raises(GearboxFileError, match=message):
         gearbox_of(**thickness)
 
 
 def test_a_thinning_beside_allowances_is_refused():
     both = content()
     both["gears"]["pinion"]["tooth_thinning_mm"] = 0.1
-    with pytest.raises(CaseError, match="gears.pinion: give tooth_thinning_mm or a .* table, not both"):
+    with pytest.raises(GearboxFileError, match="gears.pinion: give tooth_thinning_mm or a .* table, not both"):
         Gearbox.from_dict(both, "case.toml")

@@ -9,7 +9,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.templates.kinds import template
 from exugear.report.pictures.shapes import bodies_of
 from exugear.report.web.stage import drawn_bodies
@@ -114,7 +114,7 @@ def test_inertia_that_is_given_stays_and_names_the_sets_of_all() -> None:
 
 
 def test_a_body_without_inertia_shape_or_gears_to_take_it_from_is_refused() -> None:
-    with pytest.raises(CaseError, match="needs an inertia table, .* or a shape from which its inertia follows"):
+    with pytest.raises(GearboxFileError, match="needs an inertia table, .* or a shape from which its inertia follows"):
         gearbox_of((CASE[CASE.index("[bodies.two.shape]") : CASE.index("[bearings]")], ""))
 
 
@@ -180,11 +180,13 @@ def test_a_profile_shift_follows_from_the_centre_distance() -> None:
 def test_shifts_that_nothing_gives_are_refused() -> None:
     flag = ", profile_shift_from_centre_distance = true }"
     both = [(f"held_diameter_mm = {bore} }}", f"held_diameter_mm = {bore}{flag}") for bore in ("30.0", "50.0")]
-    with pytest.raises(CaseError, match="wheel of pairs.spur has no profile_shift either; give one of them"):
+    with pytest.raises(GearboxFileError, match="wheel of pairs.spur has no profile_shift either; give one of them"):
         gearbox_of(*both)
-    with pytest.raises(CaseError, match="give profile_shift or profile_shift_from_centre_distance = true, not both"):
+    with pytest.raises(
+        GearboxFileError, match="give profile_shift or profile_shift_from_centre_distance = true, not both"
+    ):
         gearbox_of(("held_diameter_mm = 50.0 }", f"held_diameter_mm = 50.0, profile_shift = 0.1{flag}"))
-    with pytest.raises(CaseError, match="no line of action touches both base circles"):
+    with pytest.raises(GearboxFileError, match="no line of action touches both base circles"):
         gearbox_of(
             ("held_diameter_mm = 50.0 }", f"held_diameter_mm = 50.0{flag}"),
             ("centre_distance_mm = 75.0", "centre_distance_mm = 70.0"),
@@ -230,13 +232,13 @@ def test_a_body_that_only_spins_and_a_fixed_one_need_no_place():
     assert bodies["brake"].axis == bodies["shaft_2"].axis
     assert bodies["floor"].axis == (0.0, 0.0)
     del content["bodies"]["shaft_1"]["axis_position_mm"]
-    with pytest.raises(CaseError, match=r"bodies.shaft_1: give either axis_position_mm"):
+    with pytest.raises(GearboxFileError, match=r"bodies.shaft_1: give either axis_position_mm"):
         Gearbox.from_dict(content, "spur.toml")
 
 
 def test_a_changed_path_with_a_typing_error_names_the_nearest_and_makes_no_entry():
     gearbox = Gearbox.from_dict(tomllib.loads(SPUR_CASE), "spur.toml")
-    with pytest.raises(CaseError, match=r"gears.pinon.teeth: no entry .* did you mean gears.pinion.teeth\?"):
+    with pytest.raises(GearboxFileError, match=r"gears.pinon.teeth: no entry .* did you mean gears.pinion.teeth\?"):
         gearbox.varied({"gears.pinon.teeth": 21})
     case = gearbox.varied({"load_cases.coast.torques_N_m": {"shaft_1": -10.0}, "load_cases.coast.duration_s": 0.5})
     assert case.load_cases["coast"].duration == 0.5
@@ -260,7 +262,7 @@ torque_z_mm = 90.0
 
 @pytest.mark.parametrize("name", ["pinion", "one_left", "torque", "tow"])
 def test_a_blank_on_a_seat_that_the_body_does_not_have_is_refused(name: str) -> None:
-    with pytest.raises(CaseError, match=f"bodies.two.shape.blanks.{name}: no such seat .* seats are wheel, two"):
+    with pytest.raises(GearboxFileError, match=f"bodies.two.shape.blanks.{name}: no such seat .* seats are wheel, two"):
         gearbox_of(("blanks.wheel", f"blanks.{name}"))
 
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.life.dynamic_factors import DynamicFactor, factors, family_factors, response_path, window_factors
 from exugear.life.life import rating_of
@@ -57,13 +57,13 @@ def test_a_run_gives_factors_over_speed_and_must_fit(tmp_path):
     gearbox = Gearbox.from_dict(content, str(tmp_path / "gearbox.toml"))
     project = Project(gearbox, tmp_path, Choice("rigid", "iso6336", load_case="run_up"))
     rating, assembly = rating_of(gearbox), project.assembly()
-    with pytest.raises(CaseError, match=r"dynamic_factor_run = 'run_up'.*no such file.*exugear run"):
+    with pytest.raises(GearboxFileError, match=r"dynamic_factor_run = 'run_up'.*no such file.*exugear run"):
         factors(assembly, rating, tmp_path, "shaft_1")
     project.run(duration=0.5)
     (found,) = factors(assembly, rating, tmp_path, "shaft_1").values()
     assert found.at(np.array([500.0])) == pytest.approx([1.02], abs=0.02)
     other = Project(gearbox.varied({"damping.mesh_time_s": 5e-6}), tmp_path, project.choice)
-    with pytest.raises(CaseError, match="belongs to another input"):
+    with pytest.raises(GearboxFileError, match="belongs to another input"):
         factors(other.assembly(), rating, tmp_path, "shaft_1")
 
 
@@ -100,7 +100,7 @@ def test_a_run_at_constant_speed_and_the_steady_response_there_give_one_factor(t
     (of_run,) = factors(assembly, rating_of(gearbox), tmp_path, "shaft_1").values()
     steady, assembly = varying_spur(tmp_path, {"dynamic_factor_steady": "nonlinear"}, speed)
     rating = rating_of(steady)
-    with pytest.raises(CaseError, match=r"dynamic_factor_steady = 'nonlinear'.*no such file.*exugear steady"):
+    with pytest.raises(GearboxFileError, match=r"dynamic_factor_steady = 'nonlinear'.*no such file.*exugear steady"):
         factors(assembly, rating, tmp_path, "shaft_1")
     settings = SteadySettings(SpeedRange(0.9 * speed * RPM, 1.1 * speed * RPM, 3), "nonlinear", at_resonances=False)
     stored_or_computed(response_path(tmp_path, assembly, rating), assembly, settings)
@@ -116,7 +116,7 @@ def test_a_run_at_constant_speed_and_the_steady_response_there_give_one_factor(t
     )
     assert of_run.source.startswith("the run run_up over ")
     other = assemble(steady.varied({"damping.mesh_time_s": 5e-6}), CHOICE, STIFFNESS)
-    with pytest.raises(CaseError, match="belongs to another input"):
+    with pytest.raises(GearboxFileError, match="belongs to another input"):
         factors(other, rating, tmp_path, "shaft_1")
 
 

@@ -18,7 +18,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import RatingSection
 from exugear.gearbox.variant import VariantError
 from exugear.life.dynamic_factors import stated_factors
@@ -315,14 +315,16 @@ def test_an_extreme_load_counts_for_static_safety_alone(tmp_path, first, stresse
 def test_bad_sections_are_one_error_each_by_the_names_of_their_keys(tmp_path, change, message):
     content = content_of(TABLE, tmp_path)
     change(content)
-    with pytest.raises(CaseError, match=message):
+    with pytest.raises(GearboxFileError, match=message):
         checked_loads(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")))
 
 
 def test_gears_that_bend_both_ways_need_their_factor(tmp_path):
     table = "torque_N_m,speed_rpm,hours\n200,1000,3\n-100,1000,1\n"
     gearbox = spur_project(tmp_path, table).gearbox
-    with pytest.raises(CaseError, match=r"rating.gears.pinion.mean_stress_factor: this key is missing") as raised:
+    with pytest.raises(
+        GearboxFileError, match=r"rating.gears.pinion.mean_stress_factor: this key is missing"
+    ) as raised:
         checked_loads(gearbox)
     missing = [f"rating.gears.{name}.mean_stress_factor: this key is missing" for name in ("pinion", "wheel")]
     assert len(raised.value.faults) == 2

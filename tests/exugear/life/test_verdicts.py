@@ -15,7 +15,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import StrengthSection
 from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.dynamic_factors import DynamicFactor, stated_factors
@@ -149,7 +149,7 @@ def test_loads_far_beyond_a_table_are_refused_before_any_work(tmp_path):
         if not refused:
             check_reach(gearbox, checked_loads(gearbox), {"spur": 100.0})
             continue
-        with pytest.raises(CaseError, match=r"0.87 kN m on shaft_1 are 8.7 times .* static_load.torques_N_m"):
+        with pytest.raises(GearboxFileError, match=r"0.87 kN m on shaft_1 are 8.7 times .* static_load.torques_N_m"):
             project.life()
         assert not project.folder.exists()
 

@@ -16,7 +16,7 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.report.findings.verdicts import begin_variations
 from exugear.report.writer import ReportError, write_report
 from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, note_time, times_spent
@@ -177,7 +177,7 @@ def test_results_of_another_case_are_left_out_by_name(results, gearbox, tmp_path
 
 
 def test_a_folder_with_nothing_of_its_case_is_refused(gearbox, tmp_path):
-    with pytest.raises(CaseError, match="no results"):
+    with pytest.raises(GearboxFileError, match="no results"):
         write_report(tmp_path)
     keep_case(gearbox, tmp_path)
     with pytest.raises(ReportError, match="no such file"):
@@ -186,7 +186,7 @@ def test_a_folder_with_nothing_of_its_case_is_refused(gearbox, tmp_path):
 
 def test_a_damaged_case_is_one_message(tmp_path):
     (tmp_path / "case.json").write_text('{"source": ', encoding="utf-8")
-    with pytest.raises(CaseError, match=r"case\.json: cannot be used"):
+    with pytest.raises(GearboxFileError, match=r"case\.json: cannot be used"):
         kept_case(tmp_path)
 
 

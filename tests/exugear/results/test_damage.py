@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from exugear.cli import app as cli
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.versions import MODES as METHOD
 from exugear.results.folder import kept_case, times_spent
 from exugear.results.run_file import load_run, read_run
@@ -96,14 +96,14 @@ def test_a_case_that_was_changed_since_is_refused(out: Path) -> None:
         path.write_bytes(damaged)
         try:
             kept = kept_case(out)
-        except CaseError as error:
+        except GearboxFileError as error:
             assert "case.json: cannot be used" in str(error)
         else:  # a blank or an end of line beside what it says
             assert kept.content == plain["content"]
     softer = json.dumps(plain).replace('"factor": 0.5', '"factor": 0.4')
     assert softer != json.dumps(plain)
     path.write_text(softer, encoding="utf-8")
-    with pytest.raises(CaseError, match="it was changed since it was written"):
+    with pytest.raises(GearboxFileError, match="it was changed since it was written"):
         kept_case(out)
 
 

@@ -11,7 +11,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.steady.mean_system.mesh_places import POSITION, mesh_places
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.nonlinear import Balance, solve_balance
+from exugear.steady.nonlinear import HarmonicResidual, solve_balance
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals, transmission_errors
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -126,7 +126,7 @@ def test_planets_out_of_phase_started_on_their_steady_state_stay_there(four, sti
 def test_the_memory_of_a_solved_speed_falls_free_at_once(four, stiffness):
     """A balance holds samples of all laws: some tens of megabytes a speed, which no search for garbage has to find."""
     gearset = gearset_of(assemble(four, Choice("bushing"), stiffness), np.array(RANGE), 4, 2)
-    balance = Balance(gearset, gearset.at(5.0), gearset.lattice)
+    balance = HarmonicResidual(gearset, gearset.at(5.0), gearset.lattice)
     gone = weakref.ref(balance)
     gc.disable()
     try:

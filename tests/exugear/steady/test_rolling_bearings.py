@@ -10,7 +10,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.nonlinear import Balance
+from exugear.steady.nonlinear import HarmonicResidual
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import stored_or_computed
@@ -104,7 +104,7 @@ def some(balance, size):
 
 
 def difference_of_tangents(solver, speed):
-    balance = Balance(solver.gearset, solver.gearset.at(speed), solver.lattice)
+    balance = HarmonicResidual(solver.gearset, solver.gearset.at(speed), solver.lattice)
     state, step = balance.static + some(balance, 1e-8), some(balance, 1e-11)
     ahead, behind = balance.forces(state + step)[0], balance.forces(state - step)[0]
     change = balance.forces(state)[1](step)

@@ -11,7 +11,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.mean_system.mean_system import torque_of_vibration
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION
-from exugear.steady.nonlinear import Balance
+from exugear.steady.nonlinear import HarmonicResidual
 from exugear.steady.point_solver import PointSolver, gearset_of
 from exugear.steady.response import dissipated_and_given, signals
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -312,7 +312,7 @@ def test_the_tangents_of_the_balance_are_those_of_differences(law, spur_surface)
     data = {"table": spur_surface, "moving load": moving_load()}.get(law, spur_stiffness())
     law = "table" if law == "table" else "line_of_action"
     solver = solver_of(assemble(SPUR, Choice("bushing", law), data), (50.0, 150.0), "nonlinear")
-    balance = Balance(solver.gearset, solver.gearset.at(80.0), solver.lattice)
+    balance = HarmonicResidual(solver.gearset, solver.gearset.at(80.0), solver.lattice)
     rng = np.random.default_rng(0)
 
     def some(size):

@@ -12,7 +12,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.life.life_file import summary
 from exugear.project import Project
 from exugear.studies.dataset import load_study
@@ -211,7 +211,7 @@ def test_lives_need_loads_and_strengths_before_any_work(tmp_path, without, words
     case = content_of(TABLE, tmp_path)
     del case[without]
     (tmp_path / CASE).write_text(toml_text(case), encoding="utf-8")
-    with pytest.raises(CaseError, match=words):
+    with pytest.raises(GearboxFileError, match=words):
         Study.from_dict(study)
     (tmp_path / "a.study.toml").write_text(toml_text({**study, "case": CASE}), encoding="utf-8")
     outcome = exugear("study", tmp_path / "a.study.toml", "--out", tmp_path / "out")

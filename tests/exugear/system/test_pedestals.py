@@ -11,7 +11,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.system.modes import eigenmodes
 from exugear.system.readiness import lacking
 
@@ -58,7 +58,7 @@ def test_a_very_stiff_foot_is_the_ground() -> None:
 
 
 def test_a_pedestal_that_can_turn_is_refused_with_what_it_needs() -> None:
-    with pytest.raises(CaseError, match="pedestal are joined to shaft_1 by no .*needs torsion_N_m_per_rad"):
+    with pytest.raises(GearboxFileError, match="pedestal are joined to shaft_1 by no .*needs torsion_N_m_per_rad"):
         Gearbox.from_dict(pedestal(FOOT | {"torsion_N_m_per_rad": 0.0}), "case.toml")
 
 
@@ -84,5 +84,5 @@ def test_a_coupling_of_two_fixed_bodies_is_refused() -> None:
     for name in ("house", "wall"):
         found["bodies"][name] = {"axis_position_mm": [0.0, 0.0], "fixed": True}
     found["couplings"] = {"arm": {"bodies": ["house", "wall"], "stiffness_N_m_per_rad": 1e5}}
-    with pytest.raises(CaseError, match="couplings.arm.bodies: 'house' does not turn by itself"):
+    with pytest.raises(GearboxFileError, match="couplings.arm.bodies: 'house' does not turn by itself"):
         Gearbox.from_dict(found, "case.toml")

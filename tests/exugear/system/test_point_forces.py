@@ -11,7 +11,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.life.static_balance import is_linear
 from exugear.system.kernels.connectors import add_connector_forces
 from exugear.system.loads import Loading, LoadTable
@@ -143,12 +143,12 @@ def test_a_force_changes_no_frequency_of_a_linear_gearbox() -> None:
     ],
 )
 def test_forces_that_cannot_be_are_refused(force: dict[str, Any], message: str) -> None:
-    with pytest.raises(CaseError, match=message):
+    with pytest.raises(GearboxFileError, match=message):
         gearbox_of(force=force)
 
 
 def test_a_force_that_has_the_name_of_a_bearing_is_refused() -> None:
     found = content()
     found["forces"] = {"bearing_2": found["forces"]["thrust"]}
-    with pytest.raises(CaseError, match=r"forces.bearing_2: one of \[bearings\] has this name, too"):
+    with pytest.raises(GearboxFileError, match=r"forces.bearing_2: one of \[bearings\] has this name, too"):
         Gearbox.from_dict(found, "case.toml")

@@ -17,7 +17,7 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.results.run_file import load_run
 from exugear.system.signals import BALANCE_TERMS
 from exugear.transient.exudyn_model.system import ExudynSystem
@@ -227,7 +227,7 @@ def test_wrong_torque_series_is_named(grc: Gearbox, stiffness: dict, tmp_path: P
     table.write_text(text)
     permitted = replace(grc, permissions=Permissions(below=tmp_path))
     gearbox = permitted.varied({"load_cases.measured": {"torque_series": str(table)}})
-    with pytest.raises(CaseError, match=words):
+    with pytest.raises(GearboxFileError, match=words):
         simulate(gearbox, Choice("rigid", load_case="measured"), stiffness, tmp_path, duration=0.01)
 
 
@@ -240,7 +240,7 @@ def test_run_with_rigid_meshes(grc: Gearbox, tmp_path: Path) -> None:
 
 
 def test_unknown_load_case_is_named(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
-    with pytest.raises(CaseError, match="no load case 'storm'"):
+    with pytest.raises(GearboxFileError, match="no load case 'storm'"):
         simulate(grc, Choice("rigid", load_case="storm"), stiffness, tmp_path)
 
 

@@ -29,7 +29,7 @@ from exugear.system.kernels.table_law import piece_at
 from exugear.system.signals import MESH_TIMES
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.transient.compiled.integrator import highest_rate
-from exugear.transient.outcome import LIMITS, Judge, LimitError, Progress, RunError
+from exugear.transient.outcome import LIMITS, LimitError, Progress, RunError, ValidityMonitor
 from exugear.transient.runup import simulate
 
 from ..cases.assembled import simulated
@@ -149,11 +149,11 @@ def test_energy_that_a_coarse_step_loses_marks_the_run(tmp_path):
     assert simulate(gearbox, Choice("rigid", load_case="run_up"), stiffness, tmp_path / "fine", **options).trusted
 
 
-def judged() -> Judge:
+def judged() -> ValidityMonitor:
     """Judge of the spur case, which nothing has happened to yet."""
     gearbox = spur()
     assembly = assemble(gearbox, Choice("rigid"), stiffness_of(gearbox))
-    return Judge(assembly, summarise_loads(gearbox, gearbox.load_cases["run_up"]))
+    return ValidityMonitor(assembly, summarise_loads(gearbox, gearbox.load_cases["run_up"]))
 
 
 def test_a_mesh_beside_unsolved_states_of_its_table_is_a_reason_not_to_trust() -> None:
@@ -166,7 +166,7 @@ def test_a_mesh_beside_unsolved_states_of_its_table_is_a_reason_not_to_trust() -
     assert "for up to 0.02 s" in reason
 
 
-def seen(judge: Judge, deflection: float = 0.0, spin: float = 0.0, left: float = 0.0) -> tuple[str, ...]:
+def seen(judge: ValidityMonitor, deflection: float = 0.0, spin: float = 0.0, left: float = 0.0) -> tuple[str, ...]:
     """Judge one more state, of 100 J and some energy that is left over."""
     account = np.array([[0.0, 50.0, 50.0 + left, 0.0, 0.0, 0.0, 0.0]])
     judge.see(np.array([0.1]), np.array([[deflection]]), np.array([[spin, 0.0]]), np.array([0.1]), account)

@@ -11,7 +11,7 @@ import pytest
 
 from fe_ste.elasticity.hexmesh import MeshSettings, sector_mesh
 from fe_ste.geometry.checks import GeometryError
-from fe_ste.geometry.gear_relations import UncheckedGear
+from fe_ste.geometry.gear_relations import GearInputs
 from fe_ste.geometry.gears import BasicRack, Gear, GearPair, PinionCutter
 from fe_ste.geometry.involute import involute
 from fe_ste.geometry.profile import tooth_profile
@@ -51,7 +51,7 @@ class RolledCutter:
     involutes of both just touch.
     """
 
-    def __init__(self, gear: UncheckedGear, reach: float | None = None) -> None:
+    def __init__(self, gear: GearInputs, reach: float | None = None) -> None:
         assert gear.cutter is not None
         self.reach = 5.0 * gear.normal_module / gear.reference_radius if reach is None else reach  # rad
         self.gear, self.ratio = gear, gear.cutter.teeth / gear.teeth
@@ -199,7 +199,7 @@ def test_tips_are_trimmed_as_rolling_says() -> None:
             break
     assert 80 < teeth < 95
     for count, is_trimmed in ((teeth - 1, False), (teeth + 2, True)):
-        gear = UncheckedGear(**(given | {"cutter": PinionCutter(count, 0.2)}))
+        gear = GearInputs(**(given | {"cutter": PinionCutter(count, 0.2)}))
         # Just inside the corner of the tooth, as the space beside it stands on the line of centres.
         radius = gear.tip_radius + 1e-3 * MODULE
         polar = 0.5 * gear.angular_pitch - gear.half_angle(radius) + 1e-3 * MODULE / radius

@@ -11,7 +11,7 @@ from string import Formatter
 import numpy as np
 import pytest
 
-from fe_ste.tools.display import Displayed, html_table, value_range
+from fe_ste.tools.display import ReprMixin, html_table, value_range
 
 HOSTILE = ("<script>alert(1)</script>", "</td></table><b>", '" onload="x', "&lt;", "dollar $x$", "\x1b[31m", "Zähne")
 
@@ -66,7 +66,7 @@ def test_a_range_is_told_by_its_ends(values, shown):
 
 
 @dataclass(frozen=True)
-class Shaft(Displayed, line=" {name!r}: {seats!n} seats, {mass:.3g} kg, {seats[0].real} first"):
+class Shaft(ReprMixin, line=" {name!r}: {seats!n} seats, {mass:.3g} kg, {seats[0].real} first"):
     name: str
     mass: float
     seats: tuple[int, ...]

@@ -22,7 +22,7 @@ from exugear.exchange.rexs.tree import Model, RexsError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, seat_key
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import VariantError
 from exugear.results.folder import bodies_folder, read_duties
@@ -39,7 +39,7 @@ from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import fitting_table, table_path
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.mean_contact import face_load_factor, load_along_face
 from fe_ste.transmission_error.table import MeshTable, TableError
@@ -47,7 +47,7 @@ from fe_ste.transmission_error.table import MeshTable, TableError
 # Results in a folder that belong to a gearbox: what was computed from another input is left out, and told
 
 Result = TypeVar("Result")
-_UNFIT = (CaseError, MeshError, VariantError, BearingError, BalanceError, FileError, KeyError, ValueError)
+_UNFIT = (GearboxFileError, MeshError, VariantError, BearingError, BalanceError, FileError, KeyError, ValueError)
 """What a file, or the case for the choice that it was computed of, may say."""
 
 
@@ -110,7 +110,7 @@ class StoredResults:
         data = load_run(path, ("mesh_force",))
         case = str(data.attrs["load_case"])
         if case not in self.gearbox.load_cases:
-            raise CaseError(f"the case has no load case {case!r}")
+            raise GearboxFileError(f"the case has no load case {case!r}")
         self._check(_choice(data.attrs), data.attrs, case)
         return replace(_choice(data.attrs), load_case=case), data
 
@@ -126,7 +126,7 @@ class StoredResults:
 
         Raises
         ------
-        CaseError
+        GearboxFileError
             It was.
         """
         if choice not in self._assemblies:
@@ -136,7 +136,7 @@ class StoredResults:
             stiffness = mesh_stiffness(self.gearbox, choice.mesh_model, self.folder)
             self._assemblies[choice] = assemble(self.gearbox, choice, stiffness, bodies)
         if input_hash(self._assemblies[choice], load_case) != attributes.get("input_hash"):
-            raise CaseError("was computed from another input; compute it again")
+            raise GearboxFileError("was computed from another input; compute it again")
 
 
 def _choice(attributes: Mapping[str, Any]) -> Choice:
@@ -472,7 +472,7 @@ def put_runs(results: Results, gearbox: Gearbox, runs: Mapping[Choice, xr.Datase
 
 
 @dataclass(frozen=True)
-class Exported(Displayed, line=": {named} attributes of REXS, {own} of exugear"):
+class Exported(ReprMixin, line=": {named} attributes of REXS, {own} of exugear"):
     """A REXS file with results."""
 
     content: bytes

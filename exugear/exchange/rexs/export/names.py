@@ -15,7 +15,7 @@ from exugear.exchange.rexs.to_case.supports import BEARINGS, PLACE_TOLERANCE
 from exugear.exchange.rexs.tree import Component, Model
 from exugear.gearbox.units import MM
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 Version = tuple[int, int]
 
@@ -106,7 +106,7 @@ def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, floa
 
 
 @dataclass
-class Results(Displayed, line=": {additions!n} attributes"):
+class Results(ReprMixin, line=": {additions!n} attributes"):
     """Attributes gathered for a file."""
 
     version: Version
@@ -137,7 +137,7 @@ class Results(Displayed, line=": {additions!n} attributes"):
 
 
 @dataclass(frozen=True)
-class Origins(Displayed, line=" of {gears!n} gears, {pairs!n} pairs, {bearings!n} bearings"):
+class Origins(ReprMixin, line=" of {gears!n} gears, {pairs!n} pairs, {bearings!n} bearings"):
     """Numbers of components by the names of parts; those of planets in the order of their angles."""
 
     gears: Mapping[str, tuple[int, ...]]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from exugear.exchange.rexs.to_case.notes import Notes, Places
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 from exugear.gearbox.units import MM
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 GEARS = ("cylindrical_gear", "ring_gear")
 JOINING = (
@@ -65,7 +65,7 @@ class Body:
         return self.of_type(*GEARS)
 
 
-class Bodies(Displayed):
+class Bodies(ReprMixin):
     """All bodies of a gearbox, by name and by component."""
 
     def __init__(self, members: Sequence[Body]) -> None:

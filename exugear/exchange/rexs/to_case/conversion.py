@@ -67,9 +67,9 @@ from exugear.exchange.rexs.to_case.supports import (
 from exugear.exchange.rexs.to_case.toothing import is_rigid, material_of, material_table
 from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.system.readiness import check_parts
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 # Bodies of a REXS file as tables of the gearbox file: place, inertia, and the shape of shafts
 
@@ -325,7 +325,7 @@ TYPES_WITHOUT_EFFECT = frozenset(
 
 
 @dataclass(frozen=True)
-class Found(Displayed, line=" in {model!r}: {bodies!r}"):
+class Found(ReprMixin, line=" in {model!r}: {bodies!r}"):
     """What an import found in a REXS file, with the names of the gearbox file."""
 
     model: Model
@@ -336,7 +336,7 @@ class Found(Displayed, line=" in {model!r}: {bodies!r}"):
 
 
 @dataclass(frozen=True)
-class Imported(Displayed, line=" {gearbox!r}: {changed!n} assumptions, {ignored!n} left out"):
+class Imported(ReprMixin, line=" {gearbox!r}: {changed!n} assumptions, {ignored!n} left out"):
     """Outcome of an import."""
 
     text: str
@@ -472,7 +472,7 @@ class _Draft:
         try:
             gearbox = Gearbox.from_dict(content, str(path))
             check_parts(gearbox)
-        except CaseError as error:
+        except GearboxFileError as error:
             raise RexsError(
                 *(self._with_components(fault.removeprefix(f"{path}: ")) for fault in error.faults)
             ) from None

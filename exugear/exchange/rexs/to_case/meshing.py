@@ -17,7 +17,7 @@ from exugear.exchange.rexs.tree import Component, Model, RexsError
 from exugear.gearbox.units import MM
 from fe_ste.geometry import pair_relations
 from fe_ste.geometry.checks import GeometryError, check_gear
-from fe_ste.geometry.gear_relations import BasicRack, UncheckedGear
+from fe_ste.geometry.gear_relations import BasicRack, GearInputs
 from fe_ste.geometry.involute import PinionCutter, involute
 from fe_ste.geometry.pair_relations import UncheckedPair
 
@@ -345,9 +345,9 @@ def _in_rack_of(mate: Toothing, gear: Toothing) -> Toothing:
     return dataclasses.replace(gear, **changes)
 
 
-def unchecked(name: str, gear: Toothing) -> UncheckedGear:
+def unchecked(name: str, gear: Toothing) -> GearInputs:
     """Build the gear with the relations of its geometry."""
-    plain = UncheckedGear(
+    plain = GearInputs(
         name=name,
         teeth=gear.teeth,
         normal_module=MM * gear.module.value,
@@ -447,7 +447,7 @@ def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
     return dataclasses.replace(gear, root_form=None)
 
 
-def _flank_end(gear: Toothing, bare: UncheckedGear) -> Entry | None:
+def _flank_end(gear: Toothing, bare: GearInputs) -> Entry | None:
     """Root form diameter (mm) that the tools leave: none where one tool without protuberance makes flank and root.
 
     The tool that comes last finishes the flank as far as its straight part reaches. A tool before it that reaches
@@ -472,7 +472,7 @@ def _flank_end(gear: Toothing, bare: UncheckedGear) -> Entry | None:
     return derived(tidy(round(2e3 * radius, 4)), source)
 
 
-def _generated_radius(gear: UncheckedGear, depth: float) -> float:
+def _generated_radius(gear: GearInputs, depth: float) -> float:
     """Radius down to which a rack that is straight to a depth in normal modules generates the flank, m."""
     angle = gear.transverse_pressure_angle
     below = (depth - gear.profile_shift) * gear.normal_module
@@ -480,7 +480,7 @@ def _generated_radius(gear: UncheckedGear, depth: float) -> float:
     return math.hypot(gear.base_radius, max(roll, 0.0))
 
 
-def _cut_by_protuberance(gear: UncheckedGear, tool: Tool, relief: float) -> float:
+def _cut_by_protuberance(gear: GearInputs, tool: Tool, relief: float) -> float:
     """Largest radius at which protuberance and rounded tip of a tool cut into the finished flank, m; 0 for nowhere.
 
     `relief` is how far the protuberance reaches beyond the line of the finished flank, in normal modules. A point of

@@ -11,7 +11,7 @@ import numpy as np
 
 from exugear.exchange.rexs.tree import Component, Faults, Model, RexsError
 from fe_ste.tools.arrays import Floats
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 ASSUMED = "A"
 DERIVED = "D"
@@ -200,7 +200,7 @@ TURNING = ("shaft", "cylindrical_gear", "ring_gear", "side_plate")
 """Types whose u axis is an axis that something turns about."""
 
 
-class Places(Displayed):
+class Places(ReprMixin):
     """Positions (mm) and senses of components.
 
     REXS places a component in the frame (u, v, w) of another, most often of the gear unit. Here x, y, z are the

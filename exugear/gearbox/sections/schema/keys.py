@@ -21,7 +21,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from exugear.gearbox.sections.case import CaseFile
+from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.entries import Range
 
 UNITS = {
@@ -82,7 +82,7 @@ def unit_of(name: str) -> str:
 
 def tables() -> dict[str, type[BaseModel]]:
     """Tables of the file by their place, such as ``bearings.NAME.catalogue``, in the order of the file."""
-    return dict(_tables(CaseFile, ""))
+    return dict(_tables(GearboxFile, ""))
 
 
 def keys() -> Iterator[Key]:
@@ -222,9 +222,9 @@ def json_schema() -> dict[str, Any]:
     >>> json_schema()["$defs"]["GearSection"]["properties"]["teeth"]
     {'maximum': 2000, 'minimum': 5, 'type': 'integer', 'description': 'Number of teeth, positive for rings, too.'}
     """
-    schema = CaseFile.model_json_schema()
+    schema = GearboxFile.model_json_schema()
     models = {model.__name__: model for model in tables().values()}
-    for name, table in {CaseFile.__name__: schema, **schema["$defs"]}.items():
+    for name, table in {GearboxFile.__name__: schema, **schema["$defs"]}.items():
         for key, meaning in meanings(models[name]).items():
             table["properties"][key]["description"] = meaning
     return {"$schema": DIALECT, **_as_toml_has_it(schema)}

@@ -40,7 +40,7 @@ from exugear.system.bearings.rolling.rows import (
     on_raceways,
 )
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.display import Displayed
+from fe_ste.tools.display import ReprMixin
 
 LINE_CONTACT_EXPONENT = 10.0 / 9.0
 """Load of a line contact over its approach."""
@@ -255,7 +255,7 @@ def loads_of_laminae(contacts: RowContacts, displacement: Floats) -> tuple[Float
 
 
 @dataclass(frozen=True)
-class BearingState(Displayed):
+class BearingState(ReprMixin):
     """A bearing in equilibrium with a force."""
 
     displacement: Floats

@@ -6,8 +6,9 @@ origin is a power of the deflection d::
     F = F0 sgn(d) x^m,  x = |d| / s,  m = tangent stiffness / (F0 / s),  tangent m F / d,  U = |F d| / (m + 1).
 
 Teeth of a stated stiffness k have m = 1, a straight line. While s and m change with pmc the teeth take or give the
-power dU/dpmc dpmc/dt, which comes from the rolling train. Below x = `STRAIGHT` the curve goes on as a straight line: it
-has no tangent at the origin. How a mesh resists misalignment stands in `exugear.system.tooth_mesh.contact_state`.
+power dU/dpmc dpmc/dt, which comes from the rolling train. Below x = `LINEAR_BELOW` the curve is extrapolated linearly,
+because it has no tangent at the origin. How a mesh resists misalignment is described in
+`exugear.system.tooth_mesh.contact_state`.
 """
 
 from __future__ import annotations
@@ -32,9 +33,9 @@ from fe_ste.transmission_error.table import TableError
 
 STIFFNESS_FORM = 0
 CURVE_FORM = 2
-STRAIGHT = 0.05
+LINEAR_BELOW = 0.05
 """Deflection over that of the table's load below which the curve is a straight line."""
-_LOG_STRAIGHT = math.log(STRAIGHT)
+_LOG_LINEAR_BELOW = math.log(LINEAR_BELOW)
 _CENTRES = ("load_centroid", "tangent_load_centroid")
 EXPONENT, PER_LOAD = 4, 8
 """Columns of a curve's coefficients behind the four of F0 / s: four of m - 1, and 1 / F0 (1/N)."""
@@ -123,7 +124,7 @@ def curve_law(
     n = c[4] + t * (c[5] + t * (c[6] + t * c[7]))
     n_slope = (c[5] + t * (2.0 * c[6] + t * 3.0 * c[7])) * pieces
     x = k * abs(delta) * c[PER_LOAD]
-    if x > STRAIGHT:
+    if x > LINEAR_BELOW:
         level = math.log(x)
         force = k * math.exp(n * level) * delta
         # Of the logarithm of the force and of the energy per cycle; both at the same deflection.
@@ -132,14 +133,14 @@ def curve_law(
         by_pmc = energy * (rate - n_slope / (2.0 + n))
         tangent = (1.0 + n) * force / delta
     else:
-        chord = k * math.exp(n * _LOG_STRAIGHT)
+        chord = k * math.exp(n * _LOG_LINEAR_BELOW)
         force = chord * delta
         tangent = chord
-        rate = n_slope * _LOG_STRAIGHT + k_rate
+        rate = n_slope * _LOG_LINEAR_BELOW + k_rate
         energy = 0.5 * chord * delta * delta
         by_pmc = energy * rate
         # Where the line meets the curve, both have the same energy: it is less at the origin by this.
-        depth = 0.5 * chord / (2.0 + n) * (STRAIGHT / (k * c[PER_LOAD])) ** 2
+        depth = 0.5 * chord / (2.0 + n) * (LINEAR_BELOW / (k * c[PER_LOAD])) ** 2
         energy -= n * depth
         by_pmc -= depth * (n * (rate - 2.0 * k_rate) + 2.0 * n_slope / (2.0 + n))
     return force, tangent, force * rate, energy, -by_pmc * cycling

@@ -63,10 +63,10 @@ from exugear.system.kernels.meshes import (
     relative_spin,
     row_dot,
     row_motion,
+    shuttling_at,
     subtract_errors,
     tilt_motion,
     turn_rows,
-    way_at,
 )
 from exugear.system.kernels.table_law import (
     NOMINAL_DEFLECTION,
@@ -85,7 +85,7 @@ from exugear.system.tooth_mesh.laws.table import (
 )
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
-from fe_ste.tools.inner_kernels import bundle, kept_bundle
+from fe_ste.tools.inner_kernels import bundle, cached_struct
 from fe_ste.tools.octets import eight, put
 
 # Laws whose force depends on the deflection along a row and on the mesh cycle: both forms of their force
@@ -406,7 +406,7 @@ def add_tilting_mesh(
     cycling = 0.0
     if meshes.way_pieces[m] > 0:
         pmc, cycling = mesh_cycle(q, v, m, meshes)
-        way, moving, beyond, changing = way_at(meshes.way[m], meshes.way_pieces[m], pmc)
+        way, moving, beyond, changing = shuttling_at(meshes.way[m], meshes.way_pieces[m], pmc)
     # Where the load bears beside the middle of the face, it deflects with the misalignment.
     approach = delta - arm * turned
     approaching = rate - arm * tilt_rate
@@ -500,7 +500,7 @@ def acting_table(meshes: MeshArrays) -> TableArrays | None:
 
 def _bundles(meshes: MeshArrays) -> tuple[MeshArrays, TableArrays | None]:
     table = acting_table(meshes)
-    return kept_bundle(meshes), None if table is None else kept_bundle(table)
+    return cached_struct(meshes), None if table is None else cached_struct(table)
 
 
 def _pass(q: Floats, v: Floats, meshes: MeshArrays, states: Floats, f: Floats, jq: Floats, jv: Floats) -> None:

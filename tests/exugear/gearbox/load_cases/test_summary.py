@@ -16,12 +16,12 @@ from exugear.gearbox.load_cases import (
     BURSTING_RIM_SPEED,
     LoadSummary,
     at_load_of,
-    doubt_about_bearings,
-    doubt_about_tables,
+    bearing_range_warning,
     doubts_about,
+    other_load_warning,
     summarise_loads,
 )
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.system.build import assemble
 from exugear.system.statics import accelerating_start
@@ -143,7 +143,7 @@ def test_check_asks_about_the_sign_of_a_torque_that_lets_the_train_run_away(tmp_
 
 def test_check_reads_the_torque_series_too(tmp_path):
     (tmp_path / "torque.csv").write_text("time_s,nobody_N_m\n0,1\n1,1\n")
-    with pytest.raises(CaseError, match="is no torque of a body"):
+    with pytest.raises(GearboxFileError, match="is no torque of a body"):
         summed(tmp_path, torque_series="torque.csv")
     case = tmp_path / "spur.toml"
     case.write_text(
@@ -175,14 +175,14 @@ def test_a_load_case_far_from_the_static_load_asks_for_rows(grc, torques, said):
     """Linear bearings are of the static load: below a quarter of it, or reversed, the remedy is named."""
     varied = grc.varied({"load_cases.rated.torques_N_m": torques})
     loads = summarise_loads(varied, varied.load_cases["rated"])
-    doubt = doubt_about_bearings(varied, loads, "bushing")
+    doubt = bearing_range_warning(varied, loads, "bushing")
     assert bool(doubt) == bool(said)
     assert said in doubt
     assert not doubt or 'model = "iso16281"' in doubt
-    assert doubt_about_bearings(varied, loads, "rigid") == ""
+    assert bearing_range_warning(varied, loads, "rigid") == ""
     names = [name for name, one in grc.case.bearings.items() if one.catalogue and one.catalogue.radial_load_kN is None]
     rows = varied.varied({f"bearings.{name}.model": "iso16281" for name in names})
-    assert doubt_about_bearings(rows, loads, "bushing") == ""
+    assert bearing_range_warning(rows, loads, "bushing") == ""
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_a_load_case_far_from_the_static_load_asks_for_rows(grc, torques, said):
 )
 def test_a_load_case_thirty_percent_off_the_load_of_the_tables_is_told(torque, said):
     gearbox = spur(torques_N_m={"shaft_1": torque, "shaft_2": 1.5 * torque})
-    doubt = doubt_about_tables(gearbox, summarise_loads(gearbox, gearbox.load_cases["run_up"]))
+    doubt = other_load_warning(gearbox, summarise_loads(gearbox, gearbox.load_cases["run_up"]))
     assert said in doubt
     assert bool(said) == bool(doubt)
 
@@ -206,5 +206,5 @@ def test_a_load_case_becomes_the_static_load_with_what_holds_it():
     static = at_load_of(gearbox, gearbox.load_cases["run_up"]).case.static_load
     assert static.torques_N_m == {"shaft_1": 40.0}
     assert static.locked == ("shaft_2",)
-    with pytest.raises(CaseError, match=r"no torque at the start but on what holds the static load \(shaft_2\)"):
+    with pytest.raises(GearboxFileError, match=r"no torque at the start but on what holds the static load \(shaft_2\)"):
         at_load_of(gearbox, spur(torques_N_m={"shaft_2": 60.0}).load_cases["run_up"])

@@ -10,7 +10,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import summarise_loads
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.results.run_file import load_run
 from exugear.system.build import assemble
 from exugear.system.modes import modes_of
@@ -95,7 +95,7 @@ def test_both_inputs_of_a_differential_add_up_by_willis() -> None:
 def test_speeds_that_contradict_each_other_are_refused() -> None:
     content = planetary("ring")
     content["load_cases"]["steady"]["start_speeds_rpm"] = {"carrier": 1.0}
-    with pytest.raises(CaseError, match=r"contradict.*load_cases.steady.start_speeds_rpm"):
+    with pytest.raises(GearboxFileError, match=r"contradict.*load_cases.steady.start_speeds_rpm"):
         Gearbox.from_dict(content)
 
 
@@ -311,14 +311,14 @@ def test_a_law_that_needs_a_table_refuses_a_stated_stiffness() -> None:
 def test_a_stated_stiffness_is_one_positive_thing(keys: dict[str, object], fault: str) -> None:
     content = pair()
     content["pairs"]["helical"]["stiffness"] = keys
-    with pytest.raises(CaseError, match=fault):
+    with pytest.raises(GearboxFileError, match=fault):
         Gearbox.from_dict(content)
 
 
 def test_a_pair_has_a_table_or_a_stated_stiffness() -> None:
     content = pair()
     content["pairs"]["helical"]["table"] = True
-    with pytest.raises(CaseError, match="table = true makes no sense beside a stated stiffness"):
+    with pytest.raises(GearboxFileError, match="table = true makes no sense beside a stated stiffness"):
         Gearbox.from_dict(content)
     assert not Gearbox.from_dict(pair()).pairs["helical"].table
 
@@ -328,5 +328,5 @@ def test_planets_that_mesh_are_told_when_they_do_not_fit() -> None:
 
     content = meshing_planets()
     content["bodies"]["short"]["planet_angles_deg"] = [angle + 2.0 for angle in (0.0, 120.0, 240.0)]
-    with pytest.raises(CaseError, match=r"pairs.short_long.centre_distance_mm|do not fit"):
+    with pytest.raises(GearboxFileError, match=r"pairs.short_long.centre_distance_mm|do not fit"):
         check_parts(Gearbox.from_dict(content))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.train import (
     UNLOADED,
     Train,
@@ -97,7 +97,7 @@ def test_turning_ring_gives_two_degrees_of_freedom(grc: Gearbox) -> None:
     assert gearbox.train.degrees_of_freedom == 2
     assert gearbox.train.ratio == pytest.approx((1 + 99 / 21) * 82 / 23 * 88 / 22, rel=1e-12)  # the ring held
     content["overall"]["input"] = "housing"  # now nothing holds the carrier
-    with pytest.raises(CaseError, match=r"2 degrees of freedom.*static_load.locked"):
+    with pytest.raises(GearboxFileError, match=r"2 degrees of freedom.*static_load.locked"):
         _ = Gearbox.from_dict(content).train.ratio
 
 
@@ -106,7 +106,7 @@ def test_a_train_is_computed_once_and_survives_a_copy_to_another_process(grc: Ge
     assert grc.train.kinematic_modes is grc.train.kinematic_modes
     copied = pickle.loads(pickle.dumps(grc)).train
     assert copied.static_mesh_forces() == grc.train.static_mesh_forces()
-    with pytest.raises(CaseError, match="body 'nobody' does not turn"):
+    with pytest.raises(GearboxFileError, match="body 'nobody' does not turn"):
         copied.rolling_speeds("nobody", 1.0)
 
 

@@ -11,7 +11,7 @@ import pytest
 from exugear.exchange.rexs.containers import read_rexs
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.life.load_spectrum.counted import count_loads
 from exugear.life.load_spectrum.sources import load_sources
 
@@ -101,7 +101,7 @@ def test_a_torque_reversal_loads_the_other_flanks(tmp_path):
 
 @pytest.mark.parametrize("line", ["0,10,1", "100,0,1"])
 def test_loads_that_wear_nothing_are_refused(tmp_path, line):
-    with pytest.raises(CaseError, match="no source of fatigue has torque, speed and hours at once"):
+    with pytest.raises(GearboxFileError, match="no source of fatigue has torque, speed and hours at once"):
         count_loads(loaded(tmp_path, f"torque_N_m,speed_rpm,hours\n{line}\n"))
 
 
@@ -153,7 +153,7 @@ HEADED = "time_s,carrier_N_m,carrier_rpm\n"
     ],
 )
 def test_bad_sources_are_one_error_each(tmp_path, text, keys, message):
-    with pytest.raises(CaseError, match=message) as caught:
+    with pytest.raises(GearboxFileError, match=message) as caught:
         load_sources(loaded(tmp_path, text, **keys))
     assert len(caught.value.faults) == 1
 
@@ -168,7 +168,7 @@ def test_bad_sources_are_one_error_each(tmp_path, text, keys, message):
     ],
 )
 def test_bad_keys_are_told(tmp_path, keys, message):
-    with pytest.raises(CaseError, match=message):
+    with pytest.raises(GearboxFileError, match=message):
         loaded(tmp_path, "torque_N_m,speed_rpm,hours\n1,1,1\n", **keys)
 
 
@@ -176,7 +176,7 @@ def test_more_hours_than_a_year_has_are_refused(tmp_path):
     gearbox = loaded(tmp_path, "torque_N_m,speed_rpm,hours\n1,1,1\n", hours_per_year=5000.0)
     content = {**gearbox.content}
     content["loads"]["sources"]["again"] = content["loads"]["sources"]["bench"]
-    with pytest.raises(CaseError, match="10000 hours a year in all"):
+    with pytest.raises(GearboxFileError, match="10000 hours a year in all"):
         load_sources(Gearbox.from_dict(content, gearbox.source))
 
 

@@ -15,7 +15,7 @@ import pytest
 from exugear.exchange.channels import LoadFileError
 from exugear.exchange.series_files import read_channels
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.life.load_spectrum import series as pools
 from exugear.life.load_spectrum.counted import CountedLoads, count_loads
 from exugear.life.load_spectrum.counting import damage_equivalent_range
@@ -213,14 +213,14 @@ def test_bad_patterns_are_one_error_each(dlc, keys, message):
     (dlc / "short.csv").write_text("file,hours_per_year\nwind_8.outb,1\n")
     (dlc / "bad.csv").write_text("file,hours_per_year\nwind_12.outb,many\n")
     (dlc / "other.csv").write_text("name,hours\na,1\n")
-    with pytest.raises(CaseError, match=message) as caught:
+    with pytest.raises(GearboxFileError, match=message) as caught:
         load_sources(gearbox(dlc, all={"skip_s": 0.0, "torque": "RotTorq", "speed": "RotSpeed", **keys}))
     assert len(caught.value.faults) == 1
 
 
 def test_a_series_needs_its_hours(tmp_path):
     (tmp_path / "series.csv").write_text("time_s,carrier_N_m,carrier_rpm\n0,1,1\n1,1,1\n2,1,1\n")
-    with pytest.raises(CaseError, match="hours_per_year: this key is missing; a series needs it"):
+    with pytest.raises(GearboxFileError, match="hours_per_year: this key is missing; a series needs it"):
         load_sources(gearbox(tmp_path, one={"file": "series.csv", "skip_s": 0.0}))
 
 
@@ -228,7 +228,7 @@ def test_a_link_that_leads_out_of_the_folder_is_refused(dlc, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "stranger.outb"
     outside.write_bytes((dlc / "dlc" / "wind_8.outb").read_bytes())
     (dlc / "dlc" / "link.outb").symlink_to(outside)
-    with pytest.raises(CaseError, match="lies outside the gearbox file's folder"):
+    with pytest.raises(GearboxFileError, match="lies outside the gearbox file's folder"):
         load_sources(gearbox(dlc, all=turbine("files", hours_per_year=10.0)))
 
 
@@ -306,7 +306,7 @@ def test_what_no_shaft_does_is_refused_with_its_row(tmp_path, place, row, messag
     rows = steady_rows()
     rows[place] = row
     (tmp_path / "series.csv").write_text(series(rows))
-    with pytest.raises(CaseError, match=message):
+    with pytest.raises(GearboxFileError, match=message):
         load_sources(gearbox(tmp_path, one={"file": "series.csv", **SOURCE}))
 
 
@@ -314,13 +314,13 @@ def test_a_gap_in_time_is_refused_with_its_row(tmp_path):
     rows = steady_rows()
     del rows[250:330]
     (tmp_path / "series.csv").write_text(series(rows))
-    with pytest.raises(CaseError, match=r"nothing between 24.9 and 33 s \(behind step 250\).*a dropout"):
+    with pytest.raises(GearboxFileError, match=r"nothing between 24.9 and 33 s \(behind step 250\).*a dropout"):
         load_sources(gearbox(tmp_path, one={"file": "series.csv", **SOURCE}))
 
 
 def test_a_speed_of_a_table_beyond_all_shafts_is_refused_with_its_row(tmp_path):
     (tmp_path / "table.csv").write_text("torque_N_m,speed_rpm,hours\n1000,10,30\n3000,1e300,10\n")
-    with pytest.raises(CaseError, match=r"row 2 has 1e\+300 rpm"):
+    with pytest.raises(GearboxFileError, match=r"row 2 has 1e\+300 rpm"):
         load_sources(gearbox(tmp_path, one={"file": "table.csv"}))
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import StrengthSection
 from exugear.life.life import LEFT_OUT
 from exugear.life.rating.standard import FlankRules, MeshLoads, rate
@@ -334,7 +334,7 @@ def test_random_ratings_are_rated_or_refused_and_never_a_traceback(tmp_path):
             content["rating"][key] = chance.choice(values)
         try:
             sheet = project_of(content, tmp_path).rating()
-        except CaseError as error:
+        except GearboxFileError as error:
             assert str(error)
             continue
         text = json.dumps(sheet.summary(), allow_nan=False)

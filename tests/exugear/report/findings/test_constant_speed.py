@@ -14,7 +14,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings.facts import facts_of_response
 from exugear.report.findings.groups import RankedResonance
 from exugear.report.findings.loudness import constant_speed_of, truest_of
-from exugear.report.findings.words import Words
+from exugear.report.findings.words import Labels
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.settings import SpeedRange, SteadySettings
 
@@ -111,6 +111,6 @@ def test_a_mode_is_that_of_the_exact_frequency_not_of_the_run_up_s(runs):
 
 
 def test_without_a_run_up_the_loudest_is_told_by_the_response():
-    (fact,) = facts_of_response(Words(Gearbox.from_toml("cases/grc750/gearbox.toml")), response())
+    (fact,) = facts_of_response(Labels(Gearbox.from_toml("cases/grc750/gearbox.toml")), response())
     assert fact.figure == "790 Hz"
     assert "Excited by mesh." in fact.sentence and "±201 µm" in fact.sentence

@@ -9,7 +9,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings.facts import levers_of
 from exugear.report.findings.verdicts import best_change, guarded
-from exugear.report.findings.words import Words
+from exugear.report.findings.words import Labels
 from exugear.results.spectra.run_spectra import is_among, other_windows, survives
 from exugear.system.modes import modes_of
 from exugear.system.sensitivity import Parameter, ParameterVariation
@@ -39,7 +39,7 @@ def test_first_order_shifts_are_those_of_a_full_solution(gearbox, pair, words):
     modes = modes_of(assembled(gearbox, Choice("rigid"), STIFFNESS))
     dataset = modes.to_dataset()
     for mode in np.flatnonzero(modes.frequency > 100.0):
-        lever = next((own for own in levers_of(Words(gearbox), dataset, int(mode)) if own.what == words), None)
+        lever = next((own for own in levers_of(Labels(gearbox), dataset, int(mode)) if own.what == words), None)
         before = float(modes.frequency[mode])
         after = frequency_of(gearbox, int(mode), STIFFNESS | {pair: (1.0 + little) * STIFFNESS[pair]})
         # The curvature of the square root over 10 % is 2.4 % of the shift; smaller ones are left out.
@@ -78,7 +78,7 @@ def test_resonances_of_resonators_survive_all_windows_and_one_that_is_not_there_
 
 
 def test_words_are_labels_and_copies_are_numbered(gearbox):
-    words = Words(gearbox.varied({"labels.planet": "planet wheel"}))
+    words = Labels(gearbox.varied({"labels.planet": "planet wheel"}))
     assert words.of("planet_2") == "planet wheel 2"
     assert words.family("pl_a_3") == "pl_a"
     assert words.family("sun_planet_1") == "sun_planet"

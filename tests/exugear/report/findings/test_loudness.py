@@ -10,7 +10,7 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import operating_range
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.report.findings.loudness import HOUSING, SHAFTS, ranking_of
 from exugear.steady.mean_system.signals import quantities_of
@@ -84,9 +84,9 @@ def test_the_range_of_operation_is_stated_or_follows_from_the_rated_speed(grc):
     assert operating_range(grc.varied({"operation.speed_range_rpm": [10.0, 30.0]})) == pytest.approx(
         (10.0 * RPM, 30.0 * RPM)
     )
-    with pytest.raises(CaseError, match="lower speed comes first"):
+    with pytest.raises(GearboxFileError, match="lower speed comes first"):
         grc.varied({"operation.speed_range_rpm": [30.0, 10.0]})
-    with pytest.raises(CaseError, match="speed_range_rpm"):
+    with pytest.raises(GearboxFileError, match="speed_range_rpm"):
         grc.varied({"operation.speed_range_rpm": [-30.0, 10.0]})
 
 

@@ -13,7 +13,7 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.system.bodies.elastic_body import FloatingCoordinates
 from exugear.system.bodies.of_gearbox import shaft_model, solid_of_shaft
 from exugear.system.bodies.reduction import Blank, ReductionError
@@ -303,7 +303,7 @@ def test_a_body_in_a_floating_frame_has_the_inertia_of_its_set(floating: Assembl
 
 
 def test_an_impossible_blank_is_refused(gearbox: Gearbox) -> None:
-    with pytest.raises(CaseError, match="shape.blanks.pinion.*axial 0.002 kg m2 exceeds twice the transverse"):
+    with pytest.raises(GearboxFileError, match="shape.blanks.pinion.*axial 0.002 kg m2 exceeds twice the transverse"):
         gearbox.varied({"bodies.shaft.shape.blanks.pinion.axial_kg_m2": 2e-3})
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import VariantError
 from exugear.report.pictures.scene import (
     animate_elastic_bodies,
@@ -201,14 +201,18 @@ def test_reductions_are_kept_in_a_folder(grc: Gearbox, tmp_path: Path) -> None:
 
 
 def test_a_bearing_longer_than_its_seat_is_refused_by_name(grc: Gearbox, stiffness: dict) -> None:
-    with pytest.raises(CaseError, match=r"bodies\.ims\.shape: seat ims_a: a shoulder lies between"):
+    with pytest.raises(GearboxFileError, match=r"bodies\.ims\.shape: seat ims_a: a shoulder lies between"):
         assembled(grc.varied({"bearings.ims_a.z_mm": 160.0}), Choice("flexible"), stiffness)
-    with pytest.raises(CaseError, match=r"bodies\.hss\.shape\.blanks\.flange: no such seat; seats are hs_pinion"):
+    with pytest.raises(
+        GearboxFileError, match=r"bodies\.hss\.shape\.blanks\.flange: no such seat; seats are hs_pinion"
+    ):
         flange = {"mass_kg": 1.0, "axial_kg_m2": 1.0, "transverse_kg_m2": 1.0}
         shaft_model(grc.varied({"bodies.hss.shape.blanks.flange": flange}), "hss")
-    with pytest.raises(CaseError, match="needs a shape"):
+    with pytest.raises(GearboxFileError, match="needs a shape"):
         grc.varied({"bodies.planet.flexibility": "elastic"})
-    with pytest.raises(CaseError, match=r"bodies\.carrier\.flexibility = 'nonrotating': the body carries planets"):
+    with pytest.raises(
+        GearboxFileError, match=r"bodies\.carrier\.flexibility = 'nonrotating': the body carries planets"
+    ):
         solid_body(grc.varied({"bodies.carrier.flexibility": "nonrotating"}), "carrier")
     with pytest.raises(VariantError, match="no body is elastic"):
         assembled(grc.varied({f"bodies.{name}.flexibility": "none" for name in SHAFTS}), Choice("flexible"), stiffness)

@@ -14,7 +14,7 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import Permissions
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import VariantError
 from exugear.report.pictures.scene import elastic_scene
 from exugear.system.bodies.of_gearbox import reduced_bodies, solid_body
@@ -255,10 +255,10 @@ def test_a_gear_in_sectors_has_a_seat_for_each(box: Gearbox) -> None:
     assert found.sectors == {"wheel": ("wheel_1", "wheel_2", "wheel_3")}
     assert [seat.name for seat in found.model.seats][:3] == list(found.sectors["wheel"])
     assert [seat.sector for seat in found.model.seats[:3]] == [(n * 2 * np.pi / 3, 2 * np.pi / 3) for n in range(3)]
-    with pytest.raises(CaseError, match=r"seats\.foot\.sectors = 3: only the seat of a gear has sectors"):
+    with pytest.raises(GearboxFileError, match=r"seats\.foot\.sectors = 3: only the seat of a gear has sectors"):
         foot = solid["seats"]["foot"] | {"sectors": 3}
         solid_body(box.varied({"bodies.box.solid": solid | {"seats": solid["seats"] | {"foot": foot}}}), "box")
-    with pytest.raises(CaseError, match="sectors must be odd"):
+    with pytest.raises(GearboxFileError, match="sectors must be odd"):
         box.varied({"bodies.box.solid.seats.wheel": {"sectors": 4}})
 
 
@@ -304,7 +304,7 @@ def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatc
         (tmp_path / name).write_text("no STEP", encoding="utf-8")
 
     def refused(changes: dict[str, Any], match: str) -> None:
-        with pytest.raises((CaseError, VariantError), match=match):
+        with pytest.raises((GearboxFileError, VariantError), match=match):
             assembled(box.varied(changes), Choice("flexible"), STIFFNESS)
 
     solid, seats = "bodies.box.solid", box.content["bodies"]["box"]["solid"]["seats"]

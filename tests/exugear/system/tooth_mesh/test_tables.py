@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.report.writer import write_report
 from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
@@ -197,14 +197,14 @@ def test_table_of_the_other_flank_sees_the_modification_from_the_other_end(tmp_p
 def test_modifications_that_make_no_sense_are_refused_with_their_key(
     change: tuple[str, str], words: str, tmp_path: Path
 ) -> None:
-    with pytest.raises(CaseError, match=words):
+    with pytest.raises(GearboxFileError, match=words):
         Gearbox.from_toml(modified(tmp_path, change))
 
 
 def test_bad_topography_names_file_line_and_value(tmp_path: Path) -> None:
     case = modified(tmp_path)
     (tmp_path / "pinion.csv").write_text(TOPOGRAPHY.replace(" 2.0", " two"), encoding="utf-8")
-    with pytest.raises(CaseError, match=r"gears.pinion.modification: .*pinion.csv: line 3: 'two'"):
+    with pytest.raises(GearboxFileError, match=r"gears.pinion.modification: .*pinion.csv: line 3: 'two'"):
         Gearbox.from_toml(case)
 
 
@@ -223,7 +223,7 @@ def test_axes_without_the_static_state_or_out_of_order_are_refused(
 ) -> None:
     case = tmp_path / "spur.toml"
     case.write_text(CASE.replace(old, new), encoding="utf-8")
-    with pytest.raises(CaseError, match=words):
+    with pytest.raises(GearboxFileError, match=words):
         Gearbox.from_toml(case)
 
 

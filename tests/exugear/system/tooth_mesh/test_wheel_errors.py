@@ -11,7 +11,7 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.reading import CaseError
+from exugear.gearbox.reading import GearboxFileError
 from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.statics import accelerating_start, locked_equilibrium
@@ -260,5 +260,5 @@ def test_pitch_errors_put_sidebands_of_the_shaft_beside_the_mesh(pitched: Gearbo
     ],
 )
 def test_impossible_errors_are_refused(grc: Gearbox, changes: dict, message: str) -> None:
-    with pytest.raises(CaseError, match=message):
+    with pytest.raises(GearboxFileError, match=message):
         grc.varied(changes)
