@@ -72,7 +72,7 @@ PERTURBATION = 1.02
 def gearset_of(
     assembly: Assembly, speeds: Floats, harmonics: int | None = None, combinations: int = 3
 ) -> HarmonicBalanceModel:
-    """Build the model of an assembly for speeds of the input (rad/s), with the lines of `SteadySettings`; linear bearings.
+    """Build the model of an assembly for speeds of the input (rad/s), lines as in `SteadySettings`; linear bearings.
 
     Where teeth may part, each state takes the lines that it needs: then it begins with few.
     """

@@ -93,7 +93,7 @@ def test_a_gear_with_a_deep_body_has_the_transmission_error_of_the_tables():
     pair = GearPair(name="deep", pinion=pinion, gear=wheel, centre_distance=115.9e-3)
     settings = NonlinearSettings(mesh=ContactMesh(layers=4, thickness=8, rim=8), finite_deformation=False)
     table, (found,) = mean_and_curve(pair, 60.0, 1, settings)
-    assert found.ste == pytest.approx(float(table["ste"]), rel=0.02)
+    assert found.ste == pytest.approx(float(table["ste"].mean()), rel=0.02)
     sector = nonlinear_position(pair, 60.0, 0.0, replace(settings, teeth=5, closed=False))
     assert sector.ste > 2.0 * found.ste
     assert_the_same_contact(table, [found])
@@ -135,7 +135,7 @@ def test_relief_takes_as_much_of_the_load_as_by_the_tables():
     plain = nonlinear_position(PAIR, 60.0, 0.0, settings)
     added = found.ste - plain.ste
     unmodified = static_transmission_error(pair_compliance(PAIR), 60.0, positions=1).squeeze()
-    assert added == pytest.approx(float(table["ste"] - unmodified["ste"]), rel=0.05)
+    assert added == pytest.approx(float((table["ste"] - unmodified["ste"]).mean()), rel=0.05)
 
 
 @pytest.mark.validation
