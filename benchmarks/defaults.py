@@ -5,8 +5,8 @@
 The default: law `line_of_action`, linear bearings, the contact of the teeth as the commands find it. The best: law
 `table` on full grids, bearings by their rows (`model = "iso16281"`). Modes are matched by shape; misalignments and
 bearing loads are those of the static load; heights are those of the loudest lines of the overall transmission error,
-beside a dense sweep of the level `nonlinear`. Figures go to `defaults.json` in the folder; docs/validation.md shows
-them.
+beside a dense sweep of the level `nonlinear`. Figures go to `defaults.json` in the folder;
+docs/validation/steady_response.md shows them.
 """
 
 from __future__ import annotations

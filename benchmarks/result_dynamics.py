@@ -191,7 +191,7 @@ def growth_section(part: Results) -> str:
             items(
                 [
                     f"Linear in what is added: {planets:.2f} µs for a planet (a body, two meshes, two bearings), "
-                    f"{stages:.2f} µs for a stage (a body, a mesh, two bearings). What bounds it is arithmetic, body "
+                    f"{stages:.2f} µs for a stage (a body, a mesh, two bearings). It is limited by arithmetic, body "
                     "by body; equal planets side by side in vector units would make the next ones cheaper.",
                 ]
             ),
@@ -207,7 +207,7 @@ def dynamics_section(part: Results) -> str:
             "## Dynamics\n",
             f"{circumstances(part)} GRC 750 kW, variant bushing: {way['bodies']} bodies, {way['meshes']} meshes, "
             f"{way['bearings']} bearings, {way['coordinates']} coordinates.\n",
-            "### Ways to solve the same equations\n",
+            "### Solvers of the same equations\n",
             f"Step {1e6 * part['step']:.2f} µs for all, in turns in one process; medians of {part['rounds']} rounds, "
             "ratios within a round, µs per step of processor time. Peak memory in a process of its own. Ways with the "
             "same time integration and step have its amplitude error, measured on one of them; "
@@ -224,7 +224,7 @@ def dynamics_section(part: Results) -> str:
             amplitude_table(part),
             items(
                 [
-                    "What bounds the step: the excitation at the top of the band. At twice that frequency, 12.8 kHz, "
+                    "The step is limited by the excitation at the top of the band. At twice that frequency, 12.8 kHz, "
                     "every method here has fewer than five steps a cycle.",
                 ]
             ),

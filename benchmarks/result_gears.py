@@ -25,7 +25,7 @@ def startup_section(part: Results) -> str:
             table(["command", "wall", "processor time"], rows),
             items(
                 [
-                    "What bounds it: imports of numba, SciPy and the package itself are half of a warm start, reading "
+                    "Limited by: imports of numba, SciPy and the package itself are half of a warm start, reading "
                     "the kernels and looking for the static state the rest. xarray, finite elements, Exudyn and what "
                     "draws are not loaded. Several runs in one process would pay this once.",
                     f"The first run compiles for {duration(cold['processor_s'] - warm['processor_s'])} of processor "
@@ -70,7 +70,7 @@ def tables_section(part: Results) -> str:
     share = max(row["once_s"] / row["curve_s"] for row in pairs)
     return "\n".join(
         [
-            "## Tables of the transmission error\n",
+            "## Transmission error tables\n",
             f"{circumstances(part)} Default mesh, from nothing but compiled kernels; medians of {part['rounds']} "
             "rounds, each in a process of its own.\n",
             table(
@@ -88,7 +88,7 @@ def tables_section(part: Results) -> str:
             ),
             items(
                 [
-                    f"What bounds it: both gears' compliance, up to {100 * share:.0f} % of a curve: right-hand sides "
+                    f"Limited by: both gears' compliance, up to {100 * share:.0f} % of a curve: right-hand sides "
                     "of the sector (cut faces and flank nodes), each a solve with the factors. Fewer right-hand sides "
                     "would save in proportion; the curve itself is what would remain.",
                     "Per position: the compliance of the cells near the contact of the position before is half, the "
@@ -100,7 +100,7 @@ def tables_section(part: Results) -> str:
             items(
                 [
                     f"The cost grows with the number of states: {duration(first['per_state_s'])} each in a table of "
-                    f"{first['states']}, {duration(last['per_state_s'])} in one of {last['states']}. What bounds it: "
+                    f"{first['states']}, {duration(last['per_state_s'])} in one of {last['states']}. Limited by: "
                     "every state is solved on its own; it begins with the contact of the position before.",
                 ]
             ),
@@ -121,7 +121,7 @@ def tables_section(part: Results) -> str:
             ),
             items(
                 [
-                    "Processor times. What bounds CalculiX: a factorisation of all unknowns in every contact "
+                    "Processor times. CalculiX is limited by a factorisation of all unknowns in every contact "
                     "iteration of every position, where the superelement has one per gear. More cases: "
                     "[calculix/README.md](calculix/README.md).",
                 ]

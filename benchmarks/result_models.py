@@ -12,9 +12,9 @@ def elastic_section(part: Results) -> str:
     _, fixed, floating = frames
     return "\n".join(
         [
-            "## Elastic bodies\n",
+            "## Flexible bodies\n",
             f"{circumstances(part)} GRC 750 kW.\n",
-            "### Reduction, once for a shape\n",
+            "### Reduction\n",
             table(
                 ["body", "unknowns", "coordinates", "takes"],
                 [
@@ -25,10 +25,10 @@ def elastic_section(part: Results) -> str:
             items(
                 [
                     f"Kept on disk ({kept['file_MB']:.0f} MB), the whole assembly takes {duration(kept['seconds'])}.",
-                    "What bounds it: factorisation of the solids, and the search for their free vibrations.",
+                    "Limited by: factorisation of the solids, and the search for their free vibrations.",
                 ]
             ),
-            "### A step with more and more elastic bodies, compiled solver\n",
+            "### Steps with more flexible bodies, compiled solver\n",
             f"In turns in one process, each at the step that its run chooses; medians of {part['rounds']} rounds, "
             "ratios to the variant bushing within a round. A run takes signals and energies of every step as well, "
             "files aside.\n",
@@ -49,7 +49,7 @@ def elastic_section(part: Results) -> str:
             ),
             items(
                 [
-                    "What bounds it: matrices of the bodies, read once for each evaluation. Vibrations of "
+                    "Limited by: matrices of the bodies, read once for each evaluation. Vibrations of "
                     "lightly damped bodies shorten the step; fewer seats on the housing would save most.",
                 ]
             ),
@@ -86,10 +86,10 @@ def bearings_section(part: Results) -> str:
     added = 1e-6 * every["added_per_row"] * every["rows"] * part["run_up"] / part["step"]
     return "\n".join(
         [
-            "## Non-linear bearings\n",
+            "## Nonlinear bearings\n",
             f"{circumstances(part)} In turns in one process, medians of {part['rounds']} rounds, ratios within a "
             "round; processor time.\n",
-            "### One row, half of its elements loaded, the cage turning\n",
+            "### One row, half of its elements loaded, moving cage\n",
             table(
                 ["row", "µs", "of a linear connector"],
                 [[row["row"], number(row["microseconds"], 2), number(row["ratio"], 2)] for row in rows],
@@ -124,7 +124,7 @@ def bearings_section(part: Results) -> str:
             ),
             items(
                 [
-                    "What bounds it: each evaluation, one a step, follows every loaded element through its table; "
+                    "Limited by: each evaluation, one a step, follows every loaded element through its table; "
                     f"that adds {duration(added)} to the run-up for all {every['bearings']}.",
                 ]
             ),
@@ -153,7 +153,7 @@ def steady_section(part: Results) -> str:
     ]
     return "\n".join(
         [
-            "## Steady response over speed\n",
+            "## Steady-state response\n",
             f"{circumstances(part)} GRC, 400 speeds of the carrier from 0 to 215 rpm, mean system and signals "
             f"included; processor time of one thread; flexible is that with elastic shafts. The last column is over "
             f"the processor time of a run-up of 30 s.\n",
@@ -165,7 +165,7 @@ def steady_section(part: Results) -> str:
             table(["harmonics", "sum of multiples of combinations", "lines", "all"], growth),
             items(
                 [
-                    "What bounds it: half of a speed is the compliance of each line, a dense solution of the mean "
+                    "Limited by: half of a speed is the compliance of each line, a dense solution of the mean "
                     "system. It grows with the number of lines and the third power of the coordinates.",
                 ]
             ),
@@ -177,7 +177,7 @@ def loads_section(part: Results) -> str:
     """Table of the cost of a life."""
     return "\n".join(
         [
-            "## A life under turbine data\n",
+            "## Life with turbine data\n",
             f"{circumstances(part)} {part['minutes']} minutes of turbine data, GRC, variant bushing, tables there "
             "before: "
             f"read, counted, static balance at 12 angles, gears, bearings. Processor time, medians of {part['rounds']} "
@@ -234,14 +234,14 @@ def report_section(part: Results) -> str:
         rows.append(["all of it ready", duration(shown["ready_s"]), "5 s"])
     return "\n".join(
         [
-            "## The report\n",
+            "## Report\n",
             f"{circumstances(part)} Results as `make demo` makes them: two variants, two inertia sets, run-ups of "
             f"30 s; medians of {part['rounds']} rounds. Chromium at the size of a desk, each time started afresh, "
             "drawn by the processor; times from when the page is asked for.\n",
             table(["what", "takes", "asked for: less than"], rows),
             items(
                 [
-                    "What bounds it: spectra of some hundred signals in one process, variations of both compliant "
+                    "Limited by: spectra of some hundred signals in one process, variations of both compliant "
                     "models beside it in another. In the browser it is the drawing of solids without graphics.",
                 ]
             ),

@@ -1,4 +1,4 @@
-"""How the documentation site is built: ``make docs``."""
+"""Sphinx configuration of the documentation site (``make docs``)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 sys.path[:0] = [str(ROOT), str(HERE / "tools")]
 
-import gallery  # noqa: E402  beside this file, found by the line above
+import gallery  # noqa: E402  found through the line above
 
 from fe_ste.tools import arrays  # noqa: E402
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# Examples name files as the command line does, from the root of the project.
+# Examples use paths from the root of the project, as the command line does.
 os.chdir(ROOT)
 
 project = "exugear"
@@ -33,6 +33,7 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
+    "claims_tables",
     "command_pages",
     "interface_pages",
     "outside_pages",
@@ -51,15 +52,15 @@ smartquotes = False
 # The programming interface, from the docstrings
 autosummary_generate = False
 autodoc_member_order = "bysource"
-autodoc_docstring_signature = False  # signatures stand in the code, not in first lines of docstrings
-autodoc_typehints = "signature"  # docstrings tell what annotations do not: shapes, units, meaning
+autodoc_docstring_signature = False  # signatures come from the code, not from docstrings
+autodoc_typehints = "signature"  # docstrings add shapes, units and meaning
 autodoc_type_aliases = {name: name for name in arrays.__all__}  # Floats, not its long form
-# A type of a signature whose name several modules have, such as LoadCase, is linked to one of them.
+# A type name that several modules have, such as LoadCase, is linked to one of them.
 suppress_warnings = ["ref.python"]
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
-# Formulas: a copy of MathJax beside the pages, so that they can be read without a network
+# Formulas: a local copy of MathJax, for reading without a network
 mathjax_path = "mathjax/tex-svg.js"
 mathjax3_config = {
     "options": {"enableMenu": False, "menuOptions": {"settings": {"assistiveMml": True}}},

@@ -2,13 +2,13 @@
 How much do my bearings matter?
 ===============================
 
-Gears on ideal joints have fewer modes than gears on bearings, and bearings are seldom known well. This example softens
-the seats of all bearings and watches the eigenfrequencies.
+Gears on elastic bearings have more modes than on ideal joints, and bearing stiffness is often uncertain. This example
+varies the seat stiffness of all bearings and shows the natural frequencies.
 """
 
 # %%
-# Two parallel stages, as ``exugear new gearbox.toml --kind parallel`` writes them. Their bearings are given by boundary
-# dimensions; the stiffness follows from ISO/TS 16281 at the load that each carries. The mesh stiffness of ISO 6336
+# The gearbox has two parallel stages, as written by ``exugear new gearbox.toml --kind parallel``. Its bearings have
+# boundary dimensions; their stiffness follows from ISO/TS 16281 at the load of each. The mesh stiffness of ISO 6336
 # needs no tables.
 
 import tomllib
@@ -22,7 +22,7 @@ gearbox = Gearbox.from_dict(tomllib.loads(template("parallel")))
 stiffness = mesh_stiffness(gearbox, "iso6336")
 
 # %%
-# Ideal joints leave the rotations alone, bearings add everything else.
+# Ideal joints permit rotation only; bearings add all other motions.
 
 for variant in ("rigid", "bushing"):
     modes = eigenmodes(gearbox, Choice(variant, "iso6336"), stiffness)
@@ -30,8 +30,8 @@ for variant in ("rigid", "bushing"):
     print(f"{variant}: {len(elastic)} modes from {elastic[0]:.0f} to {elastic[-1]:.0f} Hz")
 
 # %%
-# ``housing.factor`` is the share of a deflection that the bearing takes, the rest is its seat's: 1 is a stiff housing.
-# Any key of the gearbox file is varied by its place in the file.
+# ``housing.factor`` is the fraction of a deflection that the bearing takes; the seat takes the rest. A value of 1 is a
+# rigid housing. Any key of the gearbox file can be varied by its path.
 
 factors = np.geomspace(0.1, 1.0, 9)
 found = []
@@ -40,7 +40,7 @@ for factor in factors:
     found.append(eigenmodes(varied, Choice("bushing", "iso6336"), stiffness))
 
 # %%
-# The size of a point is how strongly the overall transmission error sees the mode.
+# The size of a point is the participation of the mode in the overall transmission error.
 
 figure = Figure(figsize=(7.0, 4.0), layout="constrained")
 panel = figure.subplots()
@@ -49,9 +49,9 @@ for factor, modes in zip(factors, found, strict=True):
     shown = (modes.frequency > 1.0) & (modes.frequency < 4000.0)
     size = 4.0 + 120.0 * seen[shown] ** 2
     panel.scatter(np.full(shown.sum(), factor), modes.frequency[shown], s=size, color="C0")
-panel.set(xscale="log", xlabel="housing factor", ylabel="eigenfrequency / Hz")
+panel.set(xscale="log", xlabel="housing factor", ylabel="natural frequency / Hz")
 panel.grid(True)
 
 # %%
-# Modes that climb to the right live in the bearings; level ones live in the teeth. Large points that climb are those
-# for which the bearings must be known well.
+# Modes that rise to the right depend on bearing stiffness; horizontal ones depend on mesh stiffness. Large points that
+# rise are those for which the bearing stiffness must be accurate.

@@ -2,12 +2,12 @@
 Which of two designs is quieter?
 ================================
 
-Two designs are run up side by side: a two-stage gearbox as it is, and with tip relief on its second stage.
+Two designs are compared in a run-up: a two-stage gearbox without and with tip relief on its second stage.
 """
 
 # %%
-# The two stages of ``exugear new gearbox.toml --kind parallel``. A design is a varied gearbox: any key of the file can
-# be replaced. Ten positions of the mesh cycle are few, to be quick.
+# The gearbox is that of ``exugear new gearbox.toml --kind parallel``. A design is a varied gearbox: any key of the
+# file can be replaced. Ten positions of the mesh cycle keep the example short.
 
 import tomllib
 from pathlib import Path
@@ -27,7 +27,7 @@ designs = {
 }
 
 # %%
-# What the teeth excite: the ripple of the transmission error of each stage.
+# The excitation is the peak-to-peak transmission error of each stage.
 
 for name, project in designs.items():
     for pair, table in project.tables(positions=10).items():
@@ -35,7 +35,7 @@ for name, project in designs.items():
         print(f"{name}, {pair}: {1e6 * float(ste.max() - ste.min()):.3f} um peak to peak")
 
 # %%
-# What becomes of it in the gearbox: both run-ups, and the level along the order of each mesh.
+# The response is shown as the order cut of each mesh, for both run-ups.
 
 spectra = {name: run_waterfall(project.run().path) for name, project in designs.items()}
 lines = order_lines(plain, count=1)
@@ -48,7 +48,8 @@ for panel, line in zip(figure.subplots(1, len(lines)), lines, strict=True):
     panel.legend()
 
 # %%
-# The loudest level of each, in dB re 1 um. A relief changes what excites; where the gearbox rings stays where it is.
+# These are the highest levels of each design, in dB re 1 µm. Tip relief changes the excitation; the resonance speeds
+# remain.
 
 for name, waterfall in spectra.items():
     level = 20.0 * np.log10(1e6 * waterfall.amplitude.max())

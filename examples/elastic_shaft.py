@@ -1,14 +1,14 @@
 """
-What do elastic shafts change?
-==============================
+What do flexible shafts change?
+===============================
 
-A gear on an overhanging or slender shaft tilts under load. This example gives the middle shaft of a two-stage gearbox
-its shape and compares it with a rigid one.
+A gear on an overhung or slender shaft tilts under load. This example describes the shape of the middle shaft of a
+two-stage gearbox and compares the flexible with the rigid shaft.
 """
 
 # %%
-# The two stages of ``exugear new gearbox.toml --kind parallel``. The shape is a list of cylindrical pieces. Gears and
-# bearings of the shaft become its seats; what the wheel adds to the shaft is a ``blank``.
+# The gearbox is that of ``exugear new gearbox.toml --kind parallel``. The shape is a list of cylinders. Gears and
+# bearings on the shaft become seats; the additional mass of the gear body is a ``blank``.
 
 import tomllib
 from pathlib import Path
@@ -33,8 +33,9 @@ shape = {
 elastic_shaft = rigid_shafts.varied({"bodies.middle.shape": shape, "bodies.middle.flexibility": "elastic"})
 
 # %%
-# Both on their bearings, with the mesh stiffness of ISO 6336, which needs no tables. The shaft is meshed over its
-# half-section and reduced to six coordinates a seat and a few modal ones; that is kept in the results folder.
+# Both variants are on bearings, with the mesh stiffness of ISO 6336, which needs no tables. The shaft is meshed as a
+# half-section and reduced to six coordinates per seat and some modal coordinates. The reduction is stored in the
+# results folder.
 
 folder = Path("results/elastic_shaft")
 before = Project(rigid_shafts, folder / "rigid", Choice("bushing", "iso6336"))
@@ -43,17 +44,17 @@ shaft = after.bodies()["middle"]
 print(shaft)
 
 # %%
-# How far the gears tilt against each other under the static load, as the opening over the face width.
+# This is the misalignment of the gears under the static load, as the gap over the face width.
 
-for name, project in {"rigid shafts": before, "elastic middle shaft": after}.items():
+for name, project in {"rigid shafts": before, "flexible middle shaft": after}.items():
     state = static_state(project.assembly())
     for mesh, tilt in zip(state.assembly.mesh_names, state.misalignment, strict=True):
         width = 1e-3 * {"stage_1": 32.0, "stage_2": 50.0}[mesh]
         print(f"{name}, {mesh}: {1e6 * tilt * width:6.2f} um")
 
 # %%
-# Modes of both: on the left with rigid shafts, on the right with the elastic one. A line joins modes that are alike in
-# shape; what stands alone on the right is the bending of the shaft.
+# The diagram shows the modes with rigid shafts on the left and with the flexible shaft on the right. A line connects
+# modes with similar shapes; a mode without a line is a bending mode of the shaft.
 
 old, new = before.modes(), after.modes()
 place, share = counterparts(old, new)
@@ -67,5 +68,5 @@ for number, frequency in enumerate(old.frequency):
 for side, modes in enumerate((old, new)):
     shown = modes.frequency[(modes.frequency > 1.0) & (modes.frequency < 3000.0)]
     panel.plot([side] * len(shown), shown, "_", color="C1", markersize=26.0, markeredgewidth=2.0)
-panel.set(xlim=(-0.3, 1.3), xticks=(0.0, 1.0), ylabel="eigenfrequency / Hz")
-panel.set_xticklabels(("rigid shafts", "elastic middle shaft"))
+panel.set(xlim=(-0.3, 1.3), xticks=(0.0, 1.0), ylabel="natural frequency / Hz")
+panel.set_xticklabels(("rigid shafts", "flexible middle shaft"))

@@ -2,12 +2,12 @@
 How large is the transmission error of my gear pair?
 ====================================================
 
-Two gears are described, meshed with finite elements, and rolled through one mesh cycle under a constant torque.
+Two gears are described, meshed with finite elements, and rotated through one mesh cycle under a constant torque.
 """
 
 # %%
-# A gear is given by what stands on its drawing. Lengths are in metres, angles in radians. ``held_diameter`` is where
-# the finite-element model is held: the bore, or the shaft under the teeth.
+# A gear is described by its drawing data. Lengths are in metres, angles in radians. ``held_diameter`` is the diameter
+# that is fixed in the finite-element model: the bore, or the shaft below the teeth.
 
 import math
 
@@ -28,15 +28,15 @@ print(f"transverse contact ratio {pair.transverse_contact_ratio:.2f}")
 print(f"working pressure angle {math.degrees(pair.working_pressure_angle):.2f} deg")
 
 # %%
-# The torque acts on the pinion. The result is an xarray dataset over the position in the mesh cycle (``pmc``).
-# Twenty positions are enough for a smooth helical pair; fifty are usual.
+# The torque acts on the pinion. The result is an xarray dataset over the position in the mesh cycle (``pmc``). Twenty
+# positions suffice for a smooth helical pair; fifty are usual.
 
 curve = static_transmission_error(pair, torque=150.0, positions=20)
 ste = curve["ste"].squeeze()
 print(f"mean {1e6 * float(ste.mean()):.2f} um, peak to peak {1e6 * float(ste.max() - ste.min()):.3f} um")
 
 # %%
-# The mean is how far the wheel lags behind under load. The ripple about it is what excites the gearbox.
+# The mean is the lag of the wheel under load. The variation about it excites the gearbox.
 
 plot_ste_curves({"helical pair at 150 N m": curve})
 

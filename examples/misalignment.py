@@ -2,13 +2,13 @@
 What does misalignment do to my gears?
 ======================================
 
-Shafts bend and bearings yield, so gears never stand quite parallel. This example tilts one gear and watches the load
-along the face, the stiffness and the ripple.
+Shafts bend and bearings deflect, so gears are never perfectly aligned. This example tilts one gear and shows load
+distribution, stiffness and peak-to-peak transmission error.
 """
 
 # %%
-# The helical pair of the first example. Six layers of elements and twelve slices are few, to be quick: the ripple is
-# good to some percent.
+# The pair is the helical pair of the first example. Six layers of elements and twelve slices keep it short; the
+# peak-to-peak value is accurate to some percent.
 
 import math
 
@@ -38,8 +38,8 @@ pair = GearPair(name="helical", pinion=pinion, gear=wheel, centre_distance=128e-
 plain = pair_compliance(pair, MeshSettings(layers=6, flank=12, thickness=8), ContactSettings(slices=12))
 
 # %%
-# Misalignment is the relative rotation of the axes in the plane of action. Here it is given by how far it opens the
-# gap over the face width, as a measuring machine would say: from -20 to 20 um.
+# Misalignment is the relative rotation of the axes in the plane of action. Here it is stated as the gap over the face
+# width, from -20 to 20 µm.
 
 opening = 1e-6 * np.linspace(-20.0, 20.0, 9)
 misalignment = opening / pair.face_width
@@ -53,13 +53,13 @@ def tilted(compliance):
 without = tilted(plain)
 
 # %%
-# Lead crowning, material taken off towards both ends of the face, is the usual remedy.
+# Lead crowning, material removed towards both ends of the face, is the usual remedy.
 
 crowned = tilted(plain.with_modifications(FlankModification(lead_crowning=6e-6), FlankModification()))
 
 # %%
-# Where the load sits along the face (from its middle), how stiff the mesh is for a little more load, and how large the
-# ripple of the transmission error is.
+# The diagrams show the axial position of the load centroid from the middle of the face, the tangent mesh stiffness,
+# and the peak-to-peak transmission error.
 
 figure = Figure(figsize=(9.0, 3.0), layout="constrained")
 panels = figure.subplots(1, 3)
@@ -69,15 +69,16 @@ for name, table in {"without crowning": without, "6 um crowning": crowned}.items
     panels[0].plot(1e6 * opening, 1e3 * mean["load_centroid"], label=name)
     panels[1].plot(1e6 * opening, 1e-6 * mean["tangent_stiffness"], label=name)
     panels[2].plot(1e6 * opening, 1e6 * ripple, label=name)
-panels[0].set_ylabel("load centre / mm")
+panels[0].set_ylabel("load centroid / mm")
 panels[1].set_ylabel("stiffness at the load / (N/um)")
 panels[2].set_ylabel("ripple / um")
 for panel in panels:
-    panel.set_xlabel("opening at the +z end / um")
+    panel.set_xlabel("gap at the +z end / um")
     panel.grid(True)
 panels[0].legend()
 
 # %%
-# Without crowning, 20 um move the load far towards one end, fewer slices of the face carry it, and the ripple grows
-# sixfold. Crowned flanks are softer, and keep the load nearer to the middle whatever the shafts do. They pay with more
-# ripple where the gears stand well: crowning, too, belongs to a load and to the misalignment that comes with it.
+# Without crowning, 20 µm move the load centroid far towards one end. Fewer slices of the face carry the load, and the
+# peak-to-peak transmission error is six times as large. Crowned flanks are more compliant and keep the load closer to
+# the middle. They have a larger peak-to-peak value if the gears are aligned: crowning has to match the load and its
+# misalignment.

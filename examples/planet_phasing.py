@@ -2,14 +2,14 @@
 What does planet phasing change?
 ================================
 
-Whether planets mesh in step is a matter of tooth numbers and places. Planets in step add up in torsion and cancel
-across; planets out of step do the opposite.
+Tooth numbers and planet positions determine whether planets mesh in phase. In phase, mesh forces add in torsion and
+cancel laterally; out of phase, the opposite holds.
 """
 
 # %%
-# Sun 24, ring 96, three planets: 24 divides by 3, so that all planets mesh in step. Planets fit at every multiple of
-# 360/(24 + 96) = 3 degrees. The second design moves two of them by 6 degrees: the same parts, another carrier. Eight
-# positions of the mesh cycle are few, to be quick.
+# Sun 24, ring 96, three planets: 24 is divisible by 3, so all planets mesh in phase. Planets can be assembled at every
+# multiple of 360/(24 + 96) = 3 degrees. The second design moves two of them by 6 degrees, with the same gears. Eight
+# positions of the mesh cycle keep the example short.
 
 from pathlib import Path
 
@@ -28,17 +28,17 @@ places = [0.0, 126.0, 234.0]
 moved = in_step.gearbox.varied({"bodies.planet.planet_angles_deg": places})
 
 # %%
-# A planet at the angle psi is 24 psi / 360 mesh cycles behind the first. The sum of the phases is what the torsion
-# sees of a harmonic, the sum with the planets' directions is what pushes the sun aside.
+# A planet at the angle psi lags the first by 24 psi / 360 mesh cycles. The sum of the phases is the torsional
+# excitation of a harmonic; the sum weighted by the planet directions is the lateral force on the sun.
 
 for angles in ([0.0, 120.0, 240.0], places):
     angle = np.radians(angles)
     torsion = [abs(np.exp(1j * harmonic * 24 * angle).mean()) for harmonic in (1, 2)]
     across = [abs((np.exp(1j * (harmonic * 24 + 1) * angle)).mean()) for harmonic in (1, 2)]
-    print(f"planets at {angles}: torsion {np.round(torsion, 2)}, across {np.round(across, 2)}")
+    print(f"planets at {angles}: torsion {np.round(torsion, 2)}, lateral {np.round(across, 2)}")
 
 # %%
-# The run-up of both. Tables depend on the gears alone, so that both designs share them.
+# Both designs are run up. Tables depend on the gears only, so both designs share them.
 
 designs = {"in step": in_step, "moved": Project(moved, Path("results/planetary/moved"), Choice("bushing"))}
 tables = designs["moved"].tables(positions=8)
@@ -59,5 +59,5 @@ for panel in panels:
     panel.legend()
 
 # %%
-# The transmission error (overall, less its mean) of the second design is a third of the first's. Its sun is pushed
-# aside once per mesh cycle, which the first spares its bearings.
+# The overall transmission error (without its mean) of the second design is a third of the first. Its sun has a lateral
+# force once per mesh cycle, which the first design does not have.

@@ -2,12 +2,12 @@
 My gearbox is a REXS file: what now?
 ====================================
 
-REXS is the exchange format of the gearbox industry. One call makes a commented gearbox file of it, in which each value
-names its source and each assumption is marked.
+REXS is the exchange format of the gearbox industry. One call converts it into a commented gearbox file, in which each
+value has its source and each assumption is marked.
 """
 
 # %%
-# The file is an industrial two-stage gearbox published with the format's own examples.
+# The file is an industrial two-stage gearbox published with the examples of the format.
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ case.write_text(imported.text)
 print(imported.gearbox)
 
 # %%
-# What the import had to assume or replace, and what it compared because the file says it twice.
+# These are assumptions and replacements of the import, and values that it compared because the file states them twice.
 
 for line in imported.changed[:6]:
     print("assumed: ", line)
@@ -31,15 +31,15 @@ for line in imported.checked[:4]:
     print("compared:", line)
 
 # %%
-# The first lines on a gear. Behind each value stands the attribute that gives it.
+# These are the first lines of a gear. Each value has the REXS attribute as a comment.
 
 lines = imported.text.splitlines()
 begin = next(number for number, line in enumerate(lines) if line.startswith("[gears."))
 print("\n".join(line[:110] for line in lines[begin : begin + 12]))
 
 # %%
-# The case runs as it is on ideal joints. Of three bearings the file knows the designation alone; they are blanks. With
-# the boundary dimensions from a catalogue the gearbox stands on its bearings.
+# The variant on ideal joints is available at once. For three bearings the file has only the designation. With boundary
+# dimensions from a catalogue, the variant on bearings becomes available.
 
 dimensions = {
     "bearing_1": {"type": "deep_groove_ball", "bore_mm": 50.0, "outer_diameter_mm": 90.0, "width_mm": 20.0},
@@ -50,7 +50,8 @@ dimensions["bearing_3"]["locates_towards"] = "-z"  # the two tapered ones hold a
 filled = imported.gearbox.varied({f"bearings.{name}.catalogue": values for name, values in dimensions.items()})
 
 # %%
-# The modes that the overall transmission error sees best, with the mesh stiffness of ISO 6336, which needs no tables.
+# These are the modes with the largest participation in the overall transmission error, with the mesh stiffness of ISO
+# 6336, which needs no tables.
 
 project = Project(filled, case.parent, Choice("bushing", "iso6336"))
 modes = project.modes()
@@ -58,11 +59,11 @@ for number in abs(modes.overall).argsort()[::-1][:6]:
     print(f"{modes.frequency[number]:7.1f} Hz  {modes.names[number]}")
 
 # %%
-# How strongly the overall transmission error answers to each mode, per error of the mesh that excites it most.
+# The amplification is the overall transmission error at resonance per transmission error of the dominant mesh.
 
 figure = Figure(figsize=(7.0, 3.6), layout="constrained")
 panel = figure.subplots()
 elastic = modes.frequency > 1.0
 panel.stem(modes.frequency[elastic], modes.amplification.max(axis=1)[elastic], basefmt=" ")
-panel.set(xlim=(0.0, 8000.0), xlabel="eigenfrequency / Hz", ylabel="amplification")
+panel.set(xlim=(0.0, 8000.0), xlabel="natural frequency / Hz", ylabel="amplification")
 panel.grid(True)

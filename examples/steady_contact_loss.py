@@ -2,13 +2,13 @@
 Do my teeth lose contact at resonance?
 ======================================
 
-Where a gear pair resonates, its teeth may part and strike back. The mesh is softer then, in the mean, and the peak
-bends towards low speeds. This example computes the steady response with the teeth free to part.
+At a resonance, the teeth of a gear pair may separate and impact. The mean mesh stiffness is then lower, and the peak
+leans towards low speeds. This example computes the steady-state response with contact loss.
 """
 
 # %%
-# A spur pair on ideal joints. Its file is short enough to stand here. Twelve positions of the mesh cycle are few, to be
-# quick.
+# A spur pair on ideal joints is described by a short gearbox file. Twelve positions of the mesh cycle keep the example
+# short.
 
 import tomllib
 from pathlib import Path
@@ -80,28 +80,28 @@ gearbox = Gearbox.from_dict(tomllib.loads(CASE))
 folder = Path("results/contact_loss")
 
 # %%
-# The law ``table`` knows the force of the teeth over load and position, and that they do not pull. The eigenfrequency
-# of the two discs on the teeth tells where to look.
+# The mesh model ``table`` has the mesh force over load and position, without tension. The natural frequency of the two
+# discs on the mesh stiffness shows the speed range of interest.
 
 parting = Project(gearbox, folder, Choice("rigid", "table"))
 tables = parting.tables()
 modes = parting.modes()
 resonance = float(modes.frequency[-1]) * 60.0 / 20.0
-print(f"mode at {modes.frequency[-1]:.0f} Hz: the mesh frequency meets it at {resonance:.0f} rpm")
+print(f"mode at {modes.frequency[-1]:.0f} Hz: equal to the mesh frequency at {resonance:.0f} rpm")
 
 # %%
-# The same speeds twice: teeth that would also pull, and teeth that part. Each speed of the second starts from the state
-# at the one before.
+# The same speeds are computed twice: with a bilateral mesh model, and with contact loss. In the second case, each
+# speed starts from the state at the previous one.
 
 speeds = SpeedRange.from_text(f"{0.8 * resonance:.0f}:{1.1 * resonance:.0f}:24")
 glued = parting.chosen(mesh_model="line_of_action")
 responses = {
-    "teeth that would pull": glued.steady(SteadySettings(speeds, method="parametric")),
-    "teeth that part": parting.steady(SteadySettings(speeds, method="nonlinear")),
+    "bilateral mesh model": glued.steady(SteadySettings(speeds, method="parametric")),
+    "with contact loss": parting.steady(SteadySettings(speeds, method="nonlinear")),
 }
 
 # %%
-# The first harmonic of the overall transmission error, and the share of time in which the teeth are apart.
+# The diagrams show the first harmonic of the overall transmission error, and the contact-loss fraction.
 
 figure = Figure(figsize=(9.0, 3.4), layout="constrained")
 panels = figure.subplots(1, 2)
@@ -111,13 +111,13 @@ for name, response in responses.items():
     panels[0].plot(speed, 1e6 * first, ".-", label=name)
 panels[1].plot(speed, 100.0 * response["contact_loss_fraction"].isel(mesh_wave=0), ".-", color="C1")
 panels[0].set_ylabel("transmission error, first harmonic / um")
-panels[1].set_ylabel("teeth apart / % of the time")
+panels[1].set_ylabel("contact loss / % of the time")
 panels[0].legend()
 for panel in panels:
     panel.set_xlabel("speed of the pinion / rpm")
     panel.grid(True)
 
 # %%
-# Near the peak the teeth are apart for up to a sixth of the time. The rise on the left becomes a step: the peak leans
-# towards low speeds. Away from it no tooth parts; there the curves differ because the law ``table`` has the stiffness
-# of a little more load, where ``line_of_action`` has that of the whole load.
+# Near the peak, the teeth are separated for up to a sixth of the time. The increase on the left becomes a step,
+# because the peak leans towards low speeds. Away from it there is no contact loss. The curves differ there, because
+# ``table`` follows the nonlinear load-deflection curve of the contact.

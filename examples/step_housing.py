@@ -2,13 +2,13 @@
 How do I bring in my own housing?
 =================================
 
-A housing comes as a STEP file from the design office. This example puts one around a helical pair, tells where its
-bearings sit, and looks at what it changes.
+A housing is often available as a STEP file. This example puts one around a helical pair, connects its bearings, and
+shows the effect on the modes.
 """
 
 # %%
-# The STEP file stands for yours. It is drawn here with gmsh: two plates with bores for four bearings, on a base with a
-# hole along each side for the feet. The axes of the file are those of the gearbox.
+# The STEP file represents your own. It is drawn here with gmsh: two plates with bores for four bearings, on a base
+# with a hole along each side for the feet. Its axes are those of the gearbox.
 
 import tomllib
 from pathlib import Path
@@ -33,9 +33,9 @@ gmsh.write(str(folder / "housing.step"))
 gmsh.finalize()
 
 # %%
-# In the gearbox file a solid names its file, the size of its elements, and a seat for everything that sits on it. The
-# seats of bearings know place and size from the bearings; those of the feet say them. A bearing sits in the housing by
-# its key ``on``, and mounts hold the housing on the ground. Large elements are coarse, to be quick.
+# In the gearbox file, a solid has its file, the element size, and a seat for each connected part. Bearing seats take
+# position and size from the bearings; the seats of the feet state them. A bearing is placed in the housing by its key
+# ``on``, and mounts connect the housing to the ground. Large elements keep the example short.
 
 foot = {"diameter_mm": 20.0, "width_mm": 200.0}
 case = tomllib.loads(template("pair"))
@@ -60,8 +60,8 @@ case["mounts"] = {
 gearbox = Gearbox.from_dict(case, str(folder / "gearbox.toml"))
 
 # %%
-# In the variant ``flexible`` the solid is meshed with tetrahedra and reduced to six coordinates a seat and some modal
-# ones. The reduction is kept in the results folder.
+# In the variant ``flexible``, the solid is meshed with tetrahedra and reduced to six coordinates per seat and some
+# modal coordinates. The reduction is stored in the results folder.
 
 project = Project(gearbox, folder, Choice("flexible", "iso6336"))
 housing = project.bodies()["housing"]
@@ -69,12 +69,12 @@ print(housing.reduced)
 plot = draw_free_vibration(housing.reduced, 0)
 
 # %%
-# What it changes: the modes of the gearbox on its bearings, in a stiff housing and in this one.
+# These are the natural frequencies of the gearbox on its bearings, in a rigid housing and in this one.
 
-for name, chosen in {"stiff housing": project.chosen(variant="bushing"), "this housing": project}.items():
+for name, chosen in {"rigid housing": project.chosen(variant="bushing"), "this housing": project}.items():
     modes = chosen.modes()
     frequencies = [f"{frequency:.0f}" for frequency in modes.frequency if 1.0 < frequency < 2000.0]
     print(f"{name}: {', '.join(frequencies)} Hz")
 
 # %%
-# The two plates bring modes of their own, and those of the bearings move.
+# The two plates add modes of their own, and the modes of the bearings are shifted.

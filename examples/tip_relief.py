@@ -2,12 +2,12 @@
 How much tip relief suits my load?
 ==================================
 
-Loaded teeth bend, so the next tooth pair would meet too early. Tip relief makes room for it. The right amount belongs
-to one load: this example looks for it.
+Loaded teeth bend, so the next tooth pair would come into contact too early. Tip relief prevents this. The right
+amount depends on the load: this example determines it.
 """
 
 # %%
-# A spur pair shows it best, for its load passes from one tooth pair to two and back.
+# A spur pair shows the effect best, because its load changes between one and two tooth pairs.
 
 import numpy as np
 
@@ -20,23 +20,23 @@ pair = GearPair(name="spur", pinion=gear, gear=gear, centre_distance=120e-3)
 compliance = pair_compliance(pair)
 
 # %%
-# The costly part, how the gears yield, is computed once. Modified flanks change the gap between the teeth alone. A
-# long relief begins where one tooth pair carries all the load: there the roll length from the tip is the contact
-# ratio less one, in base pitches.
+# The expensive part, the compliance of the gears, is computed once. Modified flanks only change the gap between the
+# teeth. A long relief begins where one tooth pair carries all the load: there, the roll length from the tip is the
+# contact ratio minus one, in base pitches.
 
 base_pitch = np.pi * gear.normal_module * np.cos(gear.normal_pressure_angle)
 start = radius_at_roll_length_from_tip(gear, (pair.transverse_contact_ratio - 1.0) * base_pitch)
 
 
 def relieved(amount):
-    """Return the pair with this much material (m) removed from the tips of both gears."""
+    """Return the pair with this tip relief (m) on both gears."""
     modification = FlankModification(tip_relief=Relief(amount, start))
     return compliance.with_modifications(modification, modification)
 
 
 # %%
-# The ripple of the transmission error over the load, for four amounts. Fifteen positions of the mesh cycle are few:
-# they give the ripple to some percent.
+# The diagram shows the peak-to-peak transmission error over the load, for four amounts. Fifteen positions of the mesh
+# cycle give it to some percent.
 
 torques = [20.0, 100.0, 200.0, 300.0, 400.0, 500.0]
 ripples = {
@@ -46,15 +46,16 @@ ripples = {
 plot_ripple(ripples)
 
 # %%
-# Each relief has a load at which the ripple is least: more relief suits more load. Below that load the relieved tips
-# leave the teeth apart for too long, above it the bending wins. Without relief the ripple grows with the load.
+# Each relief has a load with a minimum of the peak-to-peak value; more relief suits a higher load. Below that load,
+# relieved tips are out of contact for too long; above it, tooth bending dominates. Without relief, the peak-to-peak
+# value increases with the load.
 
 for name, dataset in ripples.items():
     ripple = 1e6 * np.ptp(dataset["ste"].squeeze().transpose("pmc", "torque").to_numpy(), axis=0)
     least = np.argmin(ripple)
-    print(f"{name}: least ripple {ripple[least]:.2f} um at {torques[least]:.0f} N m")
+    print(f"{name}: minimum peak-to-peak TE {ripple[least]:.2f} um at {torques[least]:.0f} N m")
 
 # %%
-# The curves at 300 N m show why.
+# The curves at 300 N m show the reason.
 
 plot_ste_curves({name: dataset.sel(torque=[300.0]) for name, dataset in ripples.items()})

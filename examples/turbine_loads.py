@@ -2,14 +2,14 @@
 What does a turbine's load do to my bearings?
 =============================================
 
-A turbine simulation gives ten minutes of torque at some wind speeds. This example counts them over twenty years, takes
-them through the balance at rest of a gearbox, and says how long its bearings last.
+A turbine simulation has ten minutes of torque at some wind speeds. This example counts them over twenty years,
+applies them to the static equilibrium of a gearbox, and computes its bearing lives.
 """
 
 # %%
-# The gearbox is the 750 kW GRC of the cases; the files are those of the NREL 5 MW turbine at 8, 12 and 18 m/s. They are
-# not loads of the GRC's turbine: its case file scales torque and speed, and every output says so. Hours are those of a
-# Rayleigh distribution of wind of 8.5 m/s on average.
+# The gearbox is the GRC 750 kW; the files are those of the NREL 5 MW turbine at 8, 12 and 18 m/s. They are not loads
+# of the GRC turbine: the gearbox file scales torque and speed, and every output states it. Hours are those of a
+# Rayleigh distribution with a mean wind speed of 8.5 m/s.
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -24,24 +24,24 @@ for line in counted.remarks:
     print(line)
 
 # %%
-# Teeth and roller bearings turn through their load: what counts is for how many revolutions a torque lasts. The
-# constant torque that does the same damage depends on the slope of the S-N curve.
+# Teeth and rolling bearings rotate through their load: the number of revolutions at each torque counts. The constant
+# torque with equal damage depends on the slope of the S-N curve.
 
 found = counted.distribution
 for slope, torque in counted.equivalents().items():
     print(f"slope {slope:.3g}: {1e-3 * torque:.0f} kN m of at most {1e-3 * found.upper.max():.0f}")
 
 # %%
-# The balance at rest is solved at twelve angles of the carrier. Mesh stiffness of ISO 6336 needs no tables, so gears
-# have no stresses here; ``exugear life`` computes their tables and rates them, too.
+# The static equilibrium is solved at twelve carrier angles. The mesh stiffness of ISO 6336 needs no tables, so gears
+# have no stresses here. ``exugear life`` computes their tables and rates them as well.
 
 assembly = Project(gearbox, "results/turbine", Choice("bushing", "iso6336")).assembly()
 life = compute_life(assembly, counted, {}, stated_factors(gearbox, 1.05), "")
-print(f"planets share the load with K_gamma = {life.load_sharing['sun_planet']:.3f} at most")
+print(f"maximum load sharing factor K_gamma = {life.load_sharing['sun_planet']:.3f}")
 
 # %%
-# L10 of ISO 281 stands beside L10r of ISO/TS 16281, which knows tilt, clearance and profile. Both are basic: oil,
-# cleanliness and ribs are left out.
+# L10 of ISO 281 is compared with L10r of ISO/TS 16281, which includes tilt, clearance and profile. Both are basic
+# lives, without lubricant, cleanliness and ribs.
 
 figure = Figure(figsize=(8.0, 3.6), layout="constrained")
 duration, lives = figure.subplots(1, 2)
@@ -56,5 +56,5 @@ lives.set(xscale="log", xlabel="life / h", yticks=place, yticklabels=[one.name f
 lives.legend()
 
 # %%
-# The bearings of the high-speed shaft come first: they turn eighty times as often as the carrier. The broken line is
-# how long they turn in twenty years.
+# The bearings of the high-speed shaft limit the life: they rotate eighty times as fast as the carrier. The broken line
+# is the operating time in twenty years.

@@ -31,7 +31,7 @@ def test_tables_are_made_of_the_stored_figures(reporting: ModuleType, results: d
     )
 
 
-@pytest.mark.parametrize(("name", "quote"), [("README.md", "in_short"), ("docs/quality/dynamics.md", "amplitudes")])
+@pytest.mark.parametrize(("name", "quote"), [("README.md", "in_short"), ("docs/validation/dynamics.md", "amplitudes")])
 def test_documents_quote_the_stored_figures(reporting: ModuleType, results: dict, name: str, quote: str) -> None:
     text = (ROOT / name).read_text(encoding="utf-8")
     assert name in reporting.QUOTED

@@ -1,10 +1,11 @@
-"""The site's sources name what is there: public names, examples, pages. `make docs` builds it and checks the rest."""
+"""Sources of the site: public names, examples, links, claims, headings. `make docs` builds it and checks the rest."""
 
 from __future__ import annotations
 
 import ast
 import importlib
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ DOCS = ROOT / "docs"
 
 @pytest.mark.parametrize("package", ["exugear", "fe_ste"])
 def test_every_public_name_stands_on_the_page_of_the_programming_interface(package):
-    listed = set(re.findall(rf"^   ~{package}\.(?:\w+\.)*(\w+)$", (DOCS / "reference" / "api.md").read_text(), re.M))
+    listed = set(re.findall(rf"^   ~{package}\.(?:\w+\.)*(\w+)$", (DOCS / "reference" / "python.md").read_text(), re.M))
     assert listed == set(importlib.import_module(package).__all__) - {"__version__"}
 
 
@@ -38,3 +39,45 @@ def test_the_readme_links_to_files_that_are_there():
     links = re.findall(r"\]\(((?!https?:)[^)#]+)", (ROOT / "README.md").read_text(encoding="utf-8"))
     assert len(links) > 10
     assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+CLAIMS = tomllib.loads((DOCS / "validation" / "claims.toml").read_text(encoding="utf-8"))
+PROMISES = tomllib.loads((DOCS / "validation" / "promises.toml").read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(("kind", "tables"), [("claims", CLAIMS), ("promises", PROMISES)])
+def test_each_table_of_claims_is_on_one_page(kind, tables):
+    pages = [path for folder in ("validation", "case_study") for path in (DOCS / folder).glob("*.md")]
+    texts = "\n".join(path.read_text(encoding="utf-8") for path in pages)
+    assert sorted(re.findall(rf"^<!-- {kind}: (\w+) -->$", texts, re.M)) == sorted(tables)
+
+
+@pytest.mark.parametrize("name", CLAIMS)
+def test_claims_have_five_entries_and_name_tests_that_exist(name):
+    tests = {path.name for path in (ROOT / "tests").rglob("test_*.py")}
+    for row in CLAIMS[name]["rows"]:
+        named = re.findall(r"`(test_\w+\.py)`", row[-1])
+        assert len(row) == 5 and row[0] and named and set(named) <= tests, row
+
+
+HEADING = re.compile(r"^#+ (What|Where|How(?!-to)|Why|When|Which (?!model when))\b", re.M)
+
+
+def pages():
+    """Pages of the site that are written by hand."""
+    made = {"elsewhere", "gallery", "rooms"}
+    return [path for path in DOCS.rglob("*.md") if not made & set(path.parts) and path.stem != "command_line"]
+
+
+@pytest.mark.parametrize("page", pages(), ids=lambda path: path.relative_to(DOCS).as_posix())
+def test_headings_are_noun_phrases_and_pages_have_a_lower_case_name(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+    assert not HEADING.search(text)
+    assert re.fullmatch(r"[a-z0-9_]+", page.stem)
+
+
+def test_diagrams_are_those_that_the_tool_draws():
+    names = re.findall(
+        r'^            "(\w+)": \w+,$', (DOCS / "tools" / "diagrams.py").read_text(encoding="utf-8"), re.M
+    )
+    assert sorted(names) == sorted(path.stem for path in (DOCS / "images").glob("*.svg"))

@@ -1,4 +1,4 @@
-"""Spelling of the documents: English words, and those of the field in ``docs/words.txt``.
+"""Spelling check of the documents: English words, and technical words in ``docs/words.txt``.
 
 Run it as ``python docs/tools/check_spelling.py``. Code, formulas and addresses are left out.
 """
@@ -26,18 +26,18 @@ LEFT_OUT = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 WORD = re.compile(r"[A-Za-zÀ-ÿ][a-zà-ÿ]+(?:'[a-z]+)?\b")
-"""Words of two letters or more; what is written in capitals is a name."""
+"""Words of two letters or more; words in capitals are names."""
 
 
 def documents() -> list[Path]:
-    """Documents in Markdown, and the examples of the gallery."""
+    """Return the Markdown documents and the examples of the gallery."""
     pages = [page for page in (ROOT / "docs").rglob("*.md") if not set(page.parts) & set(GENERATED)]
     others = [ROOT / "README.md", ROOT / "CHANGELOG.md", *(ROOT / "examples").glob("*.rst")]
     return sorted([*pages, *others, *(ROOT / "examples").glob("*.py")])
 
 
 def prose(file: Path) -> str:
-    """Text of a document without code; of an example its head and the comments between its blocks."""
+    """Return the text of a document without code, of an example its head and comments."""
     text = file.read_text(encoding="utf-8")
     if file.suffix == ".py":
         comments = re.findall(r"^# ?(.*)$", text, re.MULTILINE)
@@ -46,7 +46,7 @@ def prose(file: Path) -> str:
 
 
 def unknown_words(file: Path, dictionary: SpellChecker) -> list[str]:
-    """Words of a document that neither the dictionary nor the list has."""
+    """Return the words of a document that are in neither the dictionary nor the list."""
     words = {re.sub(r"'s?$", "", word.lower()) for word in WORD.findall(prose(file))}
     return sorted(dictionary.unknown(words))
 

@@ -1,4 +1,4 @@
-"""The page that describes the command line, made of the program itself: every verb, argument and option."""
+"""Reference page of the command line, generated from the program: every command, argument and option."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from exugear.cli.app import app as command_line
 PAGE = Path(__file__).parent.parent / "reference" / "command_line.md"
 HEAD = """# Command line
 
-Every verb with its arguments and options, written by the program itself: `exugear VERB --help` says the same. How the
-verbs follow each other stands in [verbs](verbs.md), and what their exit codes mean.
+Every command with its arguments and options, as `exugear COMMAND --help` prints them. The order of the commands and
+their exit codes are described in [workflow](workflow.md).
 """
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx what this extension does."""
+    """Register the extension."""
     app.connect("builder-inited", lambda app: write_page())
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
@@ -33,7 +33,7 @@ def write_page() -> None:
 
 
 def page() -> str:
-    """Page in Markdown."""
+    """Return the page in Markdown."""
     group: Any = typer.main.get_command(command_line)
     return "\n".join([HEAD, *(_verb(name, verb) for name, verb in group.commands.items() if not verb.hidden)])
 
@@ -49,7 +49,7 @@ def _verb(name: str, verb: Any) -> str:
 
 
 def _heading(option: Any) -> str:
-    """Names of an option, what it takes, and what holds without it."""
+    """Return names, values and default of an option."""
     kind = option.type_descriptor.annotation
     choices = [str(value.value) for value in kind] if isinstance(kind, type) and issubclass(kind, Enum) else []
     taken = "" if option.is_flag else " | ".join(choices) or option.metavar or kind.__name__.upper()

@@ -1,4 +1,4 @@
-"""How the gallery is made: the examples run while the site is built, and a failing one stops the build.
+"""Settings of the gallery: examples run while the site is built, and a failing one stops the build.
 
 Examples run again when they or any source of the packages changed; tables and other results that fit their input are
 kept in ``examples/results``.
@@ -17,7 +17,7 @@ ORDER = (
     "first_table",
     "tip_relief",
     "misalignment",
-    "where_it_rings",
+    "resonances",
     "bearing_stiffness",
     "planet_phasing",
     "elastic_shaft",
@@ -27,7 +27,7 @@ ORDER = (
     "rexs_file",
     "compare_designs",
 )
-"""Examples from the first steps to the special ones."""
+"""Order of the examples, from first steps to special topics."""
 
 
 def settings(root: Path) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def settings(root: Path) -> dict[str, Any]:
 
 
 def figures_of_a_block(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
-    """Save the figures that a block of an example made, also those without pyplot, and say where they are."""
+    """Save the figures of an example block, also those without pyplot, and return their reST."""
     names, shown = block_vars["example_globals"], block_vars.setdefault("shown", [])
     found = {id(value): value for value in names.values() if isinstance(value, Figure)}
     new = [figure for key, figure in found.items() if key not in {id(old) for old in shown}]
@@ -65,7 +65,7 @@ def figures_of_a_block(block: Any, block_vars: dict[str, Any], gallery_conf: dic
 
 
 def sources_changed(root: Path) -> bool:
-    """Whether the packages changed since the examples ran, as a digest beside the built pages tells."""
+    """Return whether the packages changed since the examples ran, from a stored digest."""
     files = sorted(file for package in ("exugear", "fe_ste") for file in (root / package).rglob("*.py"))
     digest = hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
     note = root / "docs" / "gallery" / "sources.sha256"
@@ -79,5 +79,5 @@ def sources_changed(root: Path) -> bool:
 
 
 def place(file: str) -> int:
-    """Place of an example among all."""
+    """Return the position of an example."""
     return ORDER.index(Path(file).stem)

@@ -1,4 +1,4 @@
-"""Pages of the site that stand elsewhere in the project, such as what was measured, and links to them.
+"""Pages of the site from other folders of the project, such as benchmarks, and links to them.
 
 Pages in ``docs`` link to such files by their place in the project, so that the links work where the project is read as
 files. In the site they lead to the pages that are made of those files here.
@@ -19,7 +19,7 @@ FOLDERS = ("benchmarks", "cases")
 
 
 def page_of(file: str) -> str:
-    """Page of the site that shows a document, both from the root of the project.
+    """Return the page of the site that shows a document, both from the root of the project.
 
     Examples
     --------
@@ -30,7 +30,7 @@ def page_of(file: str) -> str:
 
 
 def outside_documents() -> list[str]:
-    """Documents that stand elsewhere in the project and are pages of the site."""
+    """Return the documents of other folders that are pages of the site."""
     found = [file for folder in FOLDERS for file in (ROOT / folder).rglob("*.md")]
     return ["CHANGELOG.md", *sorted(file.relative_to(ROOT).as_posix() for file in found)]
 
@@ -41,14 +41,14 @@ LINK = re.compile(r"(\]\()([^)\s#:]+)((?:#[^)\s]*)?\))")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx what this extension does."""
+    """Register the extension."""
     app.connect("builder-inited", _write_pages)
     app.connect("source-read", _lead_links_to_pages)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def with_links(text: str, old: Path, new: Path) -> str:
-    """Return text whose links, right for a file at `old`, are right for the page at `new`, both from the root."""
+    """Return a text with its links changed from the location `old` to `new`, both from the root."""
 
     def changed(link: re.Match[str]) -> str:
         begin, target, end = link.groups()

@@ -1,4 +1,4 @@
-"""Pages of the programming interface: one for each room of the packages, with its modules from their docstrings."""
+"""API pages: one per package, generated from the docstrings of its modules."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ PACKAGES = ("exugear", "fe_ste")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Tell Sphinx what this extension does."""
+    """Register the extension."""
     app.connect("builder-inited", lambda app: write_pages())
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def write_pages() -> None:
-    """Write the page of each room and the list of all; remove pages of rooms that are gone."""
+    """Write the page of each package and the index; remove obsolete pages."""
     pages = {f"{name}.rst": _room(name, files) for name, files in rooms().items()}
     pages["index.rst"] = _index()
     FOLDER.mkdir(exist_ok=True)
@@ -34,7 +34,7 @@ def write_pages() -> None:
 
 
 def rooms() -> dict[str, list[Path]]:
-    """Modules of each room, by its dotted name; modules at the top of a package are a room."""
+    """Return the modules of each package by its dotted name."""
     found: dict[str, list[Path]] = {}
     for package in PACKAGES:
         for file in sorted((ROOT / package).rglob("*.py")):
@@ -53,7 +53,7 @@ def _room(name: str, files: list[Path]) -> str:
 
 
 def _index() -> str:
-    lines = [_title("All modules", "="), "A page for each room of the two packages.", ""]
+    lines = [_title("All modules", "="), "A page for each package, generated from the docstrings.", ""]
     for package in PACKAGES:
         names = [name for name in rooms() if name.partition(".")[0] == package]
         lines += [_title(package, "-"), ".. toctree::", "   :maxdepth: 1", "", *(f"   {name}" for name in names), ""]

@@ -235,9 +235,10 @@ def test_searches_that_cannot_be_are_refused_on_reading(tmp_path, changes, words
     assert words in str(told.value) and len(str(told.value).splitlines()) == 1
 
 
-def test_the_example_of_the_guide_can_be_read():
-    page = Path("docs/howto/design_for_production.md").read_text(encoding="utf-8")
-    content = tomllib.loads(page[page.index("```toml") + 7 : page.index("```\n\n    exugear study")])
+def test_the_example_of_the_reference_can_be_read():
+    page = Path("docs/reference/studies.md").read_text(encoding="utf-8")
+    begin = page.index('```toml\nname = "Relief')
+    content = tomllib.loads(page[begin + 7 : page.index("```\n", begin + 7)])
     study = Study.from_dict({**content, "case": "cases/grc750/gearbox.toml"})
     path = "gears.hs_pinion.modification.tip_relief_um"
     made = study.tolerances.produced(study.gearbox, {path: 30.0})

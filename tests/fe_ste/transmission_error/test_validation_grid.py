@@ -1,6 +1,6 @@
 """Tables over load and position at the default mesh: relief for a load, what misalignment does, interpolation.
 
-The figures stand in docs/quality/transmission_error.md.
+The figures stand in docs/validation/te_accuracy.md.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Transmission error of the GRC 750 kW pairs at the default mesh: refinement, smoothness, ISO 6336, slices.
 
 `make validate` takes the high-speed pair, with its elements doubled too; `make validate-long` takes the other three,
-and halves the elements of all four. The figures stand in docs/quality/transmission_error.md.
+and halves the elements of all four. The figures stand in docs/validation/te_accuracy.md.
 """
 
 from __future__ import annotations

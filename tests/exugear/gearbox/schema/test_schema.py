@@ -72,7 +72,9 @@ def _faults(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> list[st
 
 
 def test_the_page_of_the_documentation_is_what_the_models_say() -> None:
-    assert (ROOT / "docs" / "case_file.md").read_text(encoding="utf-8") == page(), "exugear schema --page --out it"
+    assert (ROOT / "docs" / "reference" / "gearbox_file.md").read_text(encoding="utf-8") == page(), (
+        "exugear schema --page --out it"
+    )
 
 
 def test_schema_prints_or_writes_the_same(tmp_path: Path) -> None:

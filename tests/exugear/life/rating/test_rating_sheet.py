@@ -202,7 +202,7 @@ def test_loads_that_teeth_do_not_feel_are_left_out(tmp_path):
 
 @pytest.mark.validation
 def test_finite_elements_stand_beside_the_nominal_load_where_a_table_is_there(tmp_path):
-    """Root stress by gauges in the closed ring; see docs/loads_and_life.md for what lies between both."""
+    """Root stress by gauges in the closed ring; see docs/theory/load_spectra_and_life.md for what lies between both."""
     content = spur(tmp_path, nominal_hours=5000.0)
     project = project_of(content, tmp_path)
     assert not project.rating().flanks[0].finite_elements

@@ -1,0 +1,92 @@
+"""The how-to guides run as pasted: their shell and Python blocks, one page after the other, in one folder.
+
+A block that runs begins with ```` ```sh ```` or ```` ```python ````. Indented blocks and blocks of other languages are
+shown only. A comment ``<!-- expect: TEXT -->`` after a block names a text that its output contains, and one
+``<!-- exit: 1 -->`` the exit code. Pages that take longer than some seconds run with the validation tests.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+GUIDES = ROOT / "docs" / "howto"
+START = "exugear new my/gearbox.toml --kind parallel"
+"""First command of the tutorial, which makes the file that all guides start from."""
+BLOCK = re.compile(
+    r"^( *)```(sh|python)\n(.*?)^\1```$((?:\s*<!-- (?:expect|exit): .*? -->)*)", re.MULTILINE | re.DOTALL
+)
+QUICK = ("catalogue_bearings", "damping", "python", "untrusted_files")
+LONG = ("reference_analysis",)
+NEEDS_GMSH = ("flexible_bodies", "solids_in_python")
+
+
+def pages() -> list[str]:
+    """Names of the guides in the order of the table of contents."""
+    contents = (GUIDES / "index.md").read_text(encoding="utf-8")
+    return re.findall(r"^([a-z_]+)$", contents[contents.index("```{toctree}") :], re.MULTILINE)
+
+
+def blocks(page: str) -> list[tuple[str, str, str, int]]:
+    """Language, text, expected text and exit code of the blocks of a page that run."""
+    found = []
+    for indent, language, text, notes in BLOCK.findall((GUIDES / f"{page}.md").read_text(encoding="utf-8")):
+        expected = re.findall(r"<!-- expect: (.*?) -->", notes)
+        codes = re.findall(r"<!-- exit: (\d+) -->", notes)
+        block = re.sub(rf"^{indent}", "", text, flags=re.MULTILINE)
+        found.append((language, block, "".join(expected), int("".join(codes) or 0)))
+    return found
+
+
+def marked(page: str) -> pytest.param:
+    marks = [] if page in QUICK else [pytest.mark.long if page in LONG else pytest.mark.validation]
+    return pytest.param(page, marks=marks)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder with the tutorial's file, and with `exugear` and `python` as commands of this interpreter."""
+    place = tmp_path_factory.mktemp("howto")
+    commands = place / "bin"
+    commands.mkdir()
+    called = "import sys; sys.argv[0] = 'exugear'; from exugear.cli.app import main; main()"
+    for name, options in {"exugear": f' -c "{called}"', "python": ""}.items():
+        script = commands / name
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}"{options} "$@"\n', encoding="utf-8")
+        script.chmod(0o755)
+    run(place, "sh", START)
+    return place
+
+
+def run(place: Path, language: str, text: str) -> subprocess.CompletedProcess[str]:
+    """Run a block as pasted into a shell, or saved and run by Python; a shell stops at the first failure."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PATH": f"{place / 'bin'}{os.pathsep}{os.environ['PATH']}"}
+    call = ["sh", "-e", "-c", text] if language == "sh" else [sys.executable, "-c", text]
+    return subprocess.run(call, cwd=place, env=environment, capture_output=True, text=True, check=False, timeout=900)
+
+
+def test_every_guide_is_in_the_contents_and_most_of_them_run() -> None:
+    assert sorted(pages()) == sorted(file.stem for file in GUIDES.glob("*.md") if file.stem != "index")
+    assert sum(bool(blocks(page)) for page in pages()) >= len(pages()) - 2
+    assert set(QUICK) | set(LONG) | set(NEEDS_GMSH) <= set(pages())
+
+
+def test_the_tutorial_makes_the_file_that_the_guides_start_from() -> None:
+    assert START in (ROOT / "docs" / "getting_started" / "own_gearbox.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("page", [marked(page) for page in pages() if blocks(page)])
+def test_a_guide_runs_as_pasted(page: str, folder: Path) -> None:
+    if page in NEEDS_GMSH and find_spec("gmsh") is None:
+        pytest.skip("gmsh is not installed")
+    for language, text, expected, code in blocks(page):
+        outcome = run(folder, language, text)
+        assert outcome.returncode == code, f"{text}\n{outcome.stdout}\n{outcome.stderr}"
+        assert expected in outcome.stdout + outcome.stderr, f"{text}\n{outcome.stdout}\n{outcome.stderr}"
