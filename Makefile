@@ -89,7 +89,7 @@ help:
 	@echo "make test PACKAGE=steady  the tests of one package"
 	@echo "make test-browser  claims about the report page in a browser, desk and phone; needs chromium"
 	@echo "make validate    the long comparisons with references"
-	@echo "make validate-long  the longest ones, before a release; docs/validation.md records them"
+	@echo "make validate-long  the longest ones, before a release; docs/validation/index.md records them"
 	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
 	@echo "make check       ruff, mypy and the wording of texts"
 	@echo "make check-web   the pages' scripts: linted, types checked; with a node of its own"
