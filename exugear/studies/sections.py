@@ -219,7 +219,7 @@ class OptimisationSection(StudyPart):
     """Of each output over the tolerances, on its bad side; 95 by default. Of 100 it is the worst draw."""
     weightings: Annotated[int, Field(ge=1, le=50)] = 5
     """Of two outputs: how many weightings, one search each, from the first alone to the second alone."""
-    population: Annotated[int, Field(ge=4, le=1000)] = 16
+    population: Annotated[int, Field(ge=5, le=1000)] = 16
     """Points of a generation."""
     generations: Annotated[int, Field(ge=1, le=10000)] = 20
     """Most generations of a search."""

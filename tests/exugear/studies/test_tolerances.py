@@ -213,6 +213,7 @@ def test_a_search_over_tolerances_that_is_begun_again_computes_nothing_twice(tmp
         ({"optimise": {"minimise": ["f"], "limits": {"f": {"min": 2.0, "max": 1.0}}}}, "min must not be above"),
         ({"optimise": {"minimise": ["f"], "limits": {"f": {"min": float("nan")}}}}, "finite number"),
         ({"optimise": {"minimise": ["f", "f"]}}, "f against itself"),
+        ({"optimise": {"minimise": ["f"], "population": 4}}, "population = 4"),
         ({"optimise": {"minimise": ["many"]}}, "outputs.many has a number for each mode; a search needs a single one"),
         ({"optimise": {"minimise": ["f"], "percentile": 95.0}}, "is taken over tolerances"),
         ({"tolerances": {"made": MADE}}, "say how many draws each point has"),
