@@ -456,12 +456,12 @@ class Project(ReprMixin):
         """Figures of the nominal load from tables that are there."""
         from exugear.life.gear_life import pair_stresses
         from exugear.life.life import rating_of
-        from exugear.life.rating.sheet import nominal_loads, of_nominal_load, remarks_on
+        from exugear.life.rating.sheet import nominal_load_values, nominal_loads, remarks_on
 
         rating = rating_of(self.gearbox)
         stresses = pair_stresses(self.requested_tables(), self.folder, begin, keep=False)
         loads = nominal_loads(self.gearbox, rating, rating.application_factor)
-        found = of_nominal_load(self.gearbox, rating, loads, balance, stresses)
+        found = nominal_load_values(self.gearbox, rating, loads, balance, stresses)
         missing = [name for name in self.gearbox.gear_pairs if name not in stresses]
         lines = [f"no finite elements beside {', '.join(missing)}: `exugear ste` computes tables"] if missing else []
         return found, (*lines, *remarks_on(stresses))

@@ -267,12 +267,12 @@ def exit_codes() -> Iterator[None]:
     except KeyboardInterrupt:
         end_with("Stopped", "finished results are kept; the same command goes on from there", EXIT_INTERRUPTED)
     except OSError as error:
-        end_with("Failed", _of_a_file(error), EXIT_FAILED)
+        end_with("Failed", _file_error_text(error), EXIT_FAILED)
     except MemoryError as error:
         end_with("Failed", f"out of memory ({error})" if str(error) else "out of memory", EXIT_FAILED)
 
 
-def _of_a_file(error: OSError) -> str:
+def _file_error_text(error: OSError) -> str:
     """File and reason; what the program says of a file by itself names it already."""
     if error.filename and error.strerror:
         return f"{error.filename}: {error.strerror}"

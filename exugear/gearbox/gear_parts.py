@@ -429,7 +429,7 @@ def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
 
     def of_section(name: str, section: PairSection) -> tuple[float, ...]:
         assert section.stiffness is not None
-        values = _over_cycle(section.stiffness)
+        values = _stiffness_over_cycle(section.stiffness)
         if values.min() <= 0.0:
             raise origin.fault(
                 f"pairs.{name}.stiffness: falls to {values.min():g} N/m in the mesh cycle; lessen its waves, "
@@ -442,7 +442,7 @@ def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
     )
 
 
-def _over_cycle(section: MeshStiffnessSection) -> Floats:
+def _stiffness_over_cycle(section: MeshStiffnessSection) -> Floats:
     """Values over the mesh cycle, N/m: those of the file, or the sum of its waves, dense enough for cubics between."""
     if section.over_cycle_N_per_m is not None:
         return np.array(section.over_cycle_N_per_m)

@@ -338,7 +338,7 @@ def static_load_in_words(gearbox: Gearbox) -> str:
     return ", ".join(f"{body} {torque:.6g} N m" for body, torque in torques.items()) or "no torque"
 
 
-def at_load_of(gearbox: Gearbox, case: LoadCase) -> Gearbox:
+def gearbox_at_load(gearbox: Gearbox, case: LoadCase) -> Gearbox:
     """Return the gearbox with the torques at the start of a load case as its static load; what holds it stays.
 
     Raises
@@ -349,7 +349,7 @@ def at_load_of(gearbox: Gearbox, case: LoadCase) -> Gearbox:
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
-    >>> at_load_of(gearbox, gearbox.load_cases["rated"]).case.static_load.torques_N_m
+    >>> gearbox_at_load(gearbox, gearbox.load_cases["rated"]).case.static_load.torques_N_m
     {'carrier': 240000.0}
     """
     first = {body: float(values[0]) for body, (_, values) in torque_series(gearbox, case).items()}

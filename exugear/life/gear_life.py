@@ -132,7 +132,7 @@ def check_strengths(
         raise GearboxFileError(*faults)
 
 
-def beyond_tables(
+def warn_beyond_tables(
     gearbox: Gearbox, acting: ActingLoads, balance: StaticBalance, stresses: Mapping[str, MeshCycleStress]
 ) -> Iterator[str]:
     """Tell of pairs whose misalignment leaves the axis of their tables, where stresses are those at its end."""
@@ -239,7 +239,7 @@ class _Case:
         top = int(np.abs(worst_torque).argmax())
         force = tangential_force(self.pair.pinion, float(torque[top].mean()) / self.pair.pinion.base_radius)
         rated = self._rated(hertz, root, cycles, speed, float(worst[0].max()), float(worst[1].max()))
-        by_standard = self._by_standard(points.torque[worn], points.other[worn], speed, cycles)
+        by_standard = self._standard_safeties(points.torque[worn], points.other[worn], speed, cycles)
         by_point = np.zeros((2, len(points.torque)))
         by_point[:, worn] = rated.pop("by_point")
         return FlankLife(
@@ -317,7 +317,7 @@ class _Case:
         )
         return {**dict(zip(keys, values, strict=True)), "by_point": np.stack([by_contact, by_root])}
 
-    def _by_standard(self, torques: Floats, hub: Floats, speed: Floats, cycles: Floats) -> tuple[float, float]:
+    def _standard_safeties(self, torques: Floats, hub: Floats, speed: Floats, cycles: Floats) -> tuple[float, float]:
         """S_H and S_F of the nominal stresses of the standard, with K_Hbeta of the finite elements."""
         strength = self.rating.gears.get(self.tooth.gear)
         if strength is None:
@@ -448,12 +448,12 @@ def pair_stresses(
             both = gauges(pair.pinion, 1), gauges(pair.gear, -1 if pair.gear.internal else 1)
             kept = mesh_cycle_stress(pair, request.stored.dataset, both)
             if keep:
-                store.write_dataset(_to_dataset(kept, request.name))
+                store.write_dataset(_flank_dataset(kept, request.name))
         stresses[request.name] = kept
     return stresses
 
 
-def _to_dataset(stress: MeshCycleStress, pair: str) -> xr.Dataset:
+def _flank_dataset(stress: MeshCycleStress, pair: str) -> xr.Dataset:
     import xarray as xr
 
     variables = {

@@ -17,7 +17,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.versions import LIFE
 from exugear.life.bearing_life import BearingLife, bearing_lives
 from exugear.life.dynamic_factors import WITHIN, DynamicFactor
-from exugear.life.gear_life import FlankLife, beyond_tables, check_strengths, flank_lives
+from exugear.life.gear_life import FlankLife, check_strengths, flank_lives, warn_beyond_tables
 from exugear.life.load_spectrum.counted import CountedLoads, count_loads
 from exugear.life.load_spectrum.sources import Progress, section_of
 from exugear.life.static_balance import ActingLoads, AngleStore, StaticBalance, acting_loads, static_balance
@@ -338,7 +338,7 @@ def compute_life(
         assumptions=(
             *_assumptions(rating, counted, acting, balance, stresses, dynamic, gearbox.case.lubricant),
             *(f"K_gamma of {family} = {value:.3f}, in the forces of each mesh" for family, value in told.items()),
-            *beyond_tables(gearbox, acting, balance, stresses),
+            *warn_beyond_tables(gearbox, acting, balance, stresses),
             *reaches(flanks),
         ),
         input_hash=digest,

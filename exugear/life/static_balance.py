@@ -77,14 +77,14 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
 
         Values over torque are linear between the torques that were solved, those of the same sign.
         """
-        found = self._over_torque(response.values / _like(self.torque, response.values), torque)
+        found = self._interpolate_torque(response.values / _like(self.torque, response.values), torque)
         found *= _like(torque, found)
         if hub is not None and response.by_hub is not None and hub.any():
-            slopes = self._over_torque(response.by_hub, torque)
+            slopes = self._interpolate_torque(response.by_hub, torque)
             found += np.einsum("nh,nh...->n...", hub, slopes)
         return found
 
-    def _over_torque(self, values: Floats, torque: Floats) -> Floats:
+    def _interpolate_torque(self, values: Floats, torque: Floats) -> Floats:
         """Interpolate values (t, ...) at torques (n,): (n, ...)."""
         found = np.zeros((len(torque), *values.shape[1:]))
         for sign in (1.0, -1.0):
@@ -194,7 +194,7 @@ def static_balance(
         count = partial(_told, progress, number * len(solved), len(turns) * len(solved))
         states = None if store is None else store.stored(number)
         if states is None:
-            states = _at_angle(assembly, body, solved, float(turn), wrenches, count)
+            states = _solve_angle(assembly, body, solved, float(turn), wrenches, count)
             if store is not None:
                 store.store(number, states)
         count(len(solved))
@@ -210,7 +210,7 @@ def _told(progress: Callable[[int, int], None] | None, before: int, total: int, 
         progress(before + done, total)
 
 
-def _at_angle(
+def _solve_angle(
     assembly: Assembly,
     body: str,
     torques: Floats,
@@ -227,9 +227,12 @@ def _at_angle(
         count(done)
         torque = float(torques[t])
         known = before[math.copysign(1.0, torque)]  # the other flanks of a torque of the other sign tell nothing
-        q = _at_rest(assembly, body, torque, about, None, _ahead(known, torque))
+        q = _static_coordinates(assembly, body, torque, about, None, _ahead(known, torque))
         alone = States.of(assembly, q)
-        beside = (None if wrench is None else _at_rest(assembly, body, torque, about, wrench, q) for wrench in wrenches)
+        beside = (
+            None if wrench is None else _static_coordinates(assembly, body, torque, about, wrench, q)
+            for wrench in wrenches
+        )
         rows[t] = [alone, *(alone if one is None else States.of(assembly, one) for one in beside)]
         known.append((torque, q))
     return States(*(np.array([[one[key] for one in row] for row in rows]) for key in range(len(States._fields))))
@@ -245,7 +248,7 @@ def _ahead(known: Sequence[tuple[float, Floats]], torque: float) -> Floats | Non
     return np.asarray(other + (other - one) * (torque - second) / (second - first))
 
 
-def _at_rest(
+def _static_coordinates(
     assembly: Assembly, body: str, torque: float, about: Floats, wrench: Floats | None, near: Floats | None
 ) -> Floats:
     """Coordinates at rest, (size,)."""

@@ -53,7 +53,7 @@ def life_section(material: ReportData) -> Part:
         if stored.data is None:
             context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
         else:
-            content.append(_of_variant(material, stored.data))
+            content.append(_variant_section(material, stored.data))
             found = found or of_life(stored.data)
             worst = limits(stored.data)
             if worst:
@@ -84,7 +84,7 @@ def _rating(material: ReportData, beside: Mapping[FlankKey, Mapping[str, float]]
     return {"rating": rated(context.gearbox, counted, balance, beside).summary()}
 
 
-def _of_variant(material: ReportData, data: xr.Dataset) -> str:
+def _variant_section(material: ReportData, data: xr.Dataset) -> str:
     told = material.words.told
     data = data.assign_coords({key: [told(str(own)) for own in data[key].to_numpy()] for key in ("flank", "bearing")})
     name = words_of(choice_of(data.attrs))

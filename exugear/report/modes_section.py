@@ -169,7 +169,7 @@ class ModelMatch:
         return f"{self.match.parameter.label} = {self.match.value:.3g}"
 
 
-def near_section(material: ReportData) -> Part:
+def target_frequency_section(material: ReportData) -> Part:
     """Tell which modes lie near the target frequency, and which assumptions would bring one there."""
     target = material.context.target
     modes = material.results.modes

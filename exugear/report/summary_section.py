@@ -112,7 +112,7 @@ def rings_section(material: ReportData) -> Part:
 
 
 def _html(material: ReportData) -> str:
-    words = _in_words(material.groups)
+    words = _groups_text(material.groups)
     channel = pieces.element("label", "Signal " + pieces.element("select", "", id="channel"))
     views = pieces.element("div", "", class_="choices", id="view", role="group", aria_label="Model shown")
     waterfall = pieces.figure("waterfall", "Waterfall", f"Read from: {material.groups[0].source}.", words)
@@ -138,7 +138,7 @@ def _without_scripts(words: str) -> str:
     return f"<noscript>{pieces.paragraph(said, 'warning')}</noscript>"
 
 
-def _in_words(groups: Sequence[RunGroup]) -> str:
+def _groups_text(groups: Sequence[RunGroup]) -> str:
     group = groups[0]
     loudest = [own for own in group.ranked[group.main] if own.steady][:3]
     told = [f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.loudness)} dB" for own in loudest]
@@ -165,7 +165,7 @@ AT_CONSTANT = "Constant speed / dB, Hz"
 
 def ranking_section(material: ReportData) -> Part:
     """Rank the resonances of each run-up, and of each steady response, in a table."""
-    in_operation = [only_for(_in_operation(material, group), group.name) for group in material.groups]
+    in_operation = [only_for(_operating_resonances(material, group), group.name) for group in material.groups]
     tables = [
         only_for(_table(material, group, variant), group.name, variant)
         for group in material.groups
@@ -187,7 +187,7 @@ def ranking_section(material: ReportData) -> Part:
     return Part(html, {}, "Ranking", "ranking")
 
 
-def _in_operation(material: ReportData, group: RunGroup) -> str:
+def _operating_resonances(material: ReportData, group: RunGroup) -> str:
     """Table of the resonances of the main variant at constant speed, where the gearbox works, by three quantities."""
     ranking = group.in_operation
     if ranking is None or not ranking.resonances:
@@ -293,7 +293,7 @@ def _row(
         "Level / dB": _level(resonance, loudest),
     }
     if run.variant in group.constant:
-        row[AT_CONSTANT] = _at_constant(resonance, loudest)
+        row[AT_CONSTANT] = _constant_speed_cell(resonance, loudest)
     row["± µm"] = Cell(figure_text(10.0 ** (resonance.loudness / 20.0), 2), resonance.loudness)
     row["Prominence / dB"] = Cell(figure_text(peak.prominence, 2), peak.prominence)
     for name, key in zip((n for n in group.runs if n != run.variant), _others(group, run.variant), strict=True):
@@ -324,7 +324,7 @@ def _level(resonance: RankedResonance, loudest: float) -> Cell:
     return Cell(f"{level:.1f}", level)
 
 
-def _at_constant(resonance: RankedResonance, loudest: float) -> Cell:
+def _constant_speed_cell(resonance: RankedResonance, loudest: float) -> Cell:
     """Level at constant speed, and the frequency where it is highest."""
     at = resonance.constant
     if at is None:

@@ -67,7 +67,7 @@ GLOSSARY = {
 def trust_section(material: ReportData) -> Part:
     """List what results rest on."""
     charts: dict[str, Any] = {}
-    compared = "".join(_beside_exudyn(material, run, charts) for run in material.results.runs)
+    compared = "".join(_exudyn_comparison(material, run, charts) for run in material.results.runs)
     parts = [
         pieces.folded("Assumptions", _assumptions(material), opened=True),
         pieces.folded("What was run, and how well its energy adds up", _runs(material)),
@@ -134,7 +134,7 @@ def _runs(material: ReportData) -> str:
     return "".join(tables) or pieces.paragraph("Nothing was run.")
 
 
-def _beside_exudyn(material: ReportData, run: VariantRun, charts: dict[str, Any]) -> str:
+def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, Any]) -> str:
     """Say how far the compiled solver is from Exudyn where the beginning of the run was integrated by both."""
     name = material.context.name_of(run.path)
     path = material.context.folder / EXUDYN_FOLDER / name

@@ -20,7 +20,7 @@ from exugear.report.findings.words import Labels
 from exugear.report.gears_section import gears_section
 from exugear.report.life_section import life_section, studies_section
 from exugear.report.material import Part, ReportData, lines_of
-from exugear.report.modes_section import change_section, modes_section, near_section
+from exugear.report.modes_section import change_section, modes_section, target_frequency_section
 from exugear.report.run_data import run_data
 from exugear.report.steady_section import steady_section
 from exugear.report.summary_section import ranking_section, rings_section, short_section
@@ -102,7 +102,7 @@ SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
     life_section,
     steady_section,
     modes_section,
-    near_section,
+    target_frequency_section,
     gears_section,
     studies_section,
     trust_section,

@@ -256,7 +256,7 @@ class ModeNamer:
 
     def _kind(self, shape: Complexes, kinetic: Floats) -> str:
         sets = self.system.frame.sets
-        shares = [(planets, self._of_kinds(planets, shape, kinetic)) for planets in sets]
+        shares = [(planets, self._motion_shares(planets, shape, kinetic)) for planets in sets]
         if not shares:
             return ""
         planets, (of_planets, own) = max(shares, key=lambda item: float(item[1][1].sum()))
@@ -268,7 +268,7 @@ class ModeNamer:
             return kind
         return f"{kind} of {planets.carrier}"
 
-    def _of_kinds(self, planets: PlanetSet, shape: Complexes, kinetic: Floats) -> tuple[float, Floats]:
+    def _motion_shares(self, planets: PlanetSet, shape: Complexes, kinetic: Floats) -> tuple[float, Floats]:
         """Share of the planets of a set, and shares (3,) of the set by type of motion."""
         places = {body.name: n for n, body in enumerate(self.assembly.bodies)}
         waves = np.array([self._wave_energy(name, shape) for name in planets.names])

@@ -135,7 +135,7 @@ class HarmonicResidual:
         return np.stack([own * rate**order for own in found for order in range(3)], axis=1)
 
     @cached_property
-    def _on_lattice(self) -> Floats:
+    def _lattice_stiffness(self) -> Floats:
         """As `_stiffness` has it, on the samples of the lattice: each mesh follows the angle of one base."""
         if self.gearset.parting:
             return self._stiffness(self.places)
@@ -193,7 +193,7 @@ class HarmonicResidual:
         slope = np.pad(slope, ((0, 0), (0, 0), (0, readings.shape[1] - COMPONENTS)))
         return LawSamples(force, slope, np.zeros_like(slope))
 
-    def _in_time(self, readings: Complexes) -> tuple[Floats, Floats]:
+    def _sample_readings(self, readings: Complexes) -> tuple[Floats, Floats]:
         """Sample (s, m, r) readings and of their rates, the latter zero where no law asks for them."""
         values = self.lattice.values(readings)
         if not self.gearset.parting:
@@ -208,8 +208,8 @@ class HarmonicResidual:
         if not self._last or self._last[0][0] is not readings:
             there = self.places.there
             back = self.places.back
-            values, rates = self._in_time(readings)
-            sampled = self._sample(there @ values, there @ rates, self.places, self._on_lattice)
+            values, rates = self._sample_readings(readings)
+            sampled = self._sample(there @ values, there @ rates, self.places, self._lattice_stiffness)
             excess = self.lattice.coefficients(back @ sampled.force) - self._mean_part(readings)
             self._last[:] = [(readings, excess, sampled)]
         _, excess, sampled = self._last[0]
@@ -227,7 +227,7 @@ class HarmonicResidual:
         """Find how the forces (n, m, f) follow a small change (n, m, r) of the readings that were sampled."""
         there = self.places.there
         back = self.places.back
-        moved, moving = self._in_time(step)
+        moved, moving = self._sample_readings(step)
         found = np.einsum("sufr,sur->suf", sampled.slope, there @ moved)
         if self.gearset.parting:
             found += np.einsum("sufr,sur->suf", sampled.damping, there @ moving)
@@ -525,8 +525,8 @@ def candidates(gearset: HarmonicBalanceModel, low: float, high: float) -> tuple[
             tangents = {at: own * values[:, harmonic] for at, values in gearset.cycle_tangents.items()}
             turned = {at: values.conj() for at, values in tangents.items()}
             for sign in (1.0, -1.0):
-                there = _between(felt, tangents, seen.conj() if sign > 0.0 else seen)
-                back = there.conj() if sign > 0.0 else _between(felt, turned, seen)
+                there = _couple_modes(felt, tangents, seen.conj() if sign > 0.0 else seen)
+                back = there.conj() if sign > 0.0 else _couple_modes(felt, turned, seen)
                 product = there * back.T
                 growth = -0.5 * (decay[:, None] + decay) + np.real(
                     np.sqrt(0.25 * (decay[:, None] - decay) ** 2 + product)
@@ -540,7 +540,7 @@ def candidates(gearset: HarmonicBalanceModel, low: float, high: float) -> tuple[
     return tuple(sorted(found, key=lambda candidate: -candidate.growth))
 
 
-def _between(felt: Complexes, tangents: Mapping[tuple[int, int], Complexes], seen: Complexes) -> Complexes:
+def _couple_modes(felt: Complexes, tangents: Mapping[tuple[int, int], Complexes], seen: Complexes) -> Complexes:
     """Couple modes (k, k) by tangents (m,) of forces by readings; what they feel (k, m, f) and make seen (r, k, m)."""
     parts = [(felt[..., force] * tangent) @ seen[read].T for (force, read), tangent in tangents.items()]
     return np.asarray(np.sum(parts, axis=0))

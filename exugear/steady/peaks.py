@@ -387,7 +387,7 @@ def compared_peaks(
     alone = orders[np.count_nonzero(index, axis=1) == 1]
     found = [peak for peak in peaks(data, signal) if np.abs(alone - peak.order).min() < SAME_ORDER * peak.order][:most]
     cuts = {peak.order: cut(OrderLine(peak.line, peak.order)) for peak in found}
-    heard = [_near(cuts[peak.order], abs(peak.speed)) for peak in found]
+    heard = [_amplitude_near(cuts[peak.order], abs(peak.speed)) for peak in found]
     louder = np.argsort(np.argsort([-amplitude for amplitude in heard], kind="stable"), kind="stable")
     out = []
     for peak, amplitude, place in zip(found, heard, louder, strict=True):
@@ -397,7 +397,7 @@ def compared_peaks(
     return tuple(out)
 
 
-def _near(cut: OrderCut, speed: float) -> float:
+def _amplitude_near(cut: OrderCut, speed: float) -> float:
     """Largest amplitude of a cut near a speed, zero where it does not pass."""
     passed = np.abs(np.abs(cut.speed) / speed - 1.0) <= BESIDE
     return float(np.abs(cut.amplitude[passed]).max(initial=0.0))

@@ -166,7 +166,7 @@ class PointSolver:
         if self.gearset.bent:
             self.state = _with_passing(self._parting(speed))
             return self.state.on(self.gearset, interface).response
-        return self._in_time(interface)
+        return self._settle_in_time(interface)
 
     @property
     def branch_gearset(self) -> HarmonicBalanceModel:
@@ -180,7 +180,7 @@ class PointSolver:
         if self.gearset.bent:
             state = self._parting(speed)
             return readings_in(state.gearset, state.readings, self.branch_gearset)
-        self._in_time(self.gearset.at(speed))
+        self._settle_in_time(self.gearset.at(speed))
         assert self._last is not None
         return self._last
 
@@ -194,7 +194,7 @@ class PointSolver:
             return response
         return ContactLossState(gearset, readings, response, np.nan).on(self.gearset, interface).response
 
-    def _in_time(self, interface: Interface) -> Response:
+    def _settle_in_time(self, interface: Interface) -> Response:
         try:
             found, self._last = nonlinear_response(self.gearset, interface, self.lattice, self._last)
         except HarmonicBalanceError:
@@ -257,7 +257,7 @@ class PointSolver:
                     verdict = "the motion in time is not finite"
                     break
                 verdict = leg.verdict
-                found = _near(gearset, interface, leg)
+                found = _state_near(gearset, interface, leg)
                 if found is not None and not self._grows(found):
                     return found
                 unstable = found or unstable
@@ -316,7 +316,7 @@ def _remarked(state: ContactLossState, remark: str) -> ContactLossState:
     return replace(state, remark="; ".join(filter(None, (state.remark, remark))))
 
 
-def _near(gearset: HarmonicBalanceModel, interface: Interface, leg: SettlingSegment) -> ContactLossState | None:
+def _state_near(gearset: HarmonicBalanceModel, interface: Interface, leg: SettlingSegment) -> ContactLossState | None:
     """Find the state near what a run in time settled to."""
     ports = interface.ports
     moved = leg.motion.copy()

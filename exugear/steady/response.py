@@ -122,11 +122,13 @@ def parametric_response(gearset: HarmonicBalanceModel, interface: Interface) -> 
     The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y.
     """
     shape = len(gearset.lines.index), *interface.ports.forces.shape[:2]
-    functions = _beyond_the_mean(gearset, interface)
+    functions = _slopes_beyond_mean(gearset, interface)
     lengths = gearset.lengths[: shape[1], : shape[2]].ravel()
     answers = lengths[:, None] * interface.along_forces
     coupling = gearset.coupling
-    scaled = [function / _of_group(lengths, group) for function, group in zip(functions, coupling.groups, strict=True)]
+    scaled = [
+        function / _group_values(lengths, group) for function, group in zip(functions, coupling.groups, strict=True)
+    ]
     parts = *flat(scaled), *flat([answers])
     memory = coupling.memory()
     octets = np.empty(2 * SIZE)
@@ -144,7 +146,7 @@ def parametric_response(gearset: HarmonicBalanceModel, interface: Interface) -> 
     return _response(gearset, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
 
 
-def _beyond_the_mean(gearset: HarmonicBalanceModel, interface: Interface) -> list[Complexes]:
+def _slopes_beyond_mean(gearset: HarmonicBalanceModel, interface: Interface) -> list[Complexes]:
     """Return the slopes of the forces along a row beyond the averaged system, like `HarmonicBalanceModel.coupled`."""
     functions = gearset.coupled(gearset.cycle_tangents, interface.ports, interface.speed)
     forces = interface.ports.forces.shape[1]
@@ -155,7 +157,7 @@ def _beyond_the_mean(gearset: HarmonicBalanceModel, interface: Interface) -> lis
     return functions
 
 
-def _of_group(values: Floats, group: Group) -> Floats:
+def _group_values(values: Floats, group: Group) -> Floats:
     """Values (k,) of all signals for those of a group."""
     return values[group.begin : group.begin + group.size]
 

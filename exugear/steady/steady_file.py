@@ -23,7 +23,7 @@ from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
 from exugear.steady.steady_response import SolvedPoints, SteadyResponse, response_of
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.build import assemble
-from exugear.system.statics import near_unconverged_states
+from exugear.system.statics import meshes_near_unconverged
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshData
 from fe_ste.tools.stores import Layout, Store, load_dataset
@@ -139,7 +139,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "mesh_contact": assembly.contacts.in_words,
         "bearings_in_time": ", ".join(response.bearing_names),
         "growth_rate": response.growth_rate,
-        "near_unconverged_states": ", ".join(near_unconverged_states(assembly)),
+        "near_unconverged_states": ", ".join(meshes_near_unconverged(assembly)),
         "planet_spread": response.planet_spread,
         "stiffness_variation": response.stiffness_variation,
         "operating_range": json.dumps(operating_range(assembly.gearbox)),

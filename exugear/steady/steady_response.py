@@ -309,13 +309,13 @@ def response_of(
     folds: tuple[float, ...] = ()
     ended = ""
     if settings.branches:
-        solved, folds, ended = _along_branch(solver, settings.speeds.first, settings.speeds.last, told)
+        solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, told)
     else:
         solved = _solve(solver, settings, found, looked_for, _Work(known, told, keep, keep_every))
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
-    explained, growth, campbell = _of_mean_system(solver, even, found, tracks)
+    explained, growth, campbell = _evaluate_mean_system(solver, even, found, tracks)
     return SteadyResponse(
         assembly=gearset.waves.assembly,
         settings=settings,
@@ -341,7 +341,7 @@ def response_of(
     )
 
 
-def _of_mean_system(
+def _evaluate_mean_system(
     solver: PointSolver, speeds: Floats, found: tuple[Crossing, ...], tracks: ModeTracks
 ) -> tuple[tuple[tuple[int, Contributions], ...], float, Campbell]:
     """Find what makes the lines at the strongest crossings, the fastest growth, and the Campbell diagram."""
@@ -451,7 +451,7 @@ def _continued(out: SolvedPoints, first: int, solver: Callable[[], PointSolver],
         count = max(first, _same_beginning(known.speed, out.speed))
         own = solver()
         if not first and own.gearset.bent and count < len(out.speed):
-            count = _in_contact(known, count)
+            count = _count_in_contact(known, count)
             if count:
                 own.response(float(out.speed[count - 1]))
         for field in fields(SolvedPoints):
@@ -495,7 +495,7 @@ def _contributions(gearset: HarmonicBalanceModel, found: tuple[Crossing, ...]) -
     return tuple(explained)
 
 
-def _along_branch(
+def _follow_branch(
     solver: PointSolver, first: float, last: float, progress: Callable[[int, int], None]
 ) -> tuple[SolvedPoints, tuple[float, ...], str]:
     """Points along a branch between two speeds (rad/s), its folds, and why it ended before the last.
@@ -541,7 +541,7 @@ def _fill(out: SolvedPoints, n: int, gearset: HarmonicBalanceModel, response: Re
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
 
 
-def _in_contact(known: SolvedPoints, count: int) -> int:
+def _count_in_contact(known: SolvedPoints, count: int) -> int:
     """Count the known points up to the last at which all touches: states hang on those before, from there anew."""
     parted = known.apart[:count].any(axis=1) | known.free[:count].any(axis=1)
     touching = np.isfinite(known.drive_torque[:count]) & ~parted

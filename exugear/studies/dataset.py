@@ -69,7 +69,7 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
         else:
             values = _filled(sizes, done, lambda record, n=name: number_of(record.values.get(n)))
             variables[name] = (dimensions, values, attributes)
-    variables |= _of_points(dimensions, sizes, at)
+    variables |= _point_variables(dimensions, sizes, at)
     coordinates: dict[str, Any] = {
         name: (axis.dimensions, axis.values, {"units": axis.units, "path": axis.path} if axis.path else {})
         for name, axis in design.axes.items()
@@ -93,7 +93,7 @@ def _row(record: Record, name: str, labels: list[str]) -> list[float]:
     return [number_of(own.get(label)) for label in labels]
 
 
-def _of_points(
+def _point_variables(
     dimensions: tuple[str, ...], sizes: tuple[int, ...], at: list[tuple[tuple[int, ...], Record | None]]
 ) -> dict[str, Any]:
     """Tell of every point what is no figure."""
@@ -288,12 +288,12 @@ def beyond(value: float, side: Side, limit: float) -> float:
     return float(np.clip(difference / (abs(limit) or 1.0), -FAR, FAR))
 
 
-def on_front(outputs: Floats) -> Booleans:
+def is_pareto_optimal(outputs: Floats) -> Booleans:
     """Tell which points (points, outputs) no other one beats: not larger in any output and smaller in one.
 
     Examples
     --------
-    >>> on_front(np.array([[1.0, 4.0], [2.0, 2.0], [3.0, 3.0]])).tolist()
+    >>> is_pareto_optimal(np.array([[1.0, 4.0], [2.0, 2.0], [3.0, 3.0]])).tolist()
     [True, True, False]
     """
     kept: Booleans = np.asarray(np.isfinite(outputs).all(axis=1))
@@ -319,7 +319,7 @@ def searched_dataset(
     for name, side, limit in criteria.limits:
         kept &= np.array([beyond(float(value), side, limit) <= 0.0 for value in judged[name, side].to_numpy()])
     outputs = np.array([judged[name, "high"].to_numpy() for name in criteria.outputs]).T
-    front = on_front(np.where(kept[:, None], outputs, np.inf))
+    front = is_pareto_optimal(np.where(kept[:, None], outputs, np.inf))
     if study.tolerances is not None:
         dataset = dataset.assign({judged_name(study, *side): values for side, values in judged.items()})
     if criteria.limits:

@@ -223,7 +223,7 @@ def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> Non
     x, y = (_finite(dataset[name].to_numpy()) for name in (first, second))
     front = dataset["on_front"].to_numpy() == 1
     order = np.argsort(x[front])
-    kept = _within_limits(dataset)
+    kept = _keeps_limits(dataset)
     axes.plot(x[~front & kept], y[~front & kept], ".", color="#BBBBBB", label="looked at")
     if not kept.all():
         axes.plot(x[~kept], y[~kept], "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
@@ -242,7 +242,7 @@ def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> Non
 def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
     """Draw a figure at the points that a search looked at, and the best so far."""
     values = _finite(dataset[name].to_numpy())
-    kept = _within_limits(dataset)
+    kept = _keeps_limits(dataset)
     axes.plot(np.where(kept, values, np.nan), ".", color="#BBBBBB")
     if not kept.all():
         axes.plot(np.where(kept, np.nan, values), "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
@@ -255,7 +255,7 @@ def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
     axes.set_ylabel(_label(dataset[name]))
 
 
-def _within_limits(dataset: xr.Dataset) -> Booleans:
+def _keeps_limits(dataset: xr.Dataset) -> Booleans:
     """Tell which points of a search keep its limits; all where it has none."""
     if "meets_limits" not in dataset:
         return np.ones(dataset.sizes[EVALUATION], dtype=bool)

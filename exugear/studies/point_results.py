@@ -274,7 +274,7 @@ class PointResults:
         """
         if pair not in self.gearbox.pairs:
             raise PointError(f"no gear pair {pair!r}; pairs are {', '.join(self.gearbox.pairs)}")
-        return self.shared.table(self.gearbox, pair, progress=_between_steps)
+        return self.shared.table(self.gearbox, pair, progress=_ignore_progress)
 
     @cached_property
     def stiffness(self) -> dict[str, MeshData]:
@@ -287,7 +287,7 @@ class PointResults:
         for pair in dict.fromkeys(mesh.pair.name for mesh in self.gearbox.meshes):
             folder = Path()
             if law is not None and law.needs_tables and (law.needs_axes or pair not in self.gearbox.stated_stiffness):
-                self.shared.table(self.gearbox, pair, law.needs_axes, _between_steps)
+                self.shared.table(self.gearbox, pair, law.needs_axes, _ignore_progress)
                 folder = self.shared.results_folder(self.gearbox, pair, law.needs_axes)
             found[pair] = reader.read(self.gearbox, pair, folder)
         return found
@@ -328,7 +328,7 @@ class PointResults:
         from exugear.steady.steady_file import to_dataset
         from exugear.steady.steady_response import response_of
 
-        return to_dataset(response_of(self.assembly, self.settings.steady, progress=_between_steps))
+        return to_dataset(response_of(self.assembly, self.settings.steady, progress=_ignore_progress))
 
     @cached_property
     def run(self) -> xr.Dataset:
@@ -388,8 +388,8 @@ class PointResults:
         if rating.dynamic_factor_run is not None:
             self._simulated(replace(self.choice, load_case=rating.dynamic_factor_run))
         elif rating.dynamic_factor_steady is not None:
-            response_of_factors(self.assembly, self.choice, self.settings.steady, self.folder, _between_steps)
-        data, doubts = point_life(self.assembly, self.choice, self.shared, self.folder, _between_steps)
+            response_of_factors(self.assembly, self.choice, self.settings.steady, self.folder, _ignore_progress)
+        data, doubts = point_life(self.assembly, self.choice, self.shared, self.folder, _ignore_progress)
         self.doubts += doubts
         return data
 
@@ -420,7 +420,7 @@ class PointResults:
             [factor * wanted.torque[0] for factor in torque_factors],
             positions,
             misalignment=[UM * opening / width for opening in misalignment_um],
-            progress=_between_steps,
+            progress=_ignore_progress,
         )
 
     def clear(self) -> None:
@@ -428,5 +428,5 @@ class PointResults:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def _between_steps(done: int, total: int) -> None:
+def _ignore_progress(done: int, total: int) -> None:
     stop_if_asked()

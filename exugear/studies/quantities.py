@@ -233,7 +233,7 @@ def order_amplitudes(
     The run is at constant speed and at least two periods of the spacing long.
     """
     orders = {f"{n:+d}" if n else "0": centre + n * spacing for n in range(-count, count + 1)}
-    return dict(zip(orders, _at_orders(results, signal, list(orders.values()), spacing), strict=True))
+    return dict(zip(orders, _order_amplitudes(results, signal, list(orders.values()), spacing), strict=True))
 
 
 def run_harmonics(results: PointResults, *, mesh: str, count: int = 6, signal: str = OVERALL) -> dict[str, float]:
@@ -243,10 +243,10 @@ def run_harmonics(results: PointResults, *, mesh: str, count: int = 6, signal: s
         raise PointError(f"no meshes {mesh!r}; meshes are {', '.join(meshes)}")
     order = results.gearbox.train.mesh_frequencies(2.0 * math.pi)[meshes[mesh]]
     orders = [n * order for n in range(1, count + 1)]
-    return {str(n): value for n, value in enumerate(_at_orders(results, signal, orders, 1.0), start=1)}
+    return {str(n): value for n, value in enumerate(_order_amplitudes(results, signal, orders, 1.0), start=1)}
 
 
-def _at_orders(results: PointResults, signal: str, orders: list[float], spacing: float) -> list[float]:
+def _order_amplitudes(results: PointResults, signal: str, orders: list[float], spacing: float) -> list[float]:
     """Peak amplitudes of a signal at orders of the input, those `spacing` apart told from each other.
 
     Hann's window over a whole number of periods of the spacing, at least two: its zeros then fall on all neighbours.
@@ -403,22 +403,22 @@ Worst = Callable[[Iterable[float]], float]
 
 def contact_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
     """Safety S_H against pitting by gear, flank and meshes, the worst of planets."""
-    return _of_flanks(results, SAFETIES[of].format("contact"))
+    return _flank_values(results, SAFETIES[of].format("contact"))
 
 
 def root_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
     """Safety S_F against breakage of teeth by gear, flank and meshes, the worst of planets."""
-    return _of_flanks(results, SAFETIES[of].format("root"))
+    return _flank_values(results, SAFETIES[of].format("root"))
 
 
 def contact_damages(results: PointResults) -> dict[str, float]:
     """Miner's sum of pitting by gear, flank and meshes, the worst of planets."""
-    return _of_flanks(results, "contact_damage")
+    return _flank_values(results, "contact_damage")
 
 
 def root_damages(results: PointResults) -> dict[str, float]:
     """Miner's sum of breakage of teeth by gear, flank and meshes, the worst of planets."""
-    return _of_flanks(results, "root_damage")
+    return _flank_values(results, "root_damage")
 
 
 def worst_planets(results: PointResults) -> dict[str, float]:
@@ -450,12 +450,12 @@ def root_damage(results: PointResults, *, gear: str = "") -> float:
 
 def bearing_lives(results: PointResults, *, by: str = MINIMUM) -> dict[str, float]:
     """Hours until bearings fail by L10, L10r or L10m, or by whichever is least."""
-    return _of_bearings(results, "hours", by, min)
+    return _bearing_values(results, "hours", by, min)
 
 
 def bearing_damages(results: PointResults, *, by: str = MINIMUM) -> dict[str, float]:
     """Miner's sum of bearings by L10, L10r or L10m, or by whichever is worst."""
-    return _of_bearings(results, "damage", by, max)
+    return _bearing_values(results, "damage", by, max)
 
 
 def static_safeties(results: PointResults) -> dict[str, float]:
@@ -499,12 +499,12 @@ def shortfalls(results: PointResults) -> float:
     return float(sum(len(json.loads(results.life.attrs[key])) for key in ("failures", "shortfalls")))
 
 
-def _of_flanks(results: PointResults, key: str) -> dict[str, float]:
+def _flank_values(results: PointResults, key: str) -> dict[str, float]:
     data = results.life
     return dict(zip(map(str, data["flank"].to_numpy()), map(float, data[f"flank_{key}"].to_numpy()), strict=True))
 
 
-def _of_bearings(results: PointResults, key: str, by: str, worst: Worst) -> dict[str, float]:
+def _bearing_values(results: PointResults, key: str, by: str, worst: Worst) -> dict[str, float]:
     """Return values by bearing, of one kind of life or the worst of all known ones."""
     data = results.life
     names = [_name_of(kind, key) for kind in (LIVES.values() if by == MINIMUM else [LIVES[by]])]

@@ -340,7 +340,7 @@ class Study(ReprMixin):
             Anything wrong with either file.
         """
         path = Path(path)
-        return cls._of(read_study_file(path), str(path), path.parent, permissions, quantities)
+        return cls._checked(read_study_file(path), str(path), path.parent, permissions, quantities)
 
     @classmethod
     def from_dict(
@@ -351,10 +351,10 @@ class Study(ReprMixin):
         quantities: Mapping[str, Quantity] = QUANTITIES,
     ) -> Study:
         """Check content already in memory; its case lies where it says, seen from the working directory."""
-        return cls._of(parse_study(content, source), source, Path(), permissions, quantities)
+        return cls._checked(parse_study(content, source), source, Path(), permissions, quantities)
 
     @classmethod
-    def _of(
+    def _checked(
         cls, file: StudyFile, source: str, folder: Path, permissions: Permissions, quantities: Mapping[str, Quantity]
     ) -> Study:
         case = Gearbox.from_toml(folder / file.case, permissions)
@@ -378,7 +378,7 @@ class Study(ReprMixin):
         faults += [*faults_of_signals(kept, gearbox, choice), *faults_of_search(file, kept)]
         if faults:
             raise StudyError("\n".join(fault_line(source, fault) for fault in faults))
-        of_life = _of_life(kept)
+        of_life = _reads_life(kept)
         if of_life:
             life_loads(gearbox, choice)
         return cls(file, source, gearbox, choice, settings, kept, design, case_digest(case, of_life), tolerances)
@@ -389,7 +389,7 @@ class Study(ReprMixin):
     @cached_property
     def case_hash(self) -> str:
         """SHA-256 of all that every point depends on: the case with its files, choices, outputs, versions."""
-        of_life = _of_life(self.outputs)
+        of_life = _reads_life(self.outputs)
         cases = self.gearbox.content.get("load_cases", {})
         read = read_content(self.gearbox, of_life)
         run = None if self.gearbox.case.rating is None else self.gearbox.case.rating.dynamic_factor_run
@@ -457,7 +457,7 @@ def _patterns(content: Any) -> Iterator[str]:
             yield from _patterns(value)
 
 
-def _of_life(outputs: Mapping[str, Output]) -> bool:
+def _reads_life(outputs: Mapping[str, Output]) -> bool:
     """Whether loads of a life are read."""
     return any(kept.quantity.needs in ("life", "bearings") for kept in outputs.values())
 

@@ -21,7 +21,7 @@ from exugear.system.kernels.coordinates import InertiaArrays, SpringArrays
 from exugear.system.kernels.elastic import ElasticArrays, no_elastic
 from exugear.system.kernels.rolling import no_rolling
 from exugear.system.kernels.turning import TravellingArrays, no_travelling
-from exugear.system.operating_points import at_static_load
+from exugear.system.operating_points import linearise_at_static_load
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import ContactState
 from exugear.system.tooth_mesh.element import Angles, MeshData, mesh_elements
@@ -118,7 +118,7 @@ def assemble(
     )
     if before_balance is not None:
         before_balance(assembly)
-    return at_static_load(assembly)
+    return linearise_at_static_load(assembly)
 
 
 def _chosen_bodies(names: tuple[str, ...], bodies: Mapping[str, ElasticBody]) -> dict[str, ElasticBody]:

@@ -24,7 +24,7 @@ from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY, UZ, ReducedB
 from exugear.system.build import assemble
 from exugear.system.kernels.coordinates import SPIN
 from exugear.system.kernels.meshes import STIFFNESS, TILT_COLUMNS, TILT_STIFFNESS
-from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, linearise, near_unconverged_states, static_state
+from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, linearise, meshes_near_unconverged, static_state
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.element import Angles, MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -229,7 +229,7 @@ class Modes(ReprMixin):
             "bearing_laws": assembly.bearing_laws,
             "mesh_contact": assembly.contacts.in_words,
             "growth_rate": self.growth_rate,
-            "near_unconverged_states": ", ".join(near_unconverged_states(assembly)),
+            "near_unconverged_states": ", ".join(meshes_near_unconverged(assembly)),
         }
         return xr.Dataset(variables, coordinates, attributes)
 

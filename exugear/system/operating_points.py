@@ -34,12 +34,12 @@ from exugear.system.bearings.stiffness import (
     equally_spaced,
     holds_one_way,
     is_catalogued,
+    law_through_point,
     linear_law,
     load_stands_still,
     planet_families,
     planet_supports,
     rolling_law,
-    through_point,
     with_equal_planets,
     with_laws,
 )
@@ -68,7 +68,7 @@ class _State(NamedTuple):
     """Operating points, None for supports that are not from a catalogue."""
 
 
-def at_static_load(assembly: Assembly) -> Assembly:
+def linearise_at_static_load(assembly: Assembly) -> Assembly:
     """Give catalogue bearings of an assembly the laws that they have under the static load of the gearbox file.
 
     Parameters
@@ -94,7 +94,7 @@ def at_static_load(assembly: Assembly) -> Assembly:
     nominal = _points(assembly, searched, assembly.support_strains(q))
     resting, laws = _resting(assembly, nominal)
     here, over_turns = _states(resting, laws, q)
-    moving, spread = _in_motion(resting, laws, here, over_turns)
+    moving, spread = _lasting_laws(resting, laws, here, over_turns)
     return replace(
         resting,
         connectors=moving,
@@ -247,7 +247,7 @@ def _states(assembly: Assembly, laws: Sequence[SupportLaw], near: Floats) -> tup
     return here, over_turns
 
 
-def _in_motion(
+def _lasting_laws(
     assembly: Assembly, laws: Sequence[SupportLaw], here: _State, over_turns: dict[str, list[_State]]
 ) -> tuple[ConnectorArrays, float]:
     """Connectors with the laws that last in motion, and how far bearings of equal planets were apart in stiffness."""
@@ -265,7 +265,7 @@ def _in_motion(
         of_rows = np.mean([point.stiffness for point in points if point is not None], axis=0)
         strain, load = np.mean([(state.strain[n], state.load[n]) for state in states], axis=0)
         linear = linear_law(support, time, of_rows)
-        found.append(through_point(linear, strain, load, load_stands_still(support, bodies)))
+        found.append(law_through_point(linear, strain, load, load_stands_still(support, bodies)))
     return with_equal_planets(with_laws(assembly.connectors, found), _equal_supports(assembly))
 
 

@@ -409,7 +409,7 @@ def static_state(assembly: Assembly) -> StaticState:
     return StaticState(resting, locked_equilibrium(resting, torques, gearbox.locked, resting.mean_meshes))
 
 
-def near_unconverged_states(assembly: Assembly) -> tuple[str, ...]:
+def meshes_near_unconverged(assembly: Assembly) -> tuple[str, ...]:
     """Meshes that, at the static load, read their table beside states that are not solved; see `SteSurface.guessed`."""
     if not any(
         element.table is not None and element.table.surface.guessed is not None for element in assembly.elements

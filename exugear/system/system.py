@@ -189,7 +189,7 @@ class Assembly(ReprMixin):
         return replace(self, connectors=self.connectors._replace(point_strain=none, point_load=none))
 
     @cached_property
-    def _of_rows(self) -> Floats:
+    def _row_stiffness(self) -> Floats:
         """Stiffness (supports, 6, 6) at the static load of what rows there are; zero for linear supports."""
         return np.where(np.diff(self.connectors.rolling.first)[:, None, None] > 0, self.rows_stiffness, 0.0)
 
@@ -198,7 +198,7 @@ class Assembly(ReprMixin):
         connectors = self.connectors
         if not self.has_rows:
             return self
-        of_rows = factor * self._of_rows
+        of_rows = factor * self._row_stiffness
         time = connectors.rolling.time[:, None, None]
         linear = connectors._replace(
             stiffness=connectors.stiffness + of_rows,
@@ -209,7 +209,7 @@ class Assembly(ReprMixin):
 
     def with_added_stiffness(self, share: float) -> Assembly:
         """Let a share of the stiffness of non-linear bearings act beside their rows."""
-        stiffness = self.connectors.stiffness + share * self._of_rows
+        stiffness = self.connectors.stiffness + share * self._row_stiffness
         if self.has_rows:
             return replace(self, connectors=self.connectors._replace(stiffness=stiffness))
         return self

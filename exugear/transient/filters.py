@@ -266,13 +266,13 @@ def stored_filter(assembly: Assembly, method: Method, step: float, factor: int) 
     low_pass = own[:, 0].copy()
     other = np.zeros_like(own)
     for lag in np.unique(lags[np.isfinite(lags)]):
-        own[:, lags == lag] += _after(low_pass, _remedy(method, lag, rows))[:, None]
+        own[:, lags == lag] += _cascade(low_pass, _remedy(method, lag, rows))[:, None]
     first = layout["mesh_force"].start
     before = layout["mesh_force"].start - layout["mesh_dte"].start
     for m in _meshes(assembly):
         element = assembly.elements[m]
         remedy = _remedy_of_force(method, element.tangent.mean(), element.damping / step, rows)
-        other[:, first + m] = element.line_of_action * _after(low_pass, remedy)
+        other[:, first + m] = element.line_of_action * _cascade(low_pass, remedy)
     return Filter(own, other, before)
 
 
@@ -330,7 +330,7 @@ def _fitted(remedy: Complexes, by: Complexes, error: Complexes, half: int) -> Fl
     return np.asarray(taps)
 
 
-def _after(low_pass: Floats, remedy: Floats) -> Floats:
+def _cascade(low_pass: Floats, remedy: Floats) -> Floats:
     """Taps of a low pass and a remedy one after the other, as many as the low pass has: what is cut off is 1e-6.
 
     Their sum is zero: a mean load may be ten thousand times the fluctuation beside it, and is right as it is.

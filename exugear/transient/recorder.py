@@ -131,7 +131,7 @@ class StateBuffer:
 
     def room(self, most: int) -> RowBuffer:
         """Rows of the next states, up to so many, for a solver to fill."""
-        return self._between(self.filled, min(self.filled + most, len(self._times)))
+        return self._rows_between(self.filled, min(self.filled + most, len(self._times)))
 
     def take(self, times: Floats) -> None:
         """Count states that were filled into the room, at times (n,), s."""
@@ -141,13 +141,13 @@ class StateBuffer:
 
     def states(self, first: int = 0) -> tuple[Floats, RowBuffer]:
         """Return times (n,) and rows of the states in it, from a number on."""
-        return self._times[first : self.filled], self._between(first, self.filled)
+        return self._times[first : self.filled], self._rows_between(first, self.filled)
 
     def clear(self) -> None:
         """Forget all states."""
         self.filled = self.observed = 0
 
-    def _between(self, first: int, end: int) -> RowBuffer:
+    def _rows_between(self, first: int, end: int) -> RowBuffer:
         return RowBuffer._make(rows[first:end] for rows in self._rows)
 
 

@@ -224,7 +224,7 @@ def brick_error(mesh: SectorMesh, side: int, incompatible_modes: bool = True) ->
     everywhere[fixed], everywhere[free] = moved, found
     middle = numbers.shape[2] // 2
     read = numbers[0, BLOCK_MARGIN:-BLOCK_MARGIN, middle - ERROR_REACH : middle + ERROR_REACH + 1]
-    return everywhere[3 * read + 2] - _on_surface(mesh, side)
+    return everywhere[3 * read + 2] - _surface_displacement(mesh, side)
 
 
 class FlankSpacing(NamedTuple):
@@ -346,7 +346,7 @@ def _half_space(mesh: SectorMesh, side: int, places: Floats) -> Floats:
     return np.asarray(moved / total * (1.0 + material.poissons_ratio) / (2.0 * np.pi * material.youngs_modulus))
 
 
-def _on_surface(mesh: SectorMesh, side: int) -> Floats:
+def _surface_displacement(mesh: SectorMesh, side: int) -> Floats:
     """Surface displacement of a half-space at the flank nodes, by node, layer and load as in `brick_error`, m/N."""
     arc, layer, shear, cosine = flank_spacing(mesh, side)
     material = mesh.gear.material
@@ -402,7 +402,7 @@ def end_errors(mesh: SectorMesh, side: int, images: Floats, incompatible_modes: 
         error = _Row(mesh, side, end, _LAYERS, incompatible_modes).error(loaded, of_end)[:, :END_LAYERS]
         # Layers of the row inside run from the upper end downwards.
         error -= known[:, middle + end * (loaded[:, None] - loaded)]
-        errors.append(_by_distance(error))
+        errors.append(_inverse_transform(error))
     return errors[0], errors[1]
 
 
@@ -411,7 +411,7 @@ def _wave_numbers() -> Floats:
     return np.asarray((np.arange(WAVES) + 0.5) * np.pi / WAVES)
 
 
-def _by_distance(transform: Floats) -> Floats:
+def _inverse_transform(transform: Floats) -> Floats:
     """Sum waves to a function of the nodes from load to place."""
     away = np.arange(1 - WAVES, WAVES)
     waves = np.exp(1j * _wave_numbers()[:, None] * away) / WAVES

@@ -303,13 +303,13 @@ def _half_boundary(
     # near 90 degrees on both sides.
     tangent_angle = np.arctan2(np.abs(step[:, 1]), np.abs(step[:, 0]))
     split = max(length[int(np.argmax(tangent_angle > _FILLET_SPLIT_ANGLE))], 0.1 * length[-1])
-    upper_fillet = _along(root_curve, length, np.linspace(split, 0.0, settings.fillet + 1))
-    lower = _along(root_curve, length, np.linspace(split, length[-1], settings.root + 1))
+    upper_fillet = _point_along(root_curve, length, np.linspace(split, 0.0, settings.fillet + 1))
+    lower = _point_along(root_curve, length, np.linspace(split, length[-1], settings.root + 1))
     upper_fillet[-1] = involute[0]  # the same point but for rounding: a crack otherwise
     return roll, np.concatenate([upper_fillet[:-1], involute]), lower
 
 
-def _along(curve: Floats, length: Floats, arc: Floats) -> Floats:
+def _point_along(curve: Floats, length: Floats, arc: Floats) -> Floats:
     return np.stack([np.interp(arc, length, curve[:, 0]), np.interp(arc, length, curve[:, 1])], axis=-1)
 
 

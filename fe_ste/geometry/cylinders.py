@@ -48,7 +48,7 @@ def mass_properties(tubes: Iterable[Tube]) -> MassProperties:
     >>> round(disc.mass, 3), round(disc.axial, 5), round(disc.transverse, 5), round(disc.centre, 5)
     (24.662, 0.12331, 0.08221, 0.05)
     """
-    return together(_of_one(tube) for tube in tubes)
+    return together(_cylinder_inertia(tube) for tube in tubes)
 
 
 def together(bodies: Iterable[MassProperties]) -> MassProperties:
@@ -62,7 +62,7 @@ def together(bodies: Iterable[MassProperties]) -> MassProperties:
     return MassProperties(mass, sum(part.axial for part in parts), transverse, centre)
 
 
-def _of_one(tube: Tube) -> MassProperties:
+def _cylinder_inertia(tube: Tube) -> MassProperties:
     outer_end = tube.outer if tube.outer_end is None else tube.outer_end
     inner_end = tube.inner if tube.inner_end is None else tube.inner_end
     outside, inside = (

@@ -367,7 +367,7 @@ def stress_of_state(
     rotation = state.pmc * pair.pinion.angular_pitch
     load_points, loads = _point_loads(pair, state.cells, state.solution.force, rotation, compliance)
     forces = sum(
-        (_on_surface(model.bricks.points, surface, load_points, loads) for surface in (model.first, model.second)),
+        (_nodal_forces(model.bricks.points, surface, load_points, loads) for surface in (model.first, model.second)),
         np.zeros_like(model.bricks.points),
     )
     held = model.held.copy()
@@ -427,7 +427,7 @@ def _point_loads(
     return load_points.reshape(-1, 3), np.repeat(force[loaded] / _POINTS_ACROSS, _POINTS_ACROSS)
 
 
-def _on_surface(points: Floats, surface: Surface, load_points: Floats, loads: Floats) -> Floats:
+def _nodal_forces(points: Floats, surface: Surface, load_points: Floats, loads: Floats) -> Floats:
     """Nodal forces (n, 3) of normal forces that push on a surface, shared by the nearest facet's corners."""
     corners = points[surface.facets]
     middle = corners.mean(axis=1)

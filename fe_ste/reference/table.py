@@ -271,7 +271,7 @@ def _figures(position: NonlinearPosition) -> dict[str, float]:
     }
 
 
-def _by_superelement(wanted: NonlinearInput, teeth: Integers) -> dict[str, Any]:
+def _superelement_variables(wanted: NonlinearInput, teeth: Integers) -> dict[str, Any]:
     """Variables of the same curve by the superelement."""
     compliance = pair_compliance(wanted.pair).with_modifications(*wanted.modifications)
     curve = static_transmission_error(compliance, wanted.torque, wanted.positions)
@@ -297,7 +297,7 @@ def _without_results(wanted: NonlinearInput) -> xr.Dataset:
     if wanted.settings.teeth is not None:
         ranges = [range(-(wanted.settings.teeth // 2), wanted.settings.teeth // 2 + 1)]
     teeth = np.arange(min(meshed.start for meshed in ranges), max(meshed.stop for meshed in ranges))
-    beside = _by_superelement(wanted, teeth)
+    beside = _superelement_variables(wanted, teeth)
     floats = [name for name in _UNITS if name not in {*names, *counts, "tooth", "converged", *_BY_TOOTH, *beside}]
     variables: dict[str, Any] = {name: (names, np.full(shape, np.nan)) for name in floats}
     variables |= {name: (names, np.zeros(shape, dtype=np.int64)) for name in counts}

@@ -39,7 +39,7 @@ def modes(
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
-        from exugear.system.statics import near_unconverged_states
+        from exugear.system.statics import meshes_near_unconverged
 
         project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
         project.begin()
@@ -57,7 +57,7 @@ def modes(
         else:
             print_table(f"Modes of {found.label}", [_mode_row(row) for row in rows], ("what moves",))
             say(f"Modes in {path}, diagram in {picture}")
-        refuse_not_converged(near_unconverged_states(found.assembly))
+        refuse_not_converged(meshes_near_unconverged(found.assembly))
 
 
 def _draw_campbell(found: Modes, path: Path) -> Path:

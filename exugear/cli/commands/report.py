@@ -44,7 +44,7 @@ def report(
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; name the one that `exugear run` wrote into")
         try:
-            with time_noted(folder, "report"), progress_bar() as bar, _beside() as executor:
+            with time_noted(folder, "report"), progress_bar() as bar, _parallel_worker() as executor:
                 task = bar.add_task("report", total=None)
 
                 def tell(what: str) -> None:
@@ -57,7 +57,7 @@ def report(
         _tell_report(folder, written.path, written.statements, written.left_out, as_json)
 
 
-def _beside() -> AbstractContextManager[Executor | None]:
+def _parallel_worker() -> AbstractContextManager[Executor | None]:
     """Another process to work beside this one, where there is a core for it; it starts when it is given work."""
     from fe_ste.tools.threads import Workers, available_cores
 

@@ -127,7 +127,7 @@ def steady(
         choice = Choice(variant.value, mesh_model.value, inertias, load_case)
         project = open_project(case, choice, out, allow_dir, scripts)
         if load_case is not None:
-            project = _at_load_of(project, load_case)
+            project = _project_at_load(project, load_case)
         settings = _settings(project, method, speeds, harmonics, branches)
         _refuse_what_has_none(project)
         project.begin()
@@ -135,14 +135,14 @@ def steady(
         _tell(project, settings, project.steady(settings), as_json)
 
 
-def _at_load_of(project: WatchedProject, load_case: str) -> WatchedProject:
+def _project_at_load(project: WatchedProject, load_case: str) -> WatchedProject:
     """Take the torques of a load case as the static load, in a results folder of its own."""
-    from exugear.gearbox.load_cases import at_load_of
+    from exugear.gearbox.load_cases import gearbox_at_load
 
     gearbox = project.gearbox
     return replace(
         project,
-        gearbox=at_load_of(gearbox, gearbox.load_cases[load_case]),
+        gearbox=gearbox_at_load(gearbox, gearbox.load_cases[load_case]),
         folder=project.folder / f"at-{load_case}",
     )
 

@@ -252,14 +252,14 @@ def _fail_if_beyond(study: Study, swept: StudyResult) -> None:
     if data is None or "meets_limits" not in data or data["meets_limits"].any():
         return
     assert study.file.optimise is not None
-    limits = (f"{name} {_in_words(limit)}" for name, limit in study.file.optimise.limits.items())
+    limits = (f"{name} {_limit_text(limit)}" for name, limit in study.file.optimise.limits.items())
     raise FailedError(
         f"none of the {data.sizes[EVALUATION]} points that were looked at keeps the limits {', '.join(limits)}; widen "
         f"limits or parameters, or give more generations. All points are in {swept.path}"
     )
 
 
-def _in_words(limit: LimitSection) -> str:
+def _limit_text(limit: LimitSection) -> str:
     bounds = (("from", limit.min), ("to", limit.max))
     return " ".join(f"{word} {value:g}" for word, value in bounds if value is not None)
 

@@ -60,21 +60,21 @@ class _Node:
 
 def _scanned(text: str, start: int) -> _Node:
     """Value that begins at a place, with the places of all that it holds."""
-    node = _Node(_after_blanks(text, start))
+    node = _Node(_skip_blanks(text, start))
     place = node.start
     if text[place] == '"':
         node.end = scanstring(text, place + 1)[1]
     elif text[place] in "{[":
-        place = _after_blanks(text, place + 1)
+        place = _skip_blanks(text, place + 1)
         while text[place] not in "}]":
             if text[node.start] == "{":
                 name, place = scanstring(text, place + 1)
-                child = node.members[name] = _scanned(text, _after_blanks(text, place) + 1)
+                child = node.members[name] = _scanned(text, _skip_blanks(text, place) + 1)
             else:
                 child = _scanned(text, place)
                 node.items.append(child)
-            place = _after_blanks(text, child.end)
-            place = _after_blanks(text, place + 1) if text[place] == "," else place
+            place = _skip_blanks(text, child.end)
+            place = _skip_blanks(text, place + 1) if text[place] == "," else place
         node.end = place + 1
     else:
         match = _PLAIN.match(text, place)
@@ -83,7 +83,7 @@ def _scanned(text: str, start: int) -> _Node:
     return node
 
 
-def _after_blanks(text: str, place: int) -> int:
+def _skip_blanks(text: str, place: int) -> int:
     match = _BLANK.match(text, place)
     assert match is not None
     return match.end()

@@ -61,7 +61,7 @@ class Range:
         return ""
 
 
-def _within(limit: float, usual: float, why: str = "") -> Range:
+def _symmetric_range(limit: float, usual: float, why: str = "") -> Range:
     return Range(-limit, limit, (-usual, usual), why)
 
 
@@ -69,8 +69,8 @@ def _within(limit: float, usual: float, why: str = "") -> Range:
 Teeth = Annotated[int, Range(5, 2000, (5, 600), "below 5 lie worms, above 2000 racks")]
 ModuleMm = Annotated[float, Range(0.05, 100.0, (0.2, 50.0))]
 PressureAngleDeg = Annotated[float, Range(10.0, 35.0, (14.0, 30.0))]
-HelixAngleDeg = Annotated[float, _within(50.0, 45.0)]
-ProfileShift = Annotated[float, _within(5.0, 2.0, "in normal modules")]
+HelixAngleDeg = Annotated[float, _symmetric_range(50.0, 45.0)]
+ProfileShift = Annotated[float, _symmetric_range(5.0, 2.0, "in normal modules")]
 RackHeight = Annotated[float, Range(0.05, 5.0, (0.4, 2.0), "in normal modules")]
 RackRadius = Annotated[float, Range(0.0, 1.0, (0.0, 0.6), "in normal modules")]
 FaceWidthMm = Annotated[float, Range(0.1, 5000.0, (1.0, 1500.0))]
@@ -83,10 +83,10 @@ RollAngleDeg = Annotated[float, Range(1e-3, 120.0)]
 
 # Flanks are ground to micrometres; 1 mm of relief is already much for the largest gear.
 RemovedUm = Annotated[float, Range(0.0, 3000.0, (0.0, 500.0), "micrometres removed from a flank")]
-SlopeUm = Annotated[float, _within(3000.0, 500.0, "micrometres over a flank")]
-PitchUm = Annotated[float, _within(3000.0, 500.0, "ISO 1328 ends at 0.5 mm")]
+SlopeUm = Annotated[float, _symmetric_range(3000.0, 500.0, "micrometres over a flank")]
+PitchUm = Annotated[float, _symmetric_range(3000.0, 500.0, "ISO 1328 ends at 0.5 mm")]
 RunoutUm = Annotated[float, Range(0.0, 3000.0, (0.0, 500.0), "ISO 1328 ends at 0.5 mm")]
-PlaceErrorUm = Annotated[float, _within(5000.0, 500.0)]
+PlaceErrorUm = Annotated[float, _symmetric_range(5000.0, 500.0)]
 
 # Materials, from foams to osmium, from rubber to diamond.
 YoungsModulusGPa = Annotated[float, Range(0.1, 1500.0, (1.0, 700.0))]
@@ -96,13 +96,13 @@ Density = Annotated[float, Range(500.0, 25000.0, (900.0, 20000.0), "kg/m3")]
 # Places and sizes of shafts and housings.
 LengthMm = Annotated[float, Range(0.01, 1e5, (0.1, 2e4))]
 BoreMm = Annotated[float, Range(0.0, 1e5, (0.0, 2e4))]
-PlaceMm = Annotated[float, _within(1e5, 3e4)]
+PlaceMm = Annotated[float, _symmetric_range(1e5, 3e4)]
 LengthUnitMm = Annotated[float, Range(1e-3, 1e3, why="1 for millimetres, 1000 for metres")]
 ElementSizeMm = Annotated[float, Range(0.2, 5000.0, (1.0, 500.0), "finer meshes fill any memory")]
 ElementsAround = Annotated[int, Range(6, 400, (6, 120), "finer meshes fill any memory")]
 Sectors = Annotated[int, Range(3, 63, (3, 31), "each is a seat of six coordinates")]
 AngleDeg = Annotated[float, Range(-3600.0, 3600.0, (-720.0, 720.0))]
-Phase = Annotated[float, _within(1000.0, 10.0, "in mesh cycles")]
+Phase = Annotated[float, _symmetric_range(1000.0, 10.0, "in mesh cycles")]
 
 # Masses, from watch wheels to the rotors of hydro generators.
 MassKg = Annotated[float, Range(1e-6, 1e7, (1e-4, 1e6))]
@@ -110,9 +110,9 @@ InertiaKgM2 = Annotated[float, Range(1e-12, 1e10, (1e-9, 1e9))]
 
 # Supports. A solid steel block of a metre has 2e11 N/m and 2e10 N m/rad.
 Stiffness = Annotated[float, Range(0.0, 1e13, (1.0, 1e12), "N/m or N m/rad")]
-StiffnessEntry = Annotated[float, _within(1e13, 1e12, "N/m, N or N m/rad")]
+StiffnessEntry = Annotated[float, _symmetric_range(1e13, 1e12, "N/m, N or N m/rad")]
 MeshStiffness = Annotated[float, Range(1.0, 1e13, (1e5, 1e12), "N/m on the line of action, of the whole face")]
-MeshStiffnessWave = Annotated[float, _within(1e13, 1e12, "N/m on the line of action, of the whole face")]
+MeshStiffnessWave = Annotated[float, _symmetric_range(1e13, 1e12, "N/m on the line of action, of the whole face")]
 CouplingStiffness = Annotated[float, Range(1e-3, 1e13, (1e-2, 1e12), "N m/rad")]
 CouplingDamping = Annotated[float, Range(0.0, 1e9, (0.0, 1e7), "N m s/rad")]
 DampingTimeS = Annotated[
@@ -127,18 +127,18 @@ GrooveRatio = Annotated[
 ]
 Osculation = Annotated[float, Range(0.5, 0.9999, (0.93, 0.995), "radius of the barrel's outline over the raceway's")]
 ProfileShare = Annotated[float, Range(0.0, 1.0, why="share of half the roller's length")]
-AxialPreloadUm = Annotated[float, _within(2000.0, 200.0)]
+AxialPreloadUm = Annotated[float, _symmetric_range(2000.0, 200.0)]
 RatingKN = Annotated[float, Range(1e-3, 1e6, (0.1, 5e4))]
 RadialLoadKN = Annotated[float, Range(0.0, 1e5, (0.0, 2e4))]
-AxialLoadKN = Annotated[float, _within(1e5, 2e4)]
+AxialLoadKN = Annotated[float, _symmetric_range(1e5, 2e4)]
 SeatFactor = Annotated[float, Range(1e-3, 1.0)]
 
 # Loads, from watches to the largest wind turbines (3e7 N m).
-TorqueNm = Annotated[float, _within(1e9, 1e8)]
-ForceN = Annotated[float, _within(1e9, 1e8)]
+TorqueNm = Annotated[float, _symmetric_range(1e9, 1e8)]
+ForceN = Annotated[float, _symmetric_range(1e9, 1e8)]
 DurationS = Annotated[float, Range(1e-9, 1e6, (1e-2, 3600.0))]
-SpeedRpm = Annotated[float, _within(1e6, 1e5)]
-Acceleration = Annotated[float, _within(1000.0, 20.0, "m/s2")]
+SpeedRpm = Annotated[float, _symmetric_range(1e6, 1e5)]
+Acceleration = Annotated[float, _symmetric_range(1000.0, 20.0, "m/s2")]
 
 # Loads over a life, and rating.
 HoursPerYear = Annotated[float, Range(0.0, 8766.0, why="a year has 8766 hours")]
@@ -146,7 +146,7 @@ EventsPerYear = Annotated[float, Range(0.0, 1e7, (0.0, 1e5))]
 WindSpeed = Annotated[float, Range(0.1, 100.0, (0.5, 15.0))]
 WeibullShape = Annotated[float, Range(0.5, 10.0, (1.5, 3.0))]
 SkippedS = Annotated[float, Range(0.0, 1e6, (0.0, 3600.0))]
-ChannelFactor = Annotated[float, _within(1e6, 1e3)]
+ChannelFactor = Annotated[float, _symmetric_range(1e6, 1e3)]
 PartialFactor = Annotated[float, Range(0.5, 5.0, (1.0, 2.0))]
 LifeYears = Annotated[float, Range(1e-4, 200.0, (1.0, 50.0))]
 LoadBins = Annotated[int, Range(1, 10000, (16, 1000))]
@@ -169,7 +169,7 @@ SafetyFactor = Annotated[float, Range(0.5, 10.0, (1.0, 3.0))]
 FrequencyHz = Annotated[float, Range(1.0, 1e6, (10.0, 1e5))]
 Positions = Annotated[int, Range(8, 2000, (8, 500))]
 LoadFactor = Annotated[float, Range(1e-3, 20.0, (1e-2, 10.0))]
-OffsetUm = Annotated[float, _within(5000.0, 1000.0)]
+OffsetUm = Annotated[float, _symmetric_range(5000.0, 1000.0)]
 
 
 def unusual_values(model: BaseModel) -> Iterator[tuple[str, float, str]]:

@@ -89,7 +89,7 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
                 member=member,
                 flank=-sign if opposite else sign,
                 meshes=passed,
-                cycles=len(passed) * abs(_against_frame(spins, mesh, holder)),
+                cycles=len(passed) * abs(_relative_revolutions(spins, mesh, holder)),
             )
     return tuple(exposures.values())
 
@@ -119,7 +119,7 @@ def bearing_turns(gearbox: Gearbox, body: str) -> dict[str, float]:
     }
 
 
-def _against_frame(spins: Mapping[str, float], mesh: Mesh, holder: str) -> float:
+def _relative_revolutions(spins: Mapping[str, float], mesh: Mesh, holder: str) -> float:
     return spins.get(holder, 0.0) - spins.get(mesh.frame, 0.0)
 
 

@@ -237,7 +237,7 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
         raise gearbox.fault(f"loads.sources: {yearly:.6g} hours a year in all; a year has {HOURS_PER_YEAR:g}")
     is_output = loads.body == gearbox.case.overall.output
     return tuple(
-        replace(source, remarks=(*source.remarks, *_against_the_speed(source, is_output))) for source in sources
+        replace(source, remarks=(*source.remarks, *_doubt_about_torque_sign(source, is_output))) for source in sources
     )
 
 
@@ -543,7 +543,7 @@ def told(sources: tuple[LoadSource, ...]) -> Iterator[str]:
         yield from source.remarks
 
 
-def _against_the_speed(source: LoadSource, is_output: bool) -> Iterator[str]:
+def _doubt_about_torque_sign(source: LoadSource, is_output: bool) -> Iterator[str]:
     """Doubt torques against the speed of a body that drives: most often a sign that the other channel does not have.
 
     A drive that brakes or coasts has some; a speed below zero under a torque above it has hardly one on purpose. At the

@@ -98,8 +98,8 @@ class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
                     "gear": flank.gear,
                     "mesh": flank.family,
                     "flank": flank.flank,
-                    "standard": _for_programs(flank.standard),
-                    "finite_elements": _for_programs(flank.finite_elements),
+                    "standard": _plain_values(flank.standard),
+                    "finite_elements": _plain_values(flank.finite_elements),
                     "not_rated": dict(flank.lacking),
                     "remarks": list(flank.remarks),
                 }
@@ -111,7 +111,7 @@ class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
         }
 
 
-def _for_programs(figures: Mapping[str, float]) -> dict[str, float | str]:
+def _plain_values(figures: Mapping[str, float]) -> dict[str, float | str]:
     programs: dict[str, float | str] = {}
     for name, value in figures.items():
         scale, unit = UNITS.get(name, (1.0, ""))
@@ -301,7 +301,7 @@ def of_life(data: xr.Dataset) -> dict[FlankKey, dict[str, float]]:
     return found
 
 
-def of_nominal_load(
+def nominal_load_values(
     gearbox: Gearbox,
     rating: RatingSection,
     counted: CountedLoads,

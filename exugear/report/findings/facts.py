@@ -155,7 +155,7 @@ def facts_of_response(words: Labels, response: xr.Dataset) -> tuple[SummaryCard,
 
 def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | None:
     if group.in_operation is not None:
-        return _in_operation(words, group, group.in_operation)
+        return _operating_resonance(words, group, group.in_operation)
     top = group.loudest
     if top is None:
         highest = max(float(run.spectra.speed.max()) for run in group.runs.values())
@@ -168,7 +168,7 @@ def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | 
     said = (
         f"Excited by {words.line_sentence(top.peak.line)}. The overall transmission error swings by "
         f"{amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(group, top)}{_moves(words, group, top)}."
-        f"{_against_rated(context, group)}"
+        f"{_speed_relative_to_rated(context, group)}"
     )
     beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
     return SummaryCard("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
@@ -184,7 +184,7 @@ def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
     return ""
 
 
-def _in_operation(words: Labels, group: RunGroup, ranking: Ranking) -> SummaryCard:
+def _operating_resonance(words: Labels, group: RunGroup, ranking: Ranking) -> SummaryCard:
     """Tell the resonance that comes first by any of three quantities at constant speed, where the gearbox works."""
     low, high = (speed_text(speed) for speed in ranking.speeds)
     where = f"from {low} to {high}" + ("" if ranking.whole else ", the speeds of operation")
@@ -239,7 +239,7 @@ def _how(group: RunGroup, resonance: RankedResonance) -> str:
     return f" at constant speed, {amplitude_text(resonance.peak.level)} in the run-up"
 
 
-def _against_rated(context: Context, group: RunGroup) -> str:
+def _speed_relative_to_rated(context: Context, group: RunGroup) -> str:
     rated = context.gearbox.case.operation.rated_speed_rpm
     if rated is None or group.loudest is None:
         return ""

@@ -168,12 +168,12 @@ def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
         return key[2] != default, key
 
     return (
-        *(_of_runs(context, key, runs[key], results) for key in sorted(runs, key=rank)),
-        *(_of_responses(context, key, responses[key], results) for key in sorted(responses, key=rank)),
+        *(_group_runs(context, key, runs[key], results) for key in sorted(runs, key=rank)),
+        *(_group_responses(context, key, responses[key], results) for key in sorted(responses, key=rank)),
     )
 
 
-def _of_runs(
+def _group_runs(
     context: Context, key: tuple[str, str, str], runs: Sequence[VariantRun], results: StoredResults
 ) -> RunGroup:
     context.tell(f"other windows, {', '.join(key)}")
@@ -186,12 +186,12 @@ def _of_runs(
     return _group(f"run-up {key[0]}", key, by_variant, windows, constant, {}, loud)
 
 
-def _of_responses(
+def _group_responses(
     context: Context, key: tuple[str, str, str], responses: Mapping[str, xr.Dataset], results: StoredResults
 ) -> RunGroup:
     context.tell(f"lines at constant speed, {', '.join(key)}")
     own = {str(variant): responses[variant] for variant in OFFERED if variant in responses}
-    runs = {variant: _as_run(context, data, results) for variant, data in own.items()}
+    runs = {variant: _spectra_of_response(context, data, results) for variant, data in own.items()}
     return _group(f"constant speed, level {key[0]}", key, runs, (), {}, own, list(own.values())[-1])
 
 
@@ -213,7 +213,7 @@ def _group(
     return RunGroup(source, *key[1:], runs, ranked, comparisons, constant, responses, in_operation)
 
 
-def _as_run(context: Context, data: xr.Dataset, results: StoredResults) -> VariantRun:
+def _spectra_of_response(context: Context, data: xr.Dataset, results: StoredResults) -> VariantRun:
     """Take a steady response as a run-up: its lines as spectra, its peaks as picks."""
     choice = choice_of(data.attrs)
     spectra = response_spectra(data, ("overall_dte",), highest_drawn(context.gearbox, data))

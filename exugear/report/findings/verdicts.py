@@ -85,8 +85,8 @@ def verdicts_of(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
     case = context.gearbox.case
     run = group.runs[group.main]
     response = group.responses.get(group.main)
-    own = _of_run(run, run_figures(run)) if response is None else _of_response(response)
-    verdicts = [*own, *_of_resonances(group)]
+    own = _check_run(run, run_figures(run)) if response is None else _check_response(response)
+    verdicts = [*own, *_check_resonances(group)]
     verdicts.append(
         CheckResult(
             False, f"damping is assumed (meshes {1e6 * case.damping.mesh_time_s:g} µs): levels are only as good"
@@ -104,7 +104,7 @@ def verdicts_of(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
     return tuple(sorted(verdicts, key=lambda own: not own.passed))
 
 
-def _of_run(run: VariantRun, figures: RunFigures) -> list[CheckResult]:
+def _check_run(run: VariantRun, figures: RunFigures) -> list[CheckResult]:
     residual, (pulling, apart, outside, _) = abs(figures.residual), figures.times
     verdicts = (
         []
@@ -130,7 +130,7 @@ def _of_run(run: VariantRun, figures: RunFigures) -> list[CheckResult]:
     return verdicts
 
 
-def _of_response(response: xr.Dataset) -> list[CheckResult]:
+def _check_response(response: xr.Dataset) -> list[CheckResult]:
     error = float(np.nanmax(response["energy_error"]))
     growth = float(response.attrs["growth_rate"])
     verdicts = [
@@ -165,7 +165,7 @@ def _of_response(response: xr.Dataset) -> list[CheckResult]:
     return verdicts
 
 
-def _of_resonances(group: RunGroup) -> list[CheckResult]:
+def _check_resonances(group: RunGroup) -> list[CheckResult]:
     loudest = group.ranked[group.main][:LOUDEST]
     if not loudest:
         return []

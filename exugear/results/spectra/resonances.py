@@ -163,8 +163,8 @@ def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
     groups: list[Resonance] = []
     while waiting:
         highest = waiting[0]
-        members = [pick for pick in waiting if _within_resolution(highest, pick)]
-        waiting = [pick for pick in waiting if not _within_resolution(highest, pick)]
+        members = [pick for pick in waiting if _are_indistinct(highest, pick)]
+        waiting = [pick for pick in waiting if not _are_indistinct(highest, pick)]
         weights = np.array([pick.resolution**-2 for pick in members])
         frequencies = np.array([pick.frequency for pick in members])
         groups.append(
@@ -177,7 +177,7 @@ def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
     return tuple(sorted(groups, key=lambda group: group.frequency))
 
 
-def _within_resolution(first: Pick, second: Pick) -> bool:
+def _are_indistinct(first: Pick, second: Pick) -> bool:
     return abs(first.frequency - second.frequency) <= max(first.resolution, second.resolution)
 
 

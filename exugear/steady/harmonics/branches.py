@@ -108,8 +108,8 @@ def trace(
     HarmonicBalanceError
         No solution at `first`, or none near the branch with steps a thousandth of the first.
     """
-    solve = solve or _by_gmres
-    lines = [_at(residual, solve, start, first, scales)]
+    solve = solve or _solve_gmres
+    lines = [_solution_at(residual, solve, start, first, scales)]
     parameters = [first]
     sense = np.sign(last - first)
     length = step
@@ -141,11 +141,11 @@ def _size(values: Complexes) -> float:
     return float(np.linalg.norm(values.ravel()))
 
 
-def _by_gmres(change: Callable[[Complexes], Complexes], right: Complexes, tolerance: float) -> Complexes:
+def _solve_gmres(change: Callable[[Complexes], Complexes], right: Complexes, tolerance: float) -> Complexes:
     return solve_lines(change, right, tolerance)[0]
 
 
-def _at(residual: Residual, solve: Solve, lines: Complexes, parameter: float, scales: Scales) -> Complexes:
+def _solution_at(residual: Residual, solve: Solve, lines: Complexes, parameter: float, scales: Scales) -> Complexes:
     """Solution at a parameter by Newton's method."""
     for _ in range(5 * MOST_CORRECTIONS):
         missing, change = residual(lines, parameter)
@@ -228,14 +228,14 @@ def exponents(
     advance = scipy.linalg.expm(step * constant)
     total = np.eye(len(constant))
     for first in range(0, kicks, TOGETHER):
-        total = _after_kicks(total, advance, pushes, reads, step * varying[first : first + TOGETHER])
+        total = _apply_kicks(total, advance, pushes, reads, step * varying[first : first + TOGETHER])
     multipliers, shapes = scipy.linalg.eig(total)
     found = np.log(np.where(multipliers == 0.0, 1e-300, multipliers)) / period
     order = np.argsort(-found.real)
     return np.asarray(found[order], dtype=complex), np.asarray(shapes[:, order], dtype=complex)
 
 
-def _after_kicks(state: Floats, advance: Floats, pushes: Floats, reads: Floats, kicks: Floats) -> Floats:
+def _apply_kicks(state: Floats, advance: Floats, pushes: Floats, reads: Floats, kicks: Floats) -> Floats:
     """Find states (n, n) after some kicks (k, j, r), each followed by a step of the constant part (n, n).
 
     Readings at each kick are those without kicks, less what the kicks before it changed in them: products with the

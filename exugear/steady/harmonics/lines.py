@@ -194,7 +194,7 @@ def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> 
     for row in itertools.product(reach, repeat=bases.size):
         if 0 < sum(map(abs, row)) <= combinations and row > tuple(-n for n in row):
             rows.add(row)
-    return _of_rows(np.array([tuple(map(int, row)) for row in rows]), bases, _independent(bases))
+    return _lines_of_rows(np.array([tuple(map(int, row)) for row in rows]), bases, _independent(bases))
 
 
 def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
@@ -212,7 +212,7 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
     for line in lines.index[1:]:
         for turns in itertools.product(*(modulator.turns(line) for modulator in modulators)):
             rows.add(tuple(int(n) for n in (*line, *turns)))
-    return _of_rows(np.array(sorted(rows)), bases, _with_slow(lines.units, len(modulators)))
+    return _lines_of_rows(np.array(sorted(rows)), bases, _with_slow(lines.units, len(modulators)))
 
 
 def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
@@ -238,12 +238,12 @@ def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
         if n
     ]
     rows = np.array([np.append(line, turn) for line in lines.index for turn in turns])
-    return _of_rows(rows, bases, _with_slow(lines.units, len(slow)))
+    return _lines_of_rows(rows, bases, _with_slow(lines.units, len(slow)))
 
 
 def joined(one: LineSet, other: LineSet) -> LineSet:
     """Lines of two sets of the same bases."""
-    return _of_rows(np.vstack([one.index, other.index]), one.bases, one.units)
+    return _lines_of_rows(np.vstack([one.index, other.index]), one.bases, one.units)
 
 
 def count_of_lines(bases: int, sum_of_multiples: int) -> int:
@@ -272,7 +272,7 @@ def largest(sizes: Floats, rest: float) -> Booleans:
     return found
 
 
-def _of_rows(rows: Integers, bases: Floats, units: Integers) -> LineSet:
+def _lines_of_rows(rows: Integers, bases: Floats, units: Integers) -> LineSet:
     """Line set of the mean and multiples (n, bases) of bases in any order and sign, some of them at one frequency.
 
     Of lines at one frequency that of one base alone stands for all, else that with the smallest multiples.

@@ -117,7 +117,7 @@ class BearingWaves:
         t, t1, _ = frame.matrices(0.0)
         chosen = self.assembly.connectors.chosen(numbers)
         ways = np.eye(q.size)
-        turn = self._along_radii()
+        turn = self._radial_transformation()
 
         def slopes(step: float, by_place: float) -> Floats:
             moved = [
@@ -143,7 +143,7 @@ class BearingWaves:
         """All bearings (c,), law by law."""
         return np.concatenate([self.waves[n].connectors for n in self.firsts]).astype(np.int64)
 
-    def _along_radii(self) -> Floats:
+    def _radial_transformation(self) -> Floats:
         """Matrices (c, 5, 5) from components along a bearing's axes to those along radius and tangent of its planet."""
         sets = [self.waves[n].planets for n in self.firsts]
         angles = [np.zeros(1) if planets is None else planets.angles for planets in sets]

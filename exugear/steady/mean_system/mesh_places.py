@@ -257,7 +257,7 @@ def coupled(
     """
     forward = waves.waves[family.first].sense * math.copysign(1.0, speed) > 0.0
     cycles = np.array([own[family.first] for own in spectra.values()])
-    parts = (_between_places if waves.carriers else _between_waves)(family, cycles, ports, speed)
+    parts = (_place_coefficients if waves.carriers else _wave_coefficients)(family, cycles, ports, speed)
     if not forward:  # the mesh runs through its cycle backwards, the carrier turns as it does
         parts = parts[:, :, ::-1].conj()
     harmonics = cycles.shape[1] - 1
@@ -268,7 +268,7 @@ def coupled(
     return np.asarray(found.reshape(-1, family.count * forces, family.count * forces))
 
 
-def _between_waves(family: Family, cycles: Complexes, ports: MeshInterface, speed: float) -> Complexes:
+def _wave_coefficients(family: Family, cycles: Complexes, ports: MeshInterface, speed: float) -> Complexes:
     """Coefficients (f, h + 1, 1, waves, waves) of each wave with itself, and of the mean wave to others."""
     orders = 2j * math.pi * np.arange(cycles.shape[1])
     turned = cycles * np.exp(orders * ports.positions[family.first])
@@ -278,7 +278,7 @@ def _between_waves(family: Family, cycles: Complexes, ports: MeshInterface, spee
     return found
 
 
-def _between_places(family: Family, cycles: Complexes, ports: MeshInterface, speed: float) -> Complexes:
+def _place_coefficients(family: Family, cycles: Complexes, ports: MeshInterface, speed: float) -> Complexes:
     """Coefficients (f, h + 1, turns, waves, waves) by all places, each as far ahead as the static state has it."""
     samples = SAMPLED * family.turns if family.carrier >= 0 else 1
     theta = 2.0 * math.pi * np.arange(samples) / samples

@@ -217,12 +217,12 @@ class MeshWaves:
         """Fourier coefficients (m, harmonics + 1) of the product of quantities over the mesh cycle."""
         found = np.zeros((len(self.waves), harmonics + 1), dtype=complex)
         for own, wave in zip(found, self.waves, strict=True):
-            product = np.prod([self._over_cycle(wave, quantity) for quantity in quantities], axis=0)
+            product = np.prod([self._sample_cycle(wave, quantity) for quantity in quantities], axis=0)
             known = fourier_coefficients(product, harmonics)
             own[: len(known)] = known
         return found
 
-    def _over_cycle(self, wave: MeshWave, quantity: CycleQuantity) -> Floats:
+    def _sample_cycle(self, wave: MeshWave, quantity: CycleQuantity) -> Floats:
         """Sample a quantity over the cycle of a wave's mesh."""
         meshes = self.assembly.meshes
         mesh = wave.first
@@ -273,7 +273,7 @@ class MeshWaves:
         """Share of the variation of compliance of each mesh that stands for waves, above each number of harmonics."""
         found = {}
         for mesh, wave in {wave.first: wave for wave in self.waves}.items():
-            values = self._over_cycle(wave, "compliance")
+            values = self._sample_cycle(wave, "compliance")
             sizes = np.abs(fourier_coefficients(values, len(values) // 2))
             above = np.sqrt(np.cumsum(sizes[:0:-1] ** 2)[::-1])
             varies = above[0] > CONSTANT * sizes[0]

@@ -167,7 +167,7 @@ class RotatingFrame:
         """Matrices and rolling at the last angle: differences ask for one angle many times."""
         return {}
 
-    def _at(self, psi: float) -> tuple[Jet, Jet]:
+    def _rotation_at(self, psi: float) -> tuple[Jet, Jet]:
         found = self._kept.get(psi)
         if found is None:
             found = self._matrices(psi), self._rolling(psi)
@@ -177,11 +177,11 @@ class RotatingFrame:
 
     def matrices(self, psi: float) -> Jet:
         """T and its two derivatives by psi, each (size, size)."""
-        return self._at(psi)[0]
+        return self._rotation_at(psi)[0]
 
     def rolling(self, psi: float) -> Jet:
         """q_rolling and its two derivatives by psi, each (size,)."""
-        return self._at(psi)[1]
+        return self._rotation_at(psi)[1]
 
     def _matrices(self, psi: float) -> Jet:
         turned = self._unit()

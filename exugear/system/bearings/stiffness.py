@@ -274,7 +274,7 @@ def rolling_law(bearing: Bearing, damping_time: float, of_rows: Floats, directio
     )
 
 
-def through_point(law: SupportLaw, strain: Floats, load: Floats, stands_still: bool) -> SupportLaw:
+def law_through_point(law: SupportLaw, strain: Floats, load: Floats, stands_still: bool) -> SupportLaw:
     """Linear law that passes a point: its load (6,) at the displacement (6,) in the axes of what the bearing sits on.
 
     It resists no spin there. Of a load that turns in these axes only the part along the axis stays what it is: the law

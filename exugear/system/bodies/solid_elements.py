@@ -53,7 +53,7 @@ class Solid:
     @cached_property
     def mass(self) -> SparseMatrix:
         """Mass matrix (3 n, 3 n), kg."""
-        return in_each_direction(self.scalar_mass)
+        return expand_to_directions(self.scalar_mass)
 
     def rigid_motions(self, centre: Sequence[float]) -> Floats:
         """Give translations, and turns about a centre (3,) m, over all unknowns (3 n, 6)."""
@@ -66,7 +66,7 @@ class Solid:
         return motions.reshape(-1, 6)
 
 
-def in_each_direction(scalar: SparseMatrix) -> SparseMatrix:
+def expand_to_directions(scalar: SparseMatrix) -> SparseMatrix:
     """Matrix (3 n, 3 n) that does in each direction what the scalar one (n, n) does."""
     return scipy.sparse.csr_array(scipy.sparse.kron(scalar, np.eye(3), format="csr"))
 

@@ -60,7 +60,7 @@ from exugear.system.bodies.solid_elements import (
     Solid,
     SolidSeat,
     assemble,
-    in_each_direction,
+    expand_to_directions,
     ordered_corners,
     seat_rows,
     shape_gradients,
@@ -238,7 +238,7 @@ def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
     matrix = np.zeros((size, size))
     if model.frame == "nonrotating":
         _check_revolution(model, reduced.component)
-        scalar = in_each_direction(reduced.solid.convection - reduced.solid.convection.T)
+        scalar = expand_to_directions(reduced.solid.convection - reduced.solid.convection.T)
         matrix = modes.T @ (scalar @ modes)
     elif model.frame == "carrier":
         by_node = modes.reshape(-1, 3, size)
@@ -339,8 +339,8 @@ def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> Fl
     flat = fields_at_nodes.reshape(len(fields_at_nodes), -1)
     moments = (flat.T @ (solid.scalar_mass @ flat)).reshape(3, count, 3, count).transpose(0, 2, 1, 3)
     first_moments = (node_mass @ flat).reshape(3, count)
-    tension = modes.T @ (in_each_direction(solid.convection_square) @ modes)
-    convection = modes.T @ (in_each_direction(solid.convection) @ modes)
+    tension = modes.T @ (expand_to_directions(solid.convection_square) @ modes)
+    convection = modes.T @ (expand_to_directions(solid.convection) @ modes)
     for n, ring in rings:
         moved = by_mode[6 * n : 6 * n + 3]
         turns = by_mode[6 * n + 3 : 6 * n + 6]

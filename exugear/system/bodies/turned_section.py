@@ -328,10 +328,10 @@ class Shaft:
         free = self.free_unknowns(harmonic)
         gyroscopic = None
         if harmonic == "bending":
-            gyroscopic = self._gather(_by_field(scalar, [0.0, 4.0, 1.0]), 3, free)
+            gyroscopic = self._gather(_repeat_for_fields(scalar, [0.0, 4.0, 1.0]), 3, free)
         return Harmonic(
             name=harmonic,
-            mass=self._gather(_by_field(scalar, inertia), len(inertia), free),
+            mass=self._gather(_repeat_for_fields(scalar, inertia), len(inertia), free),
             stiffness=self._gather(stiffness, len(inertia), free),
             gyroscopic=gyroscopic,
             seats=self._seat_rows(harmonic)[:, free],
@@ -461,7 +461,7 @@ class Shaft:
         return values.reshape(self.nodes.shape[1], fields, -1)
 
 
-def _by_field(scalar: Floats, factors: Sequence[float]) -> Floats:
+def _repeat_for_fields(scalar: Floats, factors: Sequence[float]) -> Floats:
     """Element matrices (elements, 9 f, 9 f) of f fields that do not couple, from the scalar one (elements, 9, 9)."""
     return np.asarray(np.kron(scalar, np.diag(factors)))
 
@@ -548,7 +548,7 @@ def turned_hexahedra(shaft: Shaft, around: int = 8) -> Any:
 
     mesh = skfem.MeshHex2.from_mesh(skfem_mesh(logical, numbers.reshape(-1, 8)))
     circles = np.concatenate([[0.0], radii[1:]]) if on_axis else np.concatenate([[0.0], radii])
-    return skfem.MeshHex2(_tapered(shaft, _to_circles(np.asarray(mesh.doflocs), circles)), mesh.t)
+    return skfem.MeshHex2(_tapered(shaft, _map_to_circles(np.asarray(mesh.doflocs), circles)), mesh.t)
 
 
 def _tapered(shaft: Shaft, points: Floats) -> Floats:
@@ -586,7 +586,7 @@ def _square_rings(around: int, levels: int) -> tuple[Floats, Integers, Integers]
     return np.concatenate(points), np.concatenate(faces).astype(np.int64), numbers
 
 
-def _to_circles(logical: Floats, circles: Floats) -> Floats:
+def _map_to_circles(logical: Floats, circles: Floats) -> Floats:
     """Move points (3, n) of the logical square onto circles; `circles` are the radii of rings 1, 2, 3, ..."""
     x, y, z = logical
     ring = np.maximum(np.abs(x), np.abs(y))

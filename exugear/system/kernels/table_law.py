@@ -438,7 +438,7 @@ def surface_law(
         law[LAW_OUTSIDE] = GUESSED
     if beyond:
         law[LAW_OUTSIDE] = max(law[LAW_OUTSIDE], LEFT_TABLE)
-        beyond_last(delta, start, step, count, memory)
+        extrapolate_beyond_last(delta, start, step, count, memory)
         return piece, t
     # On the piece: F = r^2, dF/d delta = 2 r (dr/dt) / (ds/dt), U = F delta - U*, dU/dx = -dU*/dx.
     root = start + step * t
@@ -452,7 +452,7 @@ def surface_law(
 
 
 @kernel
-def beyond_last(delta: float, start: float, step: float, count: int, memory: Scratch) -> None:
+def extrapolate_beyond_last(delta: float, start: float, step: float, count: int, memory: Scratch) -> None:
     """Fill `memory.law` beyond the last load: the deflection goes on in proportion to the force."""
     law, cubic = memory.law, memory.cubic
     c = cubic[0]

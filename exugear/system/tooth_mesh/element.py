@@ -233,7 +233,7 @@ class MeshElement:
             straight = contact.force / contact.tangent_stiffness
             yielding = float(np.clip(contact.deflection, straight, STEEPEST * straight))
             gap = contact.deflection - yielding
-            secant, tangent, ways = self._over_cycle(contact, yielding)
+            secant, tangent, ways = self._samples_over_cycle(contact, yielding)
             secant = secant * (contact.force / yielding / np.mean(secant))
             tangent = tangent * (contact.tangent_stiffness / np.mean(tangent))
             load = contact.force
@@ -252,7 +252,7 @@ class MeshElement:
             offset=self.offset - np.array([shift + gap, 0.0, 0.0]),
         )
 
-    def _over_cycle(self, contact: ContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
+    def _samples_over_cycle(self, contact: ContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
         """Secant and tangent stiffness (n,), N/m, and ways of the load (2, n), m, where the gears stand."""
         cycle = contact.cycle
         if cycle is None:
@@ -338,7 +338,7 @@ def mesh_elements(
         phase = phases[mesh.name]
         ends = (_node(mesh.pinion, mesh.pair.pinion, bodies, nodes), _node(mesh.gear, mesh.pair.gear, bodies, nodes))
         known = contact.get(mesh.name) if contact and flank == usual[mesh.name] else None
-        secant, tangent, load = _at_load(law, data, mesh, static[mesh.name])
+        secant, tangent, load = _stiffness_at_load(law, data, mesh, static[mesh.name])
         deflection, force = law.rows(mesh, flank, ends, angles)
         centre, misalignment = position_rows(mesh, flank, ends)
         mesh_stiffness, factor = law.stiffness(mesh, secant, angles)
@@ -374,7 +374,7 @@ def mesh_elements(
     return tuple(elements)
 
 
-def _at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats, float]:
+def _stiffness_at_load(law: Law, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats, float]:
     """Secant and tangent stiffness (n,) over the mesh cycle along the line of action, N/m, and their load, N."""
     secant, tangent = law.samples(data, mesh, static_force)
     load = abs(static_force) or (data.force if isinstance(data, MeshCurve) else 0.0)

@@ -79,7 +79,7 @@ def axes_reaching(pair: GearPair, opening: float = 20e-6, change: float = 33e-6)
     """
     end = rounded_up(max(LEAST, REACH * abs(opening)))
     steps = min(MOST_STEPS, max(2, math.ceil(end / STEP)))
-    openings = _to_end(end, steps)
+    openings = _axis_to_end(end, steps)
     farther = rounded_up(max(LEAST, REACH * abs(change)))
     offsets = [0.0]
     for sense in (-1.0, 1.0):
@@ -101,7 +101,7 @@ def rounded_up(value: float) -> float:
     return float(f"{number * power:.3g}")
 
 
-def _to_end(end: float, steps: int) -> tuple[float, ...]:
+def _axis_to_end(end: float, steps: int) -> tuple[float, ...]:
     return tuple(float(f"{end * step / steps:.6g}") for step in range(1, steps + 1))
 
 

@@ -102,7 +102,7 @@ class Method(NamedTuple):
         """Order of the error of a step, less one: the powers of time that the sums are exact for."""
         if not self.points:
             return 4
-        misses = np.abs(self.weights @ _at_nodes(self.points).T - _integrals(np.arange(self.points))).max(axis=0)
+        misses = np.abs(self.weights @ _powers_at_nodes(self.points).T - _integrals(np.arange(self.points))).max(axis=0)
         return int(np.argmax(misses > _EXACT)) or self.points
 
     @property
@@ -146,7 +146,7 @@ def adams(order: int) -> Method:
     once = np.polyint(term)(1.0)
     twice = np.polyint(np.polymul(term, [-1.0, 1.0]))(1.0)
     # The sums are exact for each power of time up to the order, less one.
-    weights = np.linalg.solve(_at_nodes(order), _integrals(powers).T).T
+    weights = np.linalg.solve(_powers_at_nodes(order), _integrals(powers).T).T
     return Method(np.ascontiguousarray(weights), np.array([once, twice]))
 
 
@@ -170,7 +170,7 @@ def stabilised() -> Method:
     return Method(np.pad(four.weights, ((0, 0), (0, free))) + _FREE_SHARES @ differences, _FREE_CORRECTION)
 
 
-def _at_nodes(points: int) -> Floats:
+def _powers_at_nodes(points: int) -> Floats:
     """Powers 0, 1, ... of time, by row, at the accelerations at 0, -1, -2 ..."""
     powers = np.arange(points)
     return np.asarray((-powers[None, :].astype(np.float64)) ** powers[:, None])
@@ -373,11 +373,11 @@ class Integration(ReprMixin):
 
 def eigenvalues(assembly: Assembly) -> Complexes:
     """Eigenvalues (1/s) of the system linearised at rest, mesh stiffness at its peaks, damping included."""
-    linear = _at_rest(assembly)
+    linear = _linearised_equations(assembly)
     return scipy.linalg.eigvals(_free_motions(linear, assembly.motions)[1]).astype(np.complex128)
 
 
-def _at_rest(assembly: Assembly) -> Linearised:
+def _linearised_equations(assembly: Assembly) -> Linearised:
     """Linearised equations with all teeth in contact, meshes and non-linear bearings as stiff as they become."""
     stiffest = assembly.unloaded.with_linear_supports(STIFFENING)
     meshes = stiffest.linear_meshes()
@@ -413,7 +413,7 @@ def fastest_motion(assembly: Assembly) -> str:
     >>> fastest_motion(assemble(gearbox, Choice("rigid"), stiffness))
     'the fastest motion, 9.25e+03 rad/s, is of hss.spin against high_speed'
     """
-    linear = _at_rest(assembly)
+    linear = _linearised_equations(assembly)
     basis, matrix = _free_motions(linear, assembly.motions)
     values, vectors = scipy.linalg.eig(matrix)
     fastest = int(np.argmax(np.abs(values)))

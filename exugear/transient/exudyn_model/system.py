@@ -94,7 +94,7 @@ class ExudynSystem:
         self.mbs.Assemble()
         self._order = self._coordinate_order()
         if self.parts.floating is not None:
-            self.mbs.SetPostStepUserFunction(self._after_step(None))
+            self.mbs.SetPostStepUserFunction(self._add_step_observer(None))
 
     def _add_parts(self, q: Floats, v: Floats, mesh_route: MeshRoute, meshes: MeshArrays | None) -> None:
         """Add bodies, what joins them, what acts on them, and the meshes unless None."""
@@ -181,7 +181,7 @@ class ExudynSystem:
         settings.solutionSettings.writeSolutionToFile = False
         settings.displayStatistics = False
         if observe is not None:
-            self.mbs.SetPostStepUserFunction(self._after_step(observe))
+            self.mbs.SetPostStepUserFunction(self._add_step_observer(observe))
         solver = exudyn.MainSolverExplicit() if explicit else exudyn.MainSolverImplicitSecondOrder()
         if explicit:
             integration.explicitIntegration.dynamicSolverType = exudyn.DynamicSolverType.RK44
@@ -191,7 +191,7 @@ class ExudynSystem:
             raise SolverFailure(str(error).splitlines()[0]) from None
         return int(solver.it.currentStepIndex) - 1
 
-    def _after_step(self, observe: Observer | None) -> Callable[[Any, float], bool]:
+    def _add_step_observer(self, observe: Observer | None) -> Callable[[Any, float], bool]:
         def after_step(mbs: Any, t: float) -> bool:
             _, q, v = self.state()
             if self.parts.floating is not None:

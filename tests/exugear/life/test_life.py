@@ -22,7 +22,7 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import RatingSection
 from exugear.gearbox.variant import VariantError
 from exugear.life.dynamic_factors import stated_factors
-from exugear.life.gear_life import beyond_tables, flank_lives, pair_stresses
+from exugear.life.gear_life import flank_lives, pair_stresses, warn_beyond_tables
 from exugear.life.life import checked_loads, compute_life, needs_of_relief, rating_of, shortfalls
 from exugear.life.life_file import damage_matrix, limits, read_life
 from exugear.life.load_spectrum.counted import count_loads
@@ -217,7 +217,7 @@ def test_misalignment_beyond_a_table_is_told(grc, balance):
             **dict.fromkeys(("hertz", "pitch_hertz", "outside", "face_load"), flat),
             **dict.fromkeys(("root", "compression"), np.ones((1, 2, 2))),
         )
-        lines = list(beyond_tables(gearbox, acting, balance, {"high_speed": stress}))
+        lines = list(warn_beyond_tables(gearbox, acting, balance, {"high_speed": stress}))
         assert len(lines) == told
         assert all(line.startswith("high_speed: its misalignment reaches") for line in lines)
         hub = np.concatenate([acting.points.other, acting.worst_hub])

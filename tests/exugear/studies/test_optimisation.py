@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from exugear.studies.dataset import EVALUATION, on_front
+from exugear.studies.dataset import EVALUATION, is_pareto_optimal
 from exugear.studies.executors import processes
 from exugear.studies.quantities import QUANTITIES, Quantity
 from exugear.studies.runner import optimise
@@ -72,7 +72,7 @@ def test_a_search_that_is_begun_again_computes_nothing_twice(tmp_path):
 
 def test_points_on_a_front_are_beaten_by_none():
     outputs = np.random.default_rng(1).random((60, 2))
-    front = on_front(outputs)
+    front = is_pareto_optimal(outputs)
     for n, own in enumerate(outputs):
         beaten = any(np.all(other <= own) and np.any(other < own) for other in outputs)
         assert front[n] != beaten

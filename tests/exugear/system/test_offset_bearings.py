@@ -16,10 +16,10 @@ from exugear.life.static_balance import is_linear
 from exugear.system.bearings.stiffness import (
     SupportLaw,
     law_in_words,
+    law_through_point,
     load_stands_still,
     planet_families,
     planet_supports,
-    through_point,
 )
 from exugear.system.build import assemble
 from exugear.system.loads import Loading, LoadTable
@@ -217,7 +217,7 @@ def test_a_stated_load_has_no_direction_and_its_law_passes_the_origin(tmp_path):
 def test_a_load_that_turns_keeps_the_part_along_the_axis(grc):
     """A shaft in a shaft: across the axis its law passes the origin, and says so."""
     strain, load = np.arange(1.0, 7.0), 1e3 * np.arange(1.0, 7.0)
-    law = through_point(SupportLaw(np.eye(6), np.eye(6)), strain, load, stands_still=False)
+    law = law_through_point(SupportLaw(np.eye(6), np.eye(6)), strain, load, stands_still=False)
     assert law.point_strain.tolist() == [0.0, 0.0, 3.0, 0.0, 0.0, 0.0]
     assert law.point_load.tolist() == [0.0, 0.0, 3e3, 0.0, 0.0, 0.0]
     bodies = {body.name: body for body in grc.bodies()}

@@ -180,12 +180,12 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
             notes.lost.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
     by_root = {union.root(part.number): body for body in bodies for part in body.parts}
     carried = [
-        one for members in sets for one in _on_one_orbit(places, members, _carrier(model, union, by_root, members))
+        one for members in sets for one in _split_by_orbit(places, members, _carrier(model, union, by_root, members))
     ]
     planet_bodies: list[Body] = []
     for number, (carrier, placed) in enumerate(carried):
         name = _lettered("planet", number, len(carried))
-        placed = _beside_mates(model, groups, placed, planet_bodies)
+        placed = _order_by_mating_planets(model, groups, placed, planet_bodies)
         planet_bodies.append(_planet_body(places, carrier, placed, name, groups))
     return Bodies([*bodies, *planet_bodies])
 
@@ -341,7 +341,7 @@ def _carrier(
     return carriers[0]
 
 
-def _on_one_orbit(
+def _split_by_orbit(
     places: Places, members: Sequence[tuple[int, Component]], carrier: Body
 ) -> Iterator[tuple[Body, list[_Planet]]]:
     """Split planets into sets equally far from the carrier's axis, in the order of angles: a Ravigneaux set has two."""
@@ -361,7 +361,7 @@ def _on_one_orbit(
         yield carrier, sorted(orbit, key=lambda planet: planet.angle)
 
 
-def _beside_mates(
+def _order_by_mating_planets(
     model: Model, groups: Mapping[int, list[Component]], placed: list[_Planet], earlier: Sequence[Body]
 ) -> list[_Planet]:
     """Turn the order of planets so that each has the number of the one of another set that it meshes with."""

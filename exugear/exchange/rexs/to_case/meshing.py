@@ -131,10 +131,10 @@ def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: N
         Shifts and centre distance contradict each other.
     """
     solved = _solved(gears, stages)
-    wrong = [stage for stage in stages if _beyond(solved, stage)]
+    wrong = [stage for stage in stages if _contradicts_distance(solved, stage)]
     for replaced in (_zeros_with_followers(gears, stages, wrong, notes), _replaceable(gears, stages, wrong, notes)):
         again = _reopened(gears, stages, replaced)
-        if replaced and not any(_beyond(again, stage) for stage in stages):
+        if replaced and not any(_contradicts_distance(again, stage) for stage in stages):
             solved = again
             notes.changed += [_replacement(gears[number], again[number]) for number in replaced]
             break
@@ -169,7 +169,7 @@ def _zeros_with_followers(
             found += zeros
     again = _reopened(gears, stages, found)
     for stage in stages:
-        if found and stage not in wrong and _beyond(again, stage):
+        if found and stage not in wrong and _contradicts_distance(again, stage):
             found += [number for number in (stage.pinion, stage.gear) if number not in found]
     return list(dict.fromkeys(found))
 
@@ -186,7 +186,7 @@ def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int,
     return solved
 
 
-def _beyond(gears: Mapping[int, Toothing], stage: Stage) -> bool:
+def _contradicts_distance(gears: Mapping[int, Toothing], stage: Stage) -> bool:
     """Tell whether the shifts of a stage contradict its centre distance."""
     stated, total = _shift_sums(gears, stage)
     return abs(stated - total) > SHIFT_TOLERANCE
@@ -288,7 +288,7 @@ def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], not
             f"has the base pitch of {mate.part}; described by its rack of {mate.module.value:g} mm at "
             f"{mate.pressure_angle.value:g} deg, base circle, tooth thickness and diameters kept"
         )
-        same[other] = _in_rack_of(mate, same[other])
+        same[other] = _relative_to_mating_rack(mate, same[other])
     return same
 
 
@@ -307,7 +307,7 @@ def _have_one_base_pitch(toothing: Toothing, other: Toothing) -> bool:
     return abs(pitches[0] - pitches[1]) <= PITCH_TOLERANCE * pitches[1] and abs(sines[0] - sines[1]) <= PITCH_TOLERANCE
 
 
-def _in_rack_of(mate: Toothing, gear: Toothing) -> Toothing:
+def _relative_to_mating_rack(mate: Toothing, gear: Toothing) -> Toothing:
     """Describe a gear by the rack of its mate."""
     before = unchecked("", gear)
     angle = math.radians(mate.pressure_angle.value)
@@ -584,7 +584,7 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
     RexsError
         Left and right flank differ.
     """
-    left, right = (_by_type(model, gear.part, side) for side in ("left", "right"))
+    left, right = (_modification_by_type(model, gear.part, side) for side in ("left", "right"))
     for kind, part in {**right, **left}.items():
         if kind not in READ and kind not in UNSIGNED:
             notes.changed.append(f"{part} of {gear.part}: not imported; give it in [gears.NAME.modification]")
@@ -620,7 +620,7 @@ def _blanks(
         yield key, assumed(0.0, f"SET IT: {said} by {part}, the end unknown")
 
 
-def _by_type(model: Model, gear: Component, side: str) -> dict[str, Component]:
+def _modification_by_type(model: Model, gear: Component, side: str) -> dict[str, Component]:
     flanks = model.related("flank", "gear", gear.number, side)
     found = [one for flank in flanks for one in model.related("reference", "origin", flank.number, "referenced")]
     return {one.type: one for one in found if one.type in MODIFICATIONS}

@@ -102,8 +102,8 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         shift=_shift(flank, internal),
         tip=_tip(gear, teeth * module, notes),
         root=_diameter(gear, "root_diameter"),
-        dedendum=_of_tool(tool, internal, "addendum_coefficient_reference_profile", 1.25),
-        tip_radius=_rounded(_of_tool(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
+        dedendum=_tool_factor(tool, internal, "addendum_coefficient_reference_profile", 1.25),
+        tip_radius=_rounded(_tool_factor(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
         thinning=_thinning(gear, module, allowances, math.radians(helix.value)),
         allowances=allowances,
         cutter=_cutter(gear, tool, module) if internal else None,
@@ -270,7 +270,7 @@ def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | N
     return read(cutter, "; ".join([f"number_of_teeth, tip and its radius of {tool}", *said]))
 
 
-def _of_tool(tool: Component | None, internal: bool, key: str, usual: float) -> Entry:
+def _tool_factor(tool: Component | None, internal: bool, key: str, usual: float) -> Entry:
     """Factor of the tool that makes the root: of a rack, which an internal gear has none of."""
     value = tool.quantity(key) if tool else None
     if tool is None or value is None or value < 0.0:

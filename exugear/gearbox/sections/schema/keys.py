@@ -90,7 +90,7 @@ def keys() -> Iterator[Key]:
     examples = tomllib.loads(files(__package__).joinpath("examples.toml").read_text(encoding="utf-8"))
     for table, model in tables().items():
         texts = meanings(model)
-        given = _at(examples, table)
+        given = _example_of_table(examples, table)
         for name, field in model.model_fields.items():
             if not _model_within(field.annotation):
                 yield _key(table, name, field, texts[name], given[name])
@@ -138,7 +138,7 @@ def _bare(kind: Any) -> Any:
     return kind
 
 
-def _at(examples: dict[str, Any], table: str) -> dict[str, Any]:
+def _example_of_table(examples: dict[str, Any], table: str) -> dict[str, Any]:
     """Return the example of a table; of a list of tables the first."""
     found: Any = examples
     for part in filter(None, table.split(".")):
@@ -227,13 +227,13 @@ def json_schema() -> dict[str, Any]:
     for name, table in {GearboxFile.__name__: schema, **schema["$defs"]}.items():
         for key, meaning in meanings(models[name]).items():
             table["properties"][key]["description"] = meaning
-    return {"$schema": DIALECT, **_as_toml_has_it(schema)}
+    return {"$schema": DIALECT, **_remove_nulls(schema)}
 
 
-def _as_toml_has_it(node: Any) -> Any:
+def _remove_nulls(node: Any) -> Any:
     """Leave out what a TOML file cannot say: null, and titles that repeat the keys."""
     if isinstance(node, list):
-        return [_as_toml_has_it(entry) for entry in node]
+        return [_remove_nulls(entry) for entry in node]
     if not isinstance(node, dict):
         return node
     if "anyOf" in node:
@@ -242,7 +242,7 @@ def _as_toml_has_it(node: Any) -> Any:
         node |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
     titled = isinstance(node.get("title"), str)
     kept = {key: value for key, value in node.items() if not (key == "title" and titled)}
-    return {key: _as_toml_has_it(value) for key, value in kept.items() if not (key == "default" and value is None)}
+    return {key: _remove_nulls(value) for key, value in kept.items() if not (key == "default" and value is None)}
 
 
 # The page of the documentation that describes every key of the gearbox file

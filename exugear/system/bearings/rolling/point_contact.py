@@ -392,7 +392,7 @@ def roller_table(row: RollerRow) -> RollerTable:
     return RollerTable(
         strips=np.column_stack([cubics.T, tilts[:-1], 1.0 / width]),
         patches=_patches(nodes, width),
-        gaps=2.0 * row.drop(_along(row)[SLICES // 2 :]),
+        gaps=2.0 * row.drop(_slice_positions(row)[SLICES // 2 :]),
         most_tilt=float(tilts[-1]),
         most_depth=most_depth,
     )
@@ -415,7 +415,7 @@ def _is_crowned(row: RollerRow) -> bool:
     return row.profile_table is None and (row.profile_factor > 0.0 or row.crown_curvature > 0.0)
 
 
-def _along(row: RollerRow) -> Floats:
+def _slice_positions(row: RollerRow) -> Floats:
     """Middles of the slices along a roller, m."""
     along: Floats = ((np.arange(SLICES) + 0.5) / SLICES - 0.5) * row.effective_length
     return along
@@ -442,7 +442,7 @@ def _nodes(row: RollerRow, roots: Floats, tilt: float, onset: float, slope: floa
 
     U over the depth squared and its derivative by the tilt, of each the value and the slope per step of the root.
     """
-    along = _along(row)
+    along = _slice_positions(row)
     depth = roots**2
     approach = np.maximum((depth + onset)[:, None] - tilt * along - 2.0 * row.drop(along), 0.0)
     power = np.cbrt(np.cbrt(approach)) * row.contact_constant / SLICES

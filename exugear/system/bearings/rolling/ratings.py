@@ -389,10 +389,10 @@ def _dynamic_factors(
         load = _relative_axial_load(rows, bearing_type, axial, static_rating)
         if double:
             return (1.0, _tabulated(DOUBLE_ROW_SMALL_Y, angle, load)), (
-                _at_angle(DOUBLE_ROW_X, angle),
+                _interpolate_angle(DOUBLE_ROW_X, angle),
                 _tabulated(DOUBLE_ROW_Y, angle, load),
             )
-        return (1.0, 0.0), (_at_angle(SINGLE_ROW_X, angle), _tabulated(SINGLE_ROW_Y, angle, load))
+        return (1.0, 0.0), (_interpolate_angle(SINGLE_ROW_X, angle), _tabulated(SINGLE_ROW_Y, angle, load))
     if angle == 0.0:
         return (1.0, 0.0), (1.0, 0.0)
     if bearing_type in THRUST:  # ISO 281:2007, table 11, for more axial load than 1.5 tan(alpha) times the radial one
@@ -409,7 +409,7 @@ def _static_factors(rows: Sequence[RollingRow], bearing_type: BearingType) -> tu
     if bearing_type == "deep_groove_ball":
         return 0.6, 0.5
     if bearing_type in ("angular_contact_ball", "four_point_ball"):
-        y = _at_angle(STATIC_Y, angle)
+        y = _interpolate_angle(STATIC_Y, angle)
     elif angle == 0.0:
         return 1.0, 0.0
     elif bearing_type in THRUST:
@@ -439,9 +439,9 @@ def _relative_axial_load(
 
 
 def _tabulated(table: tuple[tuple[float, ...], ...], angle: float, load: float) -> float:
-    return _at_angle([float(np.interp(load, RELATIVE_AXIAL_LOADS, line)) for line in table], angle)
+    return _interpolate_angle([float(np.interp(load, RELATIVE_AXIAL_LOADS, line)) for line in table], angle)
 
 
-def _at_angle(values: Sequence[float], angle: float) -> float:
+def _interpolate_angle(values: Sequence[float], angle: float) -> float:
     """Value between the tabulated contact angles, linear as the standard says, constant beyond them."""
     return float(np.interp(math.degrees(angle), CONTACT_ANGLES, values))

@@ -15,9 +15,9 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import (
     BURSTING_RIM_SPEED,
     LoadSummary,
-    at_load_of,
     bearing_range_warning,
     doubts_about,
+    gearbox_at_load,
     other_load_warning,
     summarise_loads,
 )
@@ -203,8 +203,8 @@ def test_a_load_case_thirty_percent_off_the_load_of_the_tables_is_told(torque, s
 
 def test_a_load_case_becomes_the_static_load_with_what_holds_it():
     gearbox = spur(torques_N_m={"shaft_1": 40.0, "shaft_2": 60.0})
-    static = at_load_of(gearbox, gearbox.load_cases["run_up"]).case.static_load
+    static = gearbox_at_load(gearbox, gearbox.load_cases["run_up"]).case.static_load
     assert static.torques_N_m == {"shaft_1": 40.0}
     assert static.locked == ("shaft_2",)
     with pytest.raises(GearboxFileError, match=r"no torque at the start but on what holds the static load \(shaft_2\)"):
-        at_load_of(gearbox, spur(torques_N_m={"shaft_2": 60.0}).load_cases["run_up"])
+        gearbox_at_load(gearbox, spur(torques_N_m={"shaft_2": 60.0}).load_cases["run_up"])
