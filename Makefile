@@ -71,14 +71,14 @@ endef
 # The first and the last line of a target whose time is told.
 #   $(call begin,FOLDER)  $(call end,FOLDER)
 begin = @mkdir -p $(1); date +%s >$(1)/.begin
-end = @echo "$@ took $$(( $$(date +%s) - $$(cat $(1)/.begin) )) s in all, installation aside."; rm $(1)/.begin
+end = @echo "$@ took $$(( $$(date +%s) - $$(cat $(1)/.begin) )) s in total, without installation."; rm $(1)/.begin
 
 # Prints the first interpreter that fits: the one asked for, or else whichever of the usual names runs.
 FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 python3.12 python3.11 python); do \
 	"$$candidate" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null \
 	&& { echo "$$candidate"; exit 0; }; done; \
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
-	echo "Install one, or name it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
+	echo "Install one, or specify it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
 .PHONY: test-browser help demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
 
@@ -86,20 +86,20 @@ help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
 	@echo "make demo-short  the same with 10 positions of the mesh cycle and 4 s of the run-up"
 	@echo "make test        tests and documentation examples"
-	@echo "make test PACKAGE=steady  the tests of one package"
-	@echo "make test-browser  claims about the report page in a browser, desk and phone; needs chromium"
-	@echo "make validate    the long comparisons with references"
-	@echo "make validate-long  the longest ones, before a release; docs/validation/index.md records them"
-	@echo "make benchmarks  what all of it costs, into benchmarks/results.md and what README and docs quote"
+	@echo "make test PACKAGE=steady  tests of one package, such as steady"
+	@echo "make test-browser  tests of the report page in a browser, desktop and phone; requires chromium"
+	@echo "make validate    long comparisons with reference results"
+	@echo "make validate-long  the longest comparisons, before a release; recorded in docs/validation/index.md"
+	@echo "make benchmarks  run times, into benchmarks/results.md, README and docs"
 	@echo "make check       ruff, mypy and the wording of texts"
-	@echo "make check-web   the pages' scripts: linted, types checked; with a node of its own"
-	@echo "make vendor-web  renew the libraries in the pages from npm, at the versions that web/package.json pins"
-	@echo "make docs        the documentation site, with its examples run, into $(SITE)"
+	@echo "make check-web   lint and type check of the report scripts, with a separate node"
+	@echo "make vendor-web  update the libraries of the report from npm, versions of web/package.json"
+	@echo "make docs        build the documentation site and run its examples, into $(SITE)"
 	@echo "make dist        sdist and wheel into dist; PROJECT_URL=https://... makes links and pictures absolute"
-	@echo "make wheel-test  the wheel installed and used on the Python of $(VENV)"
-	@echo "make wheel-test-all  the same on Python 3.11, 3.12 and 3.13, as far as they are found"
-	@echo "make lock        renew requirements.lock from what installs today"
-	@echo "make clean       remove all that make made, results and $(VENV) too"
+	@echo "make wheel-test  install and use the wheel with the Python of $(VENV)"
+	@echo "make wheel-test-all  the same with Python 3.11, 3.12 and 3.13, if found"
+	@echo "make lock        update requirements.lock to current versions"
+	@echo "make clean       remove all generated files, results and $(VENV)"
 
 $(INSTALLED): pyproject.toml requirements.lock
 	@python=$$($(FIND_PYTHON)) || exit 1; \

@@ -428,7 +428,7 @@ class Project(ReprMixin):
         """Figures of the life in the folder, of the variant chosen or else of another; none, and why, if none fits."""
         from exugear.life.rating.sheet import of_life
 
-        missing = "no finite elements beside it: `exugear life` computes them"
+        missing = "no finite element results: compute them by `exugear life`"
         reasons: list[str] = []
         for variant in dict.fromkeys((self.choice.variant, *reversed(OFFERED))):
             other = self.chosen(variant=variant)
@@ -463,7 +463,11 @@ class Project(ReprMixin):
         loads = nominal_loads(self.gearbox, rating, rating.application_factor)
         found = nominal_load_values(self.gearbox, rating, loads, balance, stresses)
         missing = [name for name in self.gearbox.gear_pairs if name not in stresses]
-        lines = [f"no finite elements beside {', '.join(missing)}: `exugear ste` computes tables"] if missing else []
+        lines = (
+            [(f"no finite element results for {', '.join(missing)}: compute tables by `exugear ste`")]
+            if missing
+            else []
+        )
         return found, (*lines, *remarks_on(stresses))
 
     def stored_life(self, counted: CountedLoads) -> xr.Dataset | None:

@@ -1,4 +1,4 @@
-"""Command line: the table of its verbs, and what all of them share.
+"""Command line: the table of its commands, and what all of them share.
 
 Libraries that take long to load are imported inside the verbs, so that ``--help`` answers at once.
 """
@@ -55,8 +55,9 @@ RENAMED_VARIABLE = "EXUGEAR_FILES_BELOW"
 
 
 app = typer.Typer(
-    help="Transmission error of gear pairs by finite elements, and gearbox dynamics in Exudyn.",
+    help="Gearbox dynamics: transmission error, modes, resonances, run-ups, loads and service life.",
     no_args_is_help=True,
+    rich_markup_mode=None,
     add_completion=False,
     pretty_exceptions_show_locals=False,
 )

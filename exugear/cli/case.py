@@ -1,4 +1,4 @@
-"""What verbs share: arguments and options, and what they ask of a gearbox file before they work."""
+"""Arguments and options that commands share, and the checks of a gearbox file before they start."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
     from exugear.system.system import Assembly
 
-# What verbs ask of a gearbox file before they work
+# Checks of a gearbox file before a command starts
 
 
 def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
-    """Read a gearbox file for a verb, with what the user permits it, and try all its parts; tell what is unusual."""
+    """Read a gearbox file for a command with the user's permissions, check all its parts, and print warnings."""
     from exugear.gearbox.gearbox import Gearbox
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.reading import GearboxFileError, read_toml
@@ -46,7 +46,9 @@ def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = Fals
 def check_allow_dir(folder: Path | None) -> None:
     """Refuse a further folder for the files of a case that is not there."""
     if folder is not None and not folder.is_dir():
-        raise BadInputError(f"--allow-dir {folder}: no such folder; name one that the gearbox file may read from")
+        raise BadInputError(
+            f"--allow-dir {folder}: no such folder; specify a folder that the gearbox file may read from"
+        )
 
 
 def open_project(
@@ -107,7 +109,7 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     gearbox.bodies(choice.inertias)
     if choice.load_case is not None and choice.load_case not in gearbox.load_cases:
         known = ", ".join(gearbox.load_cases) or "none"
-        raise gearbox.fault(f"no load case {choice.load_case!r}; load cases are {known}")
+        raise gearbox.fault(f"no load case {choice.load_case!r}; choose one of: {known}")
     reason = lacking(gearbox, choice.variant)
     if reason:
         raise gearbox.fault(f"variant {choice.variant}: {reason}")
@@ -119,22 +121,23 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
             raise BadInputError(gearbox.fault(without))
     if not LAWS[choice.mesh_model].has_force and not choice.variant.spins_only:
         raise BadInputError(
-            f"--mesh-model {choice.mesh_model}: needs the variant rigid, whose gears only roll, not {choice.variant}"
+            f"--mesh-model {choice.mesh_model}: a kinematic constraint, which requires --variant rigid, not "
+            f"{choice.variant}"
         )
 
 
-# Arguments and options that several verbs share
+# Arguments and options that several commands share
 
-CaseArgument = Annotated[Path, typer.Argument(metavar="CASE.toml", help="The gearbox file.", show_default=False)]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as one JSON object.")]
+CaseArgument = Annotated[Path, typer.Argument(metavar="GEARBOX.toml", help="Gearbox file.", show_default=False)]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as a JSON object.")]
 OutOption = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", help="Results folder. (default: results/FOLDER-OF-THE-CASE)"),
+    typer.Option("--out", metavar="DIR", help="Results folder. (default: results/NAME)"),
 ]
 
 
 class MeshModel(StrEnum):
-    """How teeth in mesh push each other: the laws of `exugear.system.tooth_mesh.laws.registry`."""
+    """Mesh force models, see `exugear.system.tooth_mesh.laws.registry`."""
 
     _ignore_ = ["members", "law"]
     members = vars()
@@ -143,14 +146,14 @@ class MeshModel(StrEnum):
 
 
 class ShiftRule(StrEnum):
-    """Profile shifts of an industry file that contradict the centre distance: refused, or replaced."""
+    """Source of profile shifts in an industry file: the file, or the centre distance."""
 
     file = "file"
     centre_distance = "centre-distance"
 
 
 class DistanceRule(StrEnum):
-    """Centre distances of an industry file unlike the positions of its gears: which of them counts."""
+    """Source of centre distances in an industry file: what agrees, the positions of the gears, or the file."""
 
     agreeing = "agreeing"
     positions = "positions"
@@ -161,20 +164,30 @@ ShiftsOption = Annotated[
     ShiftRule,
     typer.Option(
         "--shifts",
-        help="Profile shifts that the centre distance contradicts: those of the file, which refuses them, or "
-        "those that the centre distance asks for.",
+        metavar="RULE",
+        help="Source of profile shifts: file (a contradiction to the centre distance is an error), or centre-distance "
+        "(adjusted to it).",
     ),
 ]
 DistancesOption = Annotated[
     DistanceRule,
     typer.Option(
         "--distances",
-        help="Centre distances unlike the positions of the gears: those that agree with the profile shifts, those of "
-        "the positions, or those that the file states.",
+        metavar="RULE",
+        help="Source of centre distances that contradict the gear positions: agreeing (whichever agrees with the "
+        "profile shifts), positions, or file.",
     ),
 ]
 
 USUAL_LAW = MeshModel("line_of_action")
+
+
+_DESCRIPTIONS = {
+    Variant.rigid: "ideal joints",
+    Variant.bushing: "elastic bearings",
+    Variant.flexible: "flexible bodies",
+}
+_VARIANTS = ", ".join(f"{name} ({_DESCRIPTIONS[Variant.of(name)]})" for name in OFFERED)
 
 
 def _variant(name: str) -> Variant:
@@ -186,20 +199,20 @@ def _variant(name: str) -> Variant:
 
 VariantOption = Annotated[
     Variant,
-    typer.Option("--variant", parser=_variant, metavar=f"<{'|'.join(OFFERED)}>", help="How the shafts are held."),
+    typer.Option("--variant", parser=_variant, metavar="NAME", help=f"Variant: {_VARIANTS}."),
 ]
-_LAWS_TOLD = "How teeth in mesh push each other. " + "; ".join(
-    f"{law.name}: {law.description.replace('; ', ', ')}" for law in LAWS.values()
-)
-LawOption = Annotated[MeshModel, typer.Option("--mesh-model", help=_LAWS_TOLD)]
+LawOption = Annotated[
+    MeshModel, typer.Option("--mesh-model", metavar="NAME", help=f"Mesh force model: {', '.join(LAWS)}.")
+]
 FilesBelowOption = Annotated[
     Path | None,
     typer.Option(
         "--allow-dir",
         metavar="DIR",
         envvar="EXUGEAR_ALLOW_DIR",
-        help="A further folder that files may lie in which the gearbox file names. (default: its own alone)",
+        help="Further folder from which the gearbox file may read files.",
         show_default=False,
+        show_envvar=False,
     ),
 ]
 ScriptsOption = Annotated[
@@ -207,9 +220,10 @@ ScriptsOption = Annotated[
     typer.Option(
         "--allow-scripts",
         envvar="EXUGEAR_ALLOW_SCRIPTS",
-        help="Let gmsh scripts run that the gearbox file names; they can do all that you can.",
+        help="Run gmsh scripts of the gearbox file (full user rights).",
+        show_envvar=False,
     ),
 ]
 InertiasOption = Annotated[
-    str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. (default: as the file says)")
+    str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. (default: gearbox file)")
 ]

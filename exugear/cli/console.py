@@ -17,9 +17,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -31,7 +30,6 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
@@ -153,20 +151,6 @@ def print_json(summary: Mapping[str, Any]) -> None:
     sys.stdout.write(json.dumps(summary, indent=2, allow_nan=False) + "\n")
 
 
-def print_table(title: str, rows: list[dict[str, str]], texts: tuple[str, ...] = ()) -> None:
-    """Print rows under the keys of the first one; the first column is text, others numbers but for `texts`."""
-    table = Table(
-        title=Text(plain(title)), title_justify="left", title_style="bold", box=SIMPLE_HEAD, padding=(0, 1, 0, 0)
-    )
-    for place, heading in enumerate(rows[0]):
-        words = heading in texts
-        justify: Literal["left", "right"] = "right" if place and not words else "left"
-        table.add_column(heading, justify=justify, no_wrap=not words, overflow="fold" if words else "ellipsis")
-    for row in rows:
-        table.add_row(*(Text(plain(value)) for value in row.values()))
-    results.print(table)
-
-
 # How the command line ends: errors that a user can act on, Ctrl-C, and the exit codes of both
 
 EXIT_FAILED = 1
@@ -265,7 +249,7 @@ def exit_codes() -> Iterator[None]:
     except StoppedError as error:
         end_with("Stopped", error, EXIT_INTERRUPTED)
     except KeyboardInterrupt:
-        end_with("Stopped", "finished results are kept; the same command goes on from there", EXIT_INTERRUPTED)
+        end_with("Stopped", "finished results are kept; run the same command to resume", EXIT_INTERRUPTED)
     except OSError as error:
         end_with("Failed", _file_error_text(error), EXIT_FAILED)
     except MemoryError as error:
@@ -351,7 +335,7 @@ class Bars:
         contacts = Row(self)
 
         def solved(done: int, total: int) -> None:
-            contacts(f"contact of teeth where gears stand: {done} of {total}", done, total)
+            contacts(f"tooth contact at the static load: {done} of {total}", done, total)
 
         with ExitStack() as own:
             if self._outermost is None:
@@ -377,7 +361,7 @@ def files_read(row: Row) -> Callable[[int, int], None]:
     def show(done: int, total: int) -> None:
         interruption.check()
         if total > 1:
-            row("files of loads", done, total)
+            row("load files", done, total)
 
     return show
 
@@ -391,7 +375,7 @@ def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
 
     for name, table in tables.items():
         for remark in remarks_about_table(name, table):
-            note(remark, style="yellow")
+            note(f"Warning: {remark}", style="yellow")
     return [doubt for name, table in tables.items() for doubt in doubts_about_table(name, table)]
 
 
@@ -399,8 +383,8 @@ def refuse_not_converged(meshes: Sequence[str]) -> None:
     """End with code 1 where meshes read their tables beside states that are not solved."""
     if meshes:
         raise FailedError(
-            f"not to be trusted: at the static load {', '.join(meshes)} come beside states of their tables that are "
-            "not solved, where others stand in; exugear ste says which states these are and why"
+            f"invalid: the static state of {', '.join(meshes)} lies next to non-converged table states, values are "
+            "interpolated; `exugear ste` lists the states and reasons"
         )
 
 
@@ -411,9 +395,9 @@ def check_results_folder(folder: Path) -> None:
     """Refuse a folder that a verb could not write into, before it works, and make none."""
     there = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
     if not there.is_dir():
-        raise BadInputError(f"--out {folder}: {there} is no folder; name one that can be made")
+        raise BadInputError(f"--out {folder}: {there} is not a folder; specify a folder that can be created")
     if not os.access(there, os.W_OK):
-        raise BadInputError(f"--out {folder}: {there} is not writable; name another folder")
+        raise BadInputError(f"--out {folder}: {there} is not writable; specify another folder")
 
 
 def make_results_folder(folder: Path) -> None:
@@ -421,6 +405,6 @@ def make_results_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInputError(f"--out {folder}: {error.strerror}; name a folder that can be made") from error
+        raise BadInputError(f"--out {folder}: {error.strerror}; specify a folder that can be created") from error
     if not os.access(folder, os.W_OK):
-        raise BadInputError(f"--out {folder}: not writable; name another folder")
+        raise BadInputError(f"--out {folder}: not writable; specify another folder")

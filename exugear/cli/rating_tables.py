@@ -1,11 +1,12 @@
-"""A rating sheet on the console: factors by line, both gears of a mesh beside each other, finite elements below."""
+"""A rating sheet on the console: one factor per line, both gears of a mesh in columns, finite elements below."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
 
-from exugear.cli.console import note, print_table, say
+from exugear.cli.console import note
+from exugear.cli.tables import print_table, print_text, wrapped
 from exugear.life.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet
 
 _BLOCKS: Mapping[str, tuple[str, ...]] = {
@@ -16,14 +17,16 @@ _BLOCKS: Mapping[str, tuple[str, ...]] = {
     "root": ("Y_F", "Y_S", "Y_beta", "Y_B", "Y_DT", "sigma_F0", "sigma_F"),
     "broken": ("sigma_Flim", "Y_NT", "Y_deltarelT", "Y_RrelT", "Y_X", "Y_rel", "Y_M", "sigma_FG", "S_F"),
 }
+GEAR_COLUMN = 14
+"""Columns in which the heading of a gear is wrapped."""
 _DIGITS = {"MPa": ".1f", "kN": ".4g", "kN m": ".5g", "m/s": ".3f", "um": ".1f", "N/(mm um)": ".3f", "N^0.5/mm": ".3f"}
 
 
 def tell_rating(sheet: RatingSheet) -> None:
-    """Print a sheet, what it rests on, and what it leaves out."""
-    say(f"Rating by {sheet.edition}, method B; {sheet.load}")
+    """Print a sheet, its assumptions, and what it neglects."""
+    print_text(f"Rating to {sheet.edition}, method B; {sheet.load}")
     for title, flanks in _meshes(sheet):
-        print_table(title, [*_rows(flanks)], ("factor",))
+        print_table(f"Mesh {title}", [*_rows(flanks)])
         for line in dict.fromkeys(line for flank in flanks for line in _told(flank)):
             note(line, style="yellow")
     for line in sheet.assumptions:
@@ -39,7 +42,7 @@ def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
         sense = 1 if flank.standard["torque"] > 0.0 else -1
         found.setdefault((flank.family, sense), []).append(flank)
     for (family, sense), flanks in found.items():
-        yield family if sense > 0 else f"{family}, reversed", flanks
+        yield family if sense > 0 else f"{family}, reversed load", flanks
 
 
 def _rows(flanks: list[FlankSheet]) -> Iterator[dict[str, str]]:
@@ -57,7 +60,7 @@ def _row(
     values = {f"{flank.gear} {flank.flank}": scale * figures(flank).get(name, math.nan) for flank in flanks}
     form = ".4g" if name == "N_L" else _DIGITS.get(unit, ".3f")
     return {"factor": f"{words}, {unit}" if unit else words} | {
-        label: _number(value, form) for label, value in values.items()
+        "\n".join(wrapped(label, GEAR_COLUMN)): _number(value, form) for label, value in values.items()
     }
 
 
@@ -65,7 +68,7 @@ def _number(value: float, form: str) -> str:
     if math.isnan(value):
         return "-"
     if math.isinf(value):
-        return "infinite"
+        return "inf."
     return format(value, form)
 
 

@@ -58,12 +58,12 @@ class WatchedProject(Project):
         requests = self.missing_tables()
         self.keep_case()
         for request in requests:
-            note(request.replaces or f"{request.name}: no table in {self.folder}; it is computed first")
+            note(request.replaces or f"{request.name}: no table in {self.folder}; computing it first")
         with time_noted(self.folder, "tables, computed before dynamics") if requests else nullcontext():
             self.computed(requests)
         # What a law cannot do with it refuses itself.
         for doubt in tell_of_tables(self.tables_at_work()):
-            note(doubt, style="yellow")
+            note(f"Warning: {doubt}", style="yellow")
 
     def computed(
         self, requests: Sequence[TableRequest], progress: Callable[[int, int], None] | None = None
@@ -84,7 +84,7 @@ class WatchedProject(Project):
         with self.bars.row() as row:
 
             def show(name: str) -> None:
-                row(f"{name}: finite elements, reduced to its seats", names.index(name), len(names))
+                row(f"{name}: finite elements, reduction to interfaces", names.index(name), len(names))
 
             try:
                 return super().bodies(show)
@@ -116,7 +116,7 @@ class WatchedProject(Project):
         self, settings: SteadySettings | None = None, progress: Callable[[int, int], None] | None = None
     ) -> xr.Dataset:
         """Steady response over speed."""
-        words = f"{self.choice.variant}: steady response"
+        words = f"{self.choice.variant}: steady state"
         with self.bars.row() as row:
             row(words)
             return super().steady(settings, lambda done, total: row(words, done, total))
@@ -130,7 +130,7 @@ class WatchedProject(Project):
                 text = f"{variant}: {at.simulated:.2f} of {at.total:g} s, {at.speed:.2f} simulated s per s"
                 row(text, at.simulated, at.total)
 
-            row(f"{variant}: start in balance")
+            row(f"{variant}: initial static balance")
             return super().run(progress=show, **options)
 
     def compare_with_exudyn(self, duration: float, **options: Any) -> SolverComparison:
@@ -155,7 +155,7 @@ class WatchedProject(Project):
     ) -> xr.Dataset:
         """Life of gears and bearings."""
         with self.bars.row() as row:
-            row("stresses of pairs")
+            row("tooth stresses")
             return super().life(*_of_life(row), counted)
 
     def rating(

@@ -186,14 +186,14 @@ class Channels(ReprMixin):
         if bad.size:
             row, column = bad[0].tolist()
             raise LoadFileError(
-                f"{self.path}: channel {self.names[places[column]]} holds no number at {time[row]:g} s "
-                f"(step {before + row + 1}); every step needs one"
+                f"{self.path}: channel {self.names[places[column]]} has no number at {time[row]:g} s (step "
+                f"{before + row + 1}); correct the file"
             )
 
     def _second(self) -> float:
         unit = unit_of(self.time_unit) if self.time_unit.strip("() []") else Unit("time", 1.0)
         if unit is None or unit.quantity != "time":
-            raise LoadFileError(f"{self.path}: time has the unit {self.time_unit!r}; s, ms, min or h would be one")
+            raise LoadFileError(f"{self.path}: time has the unit {self.time_unit!r}; expected s, ms, min or h")
         return unit.factor
 
     def _unit(self, place: int, quantity: str) -> Unit:
@@ -201,8 +201,8 @@ class Channels(ReprMixin):
         if unit is None or unit.quantity != quantity:
             written = self.units[place] or "none"
             raise LoadFileError(
-                f"{self.path}: channel {self.names[place]} has the unit {written!r}, which is no unit of {quantity} "
-                f"known here; one such as {USUAL_NAMES[quantity]} ({SI_NAMES[quantity]} in SI) would be"
+                f"{self.path}: channel {self.names[place]} has the unit {written!r}, which is not a known unit of "
+                f"{quantity}; expected one such as {USUAL_NAMES[quantity]} ({SI_NAMES[quantity]} in SI)"
             )
         return unit
 
@@ -236,9 +236,7 @@ class _Steps:
         steps = np.diff(before)
         bad = np.flatnonzero(~(steps > 0.0))
         if bad.size:
-            raise LoadFileError(
-                f"{self.path}: time does not grow behind step {first + int(bad[0])}; each must be later"
-            )
+            raise LoadFileError(f"{self.path}: time does not increase after step {first + int(bad[0])}")
         if not self.usual and len(steps) >= LONG_SERIES:
             self.usual = float(np.median(steps))
         if self.usual:
@@ -246,12 +244,12 @@ class _Steps:
             if gap.size:
                 place = int(gap[0])
                 raise LoadFileError(
-                    f"{self.path}: nothing between {before[place]:g} and {before[place + 1]:g} s (behind step "
-                    f"{first + place}), where steps are {self.usual:g} s: a dropout; fill it, or make two files of it"
+                    f"{self.path}: no samples between {before[place]:g} and {before[place + 1]:g} s (after step "
+                    f"{first + place}), where steps are {self.usual:g} s: a dropout; fill it, or split the file"
                 )
         self.count += len(time)
         self.last = float(time[-1]) if len(time) else self.last
 
     def check_length(self) -> None:
         if self.count < LEAST_LINES:
-            raise LoadFileError(f"{self.path}: {self.count} steps of time; at least {LEAST_LINES} make a series")
+            raise LoadFileError(f"{self.path}: {self.count} time steps; at least {LEAST_LINES} are required")

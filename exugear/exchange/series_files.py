@@ -178,7 +178,7 @@ class _Table:
                     row[place] = fortran_number(words[place])
                 except ValueError:
                     raise LoadFileError(
-                        f"{self.path}: line {number} holds words where {self.headings[place]!r} has a number: "
+                        f"{self.path}: line {number} has text where {self.headings[place]!r} has a number: "
                         f"{words[place][:40]!r}; expected {len(words)} numbers"
                     ) from None
             rows.append(row)
@@ -209,12 +209,13 @@ def open_openfast_text(path: Path) -> Channels:
     heads = (place for place, line in enumerate(lines[:_MOST_HEADER_LINES]) if line.lower().split()[:1] == ["time"])
     number = next(heads, None)
     if number is None:
-        raise LoadFileError(f"{path}: no line begins with Time; expected OpenFAST's text output")
+        raise LoadFileError(f"{path}: no line begins with Time; expected OpenFAST text output")
     names = lines[number].split()
     units = lines[number + 1].split() if number + 1 < len(lines) else []
     if len(units) != len(names):
         raise LoadFileError(
-            f"{path}: {len(names)} names and {len(units)} units in lines {number + 1} and {number + 2}; a unit for each"
+            f"{path}: {len(names)} names and {len(units)} units in lines {number + 1} and {number + 2}; one unit per "
+            "name is required"
         )
     return Channels(path, tuple(names[1:]), tuple(units[1:]), units[0], _reader(path, names, number + 2, None))
 
@@ -249,18 +250,18 @@ def headings_of(path: Path) -> tuple[str, ...]:
     """
     lines = [line for line in first_lines(path, 100) if line.strip()]
     if len(lines) < 2:
-        found = "has headings alone" if lines else "is empty"
+        found = "has headings only" if lines else "is empty"
         raise LoadFileError(f"{path}: {found}; expected a line of headings and lines of numbers")
     try:
         (cells,) = csv.reader(lines[:1])
     except csv.Error as error:
-        raise LoadFileError(f"{path}: cannot be read as a table with commas ({error})") from None
+        raise LoadFileError(f"{path}: cannot be read as CSV ({error})") from None
     headings = tuple(cell.strip() for cell in cells)
     if len(headings) == 1:
         raise LoadFileError(f"{path}: its headings are {headings[0][:60]!r}; columns are separated by commas")
     twice = next((heading for heading in headings if headings.count(heading) > 1), None)
     if twice is not None:
-        raise LoadFileError(f"{path}: two columns are called {twice!r}; each needs a name of its own")
+        raise LoadFileError(f"{path}: two columns have the name {twice!r}; rename one")
     return headings
 
 
@@ -463,7 +464,7 @@ def read_channels(path: str | Path) -> Channels:
     path = Path(path)
     ending = path.suffix.lower()
     if ending not in SERIES_ENDINGS:
-        raise LoadFileError(f"{path}: ends in {ending or 'nothing'}; files of loads end in {', '.join(SERIES_ENDINGS)}")
+        raise LoadFileError(f"{path}: ends in {ending or 'nothing'}; load files end in {', '.join(SERIES_ENDINGS)}")
     return _OPENED[ending](path)
 
 

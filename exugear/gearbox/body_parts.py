@@ -189,7 +189,7 @@ def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
         raise origin.fault(f"bodies.{family}.carrier = {carrier!r}: that body is not enabled")
     if origin.case.bodies[carrier].axis_position_mm is None:
         raise origin.fault(
-            f"bodies.{family}.carrier = {carrier!r}: a carrier is no planet and has a place; give "
+            f"bodies.{family}.carrier = {carrier!r}: a carrier has its own axis position and is not a planet; set "
             f"bodies.{carrier}.axis_position_mm"
         )
     x, y = _axis(origin, carrier, 0.0)
@@ -220,7 +220,7 @@ def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[f
         body = bodies.get(section.body)
         if body is None or body.planet_of is None:
             planets = ", ".join(planet.name for planet in bodies.values() if planet.planet_of) or "none"
-            raise origin.fault(f"pins.{name}.body = {section.body!r}: no planet; planets are {planets}")
+            raise origin.fault(f"pins.{name}.body = {section.body!r}: not a planet; planets are {planets}")
         error = UM * complex(section.radial_um, section.tangential_um)
         error *= complex(math.cos(body.orbit_angle), math.sin(body.orbit_angle))
         return section.body, (error.real, error.imag)
@@ -242,11 +242,11 @@ def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
         driven = (section.driven_body,) if section.driven_body else ()
         for body in (*section.torques_N_m, *section.start_speeds_rpm, *driven):
             if body not in spinning:
-                raise origin.fault(f"{key}: no turning body {body!r}; bodies are {', '.join(spinning)}")
+                raise origin.fault(f"{key}: no rotating body {body!r}; bodies are {', '.join(spinning)}")
         if origin.case.overall.input in section.start_speeds_rpm:
             raise origin.fault(
                 f"{key}.start_speeds_rpm: {origin.case.overall.input} is the overall input, whose speed is "
-                "start_speed_rpm; leave it out here"
+                "start_speed_rpm; remove it here"
             )
         series = None
         if section.torque_series is not None:
@@ -284,7 +284,9 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
     def of_section(name: str, section: JointSection) -> tuple[Joint, ...]:
         key = f"joints.{name}"
         if section.body == GROUND:
-            raise origin.fault(f"{key}.body = {GROUND!r}: name the body that turns; the ground is what it turns on")
+            raise origin.fault(
+                f"{key}.body = {GROUND!r}: set the rotating body here, and the ground in the key of the other body"
+            )
         if not origin.are_enabled(key, section.body, section.on):
             return ()
         return tuple(
@@ -318,7 +320,9 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
     def of_section(name: str, section: BearingSection) -> tuple[Bearing, ...]:
         key = f"bearings.{name}"
         if section.body == GROUND:
-            raise origin.fault(f"{key}.body = {GROUND!r}: name the body that is held; the ground is what it sits on")
+            raise origin.fault(
+                f"{key}.body = {GROUND!r}: set the supported body here, and the ground in the key of the other body"
+            )
         if not origin.are_enabled(key, section.body, section.on) or not section.is_known:
             return ()
         return tuple(
@@ -403,7 +407,7 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
         if _stands_aside(origin, key, section):
             return ()
         if section.body == GROUND or not origin.are_enabled(key, section.body):
-            raise origin.fault(f"{key}.body = {section.body!r}: name an enabled body that the mount holds")
+            raise origin.fault(f"{key}.body = {section.body!r}: set an enabled body that the mount supports")
         body = origin.case.bodies[section.body]
         if body.carrier is not None or body.spin_only:
             raise origin.fault(f"{key}.body = {section.body!r}: a planet or a spin-only body cannot be mounted")
@@ -436,14 +440,14 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
     def of_section(name: str, section: ForceSection) -> tuple[PointForce, ...]:
         key = f"forces.{name}"
         if section.body == GROUND:
-            raise origin.fault(f"{key}.body = {GROUND!r}: the ground takes any force; name a body that moves")
+            raise origin.fault(f"{key}.body = {GROUND!r}: a force on the ground has no effect; set a moving body")
         if not origin.are_enabled(key, section.body):
             return ()
         body = origin.case.bodies[section.body]
         if body.carrier is not None or body.spin_only:
             raise origin.fault(
-                f"{key}.body = {section.body!r}: a planet or a spin-only body cannot have a constant force; name one "
-                "on an axis that stands still"
+                f"{key}.body = {section.body!r}: a planet or a spin-only body cannot have a constant force; set a "
+                "body on a fixed axis"
             )
         position = _position(bodies[section.body], section.z_mm)
         return (PointForce(name, section.body, position, (*section.force_N, *section.moment_N_m)),)
@@ -469,7 +473,9 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
         for body in section.bodies:
             if body not in spinning:
                 known = ", ".join(spinning)
-                raise origin.fault(f"{key}.bodies: {body!r} does not turn by itself; a coupling joins two of {known}")
+                raise origin.fault(
+                    f"{key}.bodies: {body!r} has no rotation of its own; a coupling connects two of {known}"
+                )
         if section.seat is not None and section.seat not in bearing_names:
             known = ", ".join(bearing_names)
             raise origin.fault(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")

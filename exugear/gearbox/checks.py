@@ -79,13 +79,16 @@ def faults_of(checks: Iterable[Check]) -> list[str]:
 def faults_of_bodies(case: GearboxFile) -> Iterator[str]:
     """Tell names that are taken, carriers that cannot be, wheels that are no gears."""
     if GROUND in case.bodies:
-        yield f"bodies.{GROUND}: {GROUND} is the name of what stands still; choose another"
+        yield f"bodies.{GROUND}: {GROUND} is the name of the fixed frame; choose another name"
     families: dict[str, str] = {}
     for family, section in case.bodies.items():
         count = len(section.planet_angles_deg)
         for name in [f"{family}_{number}" for number in range(1, count + 1)] or [family]:
             if name in families:
-                yield f"bodies.{family}: planets are numbered, and bodies.{families[name]} is {name}, too; rename one"
+                yield (
+                    f"bodies.{family}: planets are numbered, and bodies.{families[name]} has the same name {name}; "
+                    "rename one"
+                )
             families[name] = family
         for gear in section.gears_z_mm:
             if gear not in case.gears:
@@ -118,13 +121,13 @@ def _faults_of_carrier(case: GearboxFile, key: str, name: str) -> Iterator[str]:
     elif carrier.carrier is not None:
         yield f"{key}: a carrier cannot be a planet"
     elif carrier.spin_only:
-        yield f"{key}: a spin-only body has no place, and so carries no planets"
+        yield f"{key}: a spin-only body has no position and cannot carry planets"
 
 
 def faults_of_inertia_sets(default: str, inertia_sets: Sequence[str]) -> Iterator[str]:
     """Tell that no body moves, or that the default set is none of those that bodies have."""
     if not inertia_sets:
-        yield "bodies: none turns; a gearbox has at least one body without fixed = true"
+        yield "bodies: all bodies are fixed; a gearbox needs at least one body without fixed = true"
     elif default not in inertia_sets:
         yield f"default_inertias = {default!r}: no such set; sets are {', '.join(inertia_sets)}"
 
@@ -148,10 +151,12 @@ def faults_of_overall(overall: OverallSection, spinning: Sequence[str], gears: C
     """Tell an overall input or output that does not turn, or that both are one where there are gears."""
     for key in ("input", "output"):
         if getattr(overall, key) not in spinning:
-            yield (f"overall.{key} = {getattr(overall, key)!r}: no such turning body; bodies are {', '.join(spinning)}")
+            yield (
+                f"overall.{key} = {getattr(overall, key)!r}: no such rotating body; bodies are {', '.join(spinning)}"
+            )
             return
     if overall.input == overall.output and gears:
-        yield f"overall.output = {overall.output!r}: is the input, too; name the body at the other end"
+        yield f"overall.output = {overall.output!r}: is also the input; set the body at the other end"
 
 
 def faults_of_output_gear(
@@ -164,7 +169,10 @@ def faults_of_output_gear(
     """
     if overall.output_gear is None:
         if gears:
-            yield "overall.output_gear: this key is missing; name a gear on whose base circle the angle is a length"
+            yield (
+                "overall.output_gear: this key is missing; set the gear whose base radius converts the output angle "
+                "to a length"
+            )
         return
     if overall.output_gear not in gears:
         yield f"overall.output_gear = {overall.output_gear!r}: no such gear; gears are {', '.join(gears)}"
@@ -173,8 +181,8 @@ def faults_of_output_gear(
     known = [gear for body in bodies if body.name in turning for gear in body.wheels]
     if known and overall.output_gear not in known:
         yield (
-            f"overall.output_gear = {overall.output_gear!r}: does not turn with {overall.output}; "
-            f"gears that do are {', '.join(known)}"
+            f"overall.output_gear = {overall.output_gear!r}: does not rotate with {overall.output}; gears that do are "
+            f"{', '.join(known)}"
         )
 
 
@@ -191,9 +199,9 @@ def faults_of_repetition(
 ) -> Iterator[str]:
     """Tell errors of a wheel or a pin that are given twice: a second section would replace the first."""
     if len(deviations) < len(case.deviations):
-        yield "deviations: two of them are of one wheel; give its errors together"
+        yield "deviations: two tables for the same gear; combine them in one"
     elif len(pin_offsets) < len(case.pins):
-        yield "pins: two of them are of one planet; give its errors together"
+        yield "pins: two tables for the same planet; combine them in one"
 
 
 def faults_of_mass_properties(case: GearboxFile) -> Iterator[str]:
@@ -205,8 +213,8 @@ def faults_of_mass_properties(case: GearboxFile) -> Iterator[str]:
             for key in ("mass_kg", "transverse_kg_m2", "centre_of_mass_z_mm"):
                 if getattr(values, key) is None:
                     yield (
-                        f"bodies.{family}.inertia.{inertias}.{key}: this key is "
-                        "missing; only a spin_only body needs nothing but axial_kg_m2"
+                        f"bodies.{family}.inertia.{inertias}.{key}: this key is missing; only a spin_only body needs "
+                        "axial_kg_m2 alone"
                     )
 
 
@@ -216,17 +224,17 @@ def faults_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body
         difference = mesh.centre_distance - mesh.pair.centre_distance
         if abs(difference) > CENTRE_DISTANCE_TOLERANCE:
             yield (
-                f"pairs.{mesh.pair.name}.centre_distance_mm = {mesh.pair.centre_distance * 1e3:g}: "
-                f"the bodies {mesh.pinion} and {mesh.gear} stand {mesh.centre_distance * 1e3:.4f} mm apart; "
-                f"they may differ by {CENTRE_DISTANCE_TOLERANCE * 1e3:g} mm"
+                f"pairs.{mesh.pair.name}.centre_distance_mm = {mesh.pair.centre_distance * 1e3:g}: the axes of bodies "
+                f"{mesh.pinion} and {mesh.gear} are {mesh.centre_distance * 1e3:.4f} mm apart; the difference must be "
+                f"below {CENTRE_DISTANCE_TOLERANCE * 1e3:g} mm"
             )
         for body in (mesh.pinion, mesh.gear):
             if mesh.frame != GROUND and bodies[body].carrier is None:
                 apart = math.dist(bodies[body].axis, bodies[mesh.frame].axis)
                 if apart > AXIS_TOLERANCE:
                     yield (
-                        f"meshes.{mesh.family}: {body} stands {apart * 1e3:.4f} mm off the axis of {mesh.frame}, whose "
-                        "spin carries the line of centres; only planets of it may"
+                        f"meshes.{mesh.family}: {body} is {apart * 1e3:.4f} mm off the axis of {mesh.frame}, with "
+                        "which the line of centres rotates; only its planets may be off the axis"
                     )
 
 
@@ -319,14 +327,14 @@ def faults_of_connection(
     lost = [name for name in bodies_apart(case, bodies, meshes, couplings) if name not in held]
     if lost:
         aside = [
-            f"; couplings.{name} stands aside while bodies.{section.instead_of} is enabled"
+            f"; couplings.{name} is disabled while bodies.{section.instead_of} is enabled"
             for name, section in case.couplings.items()
             if section.instead_of is not None and set(section.bodies) & set(lost)
         ]
         yield (
-            f"bodies {', '.join(lost)} are joined to {case.overall.input} by no "
-            f"mesh, coupling or carrier{''.join(aside)}; the gear train must be one connected whole. What only "
-            "bearings and mounts hold, as a bearing pedestal, needs torsion_N_m_per_rad in one of those on what stands"
+            f"bodies {', '.join(lost)} are not connected to {case.overall.input} by a mesh, coupling or carrier"
+            f"{''.join(aside)}; the gear train must be connected. A body held only by bearings and mounts, such as a "
+            "bearing pedestal, needs torsion_N_m_per_rad in one of them on a fixed body"
         )
 
 
@@ -358,7 +366,7 @@ def faults_of_torsion(
         if coupling.second in from_first:
             yield (
                 f"couplings {', '.join([*from_first[coupling.second], coupling.name])} form a loop: {coupling.first} "
-                f"and {coupling.second} are joined twice; leave one of them out"
+                f"and {coupling.second} are connected twice; remove one of them"
             )
             return
         for start, to_start in list(from_first.items()):
@@ -370,7 +378,7 @@ def faults_of_torsion(
         if torsion and bearing.on in spinning:
             yield (
                 f"bearings.{bearing.family}.stiffness: torsion {torsion:g} N m/rad between {bearing.on} and "
-                f"{bearing.body}, which both turn; give it in a [couplings] table, which knows that they turn together"
+                f"{bearing.body}, which both rotate; set it in a [couplings] table, which makes them rotate together"
             )
             return
 
@@ -386,7 +394,7 @@ def faults_of_supports(case: GearboxFile) -> Iterator[str]:
             if stiffness is not None:
                 yield from _faults_of_matrix(f"{key}.stiffness", stiffness)
                 if not catalogue and not np.any(connector_matrix(stiffness)):
-                    yield f"{key}.stiffness: is zero in all directions; give at least one above zero"
+                    yield f"{key}.stiffness: is zero in all directions; set at least one above zero"
             if damping is not None:
                 yield from _faults_of_matrix(f"{key}.damping", damping)
     yield from _bearings_at_one_place(case.bearings)
@@ -403,8 +411,9 @@ def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[s
             half = 0.5 * sum(bearing.catalogue.width_mm for bearing in (one, other) if bearing.catalogue)
             if (one.body, one.on) == (other.body, other.on) and distance < 0.5 * half:
                 yield (
-                    f"bearings.{second}.z_mm = {other.z_mm:g}: is where bearings.{first} is, {distance:g} mm away, and "
-                    f"both are bearings of {one.body} on {one.on}; give two places, or one bearing with an arrangement"
+                    f"bearings.{second}.z_mm = {other.z_mm:g}: is at the position of bearings.{first} ({distance:g} "
+                    f"mm apart), and both support {one.body} on {one.on}; set different positions, or one bearing "
+                    "with an arrangement"
                 )
 
 
@@ -423,7 +432,7 @@ def _faults_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSect
             f"{matrix[column, row]:g} in row {column + 1}, column {row + 1}"
         )
     elif np.linalg.eigvalsh(0.5 * (scaled + scaled.T))[0] < -MATRIX_TOLERANCE:
-        yield f"{key}.matrix: is indefinite, some displacement would release energy; no eigenvalue may be below zero"
+        yield f"{key}.matrix: is not positive semi-definite (negative eigenvalue); correct the matrix"
 
 
 def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | PointForce]]) -> Iterator[str]:
@@ -435,7 +444,7 @@ def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | Poi
     for table, members in parts.items():
         for part in members:
             if part.name in tables:
-                yield f"{table}.{part.name}: one of [{tables[part.name]}] has this name, too; rename one"
+                yield f"{table}.{part.name}: also a name in [{tables[part.name]}]; rename one"
                 return
             tables[part.name] = table
 
@@ -446,15 +455,15 @@ def faults_of_joints(joints: Iterable[Joint], bodies: Mapping[str, Body]) -> Ite
     for joint in joints:
         body = bodies[joint.body]
         if body.fixed or body.spin_only:
-            yield f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body takes no joint"
+            yield f"joints.{joint.name}.body = {joint.body!r}: a fixed or spin-only body cannot have a joint"
             return
         if joint.body in joined:
             yield (
-                f"joints.{joint.name}.body = {joint.body!r}: the body already turns "
-                f"on {joined[joint.body]}; a second ideal joint on the same axis is redundant"
+                f"joints.{joint.name}.body = {joint.body!r}: the body already has a joint on {joined[joint.body]}; a "
+                "second ideal joint on the same axis is redundant"
             )
             return
         if body.carrier is not None and joint.on != body.carrier:
-            yield f"joints.{joint.name}.on = {joint.on!r}: a planet turns on its carrier {body.carrier!r}"
+            yield f"joints.{joint.name}.on = {joint.on!r}: the joint of a planet is on its carrier {body.carrier!r}"
             return
         joined[joint.body] = joint.name

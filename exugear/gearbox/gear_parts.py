@@ -107,8 +107,9 @@ def smaller_roundings(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str
         taken = gears[name].rack.tip_radius
         if taken != usual:
             yield (
-                f"gears.{name}.rack.tip_radius: the default of {usual:g} does not fit on the tool at "
-                f"{section.normal_pressure_angle_deg:g} deg and its dedendum; {taken:g} is taken, the largest that does"
+                f"gears.{name}.rack.tip_radius: the default of {usual:g} does not fit the rack at "
+                f"{section.normal_pressure_angle_deg:g} deg and its dedendum; {taken:g}, the largest possible value, "
+                "is used"
             )
 
 
@@ -134,7 +135,7 @@ def _with_shift(origin: Origin, gears: Mapping[str, GearInputs], name: str, sect
     for pair_name, pair in _pairs_of(origin, gears, name):
         mate = pair.gear if pair.pinion.name == name else pair.pinion
         if origin.case.gears[mate.name].profile_shift_from_centre_distance:
-            raise origin.fault(f"{key}: {mate.name} of pairs.{pair_name} has no profile_shift either; give one of them")
+            raise origin.fault(f"{key}: {mate.name} of pairs.{pair_name} has no profile_shift either; set one of them")
         shift = shift_beside(mate, gears[name], pair.centre_distance)
         if shift is None:
             raise origin.fault(
@@ -142,7 +143,7 @@ def _with_shift(origin: Origin, gears: Mapping[str, GearInputs], name: str, sect
                 "touches both base circles; correct it"
             )
         return replace(gears[name], profile_shift=shift)
-    raise origin.fault(f"{key}: the gear is in no pair, whose centre distance would give it; give profile_shift")
+    raise origin.fault(f"{key}: the gear is in no pair whose centre distance defines it; set profile_shift")
 
 
 LEAST_PLAY = 1e-12
@@ -195,9 +196,9 @@ def rounded_overlaps(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str]
         thinned = gears[name].tooth_thinning - sum(thinning_range(section)) / 2.0
         if thinned > LEAST_PLAY / 2.0:
             yield (
-                f"gears.{name}: profile shifts and centre distance let the flanks overlap by {1e6 * thinned:.3g} um, "
-                "which lies within the rounding of the digits given; taken with a backlash of zero, the teeth thinner "
-                "by that"
+                f"gears.{name}: profile shifts and centre distance result in a negative backlash of "
+                f"{1e6 * thinned:.3g} µm, within the rounding of the input; zero backlash is used, with teeth thinner "
+                "by that amount"
             )
 
 
@@ -212,7 +213,7 @@ def _with_fitted_tip(origin: Origin, gears: Mapping[str, GearInputs], name: str,
     except ValueError:
         return gear  # what makes the pair impossible is told when it is built
     if not tips:
-        raise origin.fault(f"gears.{name}.fitted_tip: the gear is in no pair that its tip could be fitted to")
+        raise origin.fault(f"gears.{name}.fitted_tip: the gear is in no pair; remove the key")
     return replace(gear, tip_diameter=max(tips) if gear.internal else min(tips))
 
 
@@ -276,9 +277,9 @@ def margins_of_roots(pairs: Iterable[GearPair]) -> Iterator[str]:
             if margin < LEAST_ROOT_MARGIN * tip.normal_module:
                 clear = 1e3 * clear_tip_diameter(pair, tip, ROOT_MARGIN * tip.normal_module)
                 yield (
-                    f"gears.{tip.name}: its tip touches {mate.name} {1e3 * margin:.3f} mm of roll length above the "
-                    "fillet, which contact under load may reach, and then finds no solution there: "
-                    f"tip_diameter_mm = {clear:.3f} keeps clear, or fitted_tip = true"
+                    f"gears.{tip.name}: its tip meets {mate.name} {1e3 * margin:.3f} mm of roll length above the "
+                    "fillet, which contact under load may reach, where it has no solution; set tip_diameter_mm = "
+                    f"{clear:.3f}, or fitted_tip = true"
                 )
 
 
@@ -432,8 +433,8 @@ def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
         values = _stiffness_over_cycle(section.stiffness)
         if values.min() <= 0.0:
             raise origin.fault(
-                f"pairs.{name}.stiffness: falls to {values.min():g} N/m in the mesh cycle; lessen its waves, "
-                "it must stay above zero"
+                f"pairs.{name}.stiffness: falls to {values.min():g} N/m in the mesh cycle; reduce its harmonics, it "
+                "must stay above zero"
             )
         return tuple(values.tolist())
 
@@ -468,7 +469,9 @@ def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, B
         key = f"meshes.{name}"
         for end in ("pinion_body", "gear_body"):
             if getattr(section, end) == GROUND:
-                raise origin.fault(f"{key}.{end} = {GROUND!r}: name a body; one with fixed = true does not turn")
+                raise origin.fault(
+                    f"{key}.{end} = {GROUND!r}: set a rotating body; a body with fixed = true does not rotate"
+                )
         if not origin.are_enabled(key, section.pinion_body, section.gear_body):
             return ()
         if section.pair not in pairs:
@@ -490,7 +493,7 @@ def _meshes_of_section(
     instances = origin.instances(key, *ends)
     phases = section.phase if isinstance(section.phase, tuple) else (section.phase,) * len(instances)
     if len(phases) != len(instances):
-        raise origin.fault(f"{key}.phase = {list(phases)}: {len(instances)} meshes need {len(instances)} phases")
+        raise origin.fault(f"{key}.phase = {list(phases)}: {len(instances)} meshes require {len(instances)} phases")
     for (suffix, pinion_name, gear_name), phase in zip(instances, phases, strict=True):
         pinion_body = bodies[pinion_name]
         gear_body = bodies[gear_name]
@@ -521,8 +524,8 @@ def _check_angle(origin: Origin, key: str, stated_deg: float | None, angle: floa
     """Refuse a stated angle of the line of centres that is not the one of the bodies' positions, rad."""
     if stated_deg is not None and abs(math.remainder(angle - math.radians(stated_deg), 2 * math.pi)) > ANGLE_TOLERANCE:
         raise origin.fault(
-            f"{key}.position_angle_deg = {stated_deg}: the bodies' positions give "
-            f"{math.degrees(angle):.4f} deg; leave the key out or correct the positions"
+            f"{key}.position_angle_deg = {stated_deg}: the positions of the bodies result in {math.degrees(angle):.4f}"
+            " deg; remove the key or correct the positions"
         )
 
 
@@ -533,8 +536,8 @@ def _middle_of_faces(origin: Origin, key: str, pair: GearPair, pinion_body: Body
     for body, gear in ((pinion_body, pair.pinion), (gear_body, pair.gear)):
         if gear.name not in body.wheels:
             raise origin.fault(
-                f"{key}: body {body.family!r} carries no gear {gear.name!r}; give its z in "
-                f"bodies.{body.family}.gears_z_mm"
+                f"{key}: body {body.family!r} carries no gear {gear.name!r}; set its position in bodies.{body.family}"
+                ".gears_z_mm"
             )
         low = max(low, body.wheels[gear.name] - gear.face_width / 2)
         high = min(high, body.wheels[gear.name] + gear.face_width / 2)
@@ -561,7 +564,7 @@ def deviations(
         wheels = bodies[section.body].wheels
         gear = section.gear or next(iter(wheels), "")
         if gear not in wheels or (section.gear is None and len(wheels) > 1):
-            raise origin.fault(f"{key}.gear = {section.gear!r}: name one of {', '.join(wheels) or 'no gears'}")
+            raise origin.fault(f"{key}.gear = {section.gear!r}: choose one of {', '.join(wheels) or 'no gears'}")
         return (section.body, gear), _deviation(origin, key, gears[gear], section)
 
     return dict(part_of_each(of_section, origin.case.deviations).values())

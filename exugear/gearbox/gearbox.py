@@ -137,7 +137,7 @@ class Gearbox(ReprMixin):
                 raise
             near = difflib.get_close_matches(made[0], list(_paths(self.content)), 1, 0.0)
             raise self.fault(
-                f"{made[0]}: no entry of this name is in the file, and a new one lacks keys; did you mean {near[0]}?"
+                f"{made[0]}: the file has no entry of this name, and a new one lacks keys; did you mean {near[0]}?"
             ) from error
 
     def fault(self, text: str) -> GearboxFileError:
@@ -176,7 +176,7 @@ class Gearbox(ReprMixin):
         found = [section.viscosity_40_mm2_per_s for section in sections if section is not None]
         given = [value for value in found if value is not None]
         if len(given) != 1:
-            what = "is given twice; leave that of [rating] out" if given else "this key is missing"
+            what = "is set twice; remove the key of [rating]" if given else "this key is missing"
             raise self.fault(f"lubricant.viscosity_40_mm2_per_s: {what}")
         return given[0]
 
@@ -199,14 +199,14 @@ class Gearbox(ReprMixin):
             ends = (self.case.overall.input, self.case.overall.output)
             if torsion and bearing.body in ends and bearing.on not in self.spinning:
                 key = f"bearings.{bearing.family}.stiffness"
-                lines.append(f"{key}: torsion {torsion:g} N m/rad holds {bearing.body} back, which turns")
+                lines.append(f"{key}: torsion {torsion:g} N m/rad constrains {bearing.body}, which rotates; remove it")
         lines += gear_parts.margins_of_roots(self.gear_pairs.values())
         lines += gear_parts.rounded_overlaps(self._origin, self.gears)
         lines += gear_parts.smaller_roundings(self._origin, self.gears)
         for name, gear in self.gears.items():
             if gear.is_undercut:
                 start = 2e3 * gear.form_radius
-                lines.append(f"gears.{name}: undercut by its rack; its flank begins at a diameter of {start:.3f} mm")
+                lines.append(f"gears.{name}: undercut by its rack; the root form diameter is {start:.3f} mm")
         return tuple(dict.fromkeys(lines))
 
     def _line(self) -> str:
@@ -559,7 +559,7 @@ def _check_train(gearbox: Gearbox) -> None:
     """Let the static load be held, and the train roll from input to output."""
     gearbox.train.static_mesh_forces()
     if gearbox.gears and not gearbox.meshes:
-        raise gearbox.fault("meshes: none is at work; gears need at least one")
+        raise gearbox.fault("meshes: none is enabled; a gearbox with gears needs at least one")
     _ = gearbox.train.ratio
     for case in gearbox.load_cases.values():
         try:

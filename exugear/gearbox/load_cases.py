@@ -61,13 +61,13 @@ def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, F
     if table.ndim != 2 or table.shape[1] != len(lines[0]) or not np.all(np.isfinite(table)):
         raise fault(f"every line needs {len(lines[0])} finite numbers")
     if not np.all(np.diff(table[:, 0]) > 0.0):
-        raise fault("time_s must grow from line to line")
+        raise fault("time_s must increase from line to line")
     series = {}
     for column, name in enumerate(lines[0][1:], start=1):
         body = name.strip().removesuffix("_N_m")
         if body not in gearbox.spinning or not name.strip().endswith("_N_m"):
             known = ", ".join(f"{known}_N_m" for known in gearbox.spinning)
-            raise fault(f"column {shortened(name.strip())} is no torque of a body; columns are {known}")
+            raise fault(f"column {shortened(name.strip())} is not the torque of a body; columns are {known}")
         series[body] = (table[:, 0], table[:, column])
     return series
 
@@ -128,7 +128,7 @@ class LoadSummary(ReprMixin, line=" {name!r}: net torque {net_torque:g} N m, {st
 
     def _table(self) -> TitledRows:
         speeds = (self.start_speed, self.end_speed, self.fastest_speed)
-        return f"load case {self.name} of the rolling train", {
+        return f"load case {self.name}, rigid kinematics", {
             "inertia at the input": value_range(self.inertia, "kg m2"),
             "net torque at the input": value_range(self.net_torque, "N m"),
             "driven": "yes" if self.driven else "no",
@@ -218,14 +218,14 @@ def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
     doubts = []
     if loads.reversed_flanks:
         doubts.append(
-            f"torque sign? {', '.join(loads.reversed_flanks)} loaded on another flank than by the static load, which "
-            "tables, stiffness and phases are of"
+            f"check torque signs: {', '.join(loads.reversed_flanks)} loaded on the opposite flank of the static load, "
+            "at which tables, stiffness and phases are computed"
         )
     body, rim = loads.fastest_rim
     if rim > BURSTING_RIM_SPEED:
         doubts.append(
-            f"torque sign, or too long? the torques bring a rim on {body} to {rim:.4g} m/s, and wheels of steel burst "
-            f"at some {BURSTING_RIM_SPEED:g} m/s; a run stops there"
+            f"overspeed: the tip speed on {body} reaches {rim:.4g} m/s, and steel gears burst at about "
+            f"{BURSTING_RIM_SPEED:g} m/s, where a run stops; check torque signs and duration"
         )
     return tuple(doubts)
 
@@ -250,10 +250,10 @@ def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) ->
         return ""
     turned = [family for family, share in light.items() if share < 0.0]
     least = min(light.values())
-    how = f"reverses the load of {', '.join(turned)}" if turned else f"takes {', '.join(light)} to {least:.2g} of it"
+    how = f"reverses the load of {', '.join(turned)}" if turned else f"loads {', '.join(light)} with {least:.2g} of it"
     return (
-        f"linear bearings are of the static load, and the load case {loads.name} {how}: "
-        'displacements and loads there want model = "iso16281" on the bearings'
+        f'bearings are linearised at the static load, but the load case {loads.name} {how}; set model = "iso16281" on '
+        "the bearings for displacements and loads there"
     )
 
 
@@ -280,9 +280,9 @@ def other_load_warning(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool =
     if not told or not of_one_load:
         return ""
     return (
-        f"other load: {', '.join(told)} of the static load ({static_load_in_words(gearbox)}), which the tables of "
-        "transmission error and stiffness are of; state this load under [static_load], or take the mesh law table, "
-        "whose tables go over load"
+        f"other load: {', '.join(told)} of the static load ({static_load_in_words(gearbox)}), at which transmission "
+        "error and stiffness are computed; set this load in [static_load], or use --mesh-model table, which covers a "
+        "range of loads"
     )
 
 
@@ -296,7 +296,7 @@ def band_warning(loads: LoadSummary, band: float) -> str:
     >>> band_warning(loads, 6400.0)
     ''
     >>> band_warning(loads, 5000.0)
-    'beyond the band: the run keeps frequencies up to 5000 Hz, and meshes reach high_speed 6411 Hz; exugear ...
+    'beyond the stored band: the run stores frequencies up to 5000 Hz, and mesh frequencies reach ...
     """
     beyond = {name: found for name, found in loads.mesh_frequencies.items() if found > BEYOND_BAND * band}
     if not beyond:
@@ -304,8 +304,8 @@ def band_warning(loads: LoadSummary, band: float) -> str:
     named = ", ".join(f"{name} {frequency:.0f} Hz" for name, frequency in list(beyond.items())[:SHOWN_MESHES])
     wanted = math.ceil(max(beyond.values()) / BAND_STEP) * BAND_STEP
     return (
-        f"beyond the band: the run keeps frequencies up to {band:g} Hz, and meshes reach {named}; exugear run "
-        f"--band {wanted:g} keeps them"
+        f"beyond the stored band: the run stores frequencies up to {band:g} Hz, and mesh frequencies reach {named}; "
+        f"use exugear run --band {wanted:g}"
     )
 
 
@@ -357,8 +357,8 @@ def gearbox_at_load(gearbox: Gearbox, case: LoadCase) -> Gearbox:
     torques = {body: torque for body, torque in {**case.torques, **first}.items() if torque and body not in locked}
     if not torques:
         raise gearbox.fault(
-            f"load_cases.{case.name}.torques_N_m: has no torque at the start but on what holds the static load "
-            f"({', '.join(locked)}), so that nothing is loaded; name another load case"
+            f"load_cases.{case.name}.torques_N_m: at the start, torques act only on bodies that hold the static load ("
+            f"{', '.join(locked)}), so nothing is loaded; choose another load case"
         )
     return gearbox.varied({"static_load.torques_N_m": torques})
 

@@ -48,13 +48,13 @@ def check_regular(path: Path, largest: int) -> None:
     >>> check_regular(Path("cases"), LARGEST_CASE)
     Traceback (most recent call last):
     ...
-    exugear.gearbox.named_files.NamedFileError: a folder; a regular file is needed
+    exugear.gearbox.named_files.NamedFileError: a folder; a regular file is required
     """
     try:
         if not path.exists():
             raise NamedFileError("no such file")
         if not path.is_file():
-            raise NamedFileError(f"{'a folder' if path.is_dir() else 'a pipe or device'}; a regular file is needed")
+            raise NamedFileError(f"{'a folder' if path.is_dir() else 'a pipe or device'}; a regular file is required")
         size = path.stat().st_size
     except OSError as error:
         raise NamedFileError(f"cannot be read ({error.strerror})") from None
@@ -83,9 +83,7 @@ def named_file(name: str, folder: Path, permissions: Permissions, largest: int) 
     >>> named_file("/etc/hostname", Path("cases"), NOTHING_MORE, LARGEST_TABLE)
     Traceback (most recent call last):
     ...
-    exugear.gearbox.named_files.NamedFileError: lies outside the gearbox file's folder; put it there, or permit its
-    folder \
-    by --allow-dir DIR or EXUGEAR_ALLOW_DIR
+    exugear.gearbox.named_files.NamedFileError: is outside the folder of the gearbox file; move it there, or ...
     """
     path = folder / name
     try:
@@ -95,7 +93,7 @@ def named_file(name: str, folder: Path, permissions: Permissions, largest: int) 
         raise NamedFileError("no such file") from None
     if not any(real_path.is_relative_to(parent) for parent in permitted):
         raise NamedFileError(
-            "lies outside the gearbox file's folder; put it there, or permit its folder by --allow-dir DIR or "
+            "is outside the folder of the gearbox file; move it there, or permit its folder by --allow-dir DIR or "
             "EXUGEAR_ALLOW_DIR"
         )
     check_regular(path, largest)

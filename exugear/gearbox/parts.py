@@ -64,7 +64,7 @@ class Body(ReprMixin, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 abo
         if self.carrier is not None:
             return f"planet on {self.carrier}"
         if self.planet_of is not None:
-            return f"planet on {self.planet_of}, which is held"
+            return f"planet on {self.planet_of}, which is fixed"
         if self.spin_only:
             return "spin only"
         return "turning"
@@ -119,17 +119,17 @@ class Bearing(ReprMixin):
             "position": _point(self.position),
             "stiffness": self._source,
             "damping": "in proportion to the stiffness" if self.damping is None else "given",
-            "factor of the housing": f"{self.factor:g}",
+            "housing stiffness factor": f"{self.factor:g}",
         }
 
     @property
     def _source(self) -> str:
         """Where its stiffness comes from."""
         if self.catalogue is None:
-            return "stiffness given"
+            return "specified stiffness"
         if self.stiffness is None:
             return "from catalogue"
-        return "from catalogue and stiffness given"
+        return "from catalogue data and specified stiffness"
 
 
 @dataclass(frozen=True)
@@ -196,8 +196,8 @@ class Mesh(ReprMixin):
             "pair": self.pair.name,
             "gear 1": f"{self.pair.pinion.name} on {self.pinion}",
             "gear 2": f"{self.pair.gear.name} on {self.gear}",
-            "line of centres turns with": self.frame,
-            "middle of the faces": value_range(self.z, "mm", 1e3),
+            "line of centres rotates with": self.frame,
+            "middle of the face widths": value_range(self.z, "mm", 1e3),
             "centre distance": value_range(self.centre_distance, "mm", 1e3),
             "position angle": value_range(math.degrees(self.position_angle), "deg"),
         }
@@ -221,7 +221,7 @@ class WheelDeviation(ReprMixin):
         return f": {self.teeth} teeth, runout {runout}, pitch {value_range(self.pitch, 'um', 1e6)}"
 
     def _table(self) -> TitledRows:
-        return "errors of a wheel", {
+        return "deviations of a gear", {
             "teeth": str(self.teeth),
             "cumulative pitch on the line of action": value_range(self.pitch, "um", 1e6),
             "runout": value_range(2.0 * self.eccentricity, "um", 1e6),
@@ -302,7 +302,7 @@ class PairSpec(ReprMixin):
             "static torque on gear 1": value_range(self.static_torque, "N m"),
             "loaded flank": f"{self.flank:+d}",
             "table": "wanted" if self.table else "not wanted",
-            "stated stiffness": value_range(np.array(self.stiffness), "N/m") if self.stiffness else "none",
+            "specified stiffness": value_range(np.array(self.stiffness), "N/m") if self.stiffness else "none",
         }
 
 

@@ -41,7 +41,7 @@ class GearboxFileError(ValueError):
         self.faults = tuple(dict.fromkeys(faults))
         more = len(self.faults) - SHOWN_FAULTS
         many = "s" if more > 1 else ""
-        rest = [f"and {more} more fault{many}"] if more > 0 else []
+        rest = [f"and {more} more error{many}"] if more > 0 else []
         super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
 
 
@@ -207,8 +207,8 @@ def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:
             yield f"{key}{shown}: {_remedy(fault)}"
 
 
-_NO_CONTROL = "must hold words and no control characters"
-_A_NAME = "a name has letters, digits and underscores, begins with a letter, and is 80 long at most"
+_NO_CONTROL = "must be text without control characters"
+_A_NAME = "a name consists of letters, digits and underscores, begins with a letter, and has at most 80 characters"
 _TYPES = {
     "float_type": "must be a number",
     "int_type": "must be a whole number, without quotes and decimal point",

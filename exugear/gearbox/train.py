@@ -277,17 +277,17 @@ class Train(
         """
         for body in speeds:
             if body not in self.spins:
-                raise self.fault(f"body {body!r} does not turn; bodies are {', '.join(self.spins)}")
+                raise self.fault(f"body {body!r} does not rotate; bodies are {', '.join(self.spins)}")
         if not self.degrees_of_freedom:
-            raise self.fault("meshes: the gear train cannot turn, its meshes and couplings lock each other")
+            raise self.fault("meshes: the gear train is locked by its meshes and couplings; check them")
         prescribed = self._prescribed(speeds)
         rows = self._modes_of(prescribed)
         given = np.array([speeds.get(name, 0.0) for name in prescribed])
         weights, _, rank, _ = np.linalg.lstsq(rows, given, rcond=1e-9)
         if rank < self.degrees_of_freedom:
             raise self.fault(
-                f"the gear train has {self.degrees_of_freedom} degrees of freedom; turning {', '.join(prescribed)} "
-                "does not fix it: name the bodies that are held in static_load.locked"
+                f"the gear train has {self.degrees_of_freedom} degrees of freedom; the rotation of "
+                f"{', '.join(prescribed)} does not determine all speeds; set the locked bodies in static_load.locked"
             )
         if np.abs(rows @ weights - given).max() > 1e-9 * np.abs(given).max():
             raise self.fault(
@@ -336,8 +336,8 @@ class Train(
         forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), applied)
         if forces is None:
             raise self.fault(
-                f"static_load: the torques {dict(torques)} are not held by locking "
-                f"{', '.join(self.locked) or 'nothing'}"
+                f"static_load: locking {', '.join(self.locked) or 'nothing'} does not balance the torques "
+                f"{dict(torques)}; check static_load.locked"
             )
         smallest_radius = min((mesh.pair.pinion.base_radius for mesh in self.meshes), default=1.0)
         loaded = without_round_off(forces[: len(self.meshes)], np.abs(applied).max(), smallest_radius)
@@ -366,12 +366,12 @@ class Train(
             for name in names:
                 if name not in self.spins:
                     raise self.fault(
-                        f"static_load.{key} = {name!r}: no such turning body; bodies are {', '.join(self.spins)}"
+                        f"static_load.{key} = {name!r}: no such rotating body; bodies are {', '.join(self.spins)}"
                     )
         if np.linalg.matrix_rank(self._modes_of(self.locked)) < len(self.locked):
             raise self.fault(
-                f"static_load.locked = {list(self.locked)}: more bodies than the train has freedoms, "
-                f"{self.degrees_of_freedom}; leave one out, for nothing says how they share the load"
+                f"static_load.locked = {list(self.locked)}: more bodies than the degrees of freedom of the train ("
+                f"{self.degrees_of_freedom}), load sharing is undetermined; remove one"
             )
 
     def _standing(self, body: str) -> tuple[str, ...]:

@@ -45,7 +45,7 @@ class Variant(StrEnum):
     rigid = "rigid", "on ideal joints", Trait.spins_only
     jointed = "jointed", "on joints kept as constraints", Trait.constrained
     bushing = "bushing", "on bearings", Trait.on_bearings
-    flexible = "flexible", "with elastic bodies", Trait.on_bearings | Trait.elastic
+    flexible = "flexible", "with flexible bodies", Trait.on_bearings | Trait.elastic
 
     def __repr__(self) -> str:
         """Show the name as files have it."""
@@ -97,7 +97,7 @@ class Variant(StrEnum):
         """
         variant = cls.of(name)
         if variant not in OFFERED:
-            raise VariantError(f"variant {name!r} is there to check others; variants are {', '.join(OFFERED)}")
+            raise VariantError(f"variant {name!r} is for internal comparisons only; variants are {', '.join(OFFERED)}")
         return variant
 
 

@@ -145,13 +145,13 @@ class _Case:
         largest = float(np.hypot(worst[..., 0], worst[..., 1]).max())
         least = minimum_load(ratings.dynamic, section.type)
         if ratio < LEAST_RATIO:
-            remarks.append(f"viscosity ratio {ratio:.2g} at its slowest: L10m has no a_ISO below {LEAST_RATIO:g}")
+            remarks.append(f"viscosity ratio {ratio:.2g} at the lowest speed: no a_ISO for L10m below {LEAST_RATIO:g}")
         if largest < least:
-            remarks.append(f"carries {1e-3 * largest:.3g} kN at most, below the usual least load: elements may slide")
+            remarks.append(f"load at most {1e-3 * largest:.3g} kN, below the usual minimum load: elements may slide")
         if ratings.estimated:
-            remarks.append("ratings estimated from its dimensions, on the safe side")
+            remarks.append("ratings estimated from its dimensions (conservative)")
         elif ratings.makers:
-            remarks.append(f"ratings are the least that {', '.join(ratings.makers)} print for {section.designation}")
+            remarks.append(f"ratings: smallest in catalogues of {', '.join(ratings.makers)} for {section.designation}")
         exponent = 10.0 / 3.0 if section.type.endswith("_roller") else 3.0
         total, hours = float(revolutions.sum()), float(points.hours.sum())
         return BearingLife(
@@ -215,11 +215,11 @@ class _Case:
         )
         load, tilt, top = loads[t, a], tilts[0, a], np.hypot(worst[..., 0], worst[..., 1]).max()
         if not size[t, a]:
-            return None, math.nan, ["carries nothing"]
+            return None, math.nan, ["no load"]
         holds_axially = any(row.contact_angle for row in rows) or not isinstance(rows[0], RollerRow)
         remarks = []
         if not holds_axially and abs(load[2]) > 0.01 * size[t, a]:
-            remarks.append(f"ribs carry up to {1e-3 * abs(load[2]):.3g} kN, which no life counts")
+            remarks.append(f"ribs carry up to {1e-3 * abs(load[2]):.3g} kN, which the rating life does not include")
         solved = []
         for share in LOAD_SHARES:
             factor = share * float(top) / size[t, a]

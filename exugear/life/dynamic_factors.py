@@ -97,8 +97,8 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
     try:
         arrays, attributes = read_run(path, ["time", "input_speed", "mesh_force"])
     except FileError as error:
-        command = f"exugear run CASE.toml --variant {assembly.variant} --load-case {rating.dynamic_factor_run}"
-        raise gearbox.fault(f"{key}: {error}; `{command}` makes it") from error
+        command = f"exugear run GEARBOX.toml --variant {assembly.variant} --load-case {rating.dynamic_factor_run}"
+        raise gearbox.fault(f"{key}: {error}; compute it by `{command}`") from error
     if attributes["input_hash"] != input_hash(assembly, rating.dynamic_factor_run):
         raise gearbox.fault(f"{key}: {path} belongs to another input; run it again")
     ratio = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)[body])
@@ -109,7 +109,7 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
         force = np.abs(arrays["mesh_force"][:, number].astype(np.float64))
         windows = window_factors(arrays["time"], frequencies[mesh.name] * speed, force)
         if windows is None:
-            raise gearbox.fault(f"{key}: {path} holds no window of {CYCLES:g} mesh cycles of {mesh.name}")
+            raise gearbox.fault(f"{key}: {path} is shorter than a window of {CYCLES:g} mesh cycles of {mesh.name}")
         instants, values = windows
         found.setdefault(mesh.family, []).append((ratio * np.interp(instants, arrays["time"], speed), values))
     every = np.concatenate([speeds for parts in found.values() for speeds, _ in parts]) / RPM
@@ -226,10 +226,10 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
         data = load_response(path)
         fits = settings_of(data.attrs).hash_with(assembly) == data.attrs["input_hash"]
     except (FileError, ValueError) as error:
-        command = f"exugear steady CASE.toml --variant {assembly.variant} --method {level}"
-        raise gearbox.fault(f"{key}: {error}; `{command}` makes it") from error
+        command = f"exugear steady GEARBOX.toml --variant {assembly.variant} --method {level}"
+        raise gearbox.fault(f"{key}: {error}; compute it by `{command}`") from error
     if not fits:
-        raise gearbox.fault(f"{key}: {path} belongs to another input; compute it again")
+        raise gearbox.fault(f"{key}: {path} belongs to another input; recompute it")
     frequencies = gearbox.train.mesh_frequencies(2.0 * np.pi)
     sets = planet_sets(assembly)
     ratio = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)[body])
@@ -242,8 +242,8 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
             values = family_factors(data, mesh.family, mesh.name, planets, frequencies[mesh.name])
             found[mesh.family] = [(speed, values)]
     source = (
-        f"the steady response ({level}) at {len(speed)} speeds of {body} "
-        f"from {speed.min() / RPM:.4g} to {speed.max() / RPM:.4g} rpm"
+        f"the steady-state response ({level}) at {len(speed)} speeds of {body} from {speed.min() / RPM:.4g} to "
+        f"{speed.max() / RPM:.4g} rpm"
     )
     least = rating.minimum_dynamic_factor or 1.0
     return {family: merged(parts, least, source) for family, parts in found.items()}

@@ -126,7 +126,8 @@ def check_strengths(
             faults += gearbox.fault(f"rating.gears.{name}: no gear of that name in a mesh; gears are {known}").faults
         elif (len(flanks) > 1 or reversed_too) and strength.mean_stress_factor is None:
             faults += gearbox.fault(
-                f"rating.gears.{name}.mean_stress_factor: this key is missing; teeth of {name} bend both ways"
+                f"rating.gears.{name}.mean_stress_factor: this key is missing; teeth of {name} are loaded on both "
+                "flanks (alternating bending)"
             ).faults
     if faults:
         raise GearboxFileError(*faults)
@@ -150,8 +151,8 @@ def warn_beyond_tables(
         if reached:
             told = " and ".join(f"{1e6 * extreme * width:.3g}" for extreme in reached)
             yield (
-                f"{name}: its misalignment reaches {told} um over the face, its table has "
-                f"{1e6 * low * width:.3g} to {1e6 * high * width:.3g}: stresses beyond are those at the end; widen "
+                f"{name}: misalignment reaches {told} µm over the face width, the table covers {1e6 * low * width:.3g}"
+                f" to {1e6 * high * width:.3g}; stresses beyond are those at the end of the table; widen "
                 "misalignment_um of [ste]"
             )
 
@@ -398,10 +399,10 @@ def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:
 _FIELDS = {
     "hertz": (("torque", "misalignment"), "Pa", "largest Hertzian stress inside the path of contact"),
     "pitch_hertz": (("torque", "misalignment"), "Pa", "largest Hertzian stress near the pitch point"),
-    "outside": (("torque", "misalignment"), "1", "largest share of the load outside the path of contact"),
-    "face_load": (("torque", "misalignment"), "1", "highest over mean line load along the face"),
+    "outside": (("torque", "misalignment"), "1", "largest fraction of the load outside the path of contact"),
+    "face_load": (("torque", "misalignment"), "1", "maximum over mean line load along the face width"),
     "root": (("torque", "misalignment", "gear"), "Pa", "largest principal stress at the roots of gear 1 and 2"),
-    "compression": (("torque", "misalignment", "gear"), "Pa", "least principal stress there"),
+    "compression": (("torque", "misalignment", "gear"), "Pa", "smallest principal stress there"),
 }
 _LAYOUT = Layout(
     "pair stress",

@@ -37,9 +37,9 @@ UNTRUSTED_REACH = 3.0
 TOLD_REACH = 1.001
 """From here on that is told."""
 LEFT_OUT = (
-    "scuffing (ISO/TS 6336-20, -21): not rated: its formulas are not part of this program",
-    "micropitting (ISO/TS 6336-22): not rated: its formulas are not part of this program",
-    "tooth flank fracture (ISO/TS 6336-4): not rated: its formulas are not part of this program",
+    "scuffing (ISO/TS 6336-20, -21): not rated by this program",
+    "micropitting (ISO/TS 6336-22): not rated by this program",
+    "tooth flank fracture (ISO/TS 6336-4): not rated by this program",
 )
 """Damages of gears that are not rated, and why."""
 
@@ -65,9 +65,9 @@ def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, fl
             reach, name = max((reach, name), (torque / tables[mesh.pair.name], mesh.pair.name))
     if reach > LARGEST_REACH:
         raise gearbox.fault(
-            f"loads: {1e-3 * largest:.4g} kN m on {counted.body} are {reach:.3g} times the largest torque that the "
-            f"table of {name} has; stresses are continued up to {LARGEST_REACH:g} times. Raise static_load.torques_N_m "
-            f"to these loads, or give [ste] axes with torque_factors up to {reach:.2g} and grid = true"
+            f"loads: {1e-3 * largest:.4g} kN m on {counted.body} is {reach:.3g} times the largest torque of the table "
+            f"of {name}; stresses are extrapolated up to {LARGEST_REACH:g} times. Increase static_load.torques_N_m to "
+            f"these loads, or set torque_factors up to {reach:.2g} and grid = true in [ste]"
         )
 
 
@@ -80,8 +80,8 @@ def failures(flanks: Iterable[FlankLife]) -> Iterator[str]:
         ):
             if math.isinf(damage):
                 yield (
-                    f"{label(flank, holder)}: infinite damage: a {what} stress of {1e-6 * worn:.4g} MPa is in its "
-                    f"loads, and it endures {1e-6 * limit:.4g} MPa not even for the first cycles of its S-N curve"
+                    f"{label(flank, holder)}: infinite damage: the loads cause a {what} stress of {1e-6 * worn:.4g} "
+                    f"MPa, above the {1e-6 * limit:.4g} MPa at the start of its S-N curve"
                 )
 
 
@@ -109,13 +109,12 @@ def shortfalls(
         ):
             least = min((value for value in found if not math.isnan(value)), default=math.inf)
             if least < asked:
-                yield f"{label(flank, holder)}: {name} = {least:.3g}, {asked:g} is asked for"
+                yield f"{label(flank, holder)}: {name} = {least:.3g}, required {asked:g}"
         if flank.reach > UNTRUSTED_REACH:
             yield (
-                f"{label(flank, flank.contact_holder)}: its largest torque is {flank.reach:.3g} times "
-                "that of its table: "
-                "these stresses are not to be trusted; raise static_load.torques_N_m, or give [ste] larger "
-                "torque_factors and grid = true"
+                f"{label(flank, flank.contact_holder)}: the largest torque is {flank.reach:.3g} times the largest "
+                "torque of its table: these stresses are invalid; increase static_load.torques_N_m, or set larger "
+                "torque_factors and grid = true in [ste]"
             )
     for bearing in bearings:
         for name, lasting in (
@@ -124,9 +123,9 @@ def shortfalls(
             ("L10m", bearing.modified_hours),
         ):
             if lasting < hours:
-                yield f"{bearing.name}: {name} = {lasting:,.0f} h, {hours:,.0f} h are asked for"
+                yield f"{bearing.name}: {name} = {lasting:,.0f} h, required {hours:,.0f} h"
         if bearing.static_safety < rating.minimum_S_0:
-            yield f"{bearing.name}: S_0 = {bearing.static_safety:.3g}, {rating.minimum_S_0:g} is asked for"
+            yield f"{bearing.name}: S_0 = {bearing.static_safety:.3g}, required {rating.minimum_S_0:g}"
 
 
 def reaches(flanks: Iterable[FlankLife]) -> Iterator[str]:
@@ -137,8 +136,8 @@ def reaches(flanks: Iterable[FlankLife]) -> Iterator[str]:
     for family, reach in largest.items():
         if reach > TOLD_REACH:
             yield (
-                f"{family}: its largest torque is {reach:.3g} times that of its table; from there on contact stress "
-                "grows with the root of torque, root stress with torque"
+                f"{family}: the largest torque is {reach:.3g} times the largest torque of its table; beyond the "
+                "table, contact stress is extrapolated with the square root of torque, root stress linearly"
             )
 
 
@@ -152,10 +151,10 @@ def needs_of_relief(gearbox: Gearbox, flanks: Iterable[FlankLife]) -> Iterator[s
         if share > LEAST_OUTSIDE:
             gears = (pairs[family].pinion.name, pairs[family].gear.name)
             given = " and ".join(filter(None, (_relief_in_words(gearbox, name) for name in gears)))
-            remedy = given and f"they have {given}, and need more or a longer one"
+            remedy = given and f"present: {given}; increase its amount or length"
             yield (
-                f"{family}: up to {100.0 * share:.1f} % of its load lies outside the path of contact, where tip edges "
-                f"dig in and no stress is rated: {remedy or 'its flanks need tip relief'}"
+                f"{family}: up to {100.0 * share:.1f} % of the load is outside the path of contact (tip-edge "
+                f"contact), where no stress is rated: {remedy or 'add tip relief'}"
             )
 
 
@@ -164,7 +163,7 @@ def _relief_in_words(gearbox: Gearbox, name: str) -> str:
     modification = gearbox.case.gears[name].modification
     if modification is None or not modification.tip_relief_um:
         return ""
-    return f"{modification.tip_relief_um:g} um of tip relief on {name}"
+    return f"{modification.tip_relief_um:g} µm of tip relief on {name}"
 
 
 # The life of a gearbox under its loads: gears by flank, bearings, extremes, and what limits it
@@ -213,8 +212,8 @@ def rating_of(gearbox: Gearbox) -> RatingSection:
     """
     if gearbox.case.rating is None:
         raise gearbox.fault(
-            "rating: this section is missing; [rating] needs dynamic_factor, [rating.gears.NAME] what a gear "
-            "withstands, and [lubricant] viscosity_40_mm2_per_s"
+            "rating: this section is missing; add [rating] with dynamic_factor, [rating.gears.NAME] with the "
+            "strength of each gear, and [lubricant] with viscosity_40_mm2_per_s"
         )
     return gearbox.case.rating
 
@@ -255,7 +254,9 @@ def check_keys(gearbox: Gearbox) -> None:
     named = rating and rating.dynamic_factor_run
     if named and named not in gearbox.load_cases:
         known = ", ".join(gearbox.load_cases) or "none"
-        faults += gearbox.fault(f"rating.dynamic_factor_run = {named!r}: load cases are {known}").faults
+        faults += gearbox.fault(
+            f"rating.dynamic_factor_run = {named!r}: no such load case; load cases are {known}"
+        ).faults
     if faults:
         raise GearboxFileError(*faults)
 
@@ -337,7 +338,7 @@ def compute_life(
         reliefs=tuple(needs_of_relief(gearbox, flanks)),
         assumptions=(
             *_assumptions(rating, counted, acting, balance, stresses, dynamic, gearbox.case.lubricant),
-            *(f"K_gamma of {family} = {value:.3f}, in the forces of each mesh" for family, value in told.items()),
+            *(f"K_gamma of {family} = {value:.3f}, included in the mesh forces" for family, value in told.items()),
             *warn_beyond_tables(gearbox, acting, balance, stresses),
             *reaches(flanks),
         ),
@@ -347,10 +348,10 @@ def compute_life(
 
 def _hub_in_words(counted: CountedLoads) -> str:
     if not counted.points.other.any():
-        return "torque alone: no forces or moments of a hub"
+        return "torque only: no rotor forces or moments"
     return (
-        f"forces and moments of a hub on {counted.body} in {len(counted.points.torque)} points; what they add is "
-        "linear in them, at each torque"
+        f"rotor forces and moments on {counted.body} in {len(counted.points.torque)} points; their effect is linear "
+        "at each torque"
     )
 
 
@@ -360,12 +361,12 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
     rated = rating_of(gearbox).gears
     for gear in dict.fromkeys(one.gear for one in counted.teeth):
         if gear not in rated:
-            lines.append(f"gear {gear}: no [rating.gears.{gear}] says what it withstands")
+            lines.append(f"gear {gear}: no strength; add [rating.gears.{gear}]")
     for pair in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
         if pair not in stresses:
-            lines.append(f"pair {pair}: has no table, so no stresses")
+            lines.append(f"pair {pair}: no table, so no stresses")
     for support in dict.fromkeys(one.family for one in assembly.supports if one.catalogue is None):
-        lines.append(f"{support}: given by its stiffness alone; a catalogue section would give it a life")
+        lines.append(f"{support}: defined by its stiffness only; add a [.catalogue] table for a rating life")
     if not assembly.supports:
         lines.append(f"bearings: the variant {assembly.variant} has none")
     return [*lines, *LEFT_OUT]
@@ -384,27 +385,27 @@ def _assumptions(
     turns = len(balance.angle)
     lines = [
         _hub_in_words(counted),
-        f"static balance at {count} torque{'s' * (count > 1)} and {turns} angle{'s' * (turns > 1)} of the carrier, "
-        + ("proportional to torque" if balance.linear else "forces over torque linear between these"),
+        f"static balance at {count} torque{'s' * (count > 1)} and {turns} carrier angle{'s' * (turns > 1)}, "
+        + ("proportional to torque" if balance.linear else "forces interpolated linearly over torque"),
         _dynamic_in_words(rating, dynamic, acting) + "; none on bearings",
-        "face and transverse load factors are in the stresses of the contact of finite elements"
+        "face and transverse load factors are included in the finite element contact stresses"
         + (
             ""
             if any(len(stress.misalignment) > 1 for stress in stresses.values())
-            else ", of gears that stand aligned: tables with axes (--grid) have their misalignment"
+            else ", for aligned gears; tables with axes (--grid) include misalignment"
         ),
-        f"S_H of {rating.minimum_S_H:g}, S_F of {rating.minimum_S_F:g} and S_0 of {rating.minimum_S_0:g} are asked for",
-        "S_H and S_F by ISO stand for nominal stresses with K_Hbeta of the finite elements and K_Halpha = K_Falpha = 1",
-        "Z_W = Z_X = 1; S-N curves go on beyond their last point: no load is without damage",
+        f"required: S_H {rating.minimum_S_H:g}, S_F {rating.minimum_S_F:g}, S_0 {rating.minimum_S_0:g}",
+        "S_H and S_F to ISO 6336: nominal stresses with K_Hbeta of the finite elements and K_Halpha = K_Falpha = 1",
+        "Z_W = Z_X = 1; S-N curves are extrapolated beyond their last point (no endurance limit)",
         _oil_in_words(oil),
     ]
     if balance.outside:
         lines.append(
-            f"outside their tables under some load: {', '.join(balance.outside)}; tables go on in a straight line "
-            "there; widen the axes of [ste]"
+            f"outside their tables under some loads: {', '.join(balance.outside)}; extrapolated linearly; widen the "
+            "axes of [ste]"
         )
     if np.any(counted.distribution.torque < 0.0):
-        lines.append("reversed torque presses the other flanks; teeth there are taken as the mirror of these")
+        lines.append("reversed torque loads the opposite flanks; their teeth are assumed symmetric")
     return [*lines, *counted.remarks]
 
 
@@ -412,18 +413,18 @@ def _oil_in_words(oil: LubricantSection | None) -> str:
     given = oil is not None and None not in (oil.viscosity_100_mm2_per_s, oil.temperature_C, oil.cleanliness)
     if oil is None or not given:
         return (
-            "lives of bearings are basic: ribs and cages are left out; L10m, with oil and cleanliness, needs "
-            "viscosity_100_mm2_per_s, temperature_C and cleanliness of [lubricant]"
+            "bearing lives are basic rating lives, ribs and cages neglected; L10m (lubricant, cleanliness) requires "
+            "viscosity_100_mm2_per_s, temperature_C and cleanliness in [lubricant]"
         )
     return (
-        f"L10m of bearings by ISO 281 for oil at {oil.temperature_C:g} C and cleanliness {oil.cleanliness!r}, with the "
-        "lower end of its range of e_C; ribs and cages are left out"
+        f"L10m of bearings to ISO 281 for oil at {oil.temperature_C:g} °C and cleanliness {oil.cleanliness!r}, with "
+        "the lower limit of e_C; ribs and cages neglected"
     )
 
 
 def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor], acting: ActingLoads) -> str:
     if rating.dynamic_factor is not None:
-        return f"K_v = {rating.dynamic_factor:g} on all meshes as stated"
+        return f"K_v = {rating.dynamic_factor:g} for all meshes, as specified"
     values = ", ".join(f"{name} {one.largest(acting.slowest, acting.fastest):.3f}" for name, one in dynamic.items())
     first = next(iter(dynamic.values()))
     lowest = acting.slowest / RPM
@@ -431,8 +432,8 @@ def _dynamic_in_words(rating: RatingSection, dynamic: Mapping[str, DynamicFactor
     slow = first.speed[0] / RPM
     fast = first.speed[-1] / RPM
     inside = slow <= lowest * (1.0 + WITHIN) and highest <= fast * (1.0 + WITHIN)
-    beyond = "" if inside else "; beyond its speeds that of its end is taken"
+    beyond = "" if inside else "; constant beyond that range"
     return (
-        f"K_v of {first.source}, taken from {lowest:.4g} to {highest:.4g} rpm, where the loads turn{beyond}, "
-        f"at least {rating.minimum_dynamic_factor:g}: {values}"
+        f"K_v of {first.source}, from {lowest:.4g} to {highest:.4g} rpm, the speed range of the loads{beyond}, at "
+        f"least {rating.minimum_dynamic_factor:g}: {values}"
     )

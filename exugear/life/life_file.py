@@ -93,7 +93,7 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
         values = np.array([getattr(bearing, name) for bearing in life.bearings], dtype=np.float64)
         variables[f"bearing_{name}"] = (("bearing",), values, {"units": BEARING_UNITS.get(name, "1")})
     count = len(distribution.hours)
-    none = {"units": "1", "long_name": "parts of the damage by bin of torque"}
+    none = {"units": "1", "long_name": "fractions of the damage by torque bin"}
     parts = {"flank": life.flanks, "bearing": life.bearings}
     for name, _, by_bin in DAMAGES.values():
         values = np.array([getattr(part, by_bin) for part in parts[name]], dtype=np.float64).reshape(-1, count)
@@ -269,15 +269,20 @@ def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
         colours = [COLOURS[list(DAMAGES).index(kind)] for _, kind, _ in shown]
         bars.barh(range(len(shown)), values, color=colours)
         bars.axvline(1.0, color=WARNING_COLOUR)
-        bars.set(xscale="log", xlabel="damage in the life (1: worn out)", yticks=range(len(shown)), yticklabels=names)
+        bars.set(
+            xscale="log",
+            xlabel=("fatigue damage in the life (1: failure)"),
+            yticks=range(len(shown)),
+            yticklabels=names,
+        )
         bars.xaxis.set_major_formatter("{x:g}")
         bars.set_title("what limits")
         bars.invert_yaxis()
         edges, shares = damage_matrix(data, shown)
         if shares.size:
             drawn = matrix.pcolormesh(1e-3 * edges, np.arange(len(shown) + 1) - 0.5, 100.0 * shares, cmap="viridis")
-            figure.colorbar(drawn, ax=matrix, label="share of the part's damage / %")
-        matrix.set(xlabel=f"torque on {data.attrs['body']} / kN m", title="which torques do it")
+            figure.colorbar(drawn, ax=matrix, label="fraction of the part's damage / %")
+        matrix.set(xlabel=f"torque on {data.attrs['body']} / kN m", title="damage by torque")
         matrix.grid(False)
         return finish_figure(figure, path)
 

@@ -266,8 +266,8 @@ def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]
     coordinate = assembly.coordinates[body][: len(hub)]
     if hub.any() and min(coordinate) < 0:
         raise VariantError(
-            f"loads on {body}: has no place in space in the variant {assembly.variant}, so no forces or moments of a "
-            "hub act on it; name a body on bearings, or take the variant bushing or flexible"
+            f"loads on {body}: rotations only in the variant {assembly.variant}, so rotor forces and moments cannot "
+            "act on it; set a body on bearings, or use --variant bushing or flexible"
         )
     found: list[Floats | None] = []
     for place, size in zip(coordinate, hub, strict=True):

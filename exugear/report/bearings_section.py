@@ -32,15 +32,15 @@ NOISE = 1e-3
 NOISE_OF_ALL = 1e-5
 """Share of the largest force of all bearings below which a force is told as none."""
 MEANS = (
-    "Mean force over the middle third of the run-up, and the largest amplitude along an order (root of the summed "
-    "squares of both transverse directions). Of the copies of a planet set the one that swings most stands for all. "
-    "Axial forces are those of the shaft on the bearing or joint, positive along +z."
+    "Mean force over the middle third of the run-up, and largest zero-to-peak amplitude along an order (root sum "
+    "square of both transverse directions). For planet sets, the bearing with the largest amplitude. Axial force: of "
+    "the shaft on the bearing or joint, positive along +z."
 )
 """What is told of forces in run-ups."""
 WAVES = (
-    "Largest amplitude along an order at constant speed (root of the summed squares of both transverse directions). "
-    "Forces of the bearings of planets are waves around the carrier: mean, cosine and sine. What the bearings bear at "
-    "rest stands below."
+    "Largest zero-to-peak amplitude along an order at constant speed (root sum square of both transverse "
+    "directions). Planet bearing forces are multi-blade components (mean, cosine, sine). Static loads are listed "
+    "below."
 )
 """What is told of forces at constant speed."""
 SEATS = 12
@@ -62,9 +62,9 @@ def bearings_section(material: ReportData) -> Part:
         return Part("")
     note = ""
     if not any(accelerations):
-        note = pieces.paragraph("Accelerations of the seats come with a steady response: `exugear steady`.", "note")
-    html = pieces.section("At the bearings", *forces, *accelerations, note, *duties, name="bearings")
-    return Part(html, {}, "At the bearings", "bearings")
+        note = pieces.paragraph("Accelerations at bearings require a steady-state response: `exugear steady`.", "note")
+    html = pieces.section("Bearing forces and accelerations", *forces, *accelerations, note, *duties, name="bearings")
+    return Part(html, {}, "Bearing forces and accelerations", "bearings")
 
 
 def _forces(material: ReportData, data: Mapping[str, Any], group: RunGroup, variant: str) -> str:
@@ -81,15 +81,15 @@ def _forces(material: ReportData, data: Mapping[str, Any], group: RunGroup, vari
     rows = [_force_row(group, variant, name, figures, largest) for name, figures in loudest.items()]
     caption = f"Transverse forces {Variant.of(variant).label}, {group.source}"
     lifting = [
-        f"{figures['words']}: the force swings by {100.0 * figures['amplitude'] / figures['mean']:.0f} % of its mean; "
-        "a linear bearing cannot lift off, a real one would."
+        f"{figures['words']}: dynamic force amplitude {100.0 * figures['amplitude'] / figures['mean']:.0f} % of the "
+        "mean force. A linear bearing model neglects loss of contact."
         for figures in loudest.values()
         if figures["mean"] and figures["amplitude"] > LIFTS * figures["mean"]
     ]
     words = WAVES if group.responses else MEANS
     table = pieces.table(
         rows,
-        ("loudest order",),
+        ("dominant order",),
         caption=caption,
         name=f"forces-{group.name}-{variant}",
         hidden=("axial / kN",),
@@ -108,18 +108,20 @@ def _force_row(
     share = amplitude / mean if mean else math.inf
     named = Cell(f"{figures['words']}{copies}", choice=f"channel:{group.name}:{variant}:{name}")
     swings = Cell(figure_text(1e-3 * amplitude), amplitude, bar=amplitude / largest)
-    measures = {"swings by ± / kN": swings}
+    measures = {"amplitude ± / kN": swings}
     if not group.responses:
         measures = {
             "mean / kN": Cell(figure_text(1e-3 * mean), mean),
             "axial / kN": Cell(figure_text(_without_noise(1e-3 * figures["axial"], mean)), figures["axial"]),
             **measures,
-            "of the mean / %": Cell(figure_text(100.0 * share, 2) if math.isfinite(share) else "–", min(share, 1e9)),
+            ("amplitude over mean / %"): Cell(
+                figure_text(100.0 * share, 2) if math.isfinite(share) else "–", min(share, 1e9)
+            ),
         }
     return {
         "bearing or joint": named,
         **measures,
-        "loudest order": figures["line"],
+        "dominant order": figures["line"],
         "at / rpm": Cell(figure_text(figures["speed"], 4), figures["speed"]),
         "at / Hz": Cell(f"{figures['frequency']:.0f}", figures["frequency"]),
     }
@@ -164,10 +166,13 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
                 "at / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
             }
         )
-    title = f"Accelerations of the seats: steady response of {words_of(choice_of(data.attrs))}, {data.attrs['method']}"
+    title = (
+        f"Accelerations at bearings: steady-state response of {words_of(choice_of(data.attrs))}, method "
+        f"{data.attrs['method']}"
+    )
     words = (
-        f"Largest amplitude of a single order over all speeds, the {SEATS} largest; x, y and z are the axes of the "
-        "gearbox. Seats of a planet set move as waves around the carrier: mean, cosine and sine."
+        f"Largest zero-to-peak amplitude of a single order over all speeds, the {SEATS} largest; x, y and z are the "
+        "gearbox axes. For planet sets: multi-blade components (mean, cosine, sine)."
     )
     table = pieces.table(rows, ("order",), caption=title, name=f"seats-{'-'.join(title.split()[7:])}", sortable=True)
     return pieces.element("h3", pieces.text(title)) + pieces.paragraph(words, "note") + table
@@ -200,11 +205,10 @@ def _duties(material: ReportData, assembly: Assembly) -> str:
         rows, ("model",), caption=f"Bearings at the static load, {name}", name=f"duties-{'-'.join(name.split())}"
     )
     words = (
-        "Rows of rolling elements by ISO/TS 16281 between rigid rings, under the static load of the case. L10 by "
-        "ISO 281 and L10r by ISO/TS 16281 in million revolutions, basic: lubricant and cleanliness are left out, and "
-        "so are ribs. A rating with a star is estimated on the safe side, one with + is the least that makers print. "
-        "Linear bearings have the tangent at this load. Axial loads are those of the shaft on the inner ring, positive "
-        "along +z."
+        "Rolling elements to ISO/TS 16281 with rigid rings, under the static load. L10 to ISO 281 and L10r to ISO/TS "
+        "16281 in million revolutions; lubricant, cleanliness and ribs are neglected. *: conservatively estimated "
+        "rating; +: smallest rating in manufacturers' catalogues. Linear bearings have the tangent stiffness at this "
+        "load. Axial load: of the shaft on the inner ring, positive along +z."
     )
     content = pieces.paragraph(words, "note") + table + (pieces.bullets(remarks) if remarks else "")
     content += _meshes(material, assembly)
@@ -219,9 +223,8 @@ def _meshes(material: ReportData, assembly: Assembly) -> str:
     duties = mesh_duties(assembly)
     rows = [_mesh_row(material, duty) for duty in duties]
     words = (
-        "Where the gears stand under the static load, and how teeth bear there by the contact of finite elements: the "
-        "opening is that of the gap at the +z end over the common face, K_Hbeta the highest over the mean line load "
-        "along the face."
+        "Gear misalignment and load distribution under the static load (finite element contact). Gap: opening at the "
+        "+z end over the common face width; K_Hbeta: maximum over mean line load along the face width."
     )
     table = pieces.table(
         rows, (), caption=f"Meshes at the static load, {name}", name=f"meshes-{'-'.join(name.split())}"
@@ -238,11 +241,11 @@ def _mesh_row(material: ReportData, duty: MeshLoadState) -> dict[str, object]:
     return {
         "mesh": material.words.of(duty.name),
         "force / kN": f"{1e-3 * duty.force:.4g}",
-        "misaligned / mrad": f"{1e3 * duty.misalignment:.3f}",
+        "misalignment / mrad": f"{1e3 * duty.misalignment:.3f}",
         "opens / µm": f"{1e6 * duty.opening:.1f}",
-        "load centre / mm": shown(1e3 * duty.load_centroid, ".1f"),
+        "load centroid / mm": shown(1e3 * duty.load_centroid, ".1f"),
         "K_Hbeta": shown(duty.face_load_factor, ".2f"),
-        "pressure / MPa": shown(1e-6 * duty.pressure, ".0f"),
+        "contact stress / MPa": shown(1e-6 * duty.pressure, ".0f"),
     }
 
 
@@ -259,11 +262,11 @@ def _duty_row(material: ReportData, duty: BearingLoadState) -> dict[str, object]
         "model": duty.model,
         "radial load / kN": f"{1e-3 * duty.radial_load:.4g}",
         "axial load / kN": f"{round(1e-3 * duty.axial_load, 3) + 0.0:.4g}",
-        "radial / (GN/m)": f"{1e-9 * duty.radial_stiffness:.3g}",
-        "axial / (GN/m)": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
-        "tilt / (MN m/rad)": f"{tilt:.3g}",
-        "misaligned / mrad": f"{1e3 * duty.misalignment:.3f}",
-        "pressure / MPa": f"{1e-6 * duty.pressure:.0f}",
+        "radial stiffness / (GN/m)": f"{1e-9 * duty.radial_stiffness:.3g}",
+        "axial stiffness / (GN/m)": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
+        "tilting stiffness / (MN m/rad)": f"{tilt:.3g}",
+        "misalignment / mrad": f"{1e3 * duty.misalignment:.3f}",
+        "contact stress / MPa": f"{1e-6 * duty.pressure:.0f}",
         "C_r / kN": f"{1e-3 * duty.ratings.dynamic:.4g}{sign}",
         "L10 / Mrev": _life(duty.basic_life),
         "L10r / Mrev": _life(duty.reference_life),

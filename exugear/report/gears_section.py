@@ -14,8 +14,8 @@ from exugear.report.web import html as pieces
 from exugear.report.web.html import Cell
 
 PRESSURE = (
-    "Pressure is the largest of the contact over the mesh cycle, away from tip edges, under this torque, of gears that "
-    "stand straight, without load factors."
+    "Contact stress: maximum over the mesh cycle without tip-edge contact, under this torque, aligned gears, no load "
+    "factors."
 )
 """What pressures of tables are of."""
 
@@ -29,8 +29,8 @@ def gears_section(material: ReportData) -> Part:
         html, charts = chart(
             "ste",
             "Static transmission error over one mesh cycle",
-            "Change about the mean.",
-            "; ".join(f"{material.words.of(own.pair)} {_swing(own):.2f} µm peak to peak" for own in found),
+            "Deviation from the mean.",
+            "; ".join(f"{material.words.of(own.pair)} {_swing(own):.2f} µm peak-to-peak" for own in found),
             [Curve(material.words.of(own.pair), own.position, 1e6 * (own.error - own.error.mean())) for own in found],
             [Axis("position in the mesh cycle"), Axis("transmission error / µm")],
             material.arrays,
@@ -57,10 +57,10 @@ def _row(material: ReportData, excitation: PairExcitation) -> dict[str, object]:
         "torque on gear 1 / N m": f"{excitation.torque:.1f}",
         "positions": excitation.position.size,
         "mean / µm": f"{1e6 * float(excitation.error.mean()):.2f}",
-        "peak to peak / µm": Cell(f"{_swing(excitation):.3f}", _swing(excitation)),
-        "mean stiffness / (N/µm)": f"{1e-6 * float(excitation.stiffness.mean()):.0f}",
+        "peak-to-peak / µm": Cell(f"{_swing(excitation):.3f}", _swing(excitation)),
+        "mean mesh stiffness / (N/µm)": f"{1e-6 * float(excitation.stiffness.mean()):.0f}",
         "ISO 6336-1 B / (N/µm)": f"{1e-6 * excitation.iso_stiffness:.0f}",
-        "pressure / MPa": f"{1e-6 * excitation.pressure:.0f}" if math.isfinite(excitation.pressure) else "–",
+        "contact stress / MPa": f"{1e-6 * excitation.pressure:.0f}" if math.isfinite(excitation.pressure) else "–",
     }
 
 

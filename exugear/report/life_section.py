@@ -27,13 +27,12 @@ from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError
 
 WORDS = (
-    "Loads of the gearbox file over its life, through the balance at rest of the variant and the contact of its teeth "
-    "by finite elements. Damage is Miner's sum: one is worn out. Lives of bearings are basic but for L10m, which "
-    "has oil and cleanliness; L10 and L10m are by ISO 281, L10r is by ISO/TS 16281.",
-    "σ_H is the largest contact stress, σ_F the largest stress at the tooth root, σ_H0 and σ_F0 the nominal ones of "
-    "ISO 6336-2 and -3. S_H and S_F are the factors on stress at which the damage is one; the static ones stand for "
-    "extreme loads. Outside the path: share of the load that edges of tips carry. + is the flank that faces the sense "
-    "of +z rotation. S_0: static rating over the largest load.",
+    "Load spectrum of the gearbox file, static balance of the variant, and finite element tooth contact. Damage: "
+    "Miner's sum (1: failure). Bearing lives are basic rating lives (L10 to ISO 281, L10r to ISO/TS 16281); L10m "
+    "(ISO 281) includes lubricant and cleanliness.",
+    "σ_H: largest contact stress; σ_F: largest root stress; σ_H0, σ_F0: nominal stresses of ISO 6336-2 and -3. S_H, "
+    "S_F: factors on stress at which the damage is 1; static: for extreme loads. Outside the path: fraction of the "
+    "load in tip-edge contact. +: flank facing the sense of +z rotation. S_0: static rating over the largest load.",
 )
 
 LEAST_DAMAGE = 1e-6
@@ -60,14 +59,14 @@ def life_section(material: ReportData) -> Part:
                 part, kind, damage = worst[0]
                 size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
                 context.notes.statements.append(
-                    f"{words_of(choice_of(stored.data.attrs))}: in {float(stored.data.attrs['life_years']):g} years "
-                    f"{material.words.told(part)} wears most, damage {size} ({kind})."
+                    f"{words_of(choice_of(stored.data.attrs))}: largest fatigue damage in "
+                    f"{float(stored.data.attrs['life_years']):g} years: {material.words.told(part)}, {size} ({kind})."
                 )
     data = _rating(material, found)
     if not content:
         return Part("", data)
-    html = pieces.section("How long it lasts", *(pieces.paragraph(own, "note") for own in WORDS), *content, name="life")
-    return Part(html, data, "How long it lasts", "life")
+    html = pieces.section("Rating and life", *(pieces.paragraph(own, "note") for own in WORDS), *content, name="life")
+    return Part(html, data, "Rating and life", "life")
 
 
 def _rating(material: ReportData, beside: Mapping[FlankKey, Mapping[str, float]]) -> dict[str, Any]:
@@ -79,7 +78,7 @@ def _rating(material: ReportData, beside: Mapping[FlankKey, Mapping[str, float]]
         counted = rated_loads(context.gearbox)
         balance = balanced(context.assembled(RATED_AS.of(context.gearbox)), counted)
     except (GearboxFileError, BalanceError, VariantError, MeshError, BearingError) as error:
-        context.notes.left_out.append(f"rating by ISO 6336: {error}")
+        context.notes.left_out.append(f"rating to ISO 6336: {error}")
         return {}
     return {"rating": rated(context.gearbox, counted, balance, beside).summary()}
 
@@ -91,14 +90,17 @@ def _variant_section(material: ReportData, data: xr.Dataset) -> str:
     label = f"life-{data.attrs['variant']}-{data.attrs['mesh_model']}"
     rested = [line for key in ("assumptions", "unrated") for line in json.loads(data.attrs[key])]
     return (
-        pieces.element("h3", pieces.text(f"{name[0].upper()}{name[1:]}, gears by {data.attrs['edition']}"))
+        pieces.element("h3", pieces.text(f"{name[0].upper()}{name[1:]}, gears to {data.attrs['edition']}"))
         + "".join(pieces.paragraph(f"Fails: {told(line)}.") for line in json.loads(data.attrs["failures"]))
-        + "".join(pieces.paragraph(f"Falls short: {told(line)}.") for line in json.loads(data.attrs["shortfalls"]))
+        + "".join(
+            pieces.paragraph(f"Required life not reached: {told(line)}.")
+            for line in json.loads(data.attrs["shortfalls"])
+        )
         + "".join(pieces.paragraph(f"{told(line)}.") for line in json.loads(data.attrs["reliefs"]))
-        + _picture(data, f"What limits the life, {name}")
+        + _picture(data, f"Limiting parts, {name}")
         + pieces.table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True)
         + pieces.table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True)
-        + pieces.folded("What that rests on, and what has no life", pieces.bullets(map(told, rested)))
+        + pieces.folded("Assumptions, and parts without rating", pieces.bullets(map(told, rested)))
     )
 
 
@@ -137,10 +139,10 @@ def _bearing_rows(data: xr.Dataset) -> list[dict[str, object]]:
         "L10r / h": ("reference_hours", 1.0, ".3g"),
         "L10m / h": ("modified_hours", 1.0, ".3g"),
         "κ": ("viscosity_ratio", 1.0, ".2g"),
-        "least load / kN": ("minimum_load", 1e-3, ".3g"),
-        "damage by L10": ("damage", 1.0, ".3g"),
-        "damage by L10r": ("reference_damage", 1.0, ".3g"),
-        "pressure / MPa": ("pressure", 1e-6, ".0f"),
+        "minimum load / kN": ("minimum_load", 1e-3, ".3g"),
+        "damage (L10)": ("damage", 1.0, ".3g"),
+        "damage (L10r)": ("reference_damage", 1.0, ".3g"),
+        "contact stress / MPa": ("pressure", 1e-6, ".0f"),
         "S_0": ("static_safety", 1.0, ".2f"),
     }
     return _rows(data, "bearing", "bearing", columns)
@@ -187,7 +189,7 @@ def _study(study: StoredStudy) -> str:
     lost = "".join(
         f", {count} {word}" for count, word in ((study.failed, "failed"), (study.missing, "missing")) if count
     )
-    old = "" if study.fits else pieces.paragraph("The case was changed since: sweep it again.", "warning")
+    old = "" if study.fits else pieces.paragraph("The gearbox file has changed; run the study again.", "warning")
     told = f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}"
     shown = [_picture_of_studies(path) for path in study.pictures if path.stat().st_size <= LARGEST_PICTURE]
     return pieces.section(study.title, pieces.paragraph(told), old, *shown, level=3)

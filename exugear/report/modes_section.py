@@ -39,15 +39,15 @@ def modes_section(material: ReportData) -> Part:
     for model, data in modes.items():
         growth = float(data.attrs["growth_rate"])
         if growth > 0.0:
-            unstable = f"{words_of(model)}: unstable, disturbances grow by up to {growth:.3g} 1/s."
+            unstable = f"{words_of(model)}: unstable, disturbances grow at up to {growth:.3g} 1/s."
             material.context.notes.statements.append(unstable)
     models = {model_name(model): _model(material, model, data) for model, data in modes.items()}
     campbell = pieces.figure(
         "campbell",
         "Campbell diagram",
-        "Lines across: modes that the transmission error sees. Dots: an order meets a mode; the larger, the more it is "
-        "amplified. Click a dot to see the mode move.",
-        "The list of modes below names each with its frequency, damping and amplification.",
+        "Horizontal lines: modes with TE participation. Dots: an order crosses a mode; size: TE amplification. Click "
+        "a dot to show the mode shape.",
+        "The list below gives frequency, damping and TE amplification of each mode.",
     )
     chooser = pieces.element(
         "div",
@@ -129,26 +129,26 @@ def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> str:
             "No.": Cell(str(mode.index + 1), mode.index),
             "Frequency / Hz": Cell(f"{mode.frequency:.1f}", mode.frequency, f"mode:{model_name(model)}:{mode.index}"),
             "Damping / %": Cell(f"{100 * mode.damping_ratio:.2f}", mode.damping_ratio),
-            "Share / %": Cell(f"{100 * mode.share:.2f}", mode.share),
+            "TE participation / %": Cell(f"{100 * mode.share:.2f}", mode.share),
             "Amplification": Cell(f"{mode.amplification:.2f}", mode.amplification),
             "by mesh": material.words.of(mode.mesh) if mode.amplification >= 0.01 else "–",
-            "What moves": material.words.moves(data, mode.index),
-            "What gives": percentages(material.words.gives(data, mode.index)),
+            "Mode shape": material.words.moves(data, mode.index),
+            "Strain energy": percentages(material.words.gives(data, mode.index)),
         }
         for mode in reports
     ]
     title = f"All {len(rows)} modes of {words_of(model)}"
     table = pieces.table(
         rows,
-        ("by mesh", "What moves", "What gives"),
+        ("by mesh", "Mode shape", "Strain energy"),
         caption=title,
         name=f"modes-{model_name(model)}",
-        hidden=("Share / %", "by mesh"),
+        hidden=("TE participation / %", "by mesh"),
         sortable=True,
     )
     note = (
-        "Share: of the mode in the mobility of the overall transmission error; amplification: overall transmission "
-        "error at resonance per transmission error of the mesh named."
+        "TE participation: squared mass-normalised participation of the mode in the overall TE. TE amplification: "
+        "overall TE at resonance per static TE of the mesh listed."
     )
     return pieces.folded(title, pieces.paragraph(note, "note") + table)
 
@@ -184,11 +184,12 @@ def target_frequency_section(material: ReportData) -> Part:
         rows += [_row(material, model, data, mode, target) for mode in dict.fromkeys([nearest.index, visible.index])]
         material.context.notes.statements.append(_statement(model, data, nearest, visible, target))
     words = (
-        "Share: of the mode in the mobility of the overall transmission error. Where the nearest mode has a share "
-        f"under {100 * VISIBLE_SHARE:g} %, the nearest that has more stands below it. Near: within {100 * NEAR:g} %."
+        "TE participation: squared mass-normalised participation of the mode in the overall TE. If it is below "
+        f"{100 * VISIBLE_SHARE:g} % for the nearest mode, the nearest mode above that is listed, too. Near: within "
+        f"{100 * NEAR:g} %."
     )
     title = f"Modes near {target:.0f} Hz"
-    table = pieces.table(rows, ("inertias", "what moves"), caption=title, name="near")
+    table = pieces.table(rows, ("inertia set", "mode shape"), caption=title, name="near")
     html = pieces.section(title, pieces.paragraph(words, "note"), table, *_matches(material, target), name="target")
     return Part(html, {}, title, "target")
 
@@ -197,32 +198,32 @@ def _row(material: ReportData, model: Choice, data: xr.Dataset, index: int, targ
     mode = report_mode(data, index)
     return {
         "variant": model.variant,
-        "inertias": f"{model.inertias} ({model.mesh_model})",
+        "inertia set": f"{model.inertias} ({model.mesh_model})",
         "frequency / Hz": f"{mode.frequency:.1f}",
         "near": "yes" if mode.is_near(target) else "no",
         "damping / %": f"{100 * mode.damping_ratio:.2f}",
-        "share / %": f"{100 * mode.share:.1f}",
+        "TE part. / %": f"{100 * mode.share:.1f}",
         "amplification": f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})",
-        "what moves": material.words.moves(data, index),
+        "mode shape": material.words.moves(data, index),
     }
 
 
 def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: ModeReport, target: float) -> str:
     factor = float(data.attrs["housing_factor"])
-    subject = f"Variant {words_of(model)}, housing factor {factor:g}"
+    subject = f"Variant {words_of(model)}, housing stiffness factor {factor:g}"
     if visible.is_near(target):
         return (
-            f"{subject}: a mode at {visible.frequency:.0f} Hz, near {target:.0f} Hz, which the overall transmission "
-            f"error sees with a share of {100 * visible.share:.0f} % ({visible.name})."
+            f"{subject}: mode at {visible.frequency:.0f} Hz near {target:.0f} Hz, TE participation "
+            f"{100 * visible.share:.0f} % ({visible.name})."
         )
     if nearest.is_near(target):
         return (
-            f"{subject}: a mode at {nearest.frequency:.0f} Hz, near {target:.0f} Hz, but the overall transmission "
-            f"error hardly sees it (share {100 * nearest.share:.2g} %; {nearest.name})."
+            f"{subject}: mode at {nearest.frequency:.0f} Hz near {target:.0f} Hz, but with negligible TE "
+            f"participation ({100 * nearest.share:.2g} %; {nearest.name})."
         )
     return (
-        f"{subject}: no mode within {100 * NEAR:g} % of {target:.0f} Hz; the nearest that the overall transmission "
-        f"error sees is at {visible.frequency:.0f} Hz ({visible.name})."
+        f"{subject}: no mode within {100 * NEAR:g} % of {target:.0f} Hz; the nearest mode with TE participation is at "
+        f"{visible.frequency:.0f} Hz ({visible.name})."
     )
 
 
@@ -233,9 +234,11 @@ def _matches(material: ReportData, target: float) -> Iterator[str]:
         for variation in material.variations
         for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
     ]
-    yield pieces.element("h3", f"Assumptions that bring a mode to {target:.0f} Hz")
+    yield pieces.element("h3", f"Assumptions that shift a mode to {target:.0f} Hz")
     if not modelmatchs:
-        yield pieces.paragraph(f"No value in the ranges varied brings a mode that is seen to {target:.0f} Hz.")
+        yield pieces.paragraph(
+            f"No value within the varied ranges shifts a mode with TE participation to {target:.0f} Hz."
+        )
         return
     told = "; ".join(
         f"{modelmatch.assumption} instead of {modelmatch.match.parameter.default:g} ({words_of(modelmatch.model)}: "
@@ -243,10 +246,10 @@ def _matches(material: ReportData, target: float) -> Iterator[str]:
         for modelmatch in modelmatchs
     )
     material.context.notes.statements.append(
-        f"Assumptions that bring a mode seen by the overall transmission error to {target:.0f} Hz: {told}."
+        f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {told}."
     )
     rows = [_match_row(material, modelmatch, target) for modelmatch in modelmatchs]
-    yield pieces.table(rows, ("inertias", "assumption", "what moves"), caption="Assumptions", name="matches")
+    yield pieces.table(rows, ("inertia set", "assumption", "mode shape"), caption="Assumptions", name="matches")
 
 
 def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[str, object]:
@@ -255,13 +258,15 @@ def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[s
     mode = report_mode(data, match.index)
     return {
         "variant": found.model.variant,
-        "inertias": f"{found.model.inertias} ({found.model.mesh_model})",
+        "inertia set": f"{found.model.inertias} ({found.model.mesh_model})",
         "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
         "frequency / Hz": f"{mode.frequency:.0f}",
-        "share / %": f"{100 * mode.share:.1f}",
+        "TE part. / %": f"{100 * mode.share:.1f}",
         "amplification": f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})",
-        f"nearest seen in {REFERENCE_VARIANT} / Hz": f"{_reference_frequency(material, found, target):.0f}",
-        "what moves": material.words.moves(data, match.index),
+        (
+            f"nearest with TE participation in {REFERENCE_VARIANT} / Hz"
+        ): f"{_reference_frequency(material, found, target):.0f}",
+        "mode shape": material.words.moves(data, match.index),
     }
 
 
@@ -292,7 +297,10 @@ def change_section(material: ReportData) -> Part:
     if not any(content):
         return Part("")
     return Part(
-        pieces.section("What to change", *content, name="change"), {"charts": charts}, "What to change", "change"
+        pieces.section(("Design sensitivity"), *content, name="change"),
+        {"charts": charts},
+        "Design sensitivity",
+        "change",
     )
 
 
@@ -304,7 +312,7 @@ def _group(material: ReportData, group: RunGroup, charts: dict[str, Any]) -> str
     mode = top.finding.mode
     frequency = float(modes["frequency"][mode])
     scope = (
-        f"For the mode at {frequency:.1f} Hz {Variant.of(group.main).label}, inertias {group.inertias}: "
+        f"For the mode at {frequency:.1f} Hz {Variant.of(group.main).label}, inertia set {group.inertias}: "
         f"{material.words.moves(modes, mode)}."
     )
     own = next((variation for variation in material.variations if variation.choice == group.choice(group.main)), None)
@@ -328,13 +336,13 @@ def _levers(material: ReportData, group: RunGroup, mode: int) -> str:
         for own in kinds
         for lever in own
     ]
-    caption = "First-order shifts of the loudest mode"
+    caption = "First-order frequency shifts of the mode with the highest peak"
     table = pieces.table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True)
     words = (
-        "From the shares of its energies, the shape held. A share of strain energy s raises the frequency by "
-        "f (√(1 + 0.1 s) − 1), one of kinetic energy lowers it."
+        "First-order estimate with the mode shape unchanged: +10 % stiffness of an element with strain energy "
+        "fraction s shifts the frequency by f (√(1 + 0.1 s) − 1); added inertia lowers it."
     )
-    return pieces.element("h3", "10 % more of what") + pieces.paragraph(words, "note") + table
+    return pieces.element("h3", "First-order sensitivity (+10 %)") + pieces.paragraph(words, "note") + table
 
 
 def _variations(
@@ -352,12 +360,12 @@ def _variations(
         html, data = chart(
             f"variation-{group.name}-{number}",
             label,
-            f"{_range(seen.frequency)} Hz; amplification {_range(seen.amplification)}",
+            f"{_range(seen.frequency)} Hz; TE amplification {_range(seen.amplification)}",
             best_words(material.words, best),
             [
                 Curve("this mode / Hz", values, seen.frequency),
-                Curve("its amplification", values, seen.amplification, "dashed", True),
-                Curve("loudest within an octave", values, seen.loudest, "thin", True),
+                Curve("TE amplification", values, seen.amplification, "dashed", True),
+                Curve("highest within one octave", values, seen.loudest, "thin", True),
             ],
             [Axis(label, parameter.logarithmic), Axis("Hz"), Axis("amplification")],
             material.arrays,
@@ -366,13 +374,12 @@ def _variations(
         figures.append(html)
         charts.update(data)
     words = (
-        "Full eigenvalue analysis at each value; dotted: value used. Thick, left axis: frequency of this mode. Dashed, "
-        "right axis: its amplification of the transmission error. Thin, right axis: amplification of the loudest mode "
-        "of any shape within an octave. Where the dashed line falls and the thin one does not, another mode has taken "
-        "over and nothing became quieter."
+        "Full eigenvalue analysis at each value; dotted: value used. Thick line, left axis: frequency of this mode. "
+        "Dashed, right axis: its TE amplification. Thin, right axis: largest TE amplification of any mode within one "
+        "octave. Where only the dashed line falls, another mode becomes dominant and the response does not decrease."
     )
     return (
-        pieces.element("h3", "If an assumption were different")
+        pieces.element("h3", "Parameter variation")
         + pieces.paragraph(words, "note")
         + pieces.element("div", "".join(figures), class_="grid")
         + pieces.bullets(told)

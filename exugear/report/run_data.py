@@ -278,20 +278,20 @@ def _facts(material: ReportData, group: RunGroup, run: VariantRun, resonance: Ra
     facts = [
         [
             "Level",
-            f"{figure_text(peak.level)} dB = ±{figure_text(10.0 ** (peak.level / 20.0), 2)} µm, "
-            f"{figure_text(peak.prominence, 2)} dB above its surroundings{at_constant}",
+            f"{figure_text(peak.level)} dB = ±{figure_text(10.0 ** (peak.level / 20.0), 2)} µm zero-to-peak, "
+            f"prominence {figure_text(peak.prominence, 2)} dB{at_constant}",
         ],
         ["Excited by", f"{words.line_sentence(peak.line)} (order {figure_text(peak.line.order, 4)})"],
     ]
     if others:
         facts.append(["Shown by", ", ".join(words.line(line) for line in others)])
     for variant, level in resonance.elsewhere.items():
-        lacks = "does not show it, " if variant in resonance.lacking else ""
-        there = f"{figure_text(level)} dB there" if math.isfinite(level) else "did not go there"
+        lacks = "not resolved, " if variant in resonance.lacking else ""
+        there = f"{figure_text(level)} dB there" if math.isfinite(level) else "outside its range"
         facts.append([Variant.of(variant).label.capitalize(), f"{lacks}{there}"])
     facts += _mode_facts(material, group, run, resonance)
     if not resonance.steady:
-        facts.append(["Mind", "not every length of the window shows it: it may be no resonance"])
+        facts.append(["Warning", "not found with all window lengths; possibly not a resonance"])
     return facts
 
 
@@ -300,14 +300,14 @@ def _mode_facts(material: ReportData, group: RunGroup, run: VariantRun, resonanc
     modes = run.modes
     if resonance.finding.mode_name and modes is None:
         moves = material.words.told(resonance.finding.mode_name)
-        return [["Mode", f"{resonance.finding.mode_frequency:.1f} Hz at this speed"], ["What moves", moves]]
+        return [["Mode", f"{resonance.finding.mode_frequency:.1f} Hz at this speed"], ["Mode shape", moves]]
     if modes is None and not group.responses:
-        return [["Mode", "no modes were computed: `exugear modes`"]]
+        return [["Mode", "no modes computed; run `exugear modes`"]]
     if mode is None or modes is None:
         return [["Mode", "none near"]]
     damping = 100.0 * float(modes["damping_ratio"][mode])
     return [
         ["Mode", f"{resonance.finding.mode_frequency:.1f} Hz, damping {figure_text(damping, 2)} %"],
-        ["What moves", material.words.moves(modes, mode)],
-        ["What gives", percentages(material.words.gives(modes, mode))],
+        ["Mode shape", material.words.moves(modes, mode)],
+        ["Strain energy", percentages(material.words.gives(modes, mode))],
     ]

@@ -51,8 +51,8 @@ def steady_section(material: ReportData) -> Part:
         return Part("")
     charts: dict[str, Any] = {}
     content = [_response(material, data, charts) for data in material.results.steady]
-    html = pieces.section("Steady response", *content, name="steady")
-    return Part(html, {"charts": charts}, "Steady response", "steady")
+    html = pieces.section("Steady-state response", *content, name="steady")
+    return Part(html, {"charts": charts}, "Steady-state response", "steady")
 
 
 def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) -> str:
@@ -60,33 +60,33 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
     choice = choice_of(data.attrs)
     level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
-    label = f"{words_of(choice)}, level {level}"
-    context.tell(f"steady response, {label}")
+    label = f"{words_of(choice)}, method {level}"
+    context.tell(f"steady-state response, {label}")
     found = peaks(data)[:SHOWN]
     rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
     rows = [_row(material, peak, data, rates) for peak in found]
     lost = [row for row in rows if any(value == TELL_FAST for value in row.values())]
     note = ""
     if lost:
-        told = f"run-ups are too fast for {len(lost)} of its {len(rows)} loudest peaks, which they show too low."
-        context.notes.statements.append(f"Steady response, {label}: {told}")
-        note = pieces.paragraph(f"Mind: {told}", "warning")
+        told = f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
+        context.notes.statements.append(f"Steady-state response, {label}: {told}")
+        note = pieces.paragraph(f"Warning: {told}", "warning")
     growth = float(data.attrs["growth_rate"])
     others = [_other_load(run) for run in runs if run.attributes.get("table_doubt")]
-    context.notes.statements.extend(f"Steady response, {label}: {other}" for other in others)
+    context.notes.statements.extend(f"Steady-state response, {label}: {other}" for other in others)
     content = [
         pieces.paragraph(f"At the static load: {static_load_in_words(context.gearbox)}.", "note"),
-        *(pieces.paragraph(f"Mind: {other}", "warning") for other in others),
-        pieces.alert("Unstable", [f"disturbances grow by up to {growth:.3g} 1/s"]) if growth > 0.0 else "",
+        *(pieces.paragraph(f"Warning: {other}", "warning") for other in others),
+        pieces.alert("Unstable", [f"disturbances grow at up to {growth:.3g} 1/s"]) if growth > 0.0 else "",
         note,
         _shared_lines(material, data),
         _remarks(data, f"remarks-{level}-{model_name(choice)}"),
         _order_charts(material, data, runs, f"steady-{level}-{model_name(choice)}", charts),
-        pieces.element("h4", f"Loudest peaks: the first {len(rows)}"),
+        pieces.element("h4", f"Highest peaks: first {len(rows)}"),
         pieces.table(
             rows,
-            ("line",),
-            caption=f"Peaks of the steady response, {label}",
+            ("order",),
+            caption=f"Peaks of the steady-state response, {label}",
             name=f"peaks-{level}-{model_name(choice)}",
             sortable=True,
         ),
@@ -94,9 +94,9 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
         _campbell(material, data, f"campbell-{level}-{model_name(choice)}", label, charts),
         _sidebands_table(material, data, peaks(data)),
         pieces.paragraph(
-            f"Slowest decay of a disturbance {-growth:.3g} 1/s. A run-up is called too fast for a resonance where "
-            f"f′ / (2π ζ² f²) is above {MAX_SWEEP_RATIO:g}: the peak does not build up. f is the frequency of the "
-            "peak, f′ its rate in the run-up, ζ the damping of the mode that is met there; – where no mode is known.",
+            f"Slowest decay rate of a disturbance: {-growth:.3g} 1/s. A run-up is too fast for a resonance if the "
+            f"sweep-rate ratio f′ / (2π ζ² f²) is above {MAX_SWEEP_RATIO:g}: the peak does not build up. f: peak "
+            "frequency; f′: its rate in the run-up; ζ: damping ratio of the mode; –: no mode known.",
             "note",
         ),
     ]
@@ -106,8 +106,8 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
 def _other_load(run: VariantRun) -> str:
     """Say that a run-up beside a response is at another load."""
     return (
-        f"the run-up of the load case {run.attributes['load_case']} is at another load, {run.attributes['load']}: "
-        "levels of both differ for that, too."
+        f"the run-up of the load case {run.attributes['load_case']} is at another load, {run.attributes['load']}; its "
+        "levels also differ for that reason."
     )
 
 
@@ -118,8 +118,8 @@ def _shared_lines(material: ReportData, data: xr.Dataset) -> str:
         return ""
     told = material.words.told(shared)
     return pieces.paragraph(
-        f"Mind: mesh frequencies share lines: {told}. Each such line is one, named after the simplest of those that "
-        "make it; its level is that of all of them together.",
+        f"Note: coinciding orders of several meshes: {told}. Each is named after the simplest of them; its level is "
+        "the sum of all.",
         "warning",
     )
 
@@ -136,8 +136,8 @@ def _remarks(data: xr.Dataset, name: str) -> str:
     if not told:
         return ""
     rows: list[dict[str, object]] = [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in told]
-    table = pieces.table(rows, ("remark",), caption="Remarks on speeds", name=name)
-    return pieces.folded(f"Remarks on {len(rows)} of {len(speeds) + len(lost)} speeds", table)
+    table = pieces.table(rows, ("remark",), caption="Warnings by speed", name=name)
+    return pieces.folded(f"Warnings at {len(rows)} of {len(speeds) + len(lost)} speeds", table)
 
 
 def _order_charts(
@@ -159,10 +159,10 @@ def _order_charts(
         )
         figures.append(html)
         charts.update(spec)
-    words = "Level of the overall transmission error along the orders: at steady speed"
-    words += ", and as run-ups show it, cut with the window that suits their sweep." if runs else "."
+    words = "Order cuts of the overall transmission error: at constant speed"
+    words += ", and in the run-ups, with the window that suits their sweep rate." if runs else "."
     if settings_of(data.attrs).branches:
-        words += " Branches go back at their folds; states on dashed parts do not last."
+        words += " Continuation curves turn back at turning points; dashed parts are unstable."
     return pieces.paragraph(words, "note") + pieces.element("div", "".join(figures), class_="grid")
 
 
@@ -177,7 +177,7 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> s
         speed = abs(float(load["speed"]))
         rows.append(
             {
-                "line": told(line_name(tuple(int(n) for n in index[line]), bases)),
+                "order": told(line_name(tuple(int(n) for n in index[line]), bases)),
                 "speed / rpm": f"{speed / RPM:.2f}",
                 "excited by": told(_shares(load["meshes"].items())),
                 "carried by": _shares((f"{frequency:.1f} Hz", share) for frequency, share in load["modes"]),
@@ -187,13 +187,16 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> s
         )
     if not rows:
         return ""
-    said = "What makes resonances: shares of the amplitude, and its relative change per relative change of a parameter"
+    said = (
+        "Contributions to resonances: fractions of the amplitude, and relative change per relative change of a "
+        "parameter"
+    )
     return pieces.folded(
         said,
         pieces.table(
             rows,
-            ("line", "excited by", "carried by", "per stiffness of", "per inertia of"),
-            caption="What makes resonances",
+            ("order", "excited by", "carried by", "per stiffness of", "per inertia of"),
+            caption="Contributions to resonances",
             name=name,
         ),
     )
@@ -222,13 +225,12 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
             x = np.array([abs(c["speed"]) / RPM for c in own])
             curves.append(Curve(f"{strength} crossings", x, [c["frequency"] for c in own], "points"))
     caption = (
-        f"Modes over speed as seen from the housing, {label}; dots where mesh orders and their harmonics meet modes "
-        "that they excite."
+        f"Modes over speed in the fixed frame, {label}; dots: mesh orders and harmonics cross modes that they excite."
     )
     html, spec = chart(
         name,
         "Modes over speed",
-        "Lines across: modes, by type. Dashed: mesh orders. Dots: crossings that excite.",
+        "Horizontal lines: modes, by type. Dashed: mesh orders. Dots: excited crossings.",
         caption,
         curves,
         [Axis(f"{material.input_words} speed / rpm"), Axis("frequency / Hz")],
@@ -240,9 +242,9 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
         html
         + _speed_ranges(material.context)
         + pieces.folded(
-            "Modes over speed and the crossing that excites each most: share of the largest peak of a signal",
+            "Modes over speed and their strongest crossing: fraction of the largest peak of a signal",
             pieces.table(
-                rows, ("type", "strongest crossing", "what moves"), caption=caption, name=f"{name}-modes", sortable=True
+                rows, ("type", "strongest crossing", "mode shape"), caption=caption, name=f"{name}-modes", sortable=True
             ),
         )
     )
@@ -296,13 +298,13 @@ def _mode_rows(
             "type": diagram.kinds[mode],
             "whirl": _whirl_text(whirl),
             "strongest crossing": "",
-            "share / %": "",
-            "what moves": material.words.told(diagram.names[mode]),
+            "fraction / %": "",
+            "mode shape": material.words.told(diagram.names[mode]),
         }
         if met is not None:
             line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
             row["strongest crossing"] = f"{material.words.told(line)} at {abs(met['speed']) / RPM:.1f} rpm"
-            row["share / %"] = f"{100.0 * met['share']:.1f}"
+            row["fraction / %"] = f"{100.0 * met['share']:.1f}"
         rows.append(row)
     return rows
 
@@ -323,19 +325,21 @@ def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Pea
                 {
                     "peak": f"{told(peak.line)} at {abs(peak.speed) / RPM:.1f} rpm",
                     "peak / Hz": f"{peak.frequency:.1f}",
-                    "beside it": told(band.line.replace("mesh_force ", "force of mesh ")),
+                    "sideband": told(band.line.replace("mesh_force ", "force of mesh ")),
                     "at / Hz": f"{band.frequency:.1f}",
-                    "apart / Hz": f"{band.frequency - peak.frequency:+.2f}",
+                    "offset / Hz": f"{band.frequency - peak.frequency:+.2f}",
                     "amplitude": _amplitude(band.line, band.amplitude),
-                    "share / %": f"{100.0 * band.share:.1f}",
+                    "fraction / %": f"{100.0 * band.share:.1f}",
                     "cause": told(band.cause),
                 }
             )
     if not rows:
         return ""
-    said = "Sidebands of the loudest peaks and their causes: lines at the speed of the peak that other meshes or the "
-    table = pieces.table(rows, ("beside it", "cause"))
-    return pieces.folded(f"{said}turning planets make", pieces.paragraph(told(_passages(context, carriers))) + table)
+    said = (
+        "Sidebands of the highest peaks and their causes: orders at the speed of the peak due to other meshes or the "
+    )
+    table = pieces.table(rows, ("sideband", "cause"))
+    return pieces.folded(f"{said}rotating planets", pieces.paragraph(told(_passages(context, carriers))) + table)
 
 
 def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> str:
@@ -347,8 +351,8 @@ def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> st
         count = sum(mesh.family == family for mesh in gearbox.meshes)
         passage = count * abs(ratio)
         told.append(
-            f"{family}: {count} planets of {carrier} pass a place of the housing at order {passage:g}, which goes "
-            f"{orders[family] / passage:g} times into the order of the meshes, {orders[family]:g}."
+            f"{family}: {count} planets of {carrier} pass a point of the housing at order {passage:g}, "
+            f"{orders[family] / passage:g} times contained in the mesh order {orders[family]:g}."
         )
     return " ".join(told)
 
@@ -448,7 +452,7 @@ def _whirl_text(whirl: float) -> str:
 def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
     damping = _damping(peak, data)
     row: dict[str, object] = {
-        "line": material.words.told(peak.line),
+        "order": material.words.told(peak.line),
         "speed / rpm": f"{abs(peak.speed) / RPM:.2f}",
         "frequency / Hz": f"{peak.frequency:.1f}",
         "amplitude / µm": figure_text(1e6 * peak.amplitude),

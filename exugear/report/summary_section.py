@@ -40,14 +40,14 @@ def short_section(material: ReportData) -> Part:
     if not content:
         content = [_without_groups(material)]
     elif not any(not group.responses for group in material.groups):
-        content.append(pieces.paragraph("No run-up of this case is here: `exugear run` makes one.", "note"))
-    return Part(pieces.section("In short", *content, name="short"), {}, "In short", "short")
+        content.append(pieces.paragraph("No run-up; run `exugear run`.", "note"))
+    return Part(pieces.section("Summary", *content, name="short"), {}, "Summary", "short")
 
 
 def _group(material: ReportData, group: RunGroup, facts: Sequence[SummaryCard], verdicts: Sequence[CheckResult]) -> str:
     scope = (
-        f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds are those of the "
-        f"{material.input_words}, levels those of the overall transmission error, 0 dB = 1 µm."
+        f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds: of the "
+        f"{material.input_words}. Levels: overall transmission error (TE), 0 dB = 1 µm."
     )
     return (
         pieces.paragraph(scope, "note")
@@ -62,7 +62,7 @@ def _load_of(material: ReportData, group: RunGroup) -> str:
     loads = {str(run.attributes.get("load", "")) for run in group.runs.values()}
     if group.responses or not any(loads):
         return f"static load, {static}"
-    return f"{'; '.join(sorted(filter(None, loads)))} (tables and steady responses: static load, {static})"
+    return f"{'; '.join(sorted(filter(None, loads)))} (tables and steady-state responses: static load, {static})"
 
 
 def _without_groups(material: ReportData) -> str:
@@ -70,9 +70,7 @@ def _without_groups(material: ReportData) -> str:
     facts = [fact for data in material.results.steady for fact in facts_of_response(material.words, data)]
     material.context.notes.statements.extend(fact.line for fact in facts)
     cards = pieces.element("div", "".join(map(_card, facts)), class_="cards") if facts else ""
-    return cards + pieces.paragraph(
-        "No run-up of this case is here: `exugear run` makes one, and the page tells more.", "note" if facts else ""
-    )
+    return cards + pieces.paragraph("No run-up; run `exugear run` for a complete report.", "note" if facts else "")
 
 
 def _card(fact: SummaryCard) -> str:
@@ -90,36 +88,36 @@ def verdict_list(verdicts: Sequence[CheckResult]) -> str:
     entries = []
     for verdict in verdicts:
         sign = pieces.element("b", "✓" if verdict.passed else "!", aria_hidden="true")
-        element = pieces.element("span", "Passed: " if verdict.passed else "Mind: ", class_="unseen")
+        element = pieces.element("span", "Passed: " if verdict.passed else "Warning: ", class_="unseen")
         entries.append(
             pieces.element(
                 "li", sign + element + pieces.text(verdict.words), class_="good" if verdict.passed else "mind"
             )
         )
-    return pieces.element("ul", "".join(entries), class_="verdicts", aria_label="Can this be trusted?")
+    return pieces.element("ul", "".join(entries), class_="verdicts", aria_label="Validity checks")
 
 
 # Section "Where it rings": waterfall, order cuts, the chosen resonance in words, and its mode in motion
 
-NO_MODES = "No modes are here: `exugear modes` computes them, and the page shows them move."
+NO_MODES = "No modes computed; run `exugear modes` to show mode shapes."
 
 
 def rings_section(material: ReportData) -> Part:
     """Draw the waterfalls of all run-ups and steady responses; the sentences stand in the ranking, too."""
     if not material.groups:
         return Part("")
-    return Part(_html(material), material.run_data, "Where it rings", "rings")
+    return Part(_html(material), material.run_data, "Waterfall and order cuts", "rings")
 
 
 def _html(material: ReportData) -> str:
     words = _groups_text(material.groups)
     channel = pieces.element("label", "Signal " + pieces.element("select", "", id="channel"))
     views = pieces.element("div", "", class_="choices", id="view", role="group", aria_label="Model shown")
-    waterfall = pieces.figure("waterfall", "Waterfall", f"Read from: {material.groups[0].source}.", words)
+    waterfall = pieces.figure("waterfall", "Waterfall", f"Source: {material.groups[0].source}.", words)
     scale = pieces.element("div", "", class_="scale", id="waterfall-scale") + pieces.element(
         "p", "", class_="readout", id="readout"
     )
-    cuts = pieces.figure("cuts", "Level along the orders", "Same speeds as above. Choose the orders below.", words)
+    cuts = pieces.figure("cuts", "Order cuts", "Same speeds as above. Select orders below.", words)
     orders = pieces.element("div", "", class_="chips", id="orders", role="group", aria_label="Orders shown")
     detail = pieces.element("article", "", class_="panel", id="detail", aria_live="polite")
     left = pieces.element(
@@ -130,11 +128,11 @@ def _html(material: ReportData) -> str:
     right = pieces.element("div", detail + stage)
     controls = pieces.element("div", channel + views, class_="controls scripts-only")
     split = pieces.element("div", left + right, class_="split scripts-only")
-    return pieces.section("Where it rings", controls, split, _without_scripts(words), name="rings")
+    return pieces.section("Waterfall and order cuts", controls, split, _without_scripts(words), name="rings")
 
 
 def _without_scripts(words: str) -> str:
-    said = f"Diagrams need scripts, which are switched off here; nothing is loaded from any network. {words}"
+    said = f"Diagrams require JavaScript, which is disabled; nothing is loaded from a network. {words}"
     return f"<noscript>{pieces.paragraph(said, 'warning')}</noscript>"
 
 
@@ -142,7 +140,7 @@ def _groups_text(groups: Sequence[RunGroup]) -> str:
     group = groups[0]
     loudest = [own for own in group.ranked[group.main] if own.steady][:3]
     told = [f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.loudness)} dB" for own in loudest]
-    return f"Loudest, {Variant.of(group.main).label}, {group.source}: {'; '.join(told) or 'nothing stands out'}."
+    return f"Highest resonances, {Variant.of(group.main).label}, {group.source}: {'; '.join(told) or 'none found'}."
 
 
 # Section "Resonances, loudest first": what rings, by which mesh, whether other variants have it, and what moves
@@ -177,7 +175,7 @@ def ranking_section(material: ReportData) -> Part:
         return Part("")
     controls = pieces.element("div", _variant_choice() + _filters(), class_="controls scripts-only")
     html = pieces.section(
-        "Resonances, loudest first",
+        "Resonance ranking",
         *in_operation,
         controls,
         *tables,
@@ -193,13 +191,13 @@ def _operating_resonances(material: ReportData, group: RunGroup) -> str:
     if ranking is None or not ranking.resonances:
         return ""
     low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
-    which = "all speeds" if ranking.whole else "speeds of operation"
+    which = "all speeds" if ranking.whole else "operating speed range"
     rows = [_loud_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
     title = f"At constant speed, {Variant.of(group.main).label}, {which}, {low} to {high} rpm: the first {len(rows)}"
     table = pieces.table(rows, ("Excited by", "At"), caption=title, name=f"in-operation-{group.name}", sortable=True)
     note = (
-        f"In the order of the best place in any of the three; the place stands in brackets. Accelerations are those of "
-        f"the {ranking.accelerates} at bearings. Of planets it is the root of the mean square over them."
+        "Zero-to-peak amplitudes, (rank) within each quantity; sorted by the best rank. Accelerations: of the "
+        f"{ranking.accelerates} at bearings. Planets: root mean square over the planets."
     )
     return pieces.element("h3", pieces.text(title)) + table + pieces.paragraph(note, "note")
 
@@ -225,7 +223,7 @@ def _variant_choice() -> str:
 
 def _filters() -> str:
     only = pieces.element(
-        "label", pieces.element("input", type="checkbox", id="only-lacking") + " only what another model lacks"
+        "label", pieces.element("input", type="checkbox", id="only-lacking") + " only those absent in another model"
     )
     text = pieces.element(
         "input", type="search", id="filter", placeholder="Filter: shaft, bearing, Hz", aria_label="Filter the table"
@@ -243,26 +241,26 @@ def _filters() -> str:
 def _rules() -> str:
     factors = ", ".join(f"{factor:g}" for factor in WINDOW_FACTORS)
     return (
-        "A resonance is a peak that stands at least 6 dB above its surroundings along an order; peaks of several "
-        f"orders at one frequency are one. Absent, judged at its loudest peak: {AbsenceRule().description}, with every "
-        f"window. Unsteady, of run-ups: not shown with every length of the window, {factors} times that of the "
-        "diagrams. Where a steady response is there, levels at constant speed rank: a run-up that is too fast for a "
-        f"resonance shows it too low, and is marked where it lacks {BUILT_UP:g} dB or more. At constant speed ± is "
-        "half of the width of a peak 3 dB below its top."
+        "A resonance is a peak with a prominence of at least 6 dB along an order; peaks of several orders at one "
+        f"frequency are one resonance. Absent, at its highest peak: {AbsenceRule().description}, with every window. "
+        f"Window-dependent (run-ups): not found with all window lengths, {factors} times that of the diagrams. With a "
+        "steady-state response, levels at constant speed are ranked: a run-up that is too fast underestimates a "
+        f"resonance and is marked if {BUILT_UP:g} dB or more are missing. At constant speed ± is half the width of a "
+        "peak 3 dB below its maximum."
     )
 
 
 def _table(material: ReportData, group: RunGroup, variant: str) -> str:
     run = group.runs[variant]
     ranked = group.ranked[variant]
-    title = f"{Variant.of(variant).label.capitalize()}, inertias {group.inertias}, {group.source}"
+    title = f"{Variant.of(variant).label.capitalize()}, inertia set {group.inertias}, {group.source}"
     heading = pieces.element("h3", pieces.text(f"{title}: {len(ranked)}"))
     rows = [_row(material, group, run, number, own) for number, own in enumerate(ranked, start=1)]
     if not rows:
-        return heading + pieces.paragraph("No resonance stands out.")
+        return heading + pieces.paragraph("No resonance found.")
     table = pieces.table(
         rows,
-        ("Excited by", "What moves; what gives", *_others(group, variant)),
+        ("Excited by", "Mode shape; strain energy", *_others(group, variant)),
         caption=f"Resonances {title}",
         name=f"ranking-{group.name}-{variant}",
         hidden=("± µm", "Prominence / dB", "Mode / Hz"),
@@ -305,11 +303,13 @@ def _row(
     row["Mode / Hz"] = Cell(
         f"{finding.mode_frequency:.1f}" if matched else "–", finding.mode_frequency if matched else -1.0
     )
-    row["What moves; what gives"] = _story(material, group, run, resonance)
+    row["Mode shape; strain energy"] = _story(material, group, run, resonance)
     if group.responses:
         return row
     row["Windows"] = Cell(
-        "all" if resonance.steady else "unsteady", float(resonance.steady), tag="good" if resonance.steady else "mind"
+        "all" if resonance.steady else "window-dependent",
+        float(resonance.steady),
+        tag="good" if resonance.steady else "mind",
     )
     return row
 
@@ -340,7 +340,7 @@ def _story(material: ReportData, group: RunGroup, run: VariantRun, resonance: Ra
     if modes is None:
         if group.responses:
             return NOT_NEAR
-        return "no modes were computed"
+        return "no modes computed"
     if mode is None:
         return NOT_NEAR
     gives = percentages(material.words.gives(modes, mode))

@@ -27,39 +27,40 @@ from fe_ste.tools.files import FileError
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
 """Packages whose versions a report names."""
 MESH_TIME_LABELS = (
-    "longest pull of a mesh",
-    "longest time teeth are apart",
+    "longest tensile mesh force",
+    "longest contact loss",
     "longest time outside a table",
-    "longest time beside unsolved states of a table",
+    "longest time next to non-converged table states",
 )
 """Labels of `exugear.system.signals.MESH_TIMES`, in their order."""
 GLOSSARY = {
-    "overall transmission error": "Angle of the output less the ratio times the angle of the input, as a length on the "
-    "base circle of the output gear.",
-    "static transmission error": "Approach of two gears along the line of action under load, at rest.",
-    "mesh cycle": "Passage of one tooth: one angular pitch.",
-    "order": "Periods per turn of the overall input.",
+    "overall transmission error": "(Output angle minus ratio times input angle) times base radius of the output.",
+    "static transmission error": "Approach of two gears along the line of action under static load.",
+    "mesh cycle": "Rotation by one angular pitch.",
+    "order": "Periods per revolution of the overall input.",
     "level": "20 log10 of an amplitude over a reference: 0 dB = 1 µm, or 1 N for forces; 6 dB are a factor of 2.",
-    "prominence": "Height of a peak above the higher of the two valleys beside it.",
-    "± Hz": "How exactly the sweep allows a frequency to be told: the wider of one over the length of the window and "
-    "the root of the rate at which the order sweeps.",
+    "prominence": "Height of a peak above the higher of the two adjacent minima.",
+    "± Hz": "Frequency resolution of the run-up: the larger of 1 / window length and the square root of the sweep rate "
+    "of the order.",
     "amplification": "Overall transmission error at resonance per static transmission error of one mesh.",
-    "share": "Part of a mode in the mobility of the overall transmission error, or in its strain or kinetic energy.",
-    "variant": "How shafts are held: on ideal joints (rigid), on bearings (bushing), with elastic bodies (flexible).",
-    "first-order shift": "Change of a frequency for a small change of a parameter, the shape of the mode held.",
-    "inertia set": "One of the sets of masses and inertias that the case gives its bodies.",
-    "mesh law": "How the force of a mesh follows from the motion of its gears; line_of_action: along the line on which "
-    "flanks push each other, with a stiffness that varies over the mesh cycle.",
-    "housing factor": "Share of a deflection that the bearing takes where its seat yields, too; 1 is a rigid housing.",
-    "unsteady": "Of a resonance: shown with one length of the spectra's window and not with others.",
-    "steady response": "Vibration at constant speed: what a run-up would show if it were infinitely slow.",
-    "Campbell diagram": "Eigenfrequencies over speed, with the orders that may excite them.",
-    "whirl": "Motion of a shaft's axis on a circle, forward or backward against its turn.",
-    "sideband": "Line beside a loud one, at the distance of another frequency such as the carrier's.",
-    "L10, L10r": "Rating life that nine bearings of ten reach: by ISO 281, and by ISO/TS 16281 from the loads of all "
-    "rolling elements.",
-    "damage": "Miner's sum: cycles that occur over those that each load allows. One is worn out.",
-    "S_H, S_F": "Factor on the stress of the flank, or of the tooth root, at which the damage is one.",
+    "share": (
+        "Participation of a mode in the overall transmission error (squared, mass-normalised); fraction of strain or "
+        "kinetic energy."
+    ),
+    "variant": "Support of the shafts: ideal joints (rigid), elastic bearings (bushing), flexible bodies (flexible).",
+    "first-order shift": "Change of a frequency for a small parameter change, mode shape unchanged.",
+    "inertia set": "One of the sets of masses and inertias in the gearbox file.",
+    "mesh model": "Mesh force as a function of gear motion; line_of_action: along the line of action, time-varying "
+    "stiffness.",
+    "housing stiffness factor": "Bearing stiffness with housing over bearing stiffness alone; 1: rigid housing.",
+    "window-dependent": "Of a resonance: found with one window length but not with others.",
+    "steady-state response": "Vibration at constant speed, the limit of an infinitely slow run-up.",
+    "Campbell diagram": "Eigenfrequencies over speed, with the orders that can excite them.",
+    "whirl": "Orbital motion of a shaft axis, forward or backward relative to its rotation.",
+    "sideband": "Spectral component next to a dominant one, offset by another frequency such as the carrier frequency.",
+    "L10, L10r": "Rating life reached by 90 % of bearings: to ISO 281, and to ISO/TS 16281 from element loads.",
+    "damage": "Miner's sum: number of cycles over permissible cycles, summed over all loads; 1 is failure.",
+    "S_H, S_F": "Factor on flank or root stress at which the damage is 1.",
 }
 """Words of the field that the page uses."""
 
@@ -70,16 +71,16 @@ def trust_section(material: ReportData) -> Part:
     compared = "".join(_exudyn_comparison(material, run, charts) for run in material.results.runs)
     parts = [
         pieces.folded("Assumptions", _assumptions(material), opened=True),
-        pieces.folded("What was run, and how well its energy adds up", _runs(material)),
-        pieces.folded("All inputs of the case", _inputs(material)),
+        pieces.folded("Runs and energy balance", _runs(material)),
+        pieces.folded("All inputs of the gearbox file", _inputs(material)),
         pieces.folded("Provenance: hashes and versions", _provenance(material)),
-        pieces.folded("Where the time went", _times(material)),
-        pieces.folded("Words of this page", _glossary()),
-        pieces.folded("Libraries in this page, and their licences", _licences()),
+        pieces.folded("Run time", _times(material)),
+        pieces.folded("Glossary", _glossary()),
+        pieces.folded("Libraries in this page and their licences", _licences()),
     ]
     if compared:
-        parts.insert(2, pieces.folded("The same run by Exudyn", compared))
-    html = pieces.section("What was assumed, and where it comes from", *parts, name="trust")
+        parts.insert(2, pieces.folded("Comparison with Exudyn", compared))
+    html = pieces.section("Assumptions and checks", *parts, name="trust")
     return Part(html, {"charts": charts}, "Trust", "trust")
 
 
@@ -89,18 +90,18 @@ def _assumptions(material: ReportData) -> str:
     acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
     listed = [
         f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}.",
-        f"Housing factor on the stiffness of bearings in the housing: {case.housing.factor:g}.",
-        f"Damping proportional to stiffness: bearings {1e6 * case.damping.bearing_time_s:g} µs, meshes "
+        f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}.",
+        f"Stiffness-proportional damping: bearings {1e6 * case.damping.bearing_time_s:g} µs, meshes "
         f"{1e6 * case.damping.mesh_time_s:g} µs, couplings {1e6 * case.damping.coupling_time_s:g} µs times the "
         "stiffness.",
         f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
-        f"Mesh stiffness is that at the static load of the case, {static_load_in_words(gearbox)}; meshes are "
-        "bilateral, and the time in which teeth would have to pull is counted.",
+        f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral, the time with "
+        "tensile mesh force is recorded.",
         "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
         *_elastic_words(material),
     ]
     return pieces.bullets(listed) + pieces.paragraph(
-        f"Sources of all inputs: the comments of {material.file_words}, and what lies beside it.", "note"
+        f"Sources of all inputs: comments of {material.file_words} and files in its folder.", "note"
     )
 
 
@@ -116,11 +117,11 @@ def _elastic_words(material: ReportData) -> Iterator[str]:
         unknowns = sum(body.reduced.summary.unknowns.values())
         parts.append(f"{name} ({unknowns} unknowns reduced to {body.reduced.size} coordinates)")
     yield (
-        f"Elastic in the variant {assembly.variant}: {', '.join(parts)}; damping {1e6 * case.damping.body_time_s:g} µs "
-        f"times the stiffness, modes listed up to {case.elasticity.band_Hz:g} Hz."
+        f"Flexible in the variant {assembly.variant}: {', '.join(parts)}; damping {1e6 * case.damping.body_time_s:g} "
+        f"µs times the stiffness, modes listed up to {case.elasticity.band_Hz:g} Hz."
     )
     if any(body.fixed for body in assembly.bodies):
-        yield f"In the variant {assembly.variant} the elastic housing takes the place of the housing factor."
+        yield f"In the variant {assembly.variant} the flexible housing replaces the housing stiffness factor."
 
 
 def _runs(material: ReportData) -> str:
@@ -130,8 +131,10 @@ def _runs(material: ReportData) -> str:
     if rows:
         tables.append(pieces.table(rows, ("run", "load", "solver", "analysis"), caption="What was run", name="runs"))
     if steady:
-        tables.append(pieces.table(steady, ("steady response",), caption="Steady responses", name="responses"))
-    return "".join(tables) or pieces.paragraph("Nothing was run.")
+        tables.append(
+            pieces.table(steady, ("steady-state response",), caption=("Steady-state responses"), name="responses")
+        )
+    return "".join(tables) or pieces.paragraph("No runs.")
 
 
 def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, Any]) -> str:
@@ -150,7 +153,7 @@ def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, 
     html, data = chart(
         f"exudyn-{model_name(choice_of(run.attributes))}",
         f"Overall transmission error by both solvers, {words_of(choice_of(run.attributes))}",
-        "Change about the mean of Exudyn's.",
+        "Deviation from the mean of the Exudyn result.",
         found.words,
         [Curve("compiled solver", found.time, own), Curve("Exudyn", found.time, other, "dashed")],
         [Axis("time / s"), Axis("overall transmission error / µm")],
@@ -163,14 +166,14 @@ def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, 
 def _response_row(data: xr.Dataset) -> dict[str, object]:
     speed = np.abs(data["speed"].to_numpy()) / RPM
     return {
-        "steady response": f"{words_of(choice_of(data.attrs))}, level {data.attrs['method']}",
+        "steady-state response": f"{words_of(choice_of(data.attrs))}, method {data.attrs['method']}",
         "speeds": data.sizes["point"],
         "slowest / rpm": f"{speed.min():.1f}",
         "fastest / rpm": f"{speed.max():.1f}",
         "lines": data.sizes["line"] - 1,
         "left out": len(json.loads(data.attrs["not_converged"])),
-        "largest share of power not accounted for": f"{float(np.nanmax(data['energy_error'])):.1e}",
-        "fastest growth of a disturbance / (1/s)": f"{float(data.attrs['growth_rate']):.3g}",
+        "largest error of the power balance": f"{float(np.nanmax(data['energy_error'])):.1e}",
+        "largest growth rate of a disturbance / (1/s)": f"{float(data.attrs['growth_rate']):.3g}",
     }
 
 
@@ -180,12 +183,12 @@ def _run_row(material: ReportData, run: VariantRun) -> dict[str, object]:
     return {
         "run": str(material.context.name_of(run.path)),
         "load": str(run.attributes.get("load", "")),
-        "to be trusted": "NO, see the top" if verdict_of(run.attributes) else "yes",
+        "valid": "NO, see top of page" if verdict_of(run.attributes) else "yes",
         "solver": run.attributes["solver"],
         "step / µs": f"{1e6 * float(run.attributes['step']):g}",
         "simulated / s": f"{figures.end:.2f}" + ("" if int(run.attributes["complete"]) else " (stopped)"),
         "fastest / rpm": f"{float(run.spectra.speed.max()) / RPM:.1f}",
-        "energy not accounted for": f"{figures.residual:.1e}",
+        "error of the energy balance": f"{figures.residual:.1e}",
         **{f"{what} / s": f"{time:.3g}" for what, time in times},
         "analysis": run.spectra.description,
     }
@@ -193,7 +196,7 @@ def _run_row(material: ReportData, run: VariantRun) -> dict[str, object]:
 
 def _inputs(material: ReportData) -> str:
     rows = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
-    return pieces.table(rows, ("value",), caption="All inputs of the case", name="inputs")
+    return pieces.table(rows, ("value",), caption="All inputs of the gearbox file", name="inputs")
 
 
 def flat_keys(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
@@ -217,7 +220,7 @@ def _provenance(material: ReportData) -> str:
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
     hashes |= {
-        f"steady response {words_of(choice_of(data.attrs))}, {data.attrs['method']}": data.attrs["input_hash"]
+        f"steady-state response {words_of(choice_of(data.attrs))}, {data.attrs['method']}": data.attrs["input_hash"]
         for data in results.steady
     }
     hashes |= {f"modes {words_of(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
@@ -241,8 +244,8 @@ def _times(material: ReportData) -> str:
         {"step": entry.step, "wall / s": f"{entry.seconds:.1f}", "peak memory / MB": f"{1e-6 * entry.memory:.0f}"}
         for entry in times_spent(material.context.folder)
     ]
-    note = pieces.paragraph("Each step was a process of its own; some ran side by side.", "note") if rows else ""
-    return pieces.table(rows, caption="Where the time went") + note
+    note = pieces.paragraph("Each step was a separate process; some ran in parallel.", "note") if rows else ""
+    return pieces.table(rows, caption="Run time") + note
 
 
 def _glossary() -> str:

@@ -36,16 +36,16 @@ from fe_ste.tools.files import write_file
 def page_body(material: ReportData, parts: Sequence[Part]) -> str:
     """Put the sections together: warnings first, then what was found, then what is left out."""
     notes = material.context.notes
-    warning = "Runs that are not to be trusted; what follows shows them all the same"
+    warning = "Invalid runs; they are included in the results below"
     head = html.element(
         "header",
         _headline(material) + _tools() + _contents(parts),
         class_="top",
     )
     above = html.alert(warning, notes.distrusted) if notes.distrusted else ""
-    left_out = html.section("Left out", html.bullets(notes.left_out), name="left-out") if notes.left_out else ""
+    left_out = html.section("Skipped", html.bullets(notes.left_out), name="left-out") if notes.left_out else ""
     main = html.element("main", above + _sets(material) + "".join(part.html for part in parts) + left_out, id="content")
-    told = f"Made by exugear from {material.file_words}. This page asks nothing of any network."
+    told = f"Created by exugear from {material.file_words}. This page makes no network requests."
     foot = html.element("footer", html.paragraph(told))
     skip = html.element("a", "Skip to the content", class_="skip", href="#content")
     live = html.element("p", "", id="said", class_="toast", role="status", aria_live="polite")
@@ -56,7 +56,7 @@ def page_body(material: ReportData, parts: Sequence[Part]) -> str:
 def _headline(material: ReportData) -> str:
     gearbox = material.context.gearbox
     shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
-    line = f"Where it rings, how loud, and why. Ratio {gearbox.train.ratio:.6f}"
+    line = f"Resonance report. Speed ratio output/input {gearbox.train.ratio:.6f}"
     steady = ", ".join(dict.fromkeys(str(data.attrs["variant"]) for data in material.results.steady))
     line += f"; run-ups {shown}" if shown else ""
     line += f"; constant speeds {steady}." if steady else "."
@@ -88,7 +88,7 @@ def _sets(material: ReportData) -> str:
     if len(material.groups) < 2:
         return ""
     choices = html.element("div", "", class_="choices", id="group", role="group", aria_label="Results shown")
-    return html.element("div", f"Figures of: {choices}", class_="controls scripts-only")
+    return html.element("div", f"Results of: {choices}", class_="controls scripts-only")
 
 
 # The report of a results folder: one web page that needs nothing else
@@ -165,7 +165,7 @@ def write_report(
     # The body comes last: sections note what its head tells.
     body = page_body(material, parts)
     data = {**_head_data(material), **_merged(parts)}
-    title = f"{gearbox.name}: where it rings, how loud, and why"
+    title = f"{gearbox.name}: resonance report"
     path = folder / REPORT_FILE
     page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
     write_file(path, page.encode("utf-8", "replace"))
@@ -180,7 +180,7 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
     results = with_responses(context, models)
     if not results:
         reasons = context.notes.left_out or ["no files"]
-        raise ReportError("\n".join([f"{context.folder}: nothing here belongs to its case", *reasons]))
+        raise ReportError("\n".join([f"{context.folder}: no results of this gearbox file", *reasons]))
     groups = groups_of(context, results)
     words = Labels(context.gearbox)
     material = ReportData(context, results, words, groups, (), lines_of(context), ArrayStore())

@@ -59,12 +59,12 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
     path = folder / CASE_FILE
     if not path.is_file():
         raise GearboxFileError(
-            f"{folder}: holds no results (no {CASE_FILE}); name the folder that `exugear run` wrote into"
+            f"{folder}: contains no results (no {CASE_FILE}); specify the results folder of `exugear run`"
         )
     try:
         kept = parsed(lambda: json.loads(read_text(path)), str(path), "JSON")
         if not isinstance(kept, dict):
-            raise ValueError("it holds no case")
+            raise ValueError("it contains no gearbox file")
         if "checksum" not in kept:
             raise ValueError("it was written by an earlier version")
         if kept["checksum"] != _checksum(kept):
@@ -129,7 +129,7 @@ def time_noted(folder: Path, step: str) -> Iterator[None]:
     try:
         note_time(folder, step, time.perf_counter() - start)
     except OSError as error:  # the work itself is done
-        _log.warning("The time that it took is not noted: %s", error)
+        _log.warning("The run time could not be recorded: %s", error)
 
 
 def times_spent(folder: Path) -> tuple[StepTiming, ...]:
@@ -311,7 +311,7 @@ def write_duties(
     content = {
         "input_hash": input_hash,
         "method_version": MODES,
-        "life": "basic: by ISO 281 and ISO/TS 16281 without lubricant and cleanliness; ribs and cages left out",
+        "life": "basic: to ISO 281 and ISO/TS 16281 without lubricant and cleanliness; ribs and cages neglected",
         **duties_summary(duties, meshes),
     }
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -43,7 +43,7 @@ STATE = (
     Variable("state_past", ("past", "coordinate"), "m/s2 or rad/s2"),
     Variable("state_balance", ("term",), "J"),
     Variable("state_powers", ("power",), "W"),
-    Variable("state_judgement", ("criterion", "figure"), "value, s, place"),
+    Variable("state_judgement", ("criterion", "figure"), "value, s, index"),
     Variable("state_pending", ("pending", "signal"), "of the signals"),
 )
 """What a `exugear.results.run_file.Checkpoint` is kept as."""
@@ -121,7 +121,7 @@ class Piece:
                     arrays = {name: stored[name] for name in held if names is None or name in names}
                 return cls(arrays, words["attributes"], words["names"], words["follows"]), checksum
             except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-                raise FileError(f"{path}: is no piece of a run ({error})") from error
+                raise FileError(f"{path}: is not a part of a run ({error})") from error
 
 
 class RunPieces:
@@ -158,7 +158,7 @@ class RunPieces:
         for path, piece, checksum in whole_pieces(folder):
             self._count(path, piece, checksum)
         if not self.paths:
-            raise FileError(f"{folder}: holds nothing to resume; run without resuming first")
+            raise FileError(f"{folder}: nothing to resume; run without --resume first")
         discard_pieces(folder, keep=self.paths)
         self.attributes = dict(piece.attributes)
 
@@ -249,7 +249,7 @@ def whole_pieces(folder: Path) -> Iterator[tuple[Path, Piece, str]]:
         try:
             piece, checksum = Piece.read(path)
         except FileError as error:
-            _log.warning("%s; the run goes on from before it", error)
+            _log.warning("%s; the run resumes before that point", error)
             return
         if piece.follows != last:
             return  # of a run before: a kill fell between beginning anew and removing it
@@ -279,7 +279,7 @@ def discard_pieces(folder: Path, keep: Iterable[Path] = ()) -> None:
         The folder is a link: what it leads to may be anybody's.
     """
     if folder.is_symlink():
-        raise FileError(f"{folder}: is a link; remove it, unfinished runs are kept in a folder of this name")
+        raise FileError(f"{folder}: is a link; remove it, interrupted runs are stored in a folder of this name")
     if not folder.is_dir():
         return
     kept = {path.name for path in keep}
@@ -479,7 +479,7 @@ def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]],
     with open_sealed(path) as (file, _), h5netcdf.File(file, "r") as run:
         unknown = sorted(set(names) - set(run.variables))
         if unknown:
-            raise FileError(f"{path}: holds no {unknown[0]}")
+            raise FileError(f"{path}: contains no {unknown[0]}")
         return {name: _values(run.variables[name]) for name in names}, dict(run.attrs)
 
 
@@ -499,7 +499,7 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
         for name in asked & set(piece.arrays):
             parts.setdefault(name, []).append(piece.arrays[name])
     if not parts:
-        raise FileError(f"{folder}: holds no piece of a run")
+        raise FileError(f"{folder}: contains no part of a run")
     import xarray as xr
 
     data = xr.Dataset(coords=piece.names, attrs=piece.attributes)
@@ -524,4 +524,4 @@ def verdict_of(attributes: Mapping[str, Any]) -> str:
     """
     if int(attributes.get("valid", 1)):
         return ""
-    return str(attributes.get("validity_message", "no reason is kept"))
+    return str(attributes.get("validity_message", "no reason is stored"))

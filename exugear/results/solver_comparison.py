@@ -52,8 +52,8 @@ class SolverComparison(ReprMixin, line=" of {exudyn}, {duration:.3g} s: {largest
         """One sentence on the comparison."""
         apart = ", ".join(f"{COMPARED[name]} {value:.0e}" for name, value in self.difference.items())
         return (
-            f"Over the first {self.duration:.2g} s the compiled solver ({self.compiled}) and {self.exudyn}, whose user "
-            f"functions give the mesh forces, are apart by at most: {apart} of the largest value."
+            f"Comparison over the first {self.duration:.2g} s, compiled solver ({self.compiled}) against {self.exudyn}"
+            f" with mesh forces from user functions; maximum difference: {apart} of the largest value."
         )
 
 
@@ -74,7 +74,7 @@ def compare_solvers(path: Path, exudyn_path: Path) -> SolverComparison:
     if own.attrs["input_hash"] != other.attrs["input_hash"]:
         raise FileError(f"{exudyn_path}: was computed from another input than {path.name}; compare with Exudyn again")
     if not str(other.attrs["solver"]).startswith("Exudyn") or str(own.attrs["solver"]).startswith("Exudyn"):
-        raise FileError(f"{exudyn_path}: a run of the compiled solver and one of Exudyn are compared")
+        raise FileError(f"{exudyn_path}: requires a run of the compiled solver and one of Exudyn")
     count = min(own.sizes["time"], other.sizes["time"])
     own = own.isel(time=slice(count))
     other = other.isel(time=slice(count))

@@ -353,7 +353,7 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
             "campbell_speed": (self.speeds, {"units": "rad/s", "long_name": "speed of the overall input"}),
             "mode_frequency": (self.frequency, {"units": "Hz", "long_name": "as seen from the housing"}),
             "mode_damping": (self.damping, {"units": "1", "long_name": "share of critical damping"}),
-            "mode_whirl": (self.whirl, {"units": "1", "long_name": "1 with the turn of the body, -1 against it"}),
+            "mode_whirl": (self.whirl, {"units": "1", "long_name": "1 forward whirl, -1 backward whirl"}),
             "mode_kind": (np.array(self.kinds, dtype=object), {}),
             "mode_name": (np.array(self.names, dtype=object), {}),
         }

@@ -429,7 +429,7 @@ def solve_balance(balance: HarmonicResidual, readings: Complexes, enough: float 
         readings = ahead
         error = new
     raise HarmonicBalanceError(
-        f"no steady state found at {balance.interface.speed:.5g} rad/s: the residual stays at {error / size:.1e} of "
+        f"no steady state found at {balance.interface.speed:.5g} rad/s: the residual remains at {error / size:.1e} of "
         "the deflections"
     )
 

@@ -197,7 +197,7 @@ def planet_sidebands(
             if amplitude >= least * largest:
                 shifted = peak.frequency + sign * turning / (2.0 * np.pi)
                 more = sign * turning > 0.0
-                cause = f"{'+' if more else '-'} {carrier}: planets pass the waves around it"
+                cause = f"{'+' if more else '-'} {carrier}: multi-blade components with passing planets"
                 name = f"mesh_force {family}, one planet"
                 found.append(Sideband(name, shifted, float(amplitude), float(amplitude / largest), cause))
     return tuple(sorted(found, key=lambda band: -band.share))

@@ -263,7 +263,7 @@ class PointSolver:
                 unstable = found or unstable
         if unstable is None:
             raise HarmonicBalanceError(f"{reason}; {verdict}")
-        grows = f"unstable, a disturbance grows by {unstable.growth:.3g} 1/s"
+        grows = f"unstable: a disturbance grows at {unstable.growth:.3g} 1/s"
         return replace(unstable, remark=f"{grows}; {verdict}")
 
     def _grows(self, state: ContactLossState) -> bool:
@@ -297,7 +297,7 @@ def _with_passing(state: ContactLossState) -> ContactLossState:
         try:
             readings, products = solve_balance(balance, start, enough)
         except HarmonicBalanceError:
-            return _remarked(state, "passing planets put lines beside others, but no balance with these was found")
+            return _remarked(state, "passing planets add orders, but no solution including them was found")
         response = response_of_readings(balance, readings, found.response.products + products)
         found = replace(state, gearset=gearset, readings=readings, response=response, averaged=state)
     if found is state:
@@ -308,7 +308,7 @@ def _with_passing(state: ContactLossState) -> ContactLossState:
     if share < SIDEBAND_WARNING:
         return found
     return _remarked(
-        found, f"passing planets put {100.0 * share:.2g} % of the overall transmission error beside these lines"
+        found, f"passing planets add {100.0 * share:.2g} % of the overall transmission error at other orders"
     )
 
 

@@ -45,9 +45,9 @@ class SpeedRange:
         if not 1 <= self.count <= MOST_COUNT:
             raise SteadyError(f"speeds {self.text}: the count must be from 1 to {MOST_COUNT}")
         if self.first * self.last < 0.0:
-            raise SteadyError(f"speeds {self.text}: change their sense; ask for each sense of rotation by itself")
+            raise SteadyError(f"speeds {self.text}: change sign; compute each sense of rotation separately")
         if self.first == self.last == 0.0:
-            raise SteadyError(f"speeds {self.text}: nothing is excited while the input stands; name a speed")
+            raise SteadyError(f"speeds {self.text}: no excitation at standstill; set a speed above 0")
 
     @property
     def text(self) -> str:
@@ -77,7 +77,9 @@ class SpeedRange:
             if len(parts) != 3:
                 raise ValueError
         except (ValueError, IndexError):
-            raise SteadyError(f"speeds {text!r}: must be FIRST:LAST:COUNT in rpm of the input, as 0:215:400") from None
+            raise SteadyError(
+                f"speeds {text!r}: must be FIRST:LAST:COUNT in rpm of the input, such as 0:215:400"
+            ) from None
         return cls(first * RPM, last * RPM, count)
 
 
@@ -104,8 +106,8 @@ def usual_speeds(gearbox: Gearbox) -> SpeedRange:
             break
     if fastest == 0.0:
         raise SteadyError(
-            "speeds: no load case turns the train, and [operation] names no speed; name them, as 0:215:400 in rpm of "
-            "the input"
+            "speeds: no load case rotates the train, and [operation] has no speed; use --speeds, such as 0:215:400 "
+            "in rpm of the input"
         )
     return SpeedRange(0.0, math.copysign(fastest, sense), USUAL_COUNT)
 
@@ -124,8 +126,8 @@ def check_speeds(gearbox: Gearbox, speeds: SpeedRange) -> None:
     body, rim = max(rims.items(), key=lambda item: item[1], default=("", 0.0))
     if rim * fastest > BURSTING_RIM_SPEED:
         raise SteadyError(
-            f"speeds {speeds.text}: bring a rim on {body} to {rim * fastest:.4g} m/s, and wheels of steel burst at "
-            f"some {BURSTING_RIM_SPEED:g} m/s; ask for up to {BURSTING_RIM_SPEED / rim / RPM:.4g} rpm"
+            f"speeds {speeds.text}: the tip speed on {body} reaches {rim * fastest:.4g} m/s, and steel gears burst at "
+            f"about {BURSTING_RIM_SPEED:g} m/s; use at most {BURSTING_RIM_SPEED / rim / RPM:.4g} rpm"
         )
 
 
@@ -139,11 +141,11 @@ def check_law(name: str, method: Method) -> None:
     """
     law = LAWS[name]
     if not law.has_force:
-        raise SteadyError(f"mesh law {name}: its gears only roll, so that nothing vibrates; take another law")
+        raise SteadyError(f"mesh model {name}: kinematic constraint without vibration; use another mesh model")
     if law.loses_contact and method != "nonlinear":
         raise SteadyError(
-            f"mesh law {name}: its teeth may part, which the method {method} cannot tell; take --method nonlinear, or "
-            "the law line_of_action"
+            f"mesh model {name}: includes contact loss, which the method {method} cannot treat; use --method "
+            "nonlinear, or --mesh-model line_of_action"
         )
 
 
@@ -168,11 +170,13 @@ class SteadySettings:
     def __post_init__(self) -> None:
         """Refuse unknown methods, too many harmonics, and branches where there are none."""
         if self.method not in METHODS:
-            raise SteadyError(f"method {self.method!r} is unknown; methods are {', '.join(METHODS)}")
+            raise SteadyError(f"method {self.method!r} is unknown; choose one of: {', '.join(METHODS)}")
         if self.harmonics is not None and not 1 <= self.harmonics <= MOST_HARMONICS:
             raise SteadyError(f"harmonics {self.harmonics}: must be from 1 to {MOST_HARMONICS}")
         if self.branches and self.method != "nonlinear":
-            raise SteadyError(f"branches: the method {self.method} has one state at each speed; take nonlinear")
+            raise SteadyError(
+                f"continuation: the method {self.method} has one solution at each speed; use --method nonlinear"
+            )
 
     def hash_with(self, assembly: Assembly) -> str:
         """SHA-256 of all that a response depends on."""

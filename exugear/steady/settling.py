@@ -100,13 +100,16 @@ class SettlingSegment:
     def verdict(self) -> str:
         """What the motion is, in words."""
         if self.outside < REPEATING:
-            return "the motion in time repeats"
+            return "the time-domain motion is periodic"
         if self.doubled < 0.3 * self.outside:
             return (
-                f"the motion in time repeats after two mesh periods ({100.0 * self.outside:.2g} % of its vibration is "
-                "at half orders)"
+                f"the time-domain motion repeats after two mesh periods ({100.0 * self.outside:.2g} % of the "
+                "vibration is at half orders)"
             )
-        return f"the motion in time does not repeat ({100.0 * self.outside:.2g} % of its vibration is in no line)"
+        return (
+            f"the time-domain motion is not periodic ({100.0 * self.outside:.2g} % of the vibration is not in the "
+            "spectral lines)"
+        )
 
 
 def cannot_settle(system: MeanSystem) -> str:

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _LAYOUT = Layout(
-    "steady response",
+    "steady-state response",
     STEADY,
     {
         "speed": ("point",),
@@ -79,12 +79,16 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
     amplitude = response.solved.amplitude
     variables: dict[str, tuple[tuple[str, ...], Any, dict[str, str]]] = {
         "speed": (("point",), solved.speed, {"units": "rad/s", "long_name": "speed of the overall input"}),
-        "index": (("line", "base"), response.lines.index, {"units": "1", "long_name": "multiples of the bases"}),
-        "order": (("line",), response.lines.orders, {"units": "1", "long_name": "periods per turn of the input"}),
+        "index": (
+            ("line", "base"),
+            response.lines.index,
+            {"units": "1", "long_name": ("multiples of the base frequencies")},
+        ),
+        "order": (("line",), response.lines.orders, {"units": "1", "long_name": "periods per input revolution"}),
         "amplitude": (
             ("point", "line", "signal"),
             np.abs(amplitude).astype(np.float32),
-            {"units": "as units says", "long_name": "peak amplitude; of line 0 the mean"},
+            {"units": "see units", "long_name": "peak amplitude; of line 0 the mean"},
         ),
         "phase": (
             ("point", "line", "signal"),
@@ -94,21 +98,21 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "units": (("signal",), np.array([signal.units for signal in response.signals], dtype=object), {}),
         "drive_torque": (("point",), solved.drive_torque, {"units": "N m"}),
         "energy_error": (("point",), solved.energy_error, {"units": "1"}),
-        "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "fastest growth of a disturbance"}),
+        "growth": (("point",), solved.growth, {"units": "1/s", "long_name": "largest growth rate of a disturbance"}),
         "remark": (("point",), solved.remark.astype(object), {}),
         "left_out": (
             ("mesh_wave",),
             response.left_out,
-            {"units": "1", "long_name": "share of the compliance's variation above the harmonics"},
+            {"units": "1", "long_name": "fraction of the compliance variation above the harmonics"},
         ),
         "contact_loss_fraction": (
             ("point", "mesh_wave"),
             solved.apart,
-            {"units": "1", "long_name": "share of time apart"},
+            {"units": "1", "long_name": "contact-loss fraction"},
         ),
     }
     if response.bearing_names:
-        words = "share of time in which no rolling element of a bearing touches"
+        words = "fraction of time in which a bearing is unloaded (no rolling element in contact)"
         variables["unloaded_fraction"] = (("point", "bearing"), solved.free, {"units": "1", "long_name": words})
     variables |= response.campbell.variables()
     coordinates: dict[str, Any] = {

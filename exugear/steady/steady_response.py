@@ -91,8 +91,8 @@ def follow_branch(
     gearset = solver.branch_gearset
     if gearset.waves.carriers:
         raise SteadyError(
-            f"branches: planets of {gearset.waves.carriers[0][0]} mesh out of phase, so that the carrier's angle is a "
-            "cause beside the mesh cycle, whose stability is not looked at; leave branches out"
+            f"continuation: planets of {gearset.waves.carriers[0][0]} mesh out of phase, and stability is not "
+            "computed with excitation by the carrier angle; remove --continuation"
         )
 
     def balance_at(speed: float) -> HarmonicResidual:
@@ -139,9 +139,9 @@ def _ended(branch: Branch, last: float) -> str:
     turns = [n for n, _ in branch.folds]
     lately = sum(n > len(p) // 2 for n in turns)
     return (
-        f"the branch ends at {p[-1] / RPM:.5g} rpm after {len(p)} points, before {last / RPM:.5g} rpm: its steps are "
-        f"short where teeth graze, and it turned back {len(turns)} times, {lately} of them in its second half; ask for "
-        "the speeds from there on, or leave --continuation out"
+        f"the continuation ends at {p[-1] / RPM:.5g} rpm after {len(p)} points, before {last / RPM:.5g} rpm: steps "
+        f"are short at grazing contact, with {len(turns)} turning points, {lately} of them in the second half; start "
+        "at that speed, or remove --continuation"
     )
 
 
@@ -241,7 +241,7 @@ class SteadyResponse(ReprMixin):
             "speed of the input": value_range(self.solved.speed, "rpm", 1.0 / RPM),
             "lines": str(len(self.lines.orders)),
             "signals": str(len(self.signals)),
-            "fastest growth of the mean system": f"{self.growth_rate:.3g} 1/s",
+            "largest growth rate of the averaged system": f"{self.growth_rate:.3g} 1/s",
         }
 
     def amplitude(self, signal: str, line: tuple[int, ...]) -> Complexes:

@@ -106,8 +106,8 @@ def _point_variables(
         error[index], doubts[index] = record.error, "; ".join(record.doubts)
         seconds[index], memory[index] = record.seconds, record.memory
     return {
-        "error": (dimensions, error, {"long_name": "why a point has no outputs"}),
-        "doubts": (dimensions, doubts, {"long_name": "what speaks against trusting a point"}),
+        "error": (dimensions, error, {"long_name": "why a point has no results"}),
+        "doubts": (dimensions, doubts, {"long_name": "warnings of a point"}),
         "seconds": (dimensions, seconds, {"units": "s", "long_name": "wall time of a point"}),
         "memory": (dimensions, memory, {"units": "B", "long_name": "peak memory of its process so far"}),
     }
@@ -314,7 +314,7 @@ def searched_dataset(
     """
     dataset = dataset_of(replace(study, design=_design(study, points)), records)
     judged = {side: _judged(dataset, study, criteria, *side) for side in criteria.sides}
-    words = {"long_name": "whether all limits are kept"}
+    words = {"long_name": "whether all limits are met"}
     kept = np.ones(len(points), dtype=bool)
     for name, side, limit in criteria.limits:
         kept &= np.array([beyond(float(value), side, limit) <= 0.0 for value in judged[name, side].to_numpy()])
@@ -324,7 +324,7 @@ def searched_dataset(
         dataset = dataset.assign({judged_name(study, *side): values for side, values in judged.items()})
     if criteria.limits:
         dataset = dataset.assign(meets_limits=((EVALUATION,), kept.astype(np.int8), words))
-    words = {"long_name": "whether no other point within all limits is better in all outputs that are made small"}
+    words = {"long_name": "whether the point is Pareto-optimal among those that meet all limits"}
     return dataset.assign(on_front=((EVALUATION,), front.astype(np.int8), words))
 
 

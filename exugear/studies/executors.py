@@ -394,7 +394,9 @@ def given(executor: Submits, workers: int | None = None) -> Opens:
     def opened() -> Iterator[Pool]:
         nonlocal opened_before
         if opened_before:
-            raise ExecutorError("the executor lost its workers; what is finished is kept, begin anew with another one")
+            raise ExecutorError(
+                "the executor lost its workers; finished points are stored, start again with another executor"
+            )
         opened_before = True
         yield Pool(executor, available_cores() if workers is None else workers)
 
@@ -565,7 +567,7 @@ class _Running:
                 continue
             self.losses[work.point] += 1
             if self.losses[work.point] >= MOST_LOSSES:
-                record = Record(work.point, error=f"its worker process was lost {MOST_LOSSES} times, as if killed")
+                record = Record(work.point, error=f"its worker process ended unexpectedly {MOST_LOSSES} times")
                 Journal(self.task.folder).add(record)
                 self.take([record])
             else:

@@ -200,7 +200,7 @@ def _draw_spread(axes: Axes, values: xr.DataArray, along: str, rows: Floats, lab
     if spread.min() > 0.0 and spread.max() / spread.min() > WIDE:
         _logarithmic(axes, "x")
     axes.set_xlabel(_label(values))
-    axes.set_ylabel("share of draws below")
+    axes.set_ylabel("fraction of draws below")
     axes.set_ylim(0.0, 1.0)
 
 
@@ -224,12 +224,10 @@ def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> Non
     front = dataset["on_front"].to_numpy() == 1
     order = np.argsort(x[front])
     kept = _keeps_limits(dataset)
-    axes.plot(x[~front & kept], y[~front & kept], ".", color="#BBBBBB", label="looked at")
+    axes.plot(x[~front & kept], y[~front & kept], ".", color="#BBBBBB", label="evaluated")
     if not kept.all():
         axes.plot(x[~kept], y[~kept], "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
-    axes.plot(
-        x[front][order], y[front][order], "o-", color=COLOURS[0], markersize=4, label="no other is better in both"
-    )
+    axes.plot(x[front][order], y[front][order], "o-", color=COLOURS[0], markersize=4, label="Pareto-optimal")
     axes.plot(x[0], y[0], "s", color=COLOURS[1], label="as it is")
     near = [np.nanquantile(values, 0.9) for values in (x, y)]
     axes.set_xlim(0.95 * np.nanmin(x), 1.05 * max(near[0], x[0]))

@@ -210,7 +210,7 @@ def _doubts(data: xr.Dataset) -> Iterator[str]:
     """Tell whose stresses lie too far beyond their tables."""
     for label, reach in zip(data["flank"].to_numpy().tolist(), data["flank_reach"].to_numpy().tolist(), strict=True):
         if reach > UNTRUSTED_REACH:
-            yield f"{label}: its largest torque is {reach:.3g} times that of its table: stresses not to be trusted"
+            yield f"{label}: the largest torque is {reach:.3g} times the largest torque of its table: stresses invalid"
 
 
 def response_of_factors(
@@ -324,7 +324,7 @@ class PointResults:
             The study does not say over which speeds.
         """
         if self.settings.steady is None:
-            raise PointError("outputs of steady responses need a section [steady] with speeds")
+            raise PointError("results of the steady-state response require a section [steady] with speeds")
         from exugear.steady.steady_file import to_dataset
         from exugear.steady.steady_response import response_of
 

@@ -254,13 +254,15 @@ def _order_amplitudes(results: PointResults, signal: str, orders: list[float], s
     values = _settled(results, signal)
     time = results.run["time"].to_numpy()
     if values.ndim > 1:
-        raise PointError(f"signal {signal!r} is one of each mesh or support; orders are read of single signals")
+        raise PointError(f"signal {signal!r} exists for each mesh or support; orders require a single signal")
     speed = np.abs(_settled(results, "input_speed"))
     rate = 1.0 / float(time[1] - time[0])
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / rate
     periods = int(angle[-1] * spacing / (2.0 * math.pi))
     if periods < 2:
-        raise PointError(f"the run has {periods} whole periods of the order {spacing:g}, and needs 2; make it longer")
+        raise PointError(
+            f"the run has {periods} full periods of the order {spacing:g}; 2 are required, set a longer duration"
+        )
     whole = int(np.searchsorted(angle, 2.0 * math.pi * periods / spacing))
     weights = 1.0 - np.cos(2.0 * math.pi * angle[:whole] / angle[whole])
     weighed = weights * values[:whole] * (2.0 / weights.sum())
@@ -525,7 +527,7 @@ def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
     own = {name: value for name, value in values.items() if part in ("", name, name.split(" ")[0])}
     known = [value for value in own.values() if not math.isnan(value)]
     if not known:
-        raise PointError(f"{part or 'no part'}: the life of this gearbox has no such quantity; `exugear life` says why")
+        raise PointError(f"{part or 'no part'}: the life of this gearbox has no such result; `exugear life` states why")
     return worst(known)
 
 
@@ -626,7 +628,7 @@ def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Qu
     >>> outputs_of({"ringing": {"quantity": "nearest_frequncy", "near_Hz": 800.0}}, QUANTITIES)
     Traceback (most recent call last):
     ...
-    exugear.studies.quantities.OutputError: outputs.ringing.quantity = 'nearest_frequncy': no such quantity; did you
+    exugear.studies.quantities.OutputError: outputs.ringing.quantity = 'nearest_frequncy': no such result; did you
     mean 'nearest_frequency'?
     """
     kept = {}
@@ -638,8 +640,8 @@ def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Qu
         wanted = str(options.pop("quantity", ""))
         if wanted not in known:
             near = difflib.get_close_matches(wanted[:100], known, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"quantities are {', '.join(known)}"
-            raise OutputError(f"outputs.{name}.quantity = {wanted!r}: no such quantity; {hint}")
+            hint = f"did you mean {near[0]!r}?" if near else f"results are {', '.join(known)}"
+            raise OutputError(f"outputs.{name}.quantity = {wanted!r}: no such result; {hint}")
         known[wanted].check(name, options)
         kept[name] = Output(known[wanted], options)
     return kept

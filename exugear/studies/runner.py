@@ -65,7 +65,7 @@ class Shard:
         """
         number, stroke, of = text.partition("/")
         if not (stroke and number.isdecimal() and of.isdecimal()):
-            raise ValueError(f"shard {text!r}: must be i/n, as 1/8")
+            raise ValueError(f"shard {text!r}: must be i/n, such as 1/8")
         return cls(int(number), int(of))
 
 
@@ -203,7 +203,7 @@ class _Evaluated:
         if not np.isfinite(found).all():
             records = [self.records[name] for name, _ in looked.draws]
             reason = next((record.error for record in records if record.error), records[0].values)
-            raise OptimisationError(f"the case as it is gives no outputs: {reason}")
+            raise OptimisationError(f"the unchanged gearbox has no results: {reason}")
         return np.asarray(found)
 
     def minimised(self, points: Sequence[EvaluatedPoint]) -> Floats:

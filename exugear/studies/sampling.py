@@ -203,7 +203,7 @@ def _place(section: Any, key: str, path: str) -> Any:
     if not isinstance(section, list):
         return key
     if not (key.isdigit() and int(key) < len(section)):
-        raise PathError(f"{path}: {key!r} is no entry of a list of {len(section)}; entries count from 0")
+        raise PathError(f"{path}: {key!r} is not an index of a list of {len(section)}; indices start at 0")
     return int(key)
 
 
@@ -222,14 +222,18 @@ def check_path(content: Mapping[str, Any], path: str) -> None:
     >>> check_path({"housing": {"factor": 0.3}}, "housing.facter")
     Traceback (most recent call last):
     ...
-    exugear.studies.sampling.PathError: no key 'housing.facter' in the case; did you mean housing.factor?
+    exugear.studies.sampling.PathError: no key 'housing.facter' in the gearbox file; did you mean housing.factor?
     """
     if value_at(content, path) is not None or path in set(_possible(content)):
         return
     single = {key for key in _possible(content) if not isinstance(value_at(content, key), Mapping)}
     near = difflib.get_close_matches(path[:200], sorted(single.union(_present(content, ""))), SHOWN_MATCHES)
-    hint = f"did you mean {' or '.join(near)}?" if near else "paths are as bearings.NAME.z_mm, with the case's names"
-    raise PathError(f"no key {path[:200]!r} in the case; {hint}")
+    hint = (
+        f"did you mean {' or '.join(near)}?"
+        if near
+        else ("paths are such as bearings.NAME.z_mm, with names of the gearbox file")
+    )
+    raise PathError(f"no key {path[:200]!r} in the gearbox file; {hint}")
 
 
 def _present(content: Any, before: str) -> Iterator[str]:
@@ -402,7 +406,7 @@ def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
         return value
     if isinstance(own, bool) or not isinstance(own, int | float):
         raise PathError(
-            f"{path}: the case has no number there that a value {parameter.acts.rstrip('s')}s; give one in "
+            f"{path}: the gearbox file has no number there that a value {parameter.acts.rstrip('s')}s; set one in "
             "[changes], or acts = 'replaces'"
         )
     return _rounded(own * value if parameter.acts == "scales" else own + value)
@@ -500,7 +504,7 @@ def distribution_of(parameter: ParameterSection, gearbox: Gearbox) -> Distributi
     assert parameter.iso1328 is not None
     wanted = parameter.iso1328
     if wanted.gear not in gearbox.gears:
-        raise ValueError(f"iso1328: no gear {wanted.gear!r} in the case; gears are {', '.join(gearbox.gears)}")
+        raise ValueError(f"iso1328: no gear {wanted.gear!r} in the gearbox file; gears are {', '.join(gearbox.gears)}")
     gear = gearbox.gears[wanted.gear]
     most = 1e6 * tolerance(
         wanted.deviation,

@@ -42,7 +42,7 @@ class RangeSection(StudyPart):
     @model_validator(mode="after")
     def _signs(self) -> RangeSection:
         if self.scale == "logarithmic" and not (self.first > 0.0 and self.last > 0.0):
-            raise ValueError("a logarithmic range goes from one positive value to another")
+            raise ValueError("a logarithmic range requires two positive values")
         return self
 
 
@@ -61,7 +61,7 @@ class NormalSection(StudyPart):
     @model_validator(mode="after")
     def _order(self) -> NormalSection:
         if self.min is not None and self.max is not None and self.min >= self.max:
-            raise ValueError("min must be below max")
+            raise ValueError("`least` must be below `most`")
         return self
 
 
@@ -76,7 +76,7 @@ class UniformSection(StudyPart):
     @model_validator(mode="after")
     def _order(self) -> UniformSection:
         if self.min >= self.max:
-            raise ValueError("min must be below max")
+            raise ValueError("`least` must be below `most`")
         return self
 
 
@@ -144,11 +144,11 @@ class ParameterSection(StudyPart):
     def _one_of_each(self) -> ParameterSection:
         given = [kind for kind in KINDS if getattr(self, kind) is not None]
         if len(given) != 1:
-            raise ValueError(f"give one of {', '.join(KINDS)}; {' and '.join(given) or 'none'} is given")
+            raise ValueError(f"set exactly one of {', '.join(KINDS)}; {' and '.join(given) or 'none'} is set")
         if (self.path is not None) + (self.paths is not None) != (0 if self.settings is not None else 1):
-            raise ValueError("give path or paths; settings name their own paths and need neither")
+            raise ValueError("set path or paths; settings contain their own paths and require neither")
         if self.correlation != 1.0 and not (self.is_drawn and self.paths):
-            raise ValueError("correlation is between the draws of several paths; give paths and a distribution")
+            raise ValueError("correlation applies to the draws of several paths; set paths and a distribution")
         if self.settings is not None and len({frozenset(setting) for setting in self.settings.values()}) > 1:
             raise ValueError("all settings must set the same keys")
         return self
@@ -202,9 +202,9 @@ class LimitSection(StudyPart):
     @model_validator(mode="after")
     def _order(self) -> LimitSection:
         if self.min is None and self.max is None:
-            raise ValueError("set min, max or both")
+            raise ValueError("set `least`, `most` or both")
         if self.min is not None and self.max is not None and self.min > self.max:
-            raise ValueError("min must not be above max")
+            raise ValueError("`least` must not be above `most`")
         return self
 
 
@@ -263,40 +263,44 @@ class StudyFile(StudyPart):
         if self.optimise is not None:
             wrong = [name for name, parameter in self.parameters.items() if parameter.kind != "uniform"]
             if wrong:
-                raise ValueError(f"a search needs the limits of each parameter: give {wrong[0]} a key uniform")
+                raise ValueError(
+                    f"an optimisation requires bounds for each parameter; set a key uniform for {wrong[0]}"
+                )
             self._check_search(self.optimise)
             return self
         if self.tolerances:
-            raise ValueError("tolerances: belong to a search; without [optimise] draws are parameters")
+            raise ValueError("tolerances: require [optimise]; otherwise define the draws as parameters")
         if drawn and self.samples is None:
-            raise ValueError(f"parameters.{drawn[0]} is drawn from a distribution: say how often, samples = 64")
+            raise ValueError(f"parameters.{drawn[0]} has a distribution; set the number of draws, such as samples = 64")
         if self.samples is not None and not drawn:
-            raise ValueError("samples: no parameter has a distribution; leave it out")
+            raise ValueError("samples: no parameter has a distribution; remove the key")
         self._check_sobol(bool(drawn))
         steps = [parameter.kind == "step" for parameter in self.parameters.values()]
         if any(steps) and not all(steps):
-            raise ValueError("local derivatives: give each parameter a step, or none")
+            raise ValueError("local derivatives: set a step for each parameter, or for none")
         return self
 
     def _check_search(self, wanted: OptimisationSection) -> None:
         for key, names in (("minimise", wanted.minimise), ("limits", list(wanted.limits))):
             lost = [name for name in names if name not in self.outputs]
             if lost:
-                raise ValueError(f"optimise.{key}: no output {lost[0]!r}; outputs are {', '.join(self.outputs)}")
+                raise ValueError(f"optimise.{key}: no result {lost[0]!r}; results are {', '.join(self.outputs)}")
         if len(set(wanted.minimise)) < len(wanted.minimise):
-            raise ValueError(f"optimise.minimise: {wanted.minimise[0]} against itself; name two outputs, or one")
+            raise ValueError(
+                f"optimise.minimise: {wanted.minimise[0]} is listed twice; set two different results, or one"
+            )
         listed = [name for name, tolerance in self.tolerances.items() if not tolerance.is_drawn]
         if listed:
-            raise ValueError(f"tolerances.{listed[0]}: give it a distribution: normal, uniform or iso1328")
+            raise ValueError(f"tolerances.{listed[0]}: set a distribution: normal, uniform or iso1328")
         if self.tolerances and self.samples is None:
-            raise ValueError("tolerances: say how many draws each point has, samples = 32")
+            raise ValueError("tolerances: set the number of draws per point, such as samples = 32")
         if not self.tolerances and wanted.percentile is not None:
-            raise ValueError("optimise.percentile: is taken over tolerances; give [tolerances.NAME], or leave it out")
+            raise ValueError("optimise.percentile: requires tolerances; add [tolerances.NAME], or remove the key")
         self._check_sobol(bool(self.tolerances))
 
     def _check_sobol(self, drawn: bool) -> None:
         if drawn and self.sampling == "sobol" and self.samples and self.samples & (self.samples - 1):
-            raise ValueError(f"samples = {self.samples}: a Sobol sequence is even over a power of two of points")
+            raise ValueError(f"samples = {self.samples}: a Sobol sequence requires a power of two")
 
 
 # Reading a study file: TOML to checked sections, and faults as lines that name file, key and remedy
@@ -358,7 +362,7 @@ def parse_study(content: dict[str, Any], source: str) -> StudyFile:
     except ValidationError as error:
         faults = error.errors(include_url=False)
     lines = list(dict.fromkeys(fault_line(source, _described(fault)) for fault in faults))
-    more = [f"and {len(lines) - SHOWN_FAULTS} more faults"] if len(lines) > SHOWN_FAULTS else []
+    more = [f"and {len(lines) - SHOWN_FAULTS} more errors"] if len(lines) > SHOWN_FAULTS else []
     raise StudyError("\n".join([*lines[:SHOWN_FAULTS], *more]))
 
 

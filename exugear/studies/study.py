@@ -82,11 +82,11 @@ SHOWN = 3
 
 def faults_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
     """Tell parameters and outputs whose names the dataset has for something else."""
-    taken = dict.fromkeys(OF_POINTS, "what is told of each point")
+    taken = dict.fromkeys(OF_POINTS, "the results of each point")
     drawn = [name for name, parameter in study.parameters.items() if parameter.is_drawn]
     stepped = any(parameter.kind == "step" for parameter in study.parameters.values())
     if study.optimise is not None:
-        taken |= dict.fromkeys(OF_SEARCHES, "the points of a search")
+        taken |= dict.fromkeys(OF_SEARCHES, "the points of an optimisation")
         taken |= _taken_by_tolerances(study)
     elif drawn:
         taken[SAMPLE] = "the draws"
@@ -101,11 +101,11 @@ def faults_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[st
     for table, names in {**named, "outputs": study.outputs}.items():
         for name in names:
             if name in taken:
-                yield f"{table}.{name}: this name is that of {taken[name]} in the dataset; choose another"
+                yield f"{table}.{name}: this is the name of {taken[name]} in the dataset; choose another name"
     for first, second in (("parameters", "outputs"), ("parameters", "tolerances"), ("tolerances", "outputs")):
         for name in getattr(study, first):
             if name in getattr(study, second):
-                yield f"{second}.{name}: {first}.{name} has this name, too; rename one"
+                yield f"{second}.{name}: {first}.{name} has the same name; rename one"
 
 
 def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
@@ -129,7 +129,10 @@ def faults_of_search(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[s
         for name in names:
             along = kept[name].quantity.dimension
             if along:
-                yield f"optimise.{key}: outputs.{name} has a number for each {along}; a search needs a single one"
+                yield (
+                    f"optimise.{key}: outputs.{name} has a value for each {along}; an optimisation requires a single "
+                    "one"
+                )
 
 
 def faults_of_paths(study: StudyFile) -> Iterator[str]:
@@ -150,11 +153,11 @@ def faults_of_paths(study: StudyFile) -> Iterator[str]:
                 if table != before and path == other and parameter.acts != "replaces":
                     continue
                 if (before, owner) == (table, name):
-                    yield f"{table}.{name}: sets {path} twice; name it once"
+                    yield f"{table}.{name}: sets {path} twice; remove one"
                 elif table == before:
-                    yield f"{table}.{name}: sets {path}, and {before}.{owner} {other}; give it to one of them"
+                    yield f"{table}.{name}: sets {path}, and {before}.{owner} {other}; remove one of them"
                 else:
-                    yield f'{table}.{name}: replaces {path}, which {before}.{owner} sets; give it acts = "shifts"'
+                    yield f'{table}.{name}: replaces {path}, which {before}.{owner} sets; set acts = "shifts"'
                 break
             owners.append((table, name, path))
 
@@ -168,7 +171,7 @@ def faults_of_values(design: Design) -> Iterator[str]:
             if first != number:
                 values = ", ".join(f"{path} = {value!r}" for path, value in list(change.items())[:SHOWN])
                 what = "draws" if dimension == SAMPLE else f"parameters.{dimension}: values"
-                yield f"{what} {first + 1} and {number + 1} are one and the same point, {values}; leave one out"
+                yield f"{what} {first + 1} and {number + 1} are the same point, {values}; remove one"
                 break
 
 
@@ -193,12 +196,12 @@ def faults_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
 def _faults_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -> Iterator[str]:
     """Tell options that contradict each other, or the table's positions."""
     if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
-        yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: lies above to_Hz = {options['to_Hz']:g}"
+        yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: must be below to_Hz = {options['to_Hz']:g}"
     most = gearbox.ste.positions // 2
     if options.get("harmonic", 1) > most:
         yield (
-            f"outputs.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has "
-            f"{most} harmonics; give fewer, or more ste.positions"
+            f"outputs.{name}.harmonic = {options['harmonic']}: a table of {gearbox.ste.positions} positions has {most}"
+            " harmonics; set a lower harmonic, or more ste.positions"
         )
 
 
@@ -207,11 +210,11 @@ def faults_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearb
     for name, output in kept.items():
         needs = output.quantity.needs
         if needs == "steady" and study.steady is None:
-            yield f"outputs.{name}: is read from a steady response; give a section [steady] with speeds"
+            yield f"outputs.{name}: requires a steady-state response; add a section [steady] with speeds"
         if needs == "bearings" and (not Variant.of(study.choice.variant).on_bearings or not _rated_bearings(gearbox)):
             yield (
-                f"outputs.{name}: is one of bearings with a section catalogue, which the variant "
-                f"{study.choice.variant!r} of this gearbox has not"
+                f"outputs.{name}: requires bearings with a section catalogue, which the variant "
+                f"{study.choice.variant!r} of this gearbox does not have"
             )
 
 
@@ -245,8 +248,8 @@ def _faults_of_line(name: str, output: Output, families: Sequence[str]) -> Itera
     unknown = [word for word in str(line).split() if not word.isdecimal() and word not in ("x", "+", "-", *families)]
     if line is not None and (unknown or not line):
         yield (
-            f"outputs.{name}.line = {str(line)[:200]!r}: no such line; lines are as {families[0]} and 2 x {families[0]}"
-            f", of {_listed(list(dict.fromkeys(families)))}"
+            f"outputs.{name}.line = {str(line)[:200]!r}: no such order; orders are such as {families[0]} and 2 x "
+            f"{families[0]}, of {_listed(list(dict.fromkeys(families)))}"
         )
 
 

@@ -82,7 +82,7 @@ def assemble(
         raise VariantError(f"variant {variant}: {lacking}")
     only_rolls = law in LAWS and not LAWS[law].has_force
     if only_rolls and not variant.spins_only:
-        raise VariantError(f"mesh law {law}: its gears only roll, which needs the variant rigid, not {variant}")
+        raise VariantError(f"mesh model {law}: a kinematic constraint, which requires the variant rigid, not {variant}")
     flexible = _chosen_bodies(elastic, bodies or {})
     rigid = [body for body in moving if body.name not in flexible]
     six = [body for body in rigid if not (variant.spins_only or body.spin_only)]
@@ -126,8 +126,8 @@ def _chosen_bodies(names: tuple[str, ...], bodies: Mapping[str, ElasticBody]) ->
     missing = [name for name in names if name not in bodies]
     if missing:
         raise VariantError(
-            f"variant flexible: no reduced body for {', '.join(missing)}; "
-            "give what exugear.system.bodies.of_gearbox.reduced_bodies returns"
+            f"variant flexible: no reduced body for {', '.join(missing)}; pass the result of "
+            "exugear.system.bodies.of_gearbox.reduced_bodies"
         )
     return {name: bodies[name] for name in names}
 
@@ -213,7 +213,7 @@ def elastic_arrays(flexible: Mapping[str, ElasticBody], size: int, damping_time:
         for block in own:
             others = [n for n, other in enumerate(own) if body.gyroscopic[np.ix_(block, other)].any()]
             if len(others) > 1:
-                raise VariantError(f"body {body.name}: gyroscopic forces tie one block to {len(others)} others")
+                raise VariantError(f"body {body.name}: gyroscopic forces couple one block to {len(others)} others")
             turning.append(len(blocks) + spinning)
             partner.append(len(blocks) + others[0] if others else -1)
             parts["stiffness"].append(body.stiffness[np.ix_(block, block)])

@@ -28,7 +28,7 @@ from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, linearise, mesh
 from exugear.system.system import Assembly, input_hash
 from exugear.system.tooth_mesh.element import Angles, MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Booleans, Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
 from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
 
@@ -111,7 +111,8 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
     for body, shares in zip(assembly.bodies, kinetic, strict=True):
         for motion, share in zip(BODY_MOTIONS, shares, strict=True):
             family = "planets" if body.carrier else body.name
-            moving[f"{family} {motion}"] = moving.get(f"{family} {motion}", 0.0) + float(share)
+            text = f"{family} {'torsion' if motion == 'spin' else motion}"
+            moving[text] = moving.get(text, 0.0) + float(share)
     strained: dict[str, float] = {}
     # Those of all planets together; other names keep their digits.
     families = {mesh.name: mesh.family for mesh in assembly.gearbox.meshes}
@@ -129,13 +130,13 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
     most = max(strained, key=lambda name: strained[name])
     itself = most.removesuffix("_body")
     what = f"{itself} itself" if itself != most and itself in assembly.elastic_bodies else most
-    return f"{', '.join(words)}; strained: {what} {100 * strained[most]:.0f} %"
+    return f"{', '.join(words)}; strain energy: {what} {100 * strained[most]:.0f} %"
 
 
 # Eigenmodes of a gearbox variant: frequencies, damping, where the energy sits, and what moves in words
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
-FREE_ROTATION = "free rotation of the train"
+FREE_ROTATION = "rigid-body rotation"
 """Name of the modes without any deflection."""
 SHOWN_MODES = 12
 """Modes in the table that a notebook shows."""
@@ -187,8 +188,8 @@ class Modes(ReprMixin):
     def label(self) -> str:
         """What the modes belong to: variant, mesh law, inertia set and housing factor."""
         assembly = self.assembly
-        law = f"law {assembly.mesh_model}, inertias {assembly.inertias}"
-        return f"{assembly.variant}, {law}, housing factor {assembly.housing_factor:g}"
+        model = f"mesh model {assembly.mesh_model}, inertia set {assembly.inertias}"
+        return f"{assembly.variant}, {model}, housing stiffness factor {assembly.housing_factor:g}"
 
     def nearest(self, frequency: float) -> int:
         """Find the number of the mode nearest to a frequency (Hz)."""
@@ -280,17 +281,21 @@ def kept_modes(path: Path, assembly: Assembly) -> Modes | None:
     data = Store(path, input_hash(assembly)).read_dataset(_LAYOUT)
     if data is None:
         return None
+    frequency: Floats = data["frequency"].to_numpy()
+    element_names = tuple(data["element"].to_numpy().tolist())
+    strain: Floats = data["strain_energy_share"].to_numpy()
+    kinetic: Floats = data["kinetic_energy_share"].to_numpy()
     return Modes(
         assembly=assembly,
-        frequency=data["frequency"].to_numpy(),
+        frequency=frequency,
         damping_ratio=data["damping_ratio"].to_numpy(),
         shapes=data["shape"].to_numpy(),
-        element_names=tuple(data["element"].to_numpy().tolist()),
-        strain=data["strain_energy_share"].to_numpy(),
-        kinetic=data["kinetic_energy_share"].to_numpy(),
+        element_names=element_names,
+        strain=strain,
+        kinetic=kinetic,
         overall=data["overall_dte"].to_numpy(),
         amplification=data["amplification"].to_numpy(),
-        names=tuple(data["name"].to_numpy().tolist()),
+        names=_mode_names(assembly, element_names, kinetic, strain, frequency > 0.0),
         growth_rate=float(data.attrs["growth_rate"]),
     )
 
@@ -335,7 +340,7 @@ def eigenmodes(
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
     >>> modes = eigenmodes(gearbox, Choice("rigid"), stiffness)
     >>> len(modes.frequency), modes.names[0]
-    (8, 'free rotation of the train')
+    (8, 'rigid-body rotation')
     """
     return modes_of(assemble(gearbox, choice, stiffness, bodies, angles=angles))
 
@@ -373,11 +378,18 @@ def modes_of(assembly: Assembly, preload: bool = True) -> Modes:
         kinetic=kinetic,
         overall=np.abs(overall),
         amplification=_amplification(assembly, q, linear, shapes, overall, omega, ratio, elastic),
-        names=tuple(
-            mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else FREE_ROTATION
-            for m in range(frequency.size)
-        ),
+        names=_mode_names(assembly, element_names, kinetic, strain, elastic),
         growth_rate=growth_rate(linear) if LAWS[assembly.mesh_model].has_force else 0.0,
+    )
+
+
+def _mode_names(
+    assembly: Assembly, element_names: tuple[str, ...], kinetic: Floats, strain: Floats, elastic: Booleans
+) -> tuple[str, ...]:
+    """Describe all modes by `mode_name`; those without any deflection are `FREE_ROTATION`."""
+    return tuple(
+        mode_name(assembly, element_names, kinetic[m], strain[m]) if elastic[m] else FREE_ROTATION
+        for m in range(elastic.size)
     )
 
 

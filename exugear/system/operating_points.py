@@ -295,10 +295,8 @@ def _what_holds_one_way(laws: Sequence[SupportLaw], names: Sequence[str]) -> str
     """Say which bearings hold their ring in one direction along the axis only."""
     one_way = [name for name, law in zip(names, laws, strict=True) if law.rows and holds_one_way(law.rows)]
     if not one_way:
-        return "look for a body that only clearances hold"
-    return (
-        f"{', '.join(one_way)}: held along the axis in one direction only; look at arrangements and `locates_towards`"
-    )
+        return "check for a body supported only through clearances"
+    return f"{', '.join(one_way)}: located axially in one direction only; check arrangements and `locates_towards`"
 
 
 # What all catalogue bearings and all meshes of a gearbox bear under its static load

@@ -89,8 +89,8 @@ def _doubts_about_mass(body: Body, radius: float, length: float) -> Iterator[str
     cylinder = STEEL * math.pi * radius**2 * length
     if not LEAST_MASS * cylinder < body.mass < MOST_MASS * cylinder:
         yield (
-            f"mass_kg = {body.mass:g}: a steel cylinder as wide and long as its gears and bearings, {2e3 * radius:.4g} "
-            f"by {1e3 * length:.4g} mm, weighs {cylinder:.3g} kg; is the unit right?"
+            f"mass_kg = {body.mass:g}: a steel cylinder around its gears and bearings, {2e3 * radius:.4g} by "
+            f"{1e3 * length:.4g} mm, has {cylinder:.3g} kg; check the unit"
         )
         return  # radii of gyration would only repeat it
     across = math.hypot(radius, length)
@@ -98,8 +98,8 @@ def _doubts_about_mass(body: Body, radius: float, length: float) -> Iterator[str
         gyration = math.sqrt(inertia / body.mass)
         if not LEAST_GYRATION * size < gyration < MOST_GYRATION * size:
             yield (
-                f"{key} = {inertia:g}: with {body.mass:g} kg a radius of gyration of {1e3 * gyration:.3g} mm, where "
-                f"its gears and bearings reach {1e3 * size:.3g} mm; is the unit right?"
+                f"{key} = {inertia:g}: with {body.mass:g} kg the radius of gyration is {1e3 * gyration:.3g} mm, but "
+                f"its gears and bearings extend to {1e3 * size:.3g} mm; check the unit"
             )
 
 
@@ -111,13 +111,13 @@ def _bores(gearbox: Gearbox) -> Iterator[str]:
         root = 2.0 * gear.root_radius
         if gear.internal and held > MOST_RIM * root:
             yield (
-                f"{key} = {1e3 * held:g}: a rim {500.0 * (held - root):.4g} mm thick around roots of {1e3 * root:.4g} "
-                "mm diameter; it is the outside of the ring's rim"
+                f"{key} = {1e3 * held:g}: rim thickness {500.0 * (held - root):.4g} mm with root diameter "
+                f"{1e3 * root:.4g} mm; set the outside diameter of the rim"
             )
         elif not gear.internal and held < LEAST_BORE * root:
             yield (
-                f"{key} = {1e3 * held:g}: hardly a bore under roots of {1e3 * root:.4g} mm diameter; it is the bore "
-                "or the shaft under the teeth"
+                f"{key} = {1e3 * held:g}: implausible for a root diameter of {1e3 * root:.4g} mm; set the bore, or "
+                "the shaft diameter under the teeth"
             )
 
 
@@ -136,14 +136,14 @@ def _seats(gearbox: Gearbox) -> Iterator[str]:
             if under is not None and root >= WHEEL * under and gear.held_diameter < LEAST_OVER_SHAFT * under:
                 told.add(name)
                 yield (
-                    f"{key}: bodies.{body.family}.shape is {1e3 * under:g} mm thick there; it is the bore of a wheel "
-                    "on that shaft"
+                    f"{key}: the diameter of bodies.{body.family}.shape is {1e3 * under:g} mm there; set the bore of "
+                    "the gear on that shaft"
                 )
             elif beside and root >= WHEEL * max(beside) and gear.held_diameter < LEAST_SEAT * min(beside):
                 told.add(name)
                 yield (
-                    f"{key}: the bearings on both sides of it have bores of {1e3 * beside[0]:g} and "
-                    f"{1e3 * beside[1]:g} mm; a wheel between them has a bore that goes over the thinner end"
+                    f"{key}: the bearings on both sides have bores of {1e3 * beside[0]:g} and {1e3 * beside[1]:g} mm; "
+                    "the bore of a gear between them must pass the thinner end"
                 )
 
 
@@ -193,8 +193,8 @@ def _bearings(gearbox: Gearbox) -> Iterator[str]:
             )
         elif outer > MOST_WALL * bore:
             yield (
-                f"bearings.{name}.catalogue.bore_mm = {bore:g}: no usual bearing of {outer:g} mm outer diameter has a "
-                f"bore below {outer / MOST_WALL:.3g} mm"
+                f"bearings.{name}.catalogue.bore_mm = {bore:g}: usual bearings of {outer:g} mm outer diameter have a "
+                f"bore of at least {outer / MOST_WALL:.3g} mm; check both"
             )
 
 
@@ -219,8 +219,8 @@ def _faces(gearbox: Gearbox) -> Iterator[str]:
             family = bodies[mesh.gear].family
             yield (
                 f"bodies.{family}.gears_z_mm.{gears[1].name} = {1e3 * (places[1] or 0.0):g}: {mesh.family} has "
-                f"{1e3 * max(high - low, 0.0):.4g} mm of its face in mesh, and counts with "
-                f"{1e3 * mesh.pair.face_width:.4g} mm; move a gear, or give common_face_width_mm"
+                f"{1e3 * max(high - low, 0.0):.4g} mm of its face width in mesh, but {1e3 * mesh.pair.face_width:.4g} "
+                "mm are used; move a gear, or set common_face_width_mm"
             )
 
 
@@ -246,9 +246,9 @@ def _backlashes(gearbox: Gearbox) -> Iterator[str]:
         backlash = pair.circumferential_backlash
         if backlash > MOST_BACKLASH * usual:
             yield (
-                f"pairs.{name}.centre_distance_mm = {1e3 * pair.centre_distance:g}: leaves {1e6 * backlash:.0f} um of "
-                f"backlash where some {1e6 * usual:.0f} um are usual; check it, and profile_shift of both gears "
-                f"({pair.pinion.profile_shift:g} and {pair.gear.profile_shift:g}) with its sign"
+                f"pairs.{name}.centre_distance_mm = {1e3 * pair.centre_distance:g}: backlash is {1e6 * backlash:.0f} "
+                f"µm, about {1e6 * usual:.0f} µm is usual; check the centre distance and the signs of the profile "
+                f"shifts ({pair.pinion.profile_shift:g}, {pair.gear.profile_shift:g})"
             )
 
 
@@ -263,8 +263,8 @@ def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
         if catalogue is not None and catalogue.type in TILTING and catalogue.arrangement == "single":
             told.add(body.family)
             yield (
-                f"bearings.{bearings[0].family}: is the only bearing of {body.family}, and one "
-                f"{catalogue.type.replace('_', ' ')} bearing hardly keeps a shaft from tilting; is one missing?"
+                f"bearings.{bearings[0].family}: the only bearing of {body.family}; one "
+                f"{catalogue.type.replace('_', ' ')} bearing has almost no tilting stiffness; is a bearing missing?"
             )
 
 
@@ -279,8 +279,9 @@ def _faces_in_bearings(gearbox: Gearbox) -> Iterator[str]:
                 if depth > 0.0 and (name, bearing.family) not in told:
                     told.add((name, bearing.family))
                     yield (
-                        f"bodies.{body.family}.gears_z_mm.{name} = {1e3 * wheel:g}: its face runs {1e3 * depth:.3g} "
-                        f"mm into bearings.{bearing.family} at z_mm = {1e3 * bearing.position[2]:g}; move one of them"
+                        f"bodies.{body.family}.gears_z_mm.{name} = {1e3 * wheel:g}: the face width overlaps by "
+                        f"{1e3 * depth:.3g} mm with bearings.{bearing.family} at z_mm = {1e3 * bearing.position[2]:g}"
+                        "; move one of them"
                     )
 
 
@@ -441,22 +442,24 @@ def doubts_about_pairs(gearbox: Gearbox) -> Iterator[str]:
             if margin < LEAST_FORM_MARGIN and spec.table:
                 key = f"gears.{mate.name}.tip_diameter_mm = {2e3 * mate.tip_radius:.6g}"
                 yield (
-                    f"{key}: its tip comes within {100 * margin:.2g} % of the flank to the form circle of {gear.name}, "
-                    f"where contact under load ends; the table of {name} counts what it cuts off there; "
-                    f"{1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves {100 * PROPOSED_MARGIN:g} %"
+                    f"{key}: the start of active profile is {100 * margin:.2g} % of the profile length from the root "
+                    f"form diameter of {gear.name}, where contact under load is truncated; the table of {name} lists "
+                    f"the truncated load; {1e3 * _clear_tip_diameter(spec.pair, mate):.6g} leaves "
+                    f"{100 * PROPOSED_MARGIN:g} %"
                 )
         if margins.pitch_point_pressure > LARGEST_PRESSURE:
             yield (
-                f"pairs.{name}: {1e-6 * margins.pitch_point_pressure:.4g} MPa by Hertz at the pitch point under "
-                f"[static_load] ({spec.static_torque:.4g} N m on {spec.pair.pinion.name}): no steel bears more than "
-                f"some {1e-6 * LARGEST_PRESSURE:.0f} MPa; check the unit of torques, module and face widths"
+                f"pairs.{name}: Hertzian stress {1e-6 * margins.pitch_point_pressure:.4g} MPa at the pitch point "
+                f"under [static_load] ({spec.static_torque:.4g} N m on {spec.pair.pinion.name}), about "
+                f"{1e-6 * LARGEST_PRESSURE:.0f} MPa is the maximum for steel; check the units of torques, module and "
+                "face widths"
             )
     for name, gear in gearbox.gears.items():
         thickness = gear.tip_thickness / gear.normal_module
         if thickness < USUAL_TIP_THICKNESS:
             yield (
-                f"gears.{name}.tip_diameter_mm = {2e3 * gear.tip_radius:.6g}: leaves a tip {thickness:.3f} normal "
-                f"modules thick; {USUAL_TIP_THICKNESS:g} is the usual least, 0.4 for case-hardened teeth"
+                f"gears.{name}.tip_diameter_mm = {2e3 * gear.tip_radius:.6g}: tip thickness {thickness:.3f} m_n; "
+                f"usual minimum {USUAL_TIP_THICKNESS:g} m_n, 0.4 m_n for case-hardened teeth"
             )
 
 

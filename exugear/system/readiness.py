@@ -53,14 +53,14 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     >>> pair = {"type": "cylindrical_roller", "contact_angle_deg": 0.0}
     >>> floating = {f"bearings.lss_bc.catalogue.{key}": value for key, value in pair.items()}
     >>> free_motion(gearbox.varied({**floating, "bearings.lss_a.stiffness": {}}), "bushing")
-    'body lss can move along z without resistance; add or stiffen a bearing'
+    'body lss can move along z without resistance; add a bearing or increase its stiffness'
     """
     elastic = elastic_names(gearbox) if Variant.of(variant).is_elastic else ()
     moving = [body for body in gearbox.bodies() if not body.fixed or body.name in elastic]
     starts = {body.name: 6 * number for number, body in enumerate(moving)}
     rows = np.array([row for row in _held_directions(gearbox, Variant.of(variant), starts) if row.any()])
     if not rows.size:
-        return "no bearing holds anything"
+        return "no bearing supports a body"
     # Each row of one length: how stiff a support is does not matter, only that it holds.
     _, singular, basis = np.linalg.svd(rows / np.linalg.norm(rows, axis=1, keepdims=True))
     free = basis[int(np.sum(singular > FREE_STRETCH * singular[0])) :]
@@ -75,7 +75,10 @@ def free_motion(gearbox: Gearbox, variant: str) -> str:
     if other.max() > ROLLING_TOLERANCE:
         motion = other
     body, direction = divmod(int(np.argmax(motion)), BODY_SIZE)
-    return f"body {moving[body].name} can {DIRECTIONS[direction]} without resistance; add or stiffen a bearing"
+    return (
+        f"body {moving[body].name} can {DIRECTIONS[direction]} without resistance; add a bearing or increase its "
+        "stiffness"
+    )
 
 
 def _held_directions(gearbox: Gearbox, variant: Variant, starts: Mapping[str, int]) -> Iterator[Floats]:
@@ -215,16 +218,16 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
     """Tell what is possible and unusual, and how it is taken; a line each. Every verb tells the same."""
     lines = list(gearbox.warnings)
     lines += (
-        f"pairs.{name}: carries no torque in [static_load], and so gets no table: its teeth are as stiff as "
-        "ISO 6336-1 says, and excite nothing"
+        f"pairs.{name}: no torque in [static_load], so no table is computed: mesh stiffness to ISO 6336-1, no "
+        "excitation"
         for name in gearbox.idle_pairs
     )
     train = gearbox.train
     if train.degrees_of_freedom > 1:
         others = ", ".join(train.independent[1:])
         lines.append(
-            f"meshes: the train has {train.degrees_of_freedom} degrees of freedom; ratio, orders and speeds of the "
-            f"input hold while {others} stand{'s' if len(train.independent) == 2 else ''}"
+            f"meshes: the gear train has {train.degrees_of_freedom} degrees of freedom; ratio, orders and input "
+            f"speeds apply while {others} do{'es' if len(train.independent) == 2 else ''} not rotate"
         )
     lines += doubts_about_pairs(gearbox)
     lines += doubts_about_parts(gearbox)
@@ -246,7 +249,7 @@ def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
     except BearingError as error:
         raise gearbox.fault(f"bearings.{bearing.family}.catalogue: {error}") from None
     if not np.all(np.isfinite(stiffness)):
-        raise gearbox.fault(f"bearings.{bearing.family}.catalogue: gives no finite stiffness; check its dimensions")
+        raise gearbox.fault(f"bearings.{bearing.family}.catalogue: stiffness is not finite; check its dimensions")
 
 
 def _place_teeth(gearbox: Gearbox) -> None:
@@ -261,7 +264,7 @@ def _count_states(gearbox: Gearbox) -> None:
     states = axes.positions * len(axes.torque_factors) * len(axes.centre_distance_offsets_um or _FOLLOWING)
     states *= len(axes.misalignment_um or _FOLLOWING)
     if states > MOST_STATES:
-        raise gearbox.fault(f"ste: its axes make {states} states of a table; {MOST_STATES} are the most")
+        raise gearbox.fault(f"ste: the axes result in {states} table states; at most {MOST_STATES} are permitted")
 
 
 def _pairs_with_axes(gearbox: Gearbox) -> list[str]:

@@ -182,7 +182,9 @@ def assumed_parameters(
         default = gearbox.case.housing.factor
         values = tuple(sorted({*HOUSING_FACTORS, default}))
         parameters.append(
-            Parameter("housing factor", values, default, lambda x: built({"housing.factor": x}, touching), False)
+            Parameter(
+                ("housing stiffness factor"), values, default, lambda x: built({"housing.factor": x}, touching), False
+            )
         )
     planets = planet_bearings(gearbox, base)
     first = base.connectors.rolling.first

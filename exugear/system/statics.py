@@ -251,7 +251,7 @@ def _newton(
             ahead = residual(x + share * step)
         x = x + share * step
         r = ahead
-    raise BalanceError(f"{what}: no balance found, the residual stays at {best:.2e} of the load")
+    raise BalanceError(f"{what}: static equilibrium not found, the residual remains at {best:.2e} of the load")
 
 
 def _size(residual: Floats, scale: Floats) -> float:
@@ -435,7 +435,7 @@ def _held(assembly: Assembly, torques: Mapping[str, float], locked: Sequence[str
     free = rolling @ scipy.linalg.null_space(rolling[[row(name) for name in held]]) if held else rolling
     applied = np.array([torques.get(name, 0.0) for name in gearbox.spinning])
     if free.size and np.abs(free.T @ applied).max() > 1e-9 * np.abs(applied).max():
-        raise BalanceError(f"static state: the torques are not held by locking {', '.join(locked) or 'nothing'}")
+        raise BalanceError(f"static state: locking {', '.join(locked) or 'nothing'} does not balance the torques")
     overall = gearbox.case.overall
     for name in (overall.input, overall.output, *gearbox.spinning):
         rank = np.linalg.matrix_rank(rolling[[row(other) for other in held]]) if held else 0

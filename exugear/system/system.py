@@ -351,7 +351,7 @@ class Assembly(ReprMixin):
         f = np.zeros(self.size)
         for name, torque in torques.items():
             if name not in self.spin:
-                raise VariantError(f"no turning body {name!r} to load; bodies are {', '.join(self.spin)}")
+                raise VariantError(f"no rotating body {name!r} to load; bodies are {', '.join(self.spin)}")
             f[self.spin[name]] += torque
         return f
 

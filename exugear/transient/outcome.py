@@ -112,11 +112,11 @@ class Run(ReprMixin):
         if self.complete:
             return "complete"
         if self.halted:
-            return "stopped beyond a limit"
+            return "aborted at a limit"
         return "stopped"
 
     def _line(self) -> str:
-        trust = "valid" if self.trusted else "not to be trusted"
+        trust = "valid" if self.trusted else "invalid"
         return f" {self.path}: {self._state}, {self.end:g} s simulated in {self.wall:.1f} s, {trust}"
 
     def _table(self) -> TitledRows:
@@ -125,7 +125,7 @@ class Run(ReprMixin):
             "state": self._state,
             "simulated": f"{self.end:g} s",
             "wall time": f"{self.wall:.1f} s",
-            "to be trusted": "yes" if self.trusted else f"no: {'; '.join(self.reasons)}",
+            "valid": "yes" if self.trusted else f"no: {'; '.join(self.reasons)}",
         }
         return "Run", rows
 
@@ -320,9 +320,9 @@ class ValidityMonitor:
         largest, since, _ = self.figures[ENERGY]
         if largest > self.limits.energy_marked:
             yield (
-                f"energy: from t = {since:.4g} s on more than {_percent(self.limits.energy_marked)} of the largest "
-                f"energy in the run is not accounted for, up to {_percent(largest)}; the motion is unstable, or the "
-                "step does not solve the equations"
+                f"energy: from t = {since:.4g} s on the energy balance error exceeds "
+                f"{_percent(self.limits.energy_marked)} of the largest energy in the run, maximum {_percent(largest)}"
+                "; the motion is unstable, or the time step is too large"
             )
 
     def _speed_words(self) -> Iterator[str]:
@@ -331,7 +331,7 @@ class ValidityMonitor:
         if largest > 1.0:
             name, intended, allowed = self._body(number)
             yield (
-                f"speed: at t = {since:.4g} s a rim on {name} passes {allowed:.4g} m/s, where the loads bring it to "
+                f"speed: at t = {since:.4g} s the tip speed on {name} exceeds {allowed:.4g} m/s, but the loads cause "
                 f"{intended:.4g} m/s at most; the motion is unstable"
             )
             return
@@ -339,8 +339,8 @@ class ValidityMonitor:
         if largest > self.limits.rim_speed_stopped:
             name, _, _ = self._body(number)
             yield (
-                f"speed: at t = {since:.4g} s a rim on {name} passes {self.limits.rim_speed_stopped:g} "
-                "m/s, where wheels of steel burst; look for a torque of the wrong sign, or one that nothing takes up"
+                f"overspeed at t = {since:.4g} s: tip speed on {name} exceeds {self.limits.rim_speed_stopped:g} m/s "
+                "(burst speed of steel gears); check torque signs and torque balance"
             )
 
     def _body(self, figure: float) -> tuple[str, float, float]:
@@ -355,9 +355,8 @@ class ValidityMonitor:
             height = float(self._heights[int(number)])
             mesh = self._meshes[int(number)]
             yield (
-                f"deflection: at t = {since:.4g} s the teeth of mesh {mesh}, {1e3 * height:.3g} mm "
-                f"high, give way by more than {_percent(limit)} of their height, where they would have broken; meshes "
-                f"reach {_percent(largest)}"
+                f"tooth deflection at t = {since:.4g} s: mesh {mesh}, tooth height {1e3 * height:.3g} mm, exceeds "
+                f"{_percent(limit)} of its tooth height, beyond breakage; maximum {_percent(largest)}"
             )
 
     def _pulling_words(self, share: Floats) -> Iterator[str]:
@@ -365,19 +364,18 @@ class ValidityMonitor:
         names = [name for name, part in zip(self._meshes, share, strict=True) if part >= limit]
         if names:
             all_along = share.max() > WHOLLY
-            cause = "look for a torque of the wrong sign" if all_along else "they are hardly loaded, or unstable"
+            cause = "check torque signs" if all_along else "the mesh is lightly loaded, or the motion is unstable"
             yield (
-                f"pulling: {', '.join(names)} pull for up to {_percent(share.max())} of the run (limit "
-                f"{_percent(limit)}), which no teeth do, but the law {self._law} does; {cause}, or take the law table, "
-                "which has both flanks"
+                f"tensile mesh force: {', '.join(names)} for up to {_percent(share.max())} of the run (limit "
+                f"{_percent(limit)}); model {self._law} neglects contact loss; {cause}, or use --mesh-model table"
             )
 
     def _unsolved_words(self, times: Floats) -> Iterator[str]:
         names = [name for name, time in zip(self._meshes, times, strict=True) if time > 0.0]
         if names:
             yield (
-                f"table: {', '.join(names)} come beside states of their tables that are not solved, where others stand "
-                f"in, for up to {times.max():.3g} s; exugear ste says which states these are and why"
+                f"table: {', '.join(names)} read table states next to non-converged ones (interpolated) for up to "
+                f"{times.max():.3g} s; `exugear ste` lists the states and reasons"
             )
 
 

@@ -69,12 +69,12 @@ def check_duration(
     """
     total, key = _span(gearbox, case, duration)
     if not math.isfinite(total):
-        raise GearboxFileError(f"{key} = {total:g}: give a finite number of seconds")
+        raise GearboxFileError(f"{key} = {total:g}: set a finite number of seconds")
     least = (TAPS_PER_FACTOR + LEAST_SAMPLES) / sample_rate
     if total < least:
         raise GearboxFileError(
-            f"{key} = {total:g}: too short for a spectrum, since filtering takes {TAPS_PER_FACTOR / sample_rate:.3g} s "
-            f"at the ends; give {least:.3g} s or more"
+            f"{key} = {total:g}: too short for a spectrum (filtering removes {TAPS_PER_FACTOR / sample_rate:.3g} s at "
+            f"the ends); set {least:.3g} s or more"
         )
 
 
@@ -94,8 +94,8 @@ def check_disk(
     free = shutil.disk_usage(there).free
     if needed > free:
         raise GearboxFileError(
-            f"{key} = {total:g}: {total * sample_rate:.3g} samples take {1e-9 * needed:.3g} GB, and {there} has "
-            f"{1e-9 * free:.3g} GB free; give at most {free / (sample_rate * sample_bytes):.3g} s"
+            f"{key} = {total:g}: {total * sample_rate:.3g} samples require {1e-9 * needed:.3g} GB, and {there} has "
+            f"{1e-9 * free:.3g} GB free; set at most {free / (sample_rate * sample_bytes):.3g} s"
         )
 
 
@@ -126,14 +126,14 @@ def too_fine(step: float, total: float, sample_rate: float) -> str:
     >>> too_fine(2.5e-5, 30.0, 20e3)
     ''
     >>> too_fine(1e-12, 30.0, 20e3)
-    'step = 1e-12 s: 3e+13 steps, 5e+07 for each stored sample; at most 1000 are taken, a step of 5e-08 s'
+    'step = 1e-12 s: 3e+13 steps, 5e+07 for each stored sample; at most 1000 are permitted, a step of 5e-08 s'
     """
     each = 1.0 / (step * sample_rate)
     if each <= MOST_STEPS_PER_SAMPLE * (1.0 + 1e-9):
         return ""
     return (
         f"step = {step:.3g} s: {total / step:.3g} steps, {each:.3g} for each stored sample; at most "
-        f"{MOST_STEPS_PER_SAMPLE} are taken, a step of {1.0 / (MOST_STEPS_PER_SAMPLE * sample_rate):.3g} s"
+        f"{MOST_STEPS_PER_SAMPLE} are permitted, a step of {1.0 / (MOST_STEPS_PER_SAMPLE * sample_rate):.3g} s"
     )
 
 

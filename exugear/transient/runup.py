@@ -126,7 +126,7 @@ def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, int
     try:
         system.run(state.step * step, plan.steps - state.step, step, follow, not plan.is_implicit)
     except SolverFailure as error:
-        recorder.fault = recorder.fault or f"Exudyn gave up at t = {recorder.last_time:.6g} s: {error}"
+        recorder.fault = recorder.fault or f"Exudyn stopped at t = {recorder.last_time:.6g} s: {error}"
 
 
 class _StepFollower:
@@ -151,8 +151,8 @@ class _StepFollower:
         if np.isfinite(q).all() and np.isfinite(v).all() and abs(t - due) > STEP_TOLERANCE * self._step:
             recorder.last_time = t
             recorder.fault = (
-                f"Exudyn cut the step at t = {t:.9g} s, expected {due:.9g} s: "
-                "the equations were not solved at this step; use a smaller one"
+                f"Exudyn reduced the step at t = {t:.9g} s, expected {due:.9g} s: the equations did not converge; use "
+                "a smaller step"
             )
             return False
         recorder.keep(t, q, v)
@@ -232,7 +232,7 @@ def simulate(
     """
     choice = choice.of(gearbox)
     if choice.load_case not in gearbox.load_cases:
-        raise gearbox.fault(f"no load case {choice.load_case!r}; load cases are {', '.join(gearbox.load_cases)}")
+        raise gearbox.fault(f"no load case {choice.load_case!r}; choose one of: {', '.join(gearbox.load_cases)}")
     case = gearbox.load_cases[choice.load_case]
     directory = run_directory(out, choice)
     if resume and duration is None:
@@ -282,12 +282,12 @@ def _integrate(plan: RunPlan, start: RunStart, file: RunFile, meter: ProgressMet
             start.pieces.mark()
     reasons = recorder.reasons()
     if recorder.fault:
-        raise RunError(f"{'; '.join((recorder.fault, *reasons))}; what was reached is in {plan.partial_path}")
+        raise RunError(f"{'; '.join((recorder.fault, *reasons))}; results so far: {plan.partial_path}")
     complete = not interruption.asked and not recorder.halted
     path = plan.final_path if complete else plan.partial_path
     run = Run(path, complete, recorder.last_time, meter.wall, reasons, recorder.halted)
     if run.halted:
-        raise LimitError(f"{'; '.join(reasons)}; what was reached is in {plan.partial_path}", run)
+        raise LimitError(f"{'; '.join(reasons)}; results so far: {plan.partial_path}", run)
     return run
 
 

@@ -71,14 +71,14 @@ def refuse_to_resume(directory: Path) -> str:
     if has_pieces(directory / PARTIAL_NAME):
         return ""
     if (directory / EARLIER_PARTIAL_NAME).exists():
-        return f"{directory / EARLIER_PARTIAL_NAME}: was written by an earlier version, which cannot be gone on with"
+        return f"{directory / EARLIER_PARTIAL_NAME}: was written by an earlier version and cannot be resumed"
     if (directory / FINAL_NAME).exists():
         try:
             load_run(directory / FINAL_NAME, ())
         except FileError as error:
             return str(error)
-        return f"{directory / FINAL_NAME}: is complete, nothing was stopped"
-    return f"{directory}: no run of these choices was stopped here"
+        return f"{directory / FINAL_NAME}: is complete; nothing to resume"
+    return f"{directory}: no interrupted run with these settings"
 
 
 def kept_duration(directory: Path) -> float | None:
@@ -99,7 +99,7 @@ def refuse_shorter(directory: Path, duration: float) -> str:
     reached = float(kept.get("state_step", 0)) * float(kept.get("step", 0.0))
     if reached <= duration * (1.0 + 1e-9):
         return ""
-    return f"{directory / PARTIAL_NAME}: has reached {reached:.4g} s, and a duration of {duration:g} s ends before that"
+    return f"{directory / PARTIAL_NAME}: has reached {reached:.4g} s; a duration of {duration:g} s ends before that"
 
 
 # Where a run starts from and what acts on it, anew or from the last piece of a run that was stopped
@@ -158,12 +158,14 @@ def _pieces_to_resume(plan: RunPlan, layout: SignalLayout) -> RunPieces:
     if reason:
         raise RunError(f"{reason}; run without resuming")
     if shorter := refuse_shorter(plan.directory, plan.duration):
-        raise RunError(f"{shorter}; give a longer one")
+        raise RunError(f"{shorter}; set a longer duration")
     pieces = RunPieces(plan.partial_path, layout)
     for key, value in plan.attributes().items():
         kept = pieces.attributes.get(key, "element" if key == "mesh_route" else None)  # earlier runs had no other
         if key not in ("complete", "solver", *EXPECTATIONS) and kept != value:
-            raise RunError(f"{plan.partial_path}: was run with {key} = {kept}, not {value}; start anew")
+            raise RunError(
+                f"{plan.partial_path}: was run with {key} = {kept}, not {value}; run it again without --resume"
+            )
     return pieces
 
 
@@ -171,7 +173,7 @@ def _take_over_judgement(plan: RunPlan, judge: ValidityMonitor, state: Checkpoin
     judge.figures = state.judgement
     if judge.stop:
         reasons = judge.reasons(state.mesh_times, state.step * plan.step)
-        raise RunError(f"{plan.partial_path}: stopped for good: {'; '.join(reasons)}; run it anew")
+        raise RunError(f"{plan.partial_path}: aborted: {'; '.join(reasons)}; run it again without --resume")
 
 
 def _first_state(

@@ -42,7 +42,7 @@ _UNITS = {
     "torque": ("N m", "static torque on gear 1"),
     "tooth": ("1", "tooth pair, counted ahead of pair 0, which touches at the pitch point at pmc 0"),
     "ste": ("m", "static transmission error on the transverse line of action"),
-    "superelement_ste": ("m", "the same by the superelement, on which the tables of dynamics rest"),
+    "superelement_ste": ("m", "the same by the superelement method, used for the tables of the dynamic models"),
     "mesh_stiffness": ("N/m", "secant stiffness on the transverse line of action"),
     "line_of_action_force": ("N", "torque on gear 1 over its base radius"),
     "load_share": ("1", "part of the normal load that a tooth pair carries"),
@@ -188,9 +188,9 @@ class NonlinearTable(ReprMixin):
         except FileError as error:
             raise TableError(str(error)) from error
         if not str(dataset.attrs.get("method", "")).startswith(METHOD):
-            raise TableError(f"{path}: is no table of the non-linear analysis")
+            raise TableError(f"{path}: is not a table of the nonlinear analysis")
         if wanted is not None and dataset.attrs["input_hash"] != wanted.hash:
-            raise TableError(f"{path}: was computed from another input; compute it again")
+            raise TableError(f"{path}: was computed from another input; recompute it")
         return cls(dataset)
 
     @property
@@ -319,7 +319,7 @@ def _without_results(wanted: NonlinearInput) -> xr.Dataset:
         "pair": wanted.pair.name,
         "method": f"{METHOD} on {wanted.settings.bodies}: 8-node hexahedra with incompatible modes, mortar contact "
         f"without friction, exact multipliers, {wanted.settings.strains}",
-        "boundary": "pinion hub held; gear hub (or ring's outer rim) rigid and turning about its axis only",
+        "boundary": "pinion hub fixed; gear hub (or outer rim of a ring) rigid, rotating about its axis only",
         "input": json.dumps(wanted.resolved(), sort_keys=True),
         "input_hash": wanted.hash,
         "method_version": NONLINEAR_TABLE,
@@ -337,5 +337,5 @@ def _stored(wanted: NonlinearInput, path: str | Path | None) -> NonlinearTable |
     try:
         return NonlinearTable.open(path, wanted)
     except TableError as error:
-        _log.warning("%s; its positions are computed again", error)
+        _log.warning("%s; its positions are recomputed", error)
         return None

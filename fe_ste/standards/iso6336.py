@@ -65,7 +65,7 @@ class MethodBStiffness(ReprMixin):
             "single stiffness": self.single_stiffness,
             "mesh stiffness": self.mesh_stiffness,
         }
-        return "stiffness by ISO 6336-1 method B", {
+        return "stiffness to ISO 6336-1 method B", {
             **{name: value_range(value, "N/(mm um)", 1e-9) for name, value in per_width.items()},
             "mean mesh stiffness": value_range(self.stiffness, "N/um", 1e-6),
             "outside validity": "; ".join(self.outside_validity) or "no",

@@ -79,7 +79,7 @@ def root_stress_factors(
     remarks = {
         f"notch parameter q_s = {notch:.2f} is outside 1 to 8": not 1.0 <= notch <= 8.0,
         f"virtual contact ratio {contact_ratio:.2f} is not below 2": contact_ratio >= 2.0,
-        "no cutter is given: its fillet is taken as that of its rack": gear.internal and gear.cutter is None,
+        "no cutter is specified: the root fillet of its rack is used": gear.internal and gear.cutter is None,
     }
     return RootStressFactors(
         form=form,

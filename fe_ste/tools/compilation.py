@@ -46,8 +46,8 @@ _FOLDERS_KEPT = 4
 #: What the kernels of a package do, and the processor time of all that a first verb compiles of them: the laws that its
 #: model has.
 _COMPILED = {
-    "fe_ste": " of teeth and their contact, about 8 s",
-    "exugear": " of the equations of motion, 10 to 25 s for each sort of model",
+    "fe_ste": " of tooth contact (about 8 s)",
+    "exugear": " of the equations of motion (10 to 25 s per model type)",
 }
 
 #: What a process does that compiles for this one: it finds modules where this one does.
@@ -233,7 +233,7 @@ def _tell_of_compiling(package: str) -> None:
 
 @cache
 def _tell_unkept(folder: str, reason: str) -> None:
-    _log.warning("%s: compiled kernels cannot be kept (%s); they are compiled again at each start", folder, reason)
+    _log.warning("%s: compiled kernels cannot be stored (%s); they are compiled at each start", folder, reason)
 
 
 def _package_of(source: Path) -> Path:

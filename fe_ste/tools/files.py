@@ -133,7 +133,7 @@ def open_regular(path: Path) -> Iterator[IO[bytes]]:
 
 def _demand_regular(handle: int, path: Path) -> None:
     if not stat.S_ISREG(os.fstat(handle).st_mode):
-        raise FileError(f"{path}: is no regular file")
+        raise FileError(f"{path}: is not a regular file")
 
 
 def read_text(path: Path, limit: int = _TEXT_LIMIT) -> str:
@@ -172,7 +172,7 @@ def exclusive(path: Path, work: str) -> Iterator[None]:
     try:
         lock.acquire()
     except filelock.Timeout:
-        raise FileError(f"{work}: another process is at work on it; wait for its end or stop it") from None
+        raise FileError(f"{work}: in use by another process; wait until it ends, or stop it") from None
     try:
         yield
     finally:

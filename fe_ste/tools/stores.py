@@ -219,7 +219,7 @@ def load_arrays(path: Path) -> dict[str, NDArray[Any]]:
                 return {name: content[name] for name in content.files}
         # As in `open_dataset`: only a file of another make comes here.
         except Exception as error:
-            raise FileError(f"{path}: is no npz file ({error})") from error
+            raise FileError(f"{path}: is not an npz file ({error})") from error
 
 
 def write_dataset(path: Path, dataset: xr.Dataset) -> None:
@@ -252,14 +252,16 @@ class Layout:
         """
         for name, dimensions in self.variables.items():
             if name not in dataset.variables or dataset[name].dims != dimensions:
-                raise FileError(f"{path}: holds no {self.kind}: {name} over ({', '.join(dimensions)}) is missing")
+                raise FileError(
+                    f"{path}: is not a file of {self.kind}: {name} over ({', '.join(dimensions)}) is missing"
+                )
         for name in self.attributes:
             if name not in dataset.attrs:
-                raise FileError(f"{path}: holds no {self.kind}: its attribute {name} is missing")
+                raise FileError(f"{path}: is not a file of {self.kind}: its attribute {name} is missing")
         version = dataset.attrs.get("method_version")
         if version != self.version:
             raise VersionError(
-                f"{path}: was computed by version {version} of its method, now at {self.version}; compute it again"
+                f"{path}: was computed by version {version} of its method, now at {self.version}; recompute it"
             )
 
 
@@ -280,7 +282,7 @@ def open_dataset(path: Path, layout: Layout) -> Iterator[xr.Dataset]:
         # What the checksum fits was written whole: only a file of another make comes here, and there HDF5, h5netcdf
         # and xarray raise what they like.
         except Exception as error:
-            raise FileError(f"{path}: is no netCDF file ({error})") from error
+            raise FileError(f"{path}: is not a netCDF file ({error})") from error
         with dataset:
             layout.check(dataset, path)
             yield dataset
@@ -487,7 +489,7 @@ class Cache(ReprMixin, Generic[Value]):
 
 @functools.cache
 def _tell_unkept(name: str, folder: str, reason: str) -> None:
-    _log.warning("%s: each %s cannot be kept (%s); the next process computes it again", folder, name, reason)
+    _log.warning("%s: each %s cannot be stored (%s); the next process recomputes it", folder, name, reason)
 
 
 def kept_folder() -> Path | None:

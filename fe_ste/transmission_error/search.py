@@ -152,7 +152,7 @@ def _counted(
     """State cut off at the form circles, with the share of the load that is beyond them on involutes that go on."""
     for state in (cut, whole):
         if isinstance(state, ContactError):
-            return ContactError(f"contact reaches the form circle, where the involute ends, and beyond: {state}")
+            return ContactError(f"contact extends beyond the form diameter, where the involute ends: {state}")
     assert isinstance(cut, ContactState) and isinstance(whole, ContactState)
     return replace(cut, truncated_load=share_beyond(compliance.flanks, whole.cells, whole.solution.force))
 

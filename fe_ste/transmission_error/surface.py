@@ -136,8 +136,8 @@ def _complete_line(root: Floats, nodes: Floats, tangent: Floats, centre: Floats,
 def _check(missing: int, count: int, what: str) -> None:
     if missing > MOST_MISSING * count:
         raise GapError(
-            f"{missing} of {count} {what} are not solved ({100.0 * missing / count:.3g} %); "
-            f"others can stand in for {100.0 * MOST_MISSING:g} % of them at most"
+            f"{missing} of {count} {what} not converged ({100.0 * missing / count:.3g} %); at most "
+            f"{100.0 * MOST_MISSING:g} % can be interpolated"
         )
 
 

@@ -180,7 +180,7 @@ class MeshTable(ReprMixin):
         except FileError as error:
             raise TableError(str(error)) from error
         if wanted is not None and dataset.attrs["input_hash"] != wanted.hash:
-            raise TableError(f"{path}: was computed from another input; compute it again")
+            raise TableError(f"{path}: was computed from another input; recompute it")
         return cls(_with_cut_off(dataset, path))
 
     def save(self, path: str | Path) -> None:
@@ -231,7 +231,7 @@ class MeshTable(ReprMixin):
             **self._ranges(),
             "static transmission error": value_range(self.dataset["ste"], "um", 1e6),
             "mesh stiffness": value_range(self.dataset["mesh_stiffness"], "N/um", 1e-6),
-            "states not solved": str(len(self.failures)),
+            "non-converged states": str(len(self.failures)),
             "input": self.input_hash[:12],
         }
 
@@ -253,7 +253,7 @@ def _with_cut_off(dataset: xr.Dataset, path: Path) -> xr.Dataset:
         return dataset
     unsolved = int(np.count_nonzero(~dataset["converged"].to_numpy().astype(bool)))
     if unsolved:
-        raise TableError(f"{path}: holds {unsolved} states that can be solved by now; compute it again")
+        raise TableError(f"{path}: contains {unsolved} states that this version can solve; recompute it")
     return dataset.assign({CUT_OFF: cut_off_variable(np.zeros(dataset["ste"].shape))})
 
 

@@ -96,7 +96,7 @@ def test_its_folder_can_be_taken_up_again_and_reported(project: Project) -> None
 
 
 def test_a_folder_without_results_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(GearboxFileError, match="holds no results"):
+    with pytest.raises(GearboxFileError, match=": contains no results"):
         Project.from_folder(tmp_path)
 
 

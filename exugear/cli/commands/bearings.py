@@ -1,8 +1,9 @@
-"""The verb `bearings`: what each rolling bearing bears under the static load."""
+"""The command `bearings`: load, stiffness and life of each rolling bearing under the static load."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from exugear.cli.case import (
@@ -17,7 +18,8 @@ from exugear.cli.case import (
     VariantOption,
     open_project,
 )
-from exugear.cli.console import BadInputError, exit_codes, note, print_json, print_table, say
+from exugear.cli.console import BadInputError, exit_codes, note, print_json, say
+from exugear.cli.tables import print_table, significant
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
@@ -25,10 +27,23 @@ if TYPE_CHECKING:
     from exugear.system.tooth_mesh.contact_state import MeshLoadState
 
 
-AXIAL_SIGN = "Axial loads are those of the shaft on the inner ring, positive along +z"
+LOAD_LEGEND = (
+    "Axial load: of the shaft on the inner ring, positive along +z. Misalignment: tilt of the inner ring against the "
+    "outer ring."
+)
+LIFE_LEGEND = (
+    "C_r, C_0r: dynamic and static load rating. L10: basic rating life, L10r: basic reference rating life (ISO/TS "
+    "16281), in million revolutions; lubricant, cleanliness and ribs are neglected."
+)
+ESTIMATED = " *: conservative estimate; set dynamic_rating_kN and static_rating_kN to use catalogue values."
+CATALOGUES = " +: smallest rating in manufacturers' catalogues for the designation; the same keys replace it."
+MESH_LEGEND = (
+    "Misalignment: of the gears under load; gap: opening at the +z end over the common face width, negative where the "
+    "gap opens at the other end. Load centroid: along +z from the middle of the face width. K_Hbeta: face load factor."
+)
 MESH_PRESSURE = (
-    "Pressure of a mesh: largest over ten positions of the mesh cycle, away from tip edges, under the static load "
-    "where the gears stand on their bearings, without load factors"
+    " Contact stress: maximum of ten positions of the mesh cycle, without tip-edge contact and load factors, with the "
+    "gears displaced by the static load."
 )
 
 
@@ -42,18 +57,17 @@ def bearings(
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Tell load, stiffness, contact pressure and life of each catalogue bearing under the static load.
+    """List load, stiffness and life of the catalogue bearings.
 
-    Told as well: how the gears of each mesh stand there, and how evenly their teeth bear. Teeth resist misalignment by
-    the contact of finite elements, and so share the load among the bearings; the law iso6336 needs no tables and lets
-    them bear evenly. Tables that are missing or do not fit the case are computed first.
+    All values are for the static load. Also lists misalignment, load distribution and contact stress of each mesh.
+    Transmission error tables that are missing or out of date are computed first.
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
         from exugear.results.folder import duties_summary
 
         if not variant.on_bearings:
-            raise BadInputError(f"--variant {variant}: has ideal joints in place of bearings; use bushing or flexible")
+            raise BadInputError(f"--variant {variant}: has ideal joints instead of bearings; use bushing or flexible")
         project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
         if not any(bearing.catalogue for bearing in project.gearbox.bearings):
             raise BadInputError(f"{case}: no bearing has catalogue data; add a [bearings.NAME.catalogue]")
@@ -65,38 +79,43 @@ def bearings(
             choice = {"variant": variant.value, "mesh_model": mesh_model.value, "inertias": project.choice.inertias}
             print_json({"case": str(case), **choice, **duties_summary(duties, meshes), "file": str(path)})
             return
-        title = f"Bearings under the static load, {variant.value}"
-        print_table(title, [_load_row(duty) for duty in duties])
-        say(AXIAL_SIGN)
-        print_table("Contact, ratings, basic rating life", [*map(_life_row, duties)])
-        print_table("Meshes", [*map(_mesh_row, meshes)])
-        if any(not math.isnan(mesh.pressure) for mesh in meshes):
-            say(MESH_PRESSURE)
-        if any(duty.ratings.estimated for duty in duties):
-            say("* rating estimated on the safe side; dynamic_rating_kN and static_rating_kN of the file replace it")
-        if any(duty.ratings.makers for duty in duties):
-            say("+ least rating that makers print for the designation; keys of the file replace it as well")
-        say("Lives are basic: lubricant and cleanliness are left out, and so are ribs")
-        say(f"Bearings in {path}")
+        _print_bearings(duties, meshes, variant)
+        say(f"Results: {path}")
         for duty in duties:
             if duty.ratings.two_designs:
                 note(f"bearings.{duty.name}: {duty.ratings.two_designs}")
             for remark in duty.remarks:
-                note(f"bearings.{duty.name}: {remark}", style="yellow")
+                note(f"Warning: bearings.{duty.name}: {remark}", style="yellow")
         for mesh in meshes:
             if mesh.remark:
-                note(f"meshes.{mesh.name}: {mesh.remark}", style="yellow")
+                note(f"Warning: meshes.{mesh.name}: {mesh.remark}", style="yellow")
+
+
+def _print_bearings(duties: Sequence[BearingLoadState], meshes: Sequence[MeshLoadState], variant: Variant) -> None:
+    """Print the tables of all bearings and meshes."""
+    print_table(f"Bearings under the static load, variant {variant}", [*map(_load_row, duties)], legend=LOAD_LEGEND)
+    legend = LIFE_LEGEND
+    if any(duty.ratings.estimated for duty in duties):
+        legend += ESTIMATED
+    if any(duty.ratings.makers for duty in duties):
+        legend += CATALOGUES
+    print_table("Element load, ratings and rating life of the bearings", [*map(_life_row, duties)], legend=legend)
+    if meshes:
+        legend = MESH_LEGEND
+        if any(not math.isnan(mesh.pressure) for mesh in meshes):
+            legend += MESH_PRESSURE
+        print_table("Meshes under the static load", [*map(_mesh_row, meshes)], legend=legend)
 
 
 def _load_row(duty: BearingLoadState) -> dict[str, str]:
     return {
         "bearing": duty.name,
-        "radial\nkN": f"{1e-3 * duty.radial_load:.4g}",
-        "axial\nkN": f"{round(1e-3 * duty.axial_load, 3) + 0.0:.4g}",
-        "radial\nGN/m": f"{1e-9 * duty.radial_stiffness:.3g}",
-        "axial\nGN/m": f"{1e-9 * duty.stiffness[2, 2]:.3g}",
-        "tilt\nMN m/rad": f"{0.5e-6 * (duty.stiffness[3, 3] + duty.stiffness[4, 4]):.3g}",
-        "misaligned\nmrad": f"{1e3 * duty.misalignment:.3f}",
+        "radial\nload kN": significant(round(1e-3 * duty.radial_load, 3)),
+        "axial\nload kN": significant(round(1e-3 * duty.axial_load, 3)),
+        "radial\nGN/m": significant(1e-9 * duty.radial_stiffness, 3, 5),
+        "axial\nGN/m": significant(1e-9 * duty.stiffness[2, 2], 3, 5),
+        "tilting\nMN m/rad": significant(0.5e-6 * (duty.stiffness[3, 3] + duty.stiffness[4, 4]), 3, 5),
+        "misalign-\nment mrad": f"{1e3 * duty.misalignment:.3f}",
     }
 
 
@@ -109,12 +128,12 @@ def _life_row(duty: BearingLoadState) -> dict[str, str]:
         sign = ""
     return {
         "bearing": duty.name,
-        "most loaded\nelement kN": f"{1e-3 * duty.element_load:.3g}",
-        "pressure\nMPa": f"{1e-6 * duty.pressure:.0f}",
-        "C_r\nkN": f"{1e-3 * duty.ratings.dynamic:.4g}{sign}",
-        "C_0r\nkN": f"{1e-3 * duty.ratings.static:.4g}{sign}",
-        "L10\nMrev": f"{duty.basic_life:.3g}",
-        "L10r\nMrev": f"{duty.reference_life:.3g}",
+        "max. ele-\nment kN": significant(1e-3 * duty.element_load, 3),
+        "max. contact\nstress MPa": f"{1e-6 * duty.pressure:.0f}",
+        "C_r\nkN": significant(1e-3 * duty.ratings.dynamic) + sign,
+        "C_0r\nkN": significant(1e-3 * duty.ratings.static) + sign,
+        "L10\n10⁶ rev": f"{duty.basic_life:.3g}",
+        "L10r\n10⁶ rev": f"{duty.reference_life:.3g}",
     }
 
 
@@ -126,10 +145,10 @@ def _mesh_row(duty: MeshLoadState) -> dict[str, str]:
 
     return {
         "mesh": duty.name,
-        "force\nkN": f"{1e-3 * duty.force:.4g}",
-        "misaligned\nmrad": f"{1e3 * duty.misalignment:.3f}",
-        "opens +z\nµm": f"{1e6 * duty.opening:.1f}",
-        "load centre\nmm": shown(1e3 * duty.load_centroid, ".1f"),
+        "mesh\nforce kN": significant(1e-3 * duty.force),
+        "misalign-\nment mrad": f"{1e3 * duty.misalignment:.3f}",
+        "gap at +z\nend µm": f"{1e6 * duty.opening:.1f}",
+        "load cen-\ntroid mm": shown(1e3 * duty.load_centroid, ".1f"),
         "K_Hbeta": shown(duty.face_load_factor, ".2f"),
-        "pressure\nMPa": shown(1e-6 * duty.pressure, ".0f"),
+        "contact\nstress MPa": shown(1e-6 * duty.pressure, ".0f"),
     }

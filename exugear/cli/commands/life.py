@@ -1,4 +1,4 @@
-"""The verb `life`: how long gears and bearings last under the loads of section ``loads``, and what limits them."""
+"""The command `life`: service life of gears and bearings under the loads of section ``loads``, and what limits it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from exugear.cli.case import (
     VariantOption,
     open_project,
 )
-from exugear.cli.console import FailedError, exit_codes, make_results_folder, note, print_json, print_table, say
+from exugear.cli.console import FailedError, exit_codes, make_results_folder, note, print_json, say
+from exugear.cli.tables import print_table
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
@@ -41,9 +42,10 @@ def life(
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Rate gears and bearings under the loads of section ``loads``: damages, safety factors, lives, what limits.
+    """Rate gears and bearings for their loads and service life.
 
-    Tables that are missing or do not fit the case are computed first.
+    Lists damage, safety factors, rating lives and the limiting parts for the loads of section [loads]. Transmission
+    error tables that are missing or out of date are computed first.
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
@@ -59,20 +61,31 @@ def life(
             print_json({"case": str(case), **summary(data), "file": str(project.life_path)})
         else:
             _tell(data)
-            say(f"Life in {project.life_path}, tables with commas and a picture beside it")
+            say(f"Results: {project.life_path}; CSV tables and a picture in the same folder")
         _fail_if_short(data, project.life_path)
 
 
 def _fail_if_short(data: xr.Dataset, path: Path) -> None:
-    """End with code 1 where a part fails or falls short of what is asked for."""
+    """End with code 1 where a part fails or misses its required life or safety."""
     lines = [line for key in ("failures", "shortfalls") for line in json.loads(data.attrs[key])]
     if lines:
-        raise FailedError("\n".join(["the gearbox does not live as long as it shall:", *lines, f"It is in {path}"]))
+        raise FailedError("\n".join(["required life not reached:", *lines, f"Results: {path}"]))
 
 
-CONTACT_STRESSES = (
-    "sigma_H: by Hertz from the line loads of finite elements inside the path of contact, K_v in it, where the gears "
-    "stand under each load; ISO: sigma_H0 of ISO 6336-2 under the largest load, without load factors"
+CONTACT_LEGEND = (
+    "sigma_H: Hertzian stress from the line loads of the finite element contact within the path of contact, with K_v, "
+    "gears displaced by each load; nominal: sigma_H0 of ISO 6336-2 at the largest load, without load factors. Outside: "
+    "load carried outside the path of contact. S_H ISO: safety factor of ISO 6336-2; stat.: under the largest load."
+)
+ROOT_LEGEND = (
+    "sigma_F: maximum root stress (finite elements); nominal: sigma_F0 of ISO 6336-3 at the largest load, without load "
+    "factors; minimum: smallest principal stress (compression). S_F ISO: safety factor of ISO 6336-3; stat.: under the "
+    "largest load."
+)
+BEARING_LEGEND = (
+    "Largest: radial load, with partial factors of extreme loads; equiv.: constant equivalent load of the same damage "
+    "(ISO 281). L10: basic, L10r: basic reference, L10m: modified reference rating "
+    "life. kappa: viscosity ratio. Stress: maximum contact stress. S_0: static safety factor."
 )
 
 
@@ -82,15 +95,17 @@ def _tell(data: xr.Dataset) -> None:
     for line in json.loads(data.attrs["failures"]):
         say(line)
     if data.sizes["flank"]:
-        print_table("Flanks: largest contact stress of the life, safety against pitting", _contact_rows(data))
-        say(CONTACT_STRESSES)
-        print_table("Roots: largest stress of the life, safety against breakage", _root_rows(data))
+        rows = _contact_rows(data)
+        print_table("Tooth flanks: largest contact stress, safety against pitting", rows, legend=CONTACT_LEGEND)
+        rows = _root_rows(data)
+        print_table("Tooth roots: largest stress, safety against breakage", rows, legend=ROOT_LEGEND)
     if data.sizes["bearing"]:
-        print_table("Bearings: basic rating life, static safety", _bearing_rows(data))
+        print_table("Bearings: rating life, static safety", _bearing_rows(data), legend=BEARING_LEGEND)
     worst = [limit for limit in limits(data) if limit[2] > 0.0][:SHOWN_LIMITS]
     if worst:
-        rows = [{"limits": part, "by": kind, "damage": _told(damage, ".3g")} for part, kind, damage in worst]
-        print_table(f"What limits the life of {float(data.attrs['life_years']):g} years", rows)
+        rows = [{"part": part, "failure mode": kind, "damage": _told(damage, ".3g")} for part, kind, damage in worst]
+        title = f"Parts with the largest fatigue damage in {float(data.attrs['life_years']):g} years"
+        print_table(title, rows, ("failure mode",), "Damage: 1 is failure at the design probability.")
     for key, style in (("assumptions", ""), ("unrated", "yellow"), ("reliefs", "yellow")):
         for line in json.loads(data.attrs[key]):
             note(line, style=style)
@@ -101,12 +116,13 @@ def _contact_rows(data: xr.Dataset) -> list[dict[str, str]]:
         {
             "gear, flank, mesh": _with_holder(data, label, "contact"),
             "sigma_H\nMPa": _told(1e-6 * value("contact_stress"), ".0f"),
-            "ISO\nMPa": _told(1e-6 * value("nominal_contact"), ".0f"),
+            "nominal\nMPa": _told(1e-6 * value("nominal_contact"), ".0f"),
             "outside\n%": _told(100.0 * value("outside"), ".1f"),
-            "K_Hb": _told(value("face_load"), ".3f"),
-            "damage": _told(value("contact_damage"), ".3g"),
+            "K_Hbeta": _told(value("face_load"), ".3f"),
+            "fatigue\ndamage": _told(value("contact_damage"), ".3g"),
             "S_H": _told(value("contact_safety"), ".2f"),
-            "ISO\nS_H": _told(value("standard_contact_safety"), ".2f"),
+            "S_H\nISO": _told(value("standard_contact_safety"), ".2f"),
+            "S_H\nstat.": _told(value("contact_static"), ".2f"),
         }
         for label, value in _entries(data, "flank")
     ]
@@ -117,13 +133,12 @@ def _root_rows(data: xr.Dataset) -> list[dict[str, str]]:
         {
             "gear, flank, mesh": _with_holder(data, label, "root"),
             "sigma_F\nMPa": _told(1e-6 * value("root_stress"), ".0f"),
-            "ISO\nMPa": _told(1e-6 * value("nominal_root"), ".0f"),
-            "least\nMPa": _told(1e-6 * value("compression"), ".0f"),
-            "damage": _told(value("root_damage"), ".3g"),
+            "nominal\nMPa": _told(1e-6 * value("nominal_root"), ".0f"),
+            "minimum\nMPa": _told(1e-6 * value("compression"), ".0f"),
+            "fatigue\ndamage": _told(value("root_damage"), ".3g"),
             "S_F": _told(value("root_safety"), ".2f"),
-            "ISO\nS_F": _told(value("standard_root_safety"), ".2f"),
-            "static\nS_H": _told(value("contact_static"), ".2f"),
-            "static\nS_F": _told(value("root_static"), ".2f"),
+            "S_F\nISO": _told(value("standard_root_safety"), ".2f"),
+            "S_F\nstat.": _told(value("root_static"), ".2f"),
         }
         for label, value in _entries(data, "flank")
     ]
@@ -134,12 +149,12 @@ def _bearing_rows(data: xr.Dataset) -> list[dict[str, str]]:
         {
             "bearing": label,
             "largest\nkN": _told(1e-3 * value("largest_load"), ".4g"),
-            "equivalent\nkN": _told(1e-3 * value("equivalent"), ".4g"),
+            "equiv.\nkN": _told(1e-3 * value("equivalent"), ".4g"),
             "L10\nh": _told(value("basic_hours"), ".3g"),
             "L10r\nh": _told(value("reference_hours"), ".3g"),
             "L10m\nh": _told(value("modified_hours"), ".3g"),
             "kappa": _told(value("viscosity_ratio"), ".2g"),
-            "pressure\nMPa": _told(1e-6 * value("pressure"), ".0f"),
+            "stress\nMPa": _told(1e-6 * value("pressure"), ".0f"),
             "S_0": _told(value("static_safety"), ".2f"),
         }
         for label, value in _entries(data, "bearing")
@@ -156,7 +171,7 @@ def _with_holder(data: xr.Dataset, label: str, kind: str) -> str:
     """Label of a flank, and which of several planets it is."""
     holder = str(data[f"flank_{kind}_holder"].sel(flank=label).item())
     if holder:
-        return f"{label}\n  {holder}"
+        return f"{label} ({holder})"
     return label
 
 
@@ -168,5 +183,5 @@ def _told(value: float, form: str) -> str:
     if math.isnan(value):
         return ""
     if math.isinf(value):
-        return "infinite"
+        return "inf."
     return format(value, form)

@@ -1,4 +1,4 @@
-"""The verb `loads`: what a gearbox sees of its sources of loads, counted."""
+"""The command `loads`: load spectra of meshes and bearings from the load sources of a gearbox."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from exugear.cli.console import (
     make_results_folder,
     note,
     print_json,
-    print_table,
     say,
 )
+from exugear.cli.tables import print_table
 
 if TYPE_CHECKING:
     from exugear.life.load_spectrum.counted import CountedLoads
+
+HUB_LEGEND = "Range in kN (forces) and kN m (moments), one cycle per second, by S-N exponent."
 
 
 def loads(
@@ -30,9 +32,10 @@ def loads(
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Read the files that section ``loads`` names, and tell what each mesh and bearing sees of them.
+    """Count the loads on each mesh and bearing.
 
-    No tables are needed. Writes load duration distributions as CSV, and a picture of them.
+    Reads the load files of section [loads]; needs no transmission error tables. Writes load duration distributions
+    (LDD) as CSV, and a picture of them.
     """
     with exit_codes():
         from exugear.life.load_spectrum.counted import count_loads, draw_duration, write_spectra
@@ -50,16 +53,20 @@ def loads(
         if as_json:
             print_json({"case": str(case), **counted.summary(), "files": [str(path) for path in files]})
             return
-        print_table("Sources of loads", [_source_row(row) for row in counted.source_rows()])
-        title = f"Equivalent loads on {counted.body} over {counted.life_years:g} years: torque in as many revolutions,"
-        print_table(f"{title} range of torque once a second", _equivalent_rows(counted))
+        sources = [_source_row(row) for row in counted.source_rows()]
+        print_table(
+            "Load sources", sources, ("kind",), "Skipped: at the start of each file. Torque of the loaded body."
+        )
+        title = f"Damage-equivalent loads on {counted.body} over {counted.life_years:g} years"
+        print_table(title, _equivalent_rows(counted), legend=_equivalent_legend(counted))
         hub = [_hub_row(name, ranges) for name, ranges in counted.equivalent_ranges.items() if name != "torque"]
         if hub:
-            print_table(f"Loads of the hub on {counted.body}: range once a second by slope, kN and kN m", hub)
-        print_table("What turns through its load", _part_rows(counted))
+            print_table(f"Damage-equivalent rotor loads on {counted.body}", hub, legend=HUB_LEGEND)
+        parts = _part_rows(counted)
+        print_table("Loads on rotating parts", parts, ("mesh",), "Mesh force: per mesh, at the largest torque.")
         for line in counted.remarks:
-            note(line, style="yellow")
-        say(f"Load duration distributions in {folder}")
+            note(f"Warning: {line}", style="yellow")
+        say(f"Results (load duration distributions): {folder}")
 
 
 def _source_row(row: dict[str, Any]) -> dict[str, str]:
@@ -70,27 +77,30 @@ def _source_row(row: dict[str, Any]) -> dict[str, str]:
         "files": str(row["files"]),
         "hours": f"{row['hours']:.6g}",
         "mean\nkN m": f"{row['mean_torque_kN_m']:.4g}",
-        "least\nkN m": f"{row['least_torque_kN_m']:.4g}",
-        "largest\nkN m": f"{row['largest_torque_kN_m']:.4g}",
+        "minimum\nkN m": f"{row['least_torque_kN_m']:.4g}",
+        "maximum\nkN m": f"{row['largest_torque_kN_m']:.4g}",
         "mean\nrpm": f"{row['mean_speed_rpm']:.4g}",
     }
 
 
 def _equivalent_rows(counted: CountedLoads) -> list[dict[str, str]]:
-    distribution = counted.distribution
     rows = [
-        {"by damage with the slope": f"{m:.4g}", "torque\nkN m": f"{1e-3 * value:.4g}", "range\nkN m": ""}
+        {"S-N exponent": f"{m:.4g}", "torque\nkN m": f"{1e-3 * value:.4g}", "torque range\nkN m": ""}
         for m, value in counted.equivalents().items()
     ]
     rows += [
-        {"by damage with the slope": f"{m:.4g}", "torque\nkN m": "", "range\nkN m": f"{1e-3 * value:.4g}"}
+        {"S-N exponent": f"{m:.4g}", "torque\nkN m": "", "torque range\nkN m": f"{1e-3 * value:.4g}"}
         for m, value in counted.equivalent_ranges.get("torque", {}).items()
     ]
-    say(
-        f"{len(distribution.hours)} bins, {distribution.hours.sum():.6g} h, "
-        f"{distribution.revolutions.sum():.4g} revolutions"
-    )
     return rows
+
+
+def _equivalent_legend(counted: CountedLoads) -> str:
+    found = counted.distribution
+    return (
+        f"Torque: constant torque over the same {found.revolutions.sum():.4g} revolutions with the same damage; range: "
+        f"one cycle per second. {len(found.hours)} bins, {found.hours.sum():.6g} h."
+    )
 
 
 def _hub_row(name: str, ranges: Mapping[float, float]) -> dict[str, str]:
@@ -101,9 +111,9 @@ def _part_rows(counted: CountedLoads) -> list[dict[str, str]]:
     return [
         {
             "part": str(row["part"]),
-            "loaded by": str(row["loaded_by"]),
-            "cycles": f"{row['cycles']:.4g}",
-            "at the largest\ntorque kN": f"{row['force_kN']:.4g}" if math.isfinite(float(row["force_kN"])) else "",
+            "mesh": str(row["loaded_by"]),
+            "load\ncycles": f"{row['cycles']:.4g}",
+            "mesh\nforce kN": f"{row['force_kN']:.4g}" if math.isfinite(float(row["force_kN"])) else "",
         }
         for row in counted.part_rows()
     ]

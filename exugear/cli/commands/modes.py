@@ -1,4 +1,4 @@
-"""The verb `modes`: eigenmodes of a variant at its static load, with a Campbell diagram."""
+"""The command `modes`: eigenmodes of a variant at its static load, with a Campbell diagram."""
 
 from __future__ import annotations
 
@@ -17,10 +17,17 @@ from exugear.cli.case import (
     VariantOption,
     open_project,
 )
-from exugear.cli.console import exit_codes, note, print_json, print_table, refuse_not_converged, say
+from exugear.cli.console import exit_codes, note, print_json, refuse_not_converged, say
+from exugear.cli.tables import HARD_SPACE, print_table
 
 if TYPE_CHECKING:
     from exugear.system.modes import Modes
+
+LEGEND = (
+    "TE part.: squared, mass-normalised participation of the mode in the overall TE (all modes: 100 %). TE amplif.: "
+    "overall TE at resonance per static TE of the dominant mesh. TE: transmission error. Energies: largest parts."
+)
+_STRAIN = "; strain energy: "
 
 
 def modes(
@@ -33,9 +40,10 @@ def modes(
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Compute the eigenmodes of a variant at its static load, with a Campbell diagram.
+    """Compute eigenmodes and a Campbell diagram.
 
-    Tables that are missing or do not fit the case are computed first.
+    The variant is linearised at the static load. Transmission error tables that are missing or out of date are computed
+    first.
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
@@ -49,14 +57,17 @@ def modes(
         picture = _draw_campbell(found, path)
         rows = _mode_summaries(found)
         if found.growth_rate > 0.0:
-            note(f"Unstable: disturbances grow by up to {found.growth_rate:.3g} 1/s; a run diverges", style="yellow")
+            note(
+                f"Warning: unstable: disturbances grow at up to {found.growth_rate:.3g} 1/s; a run would diverge",
+                style="yellow",
+            )
         if as_json:
             assembly = found.assembly
             label = {"variant": assembly.variant, "mesh_model": assembly.mesh_model, "inertias": assembly.inertias}
             print_json({"case": str(case), **label, "modes": rows, "file": str(path), "picture": str(picture)})
         else:
-            print_table(f"Modes of {found.label}", [_mode_row(row) for row in rows], ("what moves",))
-            say(f"Modes in {path}, diagram in {picture}")
+            _print_modes(found, rows)
+            say(f"Results: {path}; Campbell diagram: {picture}")
         refuse_not_converged(meshes_near_unconverged(found.assembly))
 
 
@@ -80,7 +91,7 @@ def _draw_campbell(found: Modes, path: Path) -> Path:
         picture,
         weights=(shares[seen] / shares.max()) ** 0.5,
         highest_frequency=top,
-        title=f"{found.label}: modes with a share over {100 * least:g} %",
+        title=f"{found.label}: modes with more than {100 * least:g} % TE participation",
     )
     return picture
 
@@ -103,12 +114,30 @@ def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
     ]
 
 
+def _print_modes(found: Modes, rows: list[dict[str, Any]]) -> None:
+    """Print the table of modes: those that vibrate have damping and shares, rigid-body motions have none."""
+    assembly = found.assembly
+    title = f"Modes: variant {assembly.variant}, mesh model {assembly.mesh_model}, inertia set {assembly.inertias}"
+    texts = ("kinetic energy\n%", "strain energy\n%")
+    print_table(title, [_mode_row(row) for row in rows], texts, LEGEND)
+    factor = assembly.housing_factor
+    say(f"Linearised at the static load; housing stiffness factor {factor:g}.")
+
+
 def _mode_row(summary: dict[str, Any]) -> dict[str, str]:
+    kinetic, _, strain = str(summary["name"]).replace(" %", "").partition(_STRAIN)
+    kinetic = ", ".join(part.replace(" ", HARD_SPACE) for part in kinetic.split(", "))
+    damping = share = amplification = "-"
+    if summary["frequency_Hz"] > 0.0:
+        damping = f"{100 * summary['damping_ratio']:.2f}"
+        share = f"{100 * summary['te_participation']:.2f}"
+        amplification = f"{summary['amplification']:.2f}"
     return {
-        "no.": str(summary["mode"]),
-        "Hz": f"{summary['frequency_Hz']:.1f}",
-        "damping\n%": f"{100 * summary['damping_ratio']:.2f}",
-        "DTE share\n%": f"{100 * summary['te_participation']:.2f}",
-        "amplif.": f"{summary['amplification']:.2f}",
-        "what moves": summary["name"],
+        "mode": str(summary["mode"]),
+        "freq.\nHz": f"{summary['frequency_Hz']:.1f}",
+        "damping\n%": damping,
+        "TE\npart. %": share,
+        "TE\namplif.": amplification,
+        "kinetic energy\n%": kinetic,
+        "strain energy\n%": strain,
     }

@@ -1,7 +1,8 @@
-"""The verb `report`: one web page of a results folder."""
+"""The command `report`: one web page of a results folder."""
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -16,25 +17,25 @@ from exugear.cli.console import (
     interruption,
     note,
     print_json,
-    print_table,
     progress_bar,
     say,
 )
+from exugear.cli.tables import print_table
 
 
 def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder.", show_default=False)],
     near: Annotated[
         float | None,
-        typer.Option(min=1.0, metavar="HZ", help="Frequency to look for modes at. (default: as the case says)"),
+        typer.Option(min=1.0, metavar="HZ", help="Target frequency to compare with modes. (default: gearbox file)"),
     ] = None,
     allow_dir: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a report of a results folder: one web page that answers where it rings, how loud, and why.
+    """Write a report of a results folder as one web page.
 
-    The page needs no network and no other file. It compares the variants whose runs and modes are there. gmsh
-    scripts never run: what they would make must be there.
+    The page lists the resonances, their amplitudes and causes, and needs no other file. It compares all variants with
+    runs and modes. gmsh scripts are not run; their meshes must exist.
     """
     with exit_codes():
         from exugear.report.writer import ReportError, write_report
@@ -42,7 +43,7 @@ def report(
 
         check_allow_dir(allow_dir)
         if not folder.is_dir():
-            raise BadInputError(f"{folder}: no such folder; name the one that `exugear run` wrote into")
+            raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
         try:
             with time_noted(folder, "report"), progress_bar() as bar, _parallel_worker() as executor:
                 task = bar.add_task("report", total=None)
@@ -73,7 +74,7 @@ def _tell_report(
 
     spent = times_spent(folder)
     for line in left_out:
-        note(f"Left out: {line}", style="yellow")
+        note(f"Warning: skipped: {line}", style="yellow")
     if as_json:
         times = {entry.step: entry.seconds for entry in spent}
         print_json({"report": str(path), "statements": list(statements), "left_out": list(left_out), "seconds": times})
@@ -81,8 +82,12 @@ def _tell_report(
     for line in statements:
         say(f"- {line}")
     rows = [
-        {"step": entry.step, "wall s": f"{entry.seconds:.1f}", "peak MB": f"{1e-6 * entry.memory:.0f}"}
+        {"step": entry.step, "wall\ntime s": f"{entry.seconds:.1f}", "memory\npeak MB": _megabytes(entry.memory)}
         for entry in spent
     ]
-    print_table("Where the time went, the last time of each step (steps side by side overlap)", rows, ("step",))
+    print_table("Run time, last execution of each step", rows, legend="Parallel steps overlap.")
     say(f"Report: {path}")
+
+
+def _megabytes(memory: float) -> str:
+    return f"{1e-6 * memory:.0f}" if math.isfinite(memory) else "-"

@@ -1,4 +1,4 @@
-"""The verb `run`: a load case in time."""
+"""The command `run`: a load case in the time domain."""
 
 from __future__ import annotations
 
@@ -62,30 +62,30 @@ def run(
     mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     load_case: Annotated[
-        str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: the first of the file)")
+        str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: first of the gearbox file)")
     ] = None,
-    solver: Annotated[Solver, typer.Option(help="What integrates.")] = Solver.compiled,
+    solver: Annotated[Solver, typer.Option(metavar="NAME", help="Solver: compiled or exudyn.")] = Solver.compiled,
     integrator: Annotated[
         Integrator | None,
-        typer.Option(help="Method of the compiled solver. (default: whichever takes fewer evaluations)"),
+        typer.Option(metavar="NAME", help="adams or rk4, compiled solver. (default: the cheaper one)"),
     ] = None,
     mesh_route: Annotated[
         MeshRoute,
         typer.Option(
             "--mesh-route",
-            help="How mesh forces enter Exudyn; loads is its textbook way, slow, with the variant bushing.",
+            metavar="NAME",
+            help="Mesh forces in Exudyn: element, or loads (slow; bushing only).",
         ),
     ] = MeshRoute.element,
     duration: Annotated[
         float | None,
-        typer.Option(metavar="S", help="Simulated time, s. (default: the load case's; with --resume that of the call)"),
+        typer.Option(metavar="S", help="Simulated time, s. (default: load case, or resumed run)"),
     ] = None,
     band: Annotated[
         float | None,
         typer.Option(
             metavar="HZ",
-            help="Highest frequency that is kept, Hz; above 8000 the stored rate grows, and the file with it. "
-            "(default: 6400; with --resume that of the call)",
+            help="Highest stored frequency, Hz. (default: 6400, or resumed run)",
             show_default=False,
         ),
     ] = None,
@@ -95,18 +95,19 @@ def run(
             "--compare-exudyn",
             metavar="S",
             min=0.0,
-            help="Integrate the first S seconds by Exudyn, too, and say how far both solvers are apart.",
+            help="Also integrate the first S seconds with Exudyn and compare.",
         ),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with a run that was stopped.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Resume an interrupted run.")] = False,
     out: OutOption = None,
     allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Run a load case in time; results are written while it goes on.
+    """Simulate a load case in the time domain.
 
-    Ctrl-C keeps what was reached. Tables that are missing or do not fit the case are computed first.
+    Results are written during the run; Ctrl-C keeps the results so far. Transmission error tables that are missing or
+    out of date are computed first.
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
@@ -122,7 +123,7 @@ def run(
         _check_solver(project.gearbox, variant, solver)
         _check_mesh_route(mesh_route, variant, solver)
         if compared is not None and solver is Solver.exudyn:
-            raise BadInputError("--compare-exudyn: the run itself is one of Exudyn; leave --solver out")
+            raise BadInputError("--compare-exudyn: requires the compiled solver; remove --solver exudyn")
         if compared is not None:
             try:
                 _check_extent(project, compared, kept["sample_rate"], out or Path("results"))
@@ -130,7 +131,7 @@ def run(
                 raise BadInputError(f"--compare-exudyn: {error}") from error
             _check_solver(project.gearbox, variant, Solver.compiled)
         if integrator and solver is Solver.exudyn:
-            raise BadInputError(f"--integrator {integrator}: is a method of the compiled solver; leave it out")
+            raise BadInputError(f"--integrator {integrator}: applies to the compiled solver only; remove --integrator")
         if not resume:
             project.begin()
         _check_run_directory(project.run_directory, resume)
@@ -160,7 +161,7 @@ def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> So
 def _load_case(project: Project) -> LoadCase:
     """Load case of the run, which is there unless the file has none."""
     if project.choice.load_case is None:
-        raise BadInputError(project.gearbox.fault("no load case ''; load cases are none"))
+        raise BadInputError(project.gearbox.fault("no load case; add a section [load_cases.NAME]"))
     return project.gearbox.load_cases[project.choice.load_case]
 
 
@@ -206,8 +207,8 @@ def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
     floating = [name for name, body in gearbox.case.bodies.items() if body.flexibility == "ffrf"]
     if variant.is_elastic and solver is Solver.compiled and floating:
         raise BadInputError(
-            f"--solver compiled: bodies.{floating[0]}.flexibility = 'ffrf' runs in Exudyn only; "
-            "add --solver exudyn, or choose 'nonrotating'"
+            f"--solver compiled: bodies.{floating[0]}.flexibility = 'ffrf' requires Exudyn; "
+            "add --solver exudyn, or set flexibility = 'nonrotating'"
         )
 
 
@@ -216,14 +217,14 @@ def _check_mesh_route(route: MeshRoute, variant: Variant, solver: Solver) -> Non
     if route is MeshRoute.element:
         return
     if variant.spins_only or variant.is_elastic:
-        why = "has no bodies, only their spins" if variant.spins_only else "has elastic bodies"
+        why = "has rotations only" if variant.spins_only else "has flexible bodies"
         raise BadInputError(
-            f"--mesh-route loads: its loads act on rigid bodies, and the variant {variant} {why}; "
-            "take --variant bushing, or --mesh-route element"
+            f"--mesh-route loads: requires rigid bodies with six degrees of freedom; the variant {variant} {why}; "
+            "use --variant bushing, or --mesh-route element"
         )
     if solver is not Solver.exudyn:
         raise BadInputError(
-            f"--mesh-route loads: loads with user functions exist in Exudyn only, not in the solver {solver}; "
+            f"--mesh-route loads: user-function loads exist in Exudyn only, not in the solver {solver}; "
             "add --solver exudyn"
         )
 
@@ -234,7 +235,7 @@ def _check_run_directory(directory: Path, resume: bool) -> None:
 
     refuse_if_busy(directory)
     if resume and (reason := refuse_to_resume(directory)):
-        raise BadInputError(f"--resume: {reason}; run without it")
+        raise BadInputError(f"--resume: {reason}; remove --resume")
 
 
 def _duration_to_resume(project: Project, duration: float | None) -> float | None:
@@ -245,7 +246,7 @@ def _duration_to_resume(project: Project, duration: float | None) -> float | Non
     if duration is None:
         return kept_duration(directory)
     if reason := refuse_shorter(directory, duration):
-        raise BadInputError(f"--duration {duration:g}: {reason}; give a longer one, or leave it out")
+        raise BadInputError(f"--duration {duration:g}: {reason}; set a longer duration, or remove --duration")
     return duration
 
 
@@ -266,7 +267,7 @@ def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
     of_bearings = bearing_range_warning(project.gearbox, loads, project.choice.variant)
     of_tables = other_load_warning(project.gearbox, loads, law.of_one_load)
     for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, band_warning(loads, band))):
-        note(f"load_cases.{load_case.name}: {doubt}", style="yellow")
+        note(f"Warning: load_cases.{load_case.name}: {doubt}", style="yellow")
 
 
 def _simulate(project: Project, resume: bool, command: str, **options: Any) -> Run:
@@ -276,7 +277,7 @@ def _simulate(project: Project, resume: bool, command: str, **options: Any) -> R
 
     directory = project.run_directory
     if not resume and has_pieces(directory / PARTIAL_NAME):
-        note(f"{directory}: a stopped run is begun anew; --resume would have gone on from it")
+        note(f"{directory}: interrupted run is restarted from the beginning; use --resume to continue one")
     try:
         return project.run(resume=resume, **options)
     except LimitError as error:
@@ -286,15 +287,15 @@ def _simulate(project: Project, resume: bool, command: str, **options: Any) -> R
     except KeyboardInterrupt:
         if not has_pieces(directory / PARTIAL_NAME):
             raise
-        raise StoppedError(f"kept in {directory}; go on from there with:\n{command}") from None
+        raise StoppedError(f"results so far are kept in {directory}; resume with:\n{command}") from None
 
 
 def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, command: str, as_json: bool) -> None:
     """Print what a run reached; end with 130 if the user stopped it, with 1 if it is not to be trusted."""
     if not finished.complete and not finished.halted:
-        so_far = "".join(f"\nNot to be trusted so far: {reason}" for reason in finished.reasons)
+        so_far = "".join(f"\nInvalid so far: {reason}" for reason in finished.reasons)
         raise StoppedError(
-            f"at {finished.end:.3f} s; kept in {finished.path}; go on from there with:\n{command}{so_far}"
+            f"at {finished.end:.3f} s; results so far are kept in {finished.path}; resume with:\n{command}{so_far}"
         )
     import numpy as np
 
@@ -337,27 +338,27 @@ def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, co
         if comparison is not None:
             say(comparison.words)
     if not finished.trusted:
-        what = "the run is" if finished.complete else f"the run was stopped at {finished.end:.4g} s and is"
-        raise FailedError("\n".join([f"{what} not to be trusted:", *finished.reasons, f"It is in {finished.path}"]))
+        what = "the run is invalid:" if finished.complete else f"the run is invalid, aborted at {finished.end:.4g} s:"
+        raise FailedError("\n".join([what, *finished.reasons, f"Results: {finished.path}"]))
 
 
 def _print_run(summary: dict[str, Any], outside: float) -> None:
     say(
-        f"{summary['variant']}, {summary['load_case']} ({summary['load']}), law {summary['mesh_model']}, "
-        f"inertias {summary['inertias']}: "
-        f"{summary['simulated_s']:g} s simulated in {summary['wall_s']:.1f} s ({summary['solver']}), "
-        f"{summary['input_speed_rpm']:.1f} rpm reached"
+        f"Variant {summary['variant']}, load case {summary['load_case']} ({summary['load']}), mesh model "
+        f"{summary['mesh_model']}, inertia set {summary['inertias']}: {summary['simulated_s']:g} s simulated in "
+        f"{summary['wall_s']:.1f} s wall time (solver {summary['solver']}); final input speed "
+        f"{summary['input_speed_rpm']:.1f} rpm"
     )
     if "stability_margin" in summary:
         say(
-            f"Steps of {1e6 * summary['step_s']:.4g} us, stable up to {summary['stability_margin']:.1f} times the "
-            f"fastest motion; errors expected up to {summary['band_Hz'] / 1e3:g} kHz: "
+            f"Time step {1e6 * summary['step_s']:.4g} µs, stability margin {summary['stability_margin']:.1f}; "
+            f"estimated integration error up to {summary['band_Hz'] / 1e3:g} kHz: "
             f"{100.0 * abs(summary['expected_error_at_band']):.2g} % of amplitudes, "
-            f"{100.0 * summary['expected_error_of_resonances']:.2g} % of a resonance's peak"
+            f"{100.0 * summary['expected_error_of_resonances']:.2g} % of resonance peaks"
         )
     if outside > 0.0:
         say(
-            f"A mesh was outside its table for {outside:.3g} s, where the table goes on in a straight line: "
-            "extrapolation_time in the results names the mesh; widen the axes of [ste]"
+            f"Warning: a mesh was outside the range of its table for {outside:.3g} s (extrapolated linearly; variable "
+            "extrapolation_time of the results). Widen the axes of [ste]."
         )
-    say(f"Results in {summary['file']}")
+    say(f"Results: {summary['file']}")

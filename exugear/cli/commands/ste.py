@@ -1,4 +1,4 @@
-"""The verb `ste`: tables of the static transmission error, with pictures."""
+"""The command `ste`: tables of the static transmission error, with pictures."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from exugear.cli.console import (
     make_results_folder,
     note,
     print_json,
-    print_table,
     progress_bar,
     say,
     tell_of_tables,
 )
+from exugear.cli.tables import print_table
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -60,27 +60,29 @@ def ste(
     positions: Annotated[
         int | None,
         typer.Option(
-            min=1, max=2000, help="Positions of the mesh cycle. (default: as the file says, 50; nonlinear: 10)"
+            min=1, max=2000, help="Positions of the mesh cycle. (default: gearbox file, else 50; nonlinear: 10)"
         ),
     ] = None,
     method: Annotated[
         Method | None,
         typer.Option(
-            help="How the teeth deflect; nonlinear takes about half a minute a position. (default: as the file says)"
+            metavar="NAME",
+            help="superelement: condensed finite elements; nonlinear: reference analysis, about 30 s per position. "
+            "(default: gearbox file)",
         ),
     ] = None,
     grid: Annotated[
         bool,
-        typer.Option("--grid", help="Over load, centre distance and misalignment too, with the axes of the file."),
+        typer.Option("--grid", help="Also vary load, centre distance and misalignment over the axes of the file."),
     ] = False,
     out: OutOption = None,
     allow_dir: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compute the static transmission error of the gear pairs, with pictures.
+    """Compute tables of the static transmission error. Also draws the curves and the teeth in contact.
 
-    Tables already there are kept if they were computed from the same input. Those of the method nonlinear lie beside
-    the others and serve to check them; dynamics do not use them.
+    Tables are cached and recomputed when their input changes. Tables of the method nonlinear are for comparison; the
+    dynamic models do not use them.
     """
     with exit_codes():
         from exugear.cli.watched import WatchedProject
@@ -93,11 +95,13 @@ def ste(
         gearbox = read_gearbox(case, allow_dir)
         if (method or Method(gearbox.ste.method)) is Method.nonlinear:
             if grid:
-                raise BadInputError("--grid: the method nonlinear computes the static state alone; leave --grid out")
+                raise BadInputError("--grid: the method nonlinear computes the static load only; remove --grid")
             _compute_references(gearbox, case, out, mesh or [], positions, as_json)
             return
         if positions is not None and positions < LEAST_TABLE_POSITIONS:
-            raise BadInputError(f"--positions {positions}: a table for dynamics needs at least {LEAST_TABLE_POSITIONS}")
+            raise BadInputError(
+                f"--positions {positions}: a table for dynamics requires at least {LEAST_TABLE_POSITIONS}"
+            )
         project = WatchedProject(gearbox, out or default_folder(case), Choice(Variant.bushing))
         folder = project.folder
         requests = _requested_tables(project, mesh or [], positions, grid)
@@ -131,8 +135,8 @@ def _tell_misalignment(project: WatchedProject) -> None:
     for element, misalignment in zip(state.assembly.elements, state.misalignment, strict=True):
         pair = element.mesh.pair
         largest[pair.name] = max(largest.get(pair.name, 0.0), abs(float(misalignment)) * pair.face_width)
-    words = ", ".join(f"{name} {1e6 * opening:.1f} um" for name, opening in largest.items())
-    note(f"Under the static load on bearings gaps open over the face by up to: {words} (exugear bearings tells more)")
+    words = ", ".join(f"{name} {1e6 * opening:.1f} µm" for name, opening in largest.items())
+    note(f"Misalignment under the static load, gap over the face width: {words} (details: exugear bearings)")
 
 
 def _requested_tables(
@@ -143,13 +147,16 @@ def _requested_tables(
     gearbox = project.gearbox
     requests = project.requested_tables(names, positions, grid=grid)
     if not requests:
-        why = without_table(gearbox, gearbox.pairs) or "pairs: none wants a table; give table = true, or --mesh NAME"
+        why = (
+            without_table(gearbox, gearbox.pairs)
+            or "pairs: no pair has table = true; set it for a pair, or use --mesh NAME"
+        )
         raise BadInputError(gearbox.fault(why))
     make_results_folder(project.folder)
     project.keep_case()
     for request in requests:
         if request.stored:
-            note(f"{request.name}: kept {request.path}, computed from the same input")
+            note(f"{request.name}: cached table of the same input: {request.path}")
             continue
         if request.replaces:
             note(request.replaces)
@@ -184,16 +191,16 @@ def _compute_references(
     if as_json:
         print_json({"case": str(case), "tables": summaries})
     else:
-        print_table("Static transmission error, non-linear finite elements", [_reference_row(row) for row in summaries])
-        say("mean and p-p (peak to peak) by contact analysis; tables: the same by the method that dynamics use")
-        say(f"Tables in {folder / 'tables'}")
+        rows = [_reference_row(row) for row in summaries]
+        print_table("Static transmission error, nonlinear finite elements", rows, legend=REFERENCE_LEGEND)
+        say(f"Results: {folder / 'tables'}")
     failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
     doubts = doubts_of_references(summaries)
     faults = []
     if failures:
-        faults += ["positions that are not solved:", *failures]
+        faults += ["positions not converged:", *failures]
     if doubts:
-        faults += ["both methods do not agree:", *doubts]
+        faults += ["the methods differ by more than the limit:", *doubts]
     if faults:
         raise FailedError("\n".join(faults))
 
@@ -257,9 +264,14 @@ def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], f
     return pictures
 
 
-PRESSURES = (
-    "Pressure: largest of the contact over the mesh cycle, away from tip edges; pitch point: by Hertz there, the load "
-    "spread evenly. Both under torque 1, of gears that stand straight, without load factors"
+TABLE_LEGEND = (
+    "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p) over the mesh cycle. Stiffness: mean mesh "
+    "stiffness. Stress: maximum contact stress of the mesh cycle without tip-edge contact; at the pitch point: Hertz, "
+    "even load distribution. Aligned gears, no load factors. States conv.: converged of all states of the table."
+)
+REFERENCE_LEGEND = (
+    "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p), by the nonlinear reference analysis; "
+    "table: by the method of the tables, which the dynamic models use."
 )
 
 
@@ -277,38 +289,37 @@ def _tell_tables(
     if as_json:
         print_json({"case": str(case), "tables": summaries, "pictures": [str(path) for path in pictures]})
     else:
-        print_table("Static transmission error", [_ste_row(summary) for summary in summaries])
-        say(PRESSURES)
-        say(f"Tables in {folder / 'tables'}, pictures in {folder / 'pictures'}")
+        print_table("Static transmission error", [_ste_row(summary) for summary in summaries], legend=TABLE_LEGEND)
+        say(f"Results: {folder / 'tables'}; pictures: {folder / 'pictures'}")
     doubts = tell_of_tables(tables)
     if doubts:
-        raise FailedError("\n".join(["tables that are not to be trusted:", *doubts]))
+        raise FailedError("\n".join(["invalid tables:", *doubts]))
 
 
 def _ste_row(summary: dict[str, Any]) -> dict[str, str]:
     return {
         "pair": summary["pair"],
-        "torque 1\nN m": _shown(summary, "torque_gear_1_N_m", ".1f"),
-        "mean\nµm": _shown(summary, "ste_mean_um", ".2f"),
-        "peak-peak\nµm": _shown(summary, "ste_peak_to_peak_um", ".3f"),
-        "stiffness\nMN/m": _shown(summary, "mesh_stiffness_mean_N_per_m", ".1f", 1e-6),
-        "pressure\nMPa": _shown(summary, "max_pressure_MPa", ".0f"),
-        "pitch point\nMPa": _shown(summary, "pitch_point_pressure_MPa", ".0f"),
-        "states\nsolved": _solved(summary),
+        "torque\nN m": _shown(summary, "torque_gear_1_N_m", ".1f"),
+        "TE mean\nµm": _shown(summary, "ste_mean_um", ".2f"),
+        "TE p-p\nµm": _shown(summary, "ste_peak_to_peak_um", ".3f"),
+        "stiffn.\nMN/m": _shown(summary, "mesh_stiffness_mean_N_per_m", ".4g", 1e-6),
+        "stress\nMPa": _shown(summary, "max_pressure_MPa", ".0f"),
+        "at pitch\npoint MPa": _shown(summary, "pitch_point_pressure_MPa", ".0f"),
+        "states\nconv.": _solved(summary),
     }
 
 
 def _reference_row(summary: dict[str, Any]) -> dict[str, str]:
-    """Both methods side by side: mean and peak-to-peak (p-p) by contact analysis and by the tables' method."""
+    """Return mean and peak-to-peak values by the reference analysis and by the method of the tables."""
     return {
         "pair": summary["pair"],
-        "torque 1\nN m": _shown(summary, "torque_gear_1_N_m", ".1f"),
-        "mean\nµm": _shown(summary, "ste_mean_um", ".2f"),
-        "tables\nµm": _shown(summary, "superelement_mean_um", ".2f"),
-        "differ\n%": _shown(summary, "difference_of_means_percent", "+.1f"),
-        "p-p\nµm": _shown(summary, "ste_peak_to_peak_um", ".3f"),
-        "tables\nµm ": _shown(summary, "superelement_peak_to_peak_um", ".3f"),
-        "solved": _solved(summary),
+        "torque\nN m": _shown(summary, "torque_gear_1_N_m", ".1f"),
+        "TE mean\nµm": _shown(summary, "ste_mean_um", ".2f"),
+        "table\nmean µm": _shown(summary, "superelement_mean_um", ".2f"),
+        "diff.\n%": _shown(summary, "difference_of_means_percent", "+.1f"),
+        "TE p-p\nµm": _shown(summary, "ste_peak_to_peak_um", ".3f"),
+        "table\np-p µm": _shown(summary, "superelement_peak_to_peak_um", ".3f"),
+        "posit.\nconv.": _solved(summary),
     }
 
 

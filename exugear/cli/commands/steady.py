@@ -1,4 +1,4 @@
-"""The verb `steady`: steady response of a variant over speed, every mesh order and their combinations."""
+"""The command `steady`: steady-state response over speed, for every mesh order and their combinations."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from exugear.cli.console import (
     exit_codes,
     note,
     print_json,
-    print_table,
     refuse_not_converged,
     say,
 )
+from exugear.cli.tables import HARD_SPACE, print_table, significant
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,8 +53,12 @@ SHOWN_RESONANCES = 15
 SHOWN_BEARINGS = 4
 KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2"}
 """Units in the keys of `--json`."""
-COLUMNS = {"error": ("um", 1e6), "force": ("kN", 1e-3), "acceleration": ("m/s2", 1.0)}
-"""Titles of the table, which are units, and what one of SI is in them."""
+COLUMNS = {
+    "error": ("overall\nTE µm", 1e6),
+    "force": ("bearing\nforce kN", 1e-3),
+    "acceleration": ("accel.\nm/s²", 1.0),
+}
+"""Headings of the table and the factors from SI units."""
 NOTICED_CHANGE = 1e-2
 """Change of the loudest peaks by more harmonics that is to be minded."""
 NOTICED_VARIATION = 1e-3
@@ -81,45 +85,50 @@ def steady(
         typer.Option(
             "--load-case",
             metavar="NAME",
-            help="Respond at the torques of a load case, with tables and results in at-NAME in the results folder. "
-            "(default: at the static load)",
+            help="Linearise at the torques of a load case; results in at-NAME of the results folder. (default: static "
+            "load)",
             show_default=False,
         ),
     ] = None,
     method: Annotated[
         Method,
         typer.Option(
-            help="linear: the transmission error as excitation; parametric: stiffness that varies, all meshes at once; "
-            "nonlinear: laws in time, such as table with teeth that part, and bearings by iso16281."
+            metavar="NAME",
+            help="Method. linear: transmission error as excitation; parametric: time-varying stiffness, all meshes "
+            "coupled; nonlinear: harmonic balance with contact loss (model table) and bearings of model iso16281.",
         ),
     ] = Method.parametric,
     speeds: Annotated[
         str | None,
         typer.Option(
             metavar="FIRST:LAST:COUNT",
-            help="Speeds of the input, rpm, positive about +z. (default: those that the first load case passes)",
+            help="Input speeds, rpm, positive about +z. (default: range of the first load case)",
             show_default=False,
         ),
     ] = None,
     harmonics: Annotated[
         int | None,
         typer.Option(
-            help="Harmonics of each mesh frequency. (default: as many as the mesh stiffness asks for)",
+            help="Harmonics of each mesh frequency. (default: as the mesh stiffness requires)",
             show_default=False,
         ),
     ] = None,
     branches: Annotated[
         bool,
-        typer.Option("--continuation", help="Follow states through turning points over speed (--method nonlinear)."),
+        typer.Option(
+            "--continuation",
+            help="Continuation: follow the solution through turning points (method nonlinear).",
+        ),
     ] = False,
     out: OutOption = None,
     allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Compute the steady response over speed: what resonates, without a run-up.
+    """Compute the steady-state response and rank the resonances.
 
-    Speeds are added where mesh orders meet modes. Tables that are missing or do not fit the case are computed first.
+    Needs no run-up. Speeds are added where mesh orders cross modes. Transmission error tables that are missing or out
+    of date are computed first.
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
@@ -155,8 +164,8 @@ def _tell_of_other_loads(gearbox: Gearbox) -> None:
     for name, load_case in gearbox.load_cases.items():
         if other_load_warning(gearbox, summarise_loads(gearbox, load_case)):
             note(
-                f"The response is at the static load ({static}), the load case {name} at another one "
-                f"({load_in_words(load_case)}): --load-case {name} responds there",
+                f"Warning: the response is computed at the static load ({static}); load case {name} has another load "
+                f"({load_in_words(load_case)}): add --load-case {name} to compute it there",
                 style="yellow",
             )
 
@@ -192,12 +201,12 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     pulling = _tell_of_pulls(data)
     swinging = _tell_of_bearings(data)
     if data.attrs["shared_lines"]:
-        note(f"Mesh frequencies share lines, each of which is named after one of them: {data.attrs['shared_lines']}")
+        note(f"Coinciding orders of several meshes, each named after one of them: {data.attrs['shared_lines']}")
     excited = bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
     if not excited:
         note(
-            f"Nothing excites the gearbox: by the mesh model {data.attrs['mesh_model']} no stiffness varies over the "
-            "mesh cycle, and all lines are zero; take the law line_of_action"
+            f"No excitation: the mesh model {data.attrs['mesh_model']} has constant stiffness over the mesh cycle, and "
+            "all amplitudes are zero; use --mesh-model line_of_action"
         )
     else:
         _tell_of_harmonics(data)
@@ -212,19 +221,24 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
         print_json({**summary, **remarks})
         _fail_if_doubtful(data, growth)
         return
-    title = f"Loudest resonances, {_speeds_of(ranking)}, {project.choice.variant}, {settings.method}"
-    title += f", at {static_load_in_words(project.gearbox)}"
+    title = f"Resonance ranking, {_speeds_of(ranking)}, variant {project.choice.variant}, {settings.method}"
+    title += f", at {static_load_in_words(project.gearbox)}".replace(" N m", f"{HARD_SPACE}N{HARD_SPACE}m")
     if ranking.resonances:
-        print_table(title, [_row(resonance) for resonance in ranking.resonances[:SHOWN_RESONANCES]])
-        say(
-            "Overall transmission error, dynamic bearing force, acceleration at bearings (of the "
-            f"{ranking.accelerates}), each with its place"
-        )
+        rows = [_row(resonance) for resonance in ranking.resonances[:SHOWN_RESONANCES]]
+        print_table(title, rows, ("bearing",), _legend(ranking))
     fastest = float(abs(data["speed"]).max()) / RPM
-    decay = f"slowest decay {-growth:.3g} 1/s" if growth <= 0.0 else f"fastest growth {growth:.3g} 1/s"
-    path = project.steady_path(settings)
-    say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm, {decay}, in {path}")
+    stable = f"slowest decay rate {-growth:.3g} 1/s (stable)" if growth <= 0.0 else f"fastest growth {growth:.3g} 1/s"
+    say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}.")
+    say(f"Results: {project.steady_path(settings)}")
     _fail_if_doubtful(data, growth)
+
+
+def _legend(ranking: Ranking) -> str:
+    text = "Zero-to-peak amplitudes, (rank) within each quantity. TE: transmission error"
+    if "force" not in ranking.resonances[0].loudness:
+        return f"{text}."
+    owner = {"shafts": "shaft", "housing": "housing"}.get(ranking.accelerates, ranking.accelerates)
+    return f"{text}; force: largest dynamic bearing force; accel.: {owner} at the bearing."
 
 
 def _whole_summary(
@@ -284,11 +298,11 @@ def _tell_of_range(ranking: Ranking) -> None:
     """Say which speeds are ranked, where they are all, and where nothing stands out."""
     if ranking.whole:
         note(
-            "All speeds are ranked: none of those computed is one of operation, or the file names none "
-            "([operation] rated_speed_rpm, or speed_range_rpm)"
+            "Ranking over all speeds: no computed speed lies in an operating range. Set rated_speed_rpm or "
+            "speed_range_rpm in [operation]."
         )
     if not ranking.resonances:
-        note(f"No peak stands out at {_speeds_of(ranking)}")
+        note(f"No resonance at {_speeds_of(ranking)}")
 
 
 def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
@@ -298,9 +312,9 @@ def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
     """
     refuse_not_converged([mesh for mesh in str(data.attrs["near_unconverged_states"]).split(", ") if mesh])
     if data.attrs["branch_ended"]:
-        raise FailedError(f"the branch is not whole: {data.attrs['branch_ended']}")
+        raise FailedError(f"continuation incomplete: {data.attrs['branch_ended']}")
     if growth > 0.0 and not bool(data["growth"].notnull().any()):
-        raise FailedError(f"the steady response is not to be trusted: disturbances grow by up to {growth:.3g} 1/s")
+        raise FailedError(f"invalid steady-state response: disturbances grow at up to {growth:.3g} 1/s (unstable)")
 
 
 def _tell_of_pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
@@ -313,9 +327,9 @@ def _tell_of_pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
     found: tuple[TensileMesh, ...] = () if LAWS[law].loses_contact else pulls(data)
     for pull in found:
         note(
-            f"{pull.mesh}: teeth would have to pull at {pull.count} of {data.sizes['point']} speeds, longest at "
-            f"{pull.speed / RPM:.4g} rpm, {100.0 * pull.share:.2g} % of the time: they would part, which the law "
-            f"{law} does not know; take --mesh-model table --method nonlinear",
+            f"Warning: {pull.mesh}: tensile mesh force at {pull.count} of {data.sizes['point']} speeds, at most "
+            f"{100.0 * pull.share:.2g} % of the time at {pull.speed / RPM:.4g} rpm. The model {law} neglects contact "
+            "loss; use --mesh-model table --method nonlinear.",
             style="yellow",
         )
     return found
@@ -332,14 +346,14 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
     from exugear.gearbox.units import RPM
 
     for missing in json.loads(data.attrs["not_converged"]):
-        note(f"{missing['speed'] / RPM:.4g} rpm: {missing['reason']}", style="yellow")
+        note(f"Warning: {missing['speed'] / RPM:.4g} rpm: {missing['reason']}", style="yellow")
     for speed, remark in zip(data["speed"].values, data["remark"].values, strict=True):
         if remark:
-            note(f"{float(speed) / RPM:.4g} rpm: {remark}", style="yellow")
+            note(f"Warning: {float(speed) / RPM:.4g} rpm: {remark}", style="yellow")
     if growth > 0.0:
         speeds = data["speed"].values[data["growth"].values == growth]
         where = f" (at {float(speeds[0]) / RPM:.4g} rpm)" if speeds.size else ""
-        note(f"Unstable: disturbances grow by up to {growth:.3g} 1/s{where}; no steady state lasts", style="yellow")
+        note(f"Warning: unstable: disturbances grow at up to {growth:.3g} 1/s{where}; no steady state", style="yellow")
 
 
 def _tell_of_wandering_loads(project: Project) -> tuple[Shuttling, ...]:
@@ -353,9 +367,9 @@ def _tell_of_wandering_loads(project: Project) -> tuple[Shuttling, ...]:
     found = wandering_loads(project.gearbox, project.folder)
     if found and found[0].over_error > NOTICED_WAY:
         note(
-            f"{found[0].in_words}; its moment, {found[0].over_error:.2g} times the push of the transmission error, is "
-            f"left out by the law {law.name}: peaks of modes in which gears tilt may be many times higher; "
-            "--mesh-model line_of_action has it",
+            f"Warning: {found[0].in_words}. The shuttling moment, {found[0].over_error:.2g} times the excitation by "
+            f"the transmission error, is neglected by the mesh model {law.name}; resonances with tilting gears may be "
+            "many times higher. Use --mesh-model line_of_action.",
             style="yellow",
         )
     return found
@@ -381,13 +395,17 @@ def _tell_of_harmonics(data: xr.Dataset) -> None:
     """Say how many harmonics there are, what they leave out, and what more of them change."""
     mesh, share = max(_left_out(data).items(), key=lambda own: own[1])
     change = _known(float(data.attrs["change_with_more"]))
-    said = f"{data.attrs['harmonics']} harmonics of each mesh frequency leave out {100.0 * share:.2g} % of what {mesh} "
-    said += "excites"
+    count = int(data.attrs["harmonics"])
+    text = f"Harmonic truncation: {count} mesh harmonics; {100.0 * share:.2g} % (rms) of the compliance variation of "
+    text += f"{mesh} neglected"
     if change is None:
-        note(f"{said}, but for the lines that a state needs besides")
+        note(f"{text}; harmonics that a solution requires are added.")
         return
-    style = "yellow" if change > NOTICED_CHANGE else ""
-    note(f"{said}; with half as many again the ten loudest peaks change by up to {100.0 * change:.2g} %", style=style)
+    text += f"; 1.5 times as many harmonics change the ten highest peaks by at most {100.0 * change:.2g} %."
+    if change > NOTICED_CHANGE:
+        note(f"Warning: {text}", style="yellow")
+    else:
+        note(text)
 
 
 def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
@@ -396,14 +414,14 @@ def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
     from exugear.steady.peaks import STRAINED, bearing_swings
 
     if data.attrs["bearings_in_time"]:
-        note(f"Bearings by their rolling elements: {data.attrs['bearings_in_time']}")
-    elif "rows by" in data.attrs["bearing_laws"]:
-        note("Non-linear bearings are linear about the static state here; --method nonlinear evaluates their law")
+        note(f"Nonlinear bearings (rolling elements evaluated in time): {data.attrs['bearings_in_time']}")
+    elif "16281" in data.attrs["bearing_laws"]:
+        note("Nonlinear bearings are linearised at the static load; --method nonlinear evaluates the nonlinear model")
     variation = float(data.attrs["stiffness_variation"])
     if variation > NOTICED_VARIATION:
         note(
-            f"Stiffness changes by {100.0 * variation:.2g} % as the carrier turns, since planets share the load "
-            "unequally: its mean counts, lines beside light modes of the planets are off by some thousandths",
+            f"Warning: stiffness varies by {100.0 * variation:.2g} % over a carrier revolution (unequal planet loads). "
+            "The mean is used; responses near lightly damped planet modes are off by a few thousandths.",
             style="yellow",
         )
     swinging = bearing_swings(data)
@@ -414,9 +432,10 @@ def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
         )
         more = f", and {len(swinging) - SHOWN_BEARINGS} more" if len(swinging) > SHOWN_BEARINGS else ""
         note(
-            f"Vibration takes {100.0 * STRAINED:.0f} % or more of the static load of bearings ({worst}{more}): their "
-            "rows are no straight line so far off, and peaks there come out too high, by half where one comes free; "
-            'model = "iso16281" and --method nonlinear follow them',
+            f"Warning: dynamic load of bearings at least {100.0 * STRAINED:.0f} % of their static load "
+            f"({worst}{more}). Outside the linear range; peaks there are overestimated, by about 50 % where a bearing "
+            "is unloaded part of the time. Set "
+            'model = "iso16281" and use --method nonlinear.',
             style="yellow",
         )
     return swinging
@@ -466,11 +485,15 @@ def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
 def _row(resonance: Resonance) -> dict[str, str]:
     from exugear.gearbox.units import RPM
 
-    found = {"line": resonance.line, "rpm": f"{resonance.speed / RPM:.2f}", "Hz": f"{resonance.frequency:.1f}"}
+    found = {
+        "order": resonance.line,
+        "speed\nrpm": significant(resonance.speed / RPM, 5, 2),
+        "freq.\nHz": significant(resonance.frequency, 4, 2),
+    }
     for quantity, loudness in resonance.loudness.items():
-        unit, factor = COLUMNS[quantity]
-        place = "" if loudness.place is None else f" ({loudness.place})"
-        found[unit] = f"{factor * loudness.amplitude:.3g}{place}"
+        heading, factor = COLUMNS[quantity]
+        rank = "" if loudness.place is None else f" ({loudness.place})"
+        found[heading] = significant(factor * loudness.amplitude, 3, 6) + rank
         if quantity == "force":
-            found["at"] = loudness.at
+            found["bearing"] = loudness.at
     return found

@@ -18,11 +18,11 @@ from exugear.cli.console import (
     make_results_folder,
     note,
     print_json,
-    print_table,
     progress_bar,
     say,
 )
 from exugear.cli.process import let_in_dask
+from exugear.cli.tables import print_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,28 +46,31 @@ class Executor(StrEnum):
 def study(
     file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="The study file.", show_default=False)],
     executor: Annotated[
-        Executor, typer.Option(help="processes: on this machine; dask: on a Dask cluster.")
+        Executor, typer.Option(metavar="NAME", help="processes (this machine) or dask (Dask cluster).")
     ] = Executor.processes,
     workers: Annotated[
-        int | None, typer.Option(min=1, max=1024, help="Processes on this machine. (default: all cores)")
+        int | None, typer.Option(min=1, max=1024, help="Number of processes on this machine. (default: all cores)")
     ] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, as tcp://10.0.0.1:8786.")
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler, such as tcp://10.0.0.1:8786.")
     ] = None,
     shard: Annotated[
-        str | None, typer.Option(metavar="i/n", help="Compute every n-th point only, from the i-th on.")
+        str | None, typer.Option(metavar="i/n", help="Compute only every n-th point, starting at the i-th.")
     ] = None,
-    merge: Annotated[bool, typer.Option("--merge", help="Compute nothing, put together what is finished.")] = False,
-    retry: Annotated[bool, typer.Option("--retry-failed", help="Compute points again that failed before.")] = False,
+    merge: Annotated[
+        bool, typer.Option("--merge", help="Merge finished points into the dataset; compute none.")
+    ] = False,
+    retry: Annotated[bool, typer.Option("--retry-failed", help="Recompute points that failed before.")] = False,
     out: OutOption = None,
     allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Vary a gearbox: compute tables, modes, steady responses or runs at each point of a study, as one dataset.
+    """Run a study: vary a gearbox and collect the results.
 
-    Points that are finished are kept; the same command goes on after a kill. What fails is told and does not stop the
-    rest.
+    Computes tables, modes, steady-state responses, lives or runs at each point and writes one dataset.
+
+    Finished points are stored; run the same command again to resume. Failed points are reported; the study continues.
     """
     with exit_codes():
         from exugear.studies.executors import ExecutorError
@@ -78,8 +81,8 @@ def study(
         read = _read(file, allow_dir, scripts)
         if read.file.optimise is not None and (merge or retry or shard is not None):
             raise BadInputError(
-                f"{file}: a search follows from its points one after the other; "
-                "leave --shard, --merge and --retry-failed out"
+                f"{file}: the points of an optimisation depend on each other; "
+                "remove --shard, --merge and --retry-failed"
             )
         folder = out or _default_folder(read, file)
         check_choice(read.gearbox, read.choice, folder)
@@ -98,7 +101,7 @@ def _shard(text: str | None, merge: bool) -> Shard:
     if text is None:
         return WHOLE
     if merge:
-        raise BadInputError("--merge puts all parts together and computes none; leave --shard out")
+        raise BadInputError("--merge merges all parts and computes none; remove --shard")
     try:
         return Shard.from_text(text)
     except ValueError as error:
@@ -110,13 +113,13 @@ def _executor(executor: Executor, workers: int | None, scheduler: str | None) ->
 
     if executor is Executor.dask:
         if scheduler is None:
-            raise BadInputError("--executor dask needs --scheduler ADDRESS, as tcp://10.0.0.1:8786")
+            raise BadInputError("--executor dask requires --scheduler ADDRESS, such as tcp://10.0.0.1:8786")
         if workers is not None:
-            raise BadInputError("--workers: the cluster has as many as were started; leave it out")
+            raise BadInputError("--workers: the Dask cluster determines the number of workers; remove --workers")
         let_in_dask()
         return dask_cluster(scheduler)
     if scheduler is not None:
-        raise BadInputError("--scheduler is that of a Dask cluster; add --executor dask")
+        raise BadInputError("--scheduler applies to a Dask cluster; add --executor dask")
     return processes(workers)
 
 
@@ -135,7 +138,9 @@ def _read(path: Path, allow_dir: Path | None, scripts: bool) -> Study:
         raise BadInputError(error) from error
     if study.choice.mesh_model not in _laws():
         laws = ", ".join(_laws())
-        raise BadInputError(f"{path}: choice.mesh_model = {study.choice.mesh_model!r}: no such law; laws are {laws}")
+        raise BadInputError(
+            f"{path}: choice.mesh_model = {study.choice.mesh_model!r}: unknown mesh model; choose one of {laws}"
+        )
     return study
 
 
@@ -209,10 +214,10 @@ def _tell(study: Study, path: Path, folder: Path, swept: StudyResult, pictures: 
         _print(study, folder, swept, summary)
     _fail_if_beyond(study, swept)
     if failed:
-        lines = [f"{len(failed)} of {total} points failed; their errors are in {folder}, --retry-failed tries again:"]
+        lines = [f"{len(failed)} of {total} points failed; errors: {folder}; use --retry-failed to recompute them:"]
         raise FailedError("\n".join([*lines, *(f"- {record.error}" for record in failed[:SHOWN_FAILURES])]))
     if missing and swept.path is not None:
-        raise FailedError(f"{missing} of {total} points are missing; run the study, or the shards that have not ended")
+        raise FailedError(f"{missing} of {total} points are missing; run the study, or the unfinished shards")
 
 
 def _print(study: Study, folder: Path, swept: StudyResult, summary: dict[str, Any]) -> None:
@@ -221,20 +226,20 @@ def _print(study: Study, folder: Path, swept: StudyResult, summary: dict[str, An
 
     say(
         f"{study.file.name}: {summary['finished']} of {summary['points']} points finished, "
-        f"{swept.computed} computed now, {summary['seconds_of_points']:.1f} s of workers' time in all"
+        f"{swept.computed} computed now, {summary['seconds_of_points']:.1f} s worker time in total"
     )
     if swept.dataset is None or swept.path is None:
-        note(f"{summary['missing']} points are left to other shards; the last one, or --merge, writes the dataset")
-        say(f"Points in {folder}")
+        note(f"{summary['missing']} points belong to other shards; the last shard, or --merge, writes the dataset")
+        say(f"Points: {folder}")
         return
     if SIDE in study.design.shape:
         ranked = sorted(slopes(swept.dataset), key=lambda entry: -abs(entry[2]))
-        rows = [{"parameter": p, "quantity": f, "% a step": f"{100.0 * c:+.3f}"} for f, p, c in ranked]
+        rows = [{"parameter": p, "result": f, "change per\nstep %": f"{100.0 * c:+.3f}"} for f, p, c in ranked]
         if rows:
-            print_table("What moves the figures most", rows, ("figure",))
+            print_table("Sensitivity of the results, largest first", rows, ("result",))
     if study.file.optimise is not None:
         _print_front(study, swept.dataset)
-    say(f"Results in {swept.path}, pictures beside it")
+    say(f"Results: {swept.path}; pictures in the same folder")
 
 
 def _judged(study: Study) -> list[str]:
@@ -254,13 +259,13 @@ def _fail_if_beyond(study: Study, swept: StudyResult) -> None:
     assert study.file.optimise is not None
     limits = (f"{name} {_limit_text(limit)}" for name, limit in study.file.optimise.limits.items())
     raise FailedError(
-        f"none of the {data.sizes[EVALUATION]} points that were looked at keeps the limits {', '.join(limits)}; widen "
-        f"limits or parameters, or give more generations. All points are in {swept.path}"
+        f"none of the {data.sizes[EVALUATION]} evaluated points meets the limits {', '.join(limits)}; widen the limits "
+        f"or parameter ranges, or set more generations. All points: {swept.path}"
     )
 
 
 def _limit_text(limit: LimitSection) -> str:
-    bounds = (("from", limit.min), ("to", limit.max))
+    bounds = (("min", limit.min), ("max", limit.max))
     return " ".join(f"{word} {value:g}" for word, value in bounds if value is not None)
 
 
@@ -271,13 +276,13 @@ def _print_front(study: Study, dataset: xr.Dataset) -> None:
     figures = _judged(study)
     front = dataset.isel(evaluation=dataset["on_front"].to_numpy() == 1).sortby(figures[0])
     shown = sorted({round(n) for n in np.linspace(0, front.sizes["evaluation"] - 1, SHOWN_OF_FRONT)})
-    points = {"begun at": dataset.isel(evaluation=0)}
-    points |= {f"point {n + 1}": front.isel(evaluation=n) for n in shown if front.sizes["evaluation"]}
+    points = {"start\npoint": dataset.isel(evaluation=0)}
+    points |= {f"point\n{n + 1}": front.isel(evaluation=n) for n in shown if front.sizes["evaluation"]}
     rows = [
-        {"": name} | {label: _number(float(point[name])) for label, point in points.items()}
+        {"result or\nparameter": name} | {label: _number(float(point[name])) for label, point in points.items()}
         for name in (*figures, *study.file.parameters)
     ]
-    print_table(f"Front of {front.sizes['evaluation']} points that no other beats", rows)
+    print_table(f"Pareto front: {front.sizes['evaluation']} points", rows)
     if study.tolerances is not None:
         for name in figures:
             note(f"{name}: {dataset[name].attrs['long_name']}")
@@ -287,5 +292,5 @@ def _number(value: float) -> str:
     if math.isnan(value):
         return ""
     if math.isinf(value):
-        return "infinite"
+        return "inf."
     return f"{value:.4g}"

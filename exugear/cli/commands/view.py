@@ -1,4 +1,4 @@
-"""The verb `view`: the gearbox and its modes in three dimensions."""
+"""The command `view`: the gearbox and its mode shapes in three dimensions."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ def view(
     near: Annotated[
         float | None,
         typer.Option(
-            min=0.0, metavar="HZ", help="Frequency whose nearest mode is shown first. (default: as the file says)"
+            min=0.0, metavar="HZ", help="Show the mode nearest to this frequency first. (default: gearbox file)"
         ),
     ] = None,
-    animation: Annotated[bool, typer.Option("--gif", help="Write that mode as an animated picture, too.")] = False,
+    animation: Annotated[bool, typer.Option("--gif", help="Also write an animated GIF of that mode.")] = False,
     out: OutOption = None,
     allow_dir: FilesBelowOption = None,
     scripts: ScriptsOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show the gearbox and its modes in three dimensions: a web page that stands alone, and pictures."""
+    """Write a web page of the gearbox and its mode shapes. It is self-contained and three-dimensional."""
     with exit_codes():
         from exugear.gearbox.choice import Choice
 
@@ -75,7 +75,7 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
         if frequency > 0.0 and any(motion.any() for body, motion in motions.items() if body in drawn):
             places.append(place)
     if not places:
-        raise BadInputError(f"{found.label}: no elastic mode to show")
+        raise BadInputError(f"{found.label}: all modes are rigid-body rotations; nothing to show")
     shown = places.index(first) if first in places else 0
     words = Labels(assembly.gearbox)
     modes = found.to_dataset()
@@ -124,6 +124,6 @@ def _draw_pictures(modes: Modes, folder: Path, place: int, animation: bool) -> l
             draw_mode(scene, still)
             moving = [animate_mode(scene, animated)] if animation else []
     except RenderingError as error:
-        note(f"No pictures: {error}", style="yellow")
+        note(f"Warning: no pictures: {error}", style="yellow")
         return []
     return [*moving, folder / "gearbox.png", still]

@@ -1,8 +1,9 @@
-"""The verb `check`: read and check a gearbox file, and sum up what follows from it at once, or rate its gears."""
+"""The command `check`: read and check a gearbox file and summarise it, or rate its gears."""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -26,9 +27,9 @@ from exugear.cli.console import (
     model_errors,
     note,
     print_json,
-    print_table,
     say,
 )
+from exugear.cli.tables import HARD_SPACE, print_table, print_text, significant
 from exugear.gearbox.variant import OFFERED, Variant
 
 if TYPE_CHECKING:
@@ -40,8 +41,8 @@ RatingOption = Annotated[
     bool,
     typer.Option(
         "--rating",
-        help="Rate the gears by ISO 6336-2 and -3 instead, all factors by name, beside what the results folder has of "
-        "finite elements.",
+        help="Rate the gears to ISO 6336-2 and -3 instead: all factors, next to the finite element results of the "
+        "results folder.",
     ),
 ]
 
@@ -53,7 +54,7 @@ def check(
     allow_dir: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Read and check a gearbox file; sum up its gear pairs, bearings and load cases. Writes nothing."""
+    """Check a gearbox file and summarise it. Lists gear pairs, bearings and load cases; writes no files."""
     with exit_codes():
         if rating:
             _rate(case, out, allow_dir, as_json)
@@ -81,55 +82,76 @@ def check(
             found["warnings"] = warnings
             print_json({**summary, **found})
         else:
-            say(f"{gearbox.name}: no fault found, ratio {gearbox.train.ratio:.6f}")
-            if pairs:
-                print_table("Gear pairs", [_pair_row(pair) for pair in pairs])
-                print_table("Margins of gear 1 and 2", [_margin_row(pair) for pair in pairs])
-                say("Pressure: by Hertz at the pitch point under torque 1, load spread evenly, without load factors")
-            if thicknesses:
-                print_table(
-                    "Tooth thickness within its allowances", [_thickness_row(thickness) for thickness in thicknesses]
-                )
-                for thickness in thicknesses:
-                    if thickness["span_doubt"]:
-                        note(thickness["span_doubt"], style="yellow")
-            if gearbox.forces:
-                print_table("Constant forces on bodies", [_force_row(force) for force in _force_summaries(gearbox)])
-            if loads:
-                band = 1e-3 * loads[0]["band_Hz"]
-                title = f"Load cases, rolling at the overall input {gearbox.case.overall.input}; runs keep {band:g} kHz"
-                print_table(title, [_load_row(load) for load in loads], ("loaded flanks",))
-            if bearings:
-                print_table(
-                    "Bearings under the static load", [_bearing_row(bearing) for bearing in bearings], ("most by",)
-                )
-                say("Axial loads are those of the shaft on the inner ring, positive along +z")
-                if any(bearing["reaction_kN"] is not None for bearing in bearings):
-                    say("* stated by the file, which the stiffness goes by")
-            _tell_possibilities(variants, steady, lives)
+            _print_check(gearbox, pairs, thicknesses, loads, bearings)
+            _print_availability(variants, steady, lives)
             for line in counted([f"Warning: {line}" for line in warnings]):
                 note(line, style="yellow")
         for one in loads:
             for doubt in one["doubts"]:
-                note(f"load_cases.{one['load_case']}: {doubt}", style="yellow")
+                note(f"Warning: load_cases.{one['load_case']}: {doubt}", style="yellow")
 
 
-def _tell_possibilities(
+def _print_check(
+    gearbox: Gearbox,
+    pairs: list[dict[str, Any]],
+    thicknesses: list[dict[str, Any]],
+    loads: list[dict[str, Any]],
+    bearings: list[dict[str, Any]],
+) -> None:
+    """Print the tables of a gearbox without errors."""
+    ratio = gearbox.train.ratio
+    inverse = f" (i = {1.0 / ratio:.4g})" if ratio else ""
+    print_text(f"{gearbox.name}: no errors; speed ratio output/input {ratio:.6g}{inverse}")
+    if pairs:
+        print_table("Gear pairs", [_pair_row(pair) for pair in pairs], legend=PAIR_LEGEND)
+        print_table("Geometry checks, gear 1 / gear 2", [_margin_row(pair) for pair in pairs], legend=MARGIN_LEGEND)
+    if thicknesses:
+        rows = [_thickness_row(thickness) for thickness in thicknesses]
+        print_table("Tooth thickness within its allowances", rows)
+        for thickness in thicknesses:
+            if thickness["span_doubt"]:
+                note(thickness["span_doubt"], style="yellow")
+    if gearbox.forces:
+        rows = [_force_row(force) for force in _force_summaries(gearbox)]
+        print_table("Constant forces on bodies", rows, ("body", "force x, y, z\nkN", "moment x, y\nN m"))
+    if loads:
+        band = 1e-3 * loads[0]["band_Hz"]
+        title = (
+            f'Load cases (rigid kinematics, speeds of body "{gearbox.case.overall.input}"; stored up to {band:g} kHz)'
+        )
+        rows = [_load_row(load) for load in loads]
+        legend = ""
+        if any(load["driven"] for load in loads):
+            legend += LOAD_LEGEND
+        if any(load["reversed_flanks"] for load in loads):
+            legend += REVERSED_LEGEND
+        print_table(title, rows, ("loaded flank\nof gear 1",), legend.strip())
+    if bearings:
+        stated = any(bearing["reaction_kN"] is not None for bearing in bearings)
+        rows = [_bearing_row(bearing, stated) for bearing in bearings]
+        legend = BEARING_LEGEND
+        if stated:
+            legend += STATED_LEGEND
+        print_table("Bearings under the static load", rows, ("dominant\nestimate",), legend)
+
+
+def _print_availability(
     variants: Mapping[str, str], steady: Mapping[str, str], lives: Mapping[str, Sequence[str]]
 ) -> None:
-    """Print which variants and which verbs are possible, and why others are not."""
+    """Print which variants and which commands are available, and why others are not."""
+    say("")
     for variant, reason in variants.items():
-        say(f"variant {variant}: {f'not possible, {reason}' if reason else 'possible'}")
+        print_text(f"Variant {variant}: {f'not available, {reason}' if reason else 'available'}", "  ")
     for reason in dict.fromkeys(filter(None, steady.values())):
         names = ", ".join(variant for variant in steady if steady[variant] == reason)
-        say(f"steady response ({names}): not possible, {reason}")
+        print_text(f"Steady-state response ({names}): not available, {reason}", "  ")
     for verb, reasons in lives.items():
-        for line in [f"not possible, {reason}" for reason in reasons] or ["possible"]:
-            say(f"{verb}: {line}")
+        for line in [f"not available, {reason}" for reason in reasons] or ["available"]:
+            print_text(f"Command {verb}: {line}", "  ")
 
 
 def _rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -> None:
-    """Print the rating of all gears; end with code 1 where one has less safety than is asked for."""
+    """Print the rating of all gears; end with code 1 where a safety factor is below the required one."""
     from exugear.cli.rating_tables import tell_rating
     from exugear.cli.watched import WatchedProject
     from exugear.gearbox.choice import Choice
@@ -143,7 +165,7 @@ def _rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -
     else:
         tell_rating(sheet)
     if sheet.shortfalls:
-        raise FailedError("\n".join(["gears have less safety than is asked for:", *sheet.shortfalls]))
+        raise FailedError("\n".join(["safety factors below the required minimum:", *sheet.shortfalls]))
 
 
 def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
@@ -215,33 +237,48 @@ def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
     }
 
 
+PAIR_LEGEND = "Gear 1 is the first gear of the pair; torque: static torque of the gearbox file."
+MARGIN_LEGEND = (
+    "Contact stress: Hertz, at the pitch point under the static torque of gear 1, even load distribution, no load "
+    "factors. SAP: start of active profile; its distance from the root form diameter in % of the profile length "
+    "(roll length). Backlash: circumferential, on the working circle."
+)
+LOAD_LEGEND = "*: the speed of a body is prescribed (driven_body). "
+REVERSED_LEGEND = "!: the flank opposite to the flank loaded by the static load."
+BEARING_LEGEND = (
+    "Axial load: of the shaft on the inner ring, positive along +z. Stiffness: radial; range: with the "
+    "estimated (not specified) inputs at their limits; dominant estimate: the input with the largest effect."
+)
+STATED_LEGEND = " *: specified in the gearbox file, used for the stiffness; static react.: static balance."
+
+
 def _pair_row(pair: dict[str, Any]) -> dict[str, str]:
     return {
         "pair": pair["pair"],
         "teeth": "{}/{}".format(*pair["teeth"]),
-        "centre dist.\nmm": f"{pair['centre_distance_mm']:.3f}",
-        "press. angle\ndeg": f"{pair['pressure_angle_deg']:.3f}",
-        "contact ratio\n+ overlap": f"{pair['transverse_contact_ratio']:.3f} + {pair['overlap_ratio']:.3f}",
-        "torque 1\nN m": f"{pair['torque_gear_1_N_m']:.1f}",
+        "centre\ndistance mm": f"{pair['centre_distance_mm']:.3f}",
+        "working press.\nangle α_wt deg": f"{pair['pressure_angle_deg']:.3f}",
+        "contact ratio\ntransv. overlap": f"{pair['transverse_contact_ratio']:.3f}   {pair['overlap_ratio']:.3f}",
+        "torque on\ngear 1 N m": f"{pair['torque_gear_1_N_m']:.1f}",
     }
 
 
 def _margin_row(pair: dict[str, Any]) -> dict[str, str]:
-    left = ("-" if margin is None else f"{100 * margin:.1f}" for margin in pair["margin_to_form_diameter"])
+    margins = ("-" if margin is None else f"{100 * margin:.1f}" for margin in pair["margin_to_form_diameter"])
     return {
         "pair": pair["pair"],
-        "pressure at pitch\npoint, MPa": f"{pair['pitch_point_pressure_MPa']:.0f}",
-        "left to form circles\n% of the flanks": " / ".join(left),
-        "backlash\num": _play(pair["backlash_um"]),
-        "tips\nnormal modules": " / ".join(f"{tip:.2f}" for tip in pair["tip_thickness_in_modules"]),
+        "contact stress at\npitch point MPa": f"{pair['pitch_point_pressure_MPa']:.0f}",
+        "SAP above root\nform dia. %": " / ".join(margins),
+        "backlash\nµm": _backlash(pair["backlash_um"]),
+        "tip thickness\ns_an/m_n": " / ".join(f"{tip:.2f}" for tip in pair["tip_thickness_in_modules"]),
     }
 
 
-def _play(ends: list[float]) -> str:
-    least, given, most = ends
-    if most - least < 1.0:
-        return f"{given:.0f}"
-    return f"{given:.0f} ({least:.0f} to {most:.0f})"
+def _backlash(ends: list[float]) -> str:
+    minimum, nominal, maximum = ends
+    if maximum - minimum < 1.0:
+        return f"{nominal:.0f}"
+    return f"{nominal:.0f} ({minimum:.0f} to {maximum:.0f})"
 
 
 def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
@@ -281,10 +318,10 @@ def _force_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
 def _force_row(force: dict[str, Any]) -> dict[str, str]:
     return {
         "force": force["force"],
-        "on": force["body"],
-        "at z\nmm": f"{force['z_mm']:g}",
-        "along x, y, z\nkN": " / ".join(f"{1e-3 * value:.4g}" for value in force["force_N"]),
-        "about x, y\nN m": " / ".join(f"{value:.4g}" for value in force["moment_N_m"]),
+        "body": force["body"],
+        "z position\nmm": f"{force['z_mm']:g}",
+        "force x, y, z\nkN": " / ".join(f"{1e-3 * value:.4g}" for value in force["force_N"]),
+        "moment x, y\nN m": " / ".join(f"{value:.4g}" for value in force["moment_N_m"]),
     }
 
 
@@ -292,9 +329,9 @@ def _thickness_row(one: dict[str, Any]) -> dict[str, str]:
     span = one["base_tangent_length_mm"]
     return {
         "gear": one["gear"],
-        "normal thickness\nmm": "{:.3f} to {:.3f}".format(*one["normal_tooth_thickness_mm"]),
-        "teeth of\nthe span": str(one["span_teeth"] or "-"),
-        "base tangent length\nmm": "{:.3f} to {:.3f}".format(*span) if span else "-",
+        "normal tooth\nthickness mm": "{:.3f} to {:.3f}".format(*one["normal_tooth_thickness_mm"]),
+        "teeth\nspanned": str(one["span_teeth"] or "-"),
+        "base tangent\nlength mm": "{:.3f} to {:.3f}".format(*span) if span else "-",
     }
 
 
@@ -337,23 +374,24 @@ def _bearing_summaries(
     return summaries, doubts
 
 
-def _bearing_row(summary: dict[str, Any]) -> dict[str, str]:
+def _bearing_row(summary: dict[str, Any], with_reaction: bool) -> dict[str, str]:
     ranges = {
         key: [end for end in one["radial_stiffness_N_per_m"] if end is not None]
         for key, one in summary["estimated"].items()
     }
     ends = [end for pair in ranges.values() for end in pair]
-    spread = f"{1e-9 * min(ends):.3g} to {1e-9 * max(ends):.3g}" if ends else ""
+    spread = f"{significant(1e-9 * min(ends), 3, 5)} - {significant(1e-9 * max(ends), 3, 5)}" if ends else ""
     stated = summary["reaction_kN"] is not None
-    most = max(ranges, key=lambda key: max(ranges[key], default=0.0) - min(ranges[key], default=0.0), default="")
+    dominant = max(ranges, key=lambda key: max(ranges[key], default=0.0) - min(ranges[key], default=0.0), default="")
+    reaction = {"static\nreact. kN": significant(summary["reaction_kN" if stated else "radial_load_kN"])}
     return {
         "bearing": summary["bearing"],
-        "radial\nkN": f"{summary['radial_load_kN']:.4g}{'*' if stated else ''}",
-        "statics\nkN": f"{summary['reaction_kN' if stated else 'radial_load_kN']:.4g}",
-        "axial\nkN": f"{round(summary['axial_load_kN'], 3) + 0.0:.4g}",
-        "radial\nGN/m": f"{1e-9 * summary['radial_stiffness_N_per_m']:.3g}",
-        "over the range\nof estimates": spread,
-        "most by": most,
+        "radial\nload kN": significant(summary["radial_load_kN"]) + ("*" if stated else ""),
+        **(reaction if with_reaction else {}),
+        "axial\nload kN": significant(round(summary["axial_load_kN"], 3)),
+        "stiffness\nGN/m": significant(1e-9 * summary["radial_stiffness_N_per_m"], 3, 5),
+        "range\nGN/m": spread,
+        "dominant\nestimate": re.sub(r"_(mm|um|deg|kN)$", "", dominant).replace("_", " "),
     }
 
 
@@ -401,13 +439,15 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
 
 
 def _load_row(summary: dict[str, Any]) -> dict[str, str]:
-    turned = summary["reversed_flanks"]
-    flanks = (f"{name} {sign}{'!' if name in turned else ''}" for name, sign in summary["loaded_flanks"].items())
+    reverse = summary["reversed_flanks"]
+    flanks = (
+        f"{name}{HARD_SPACE}{sign}{'!' if name in reverse else ''}" for name, sign in summary["loaded_flanks"].items()
+    )
     return {
         "load case": summary["load_case"],
-        "net torque\nN m": f"{summary['net_torque_N_m']:.6g}" + (" (driven)" if summary["driven"] else ""),
-        "end speed\nrpm": f"{summary['end_speed_rpm']:.4g}",
-        "meshes\nkHz": f"{1e-3 * summary['highest_mesh_frequency_Hz']:.3g}",
-        "rim\nm/s": f"{summary['fastest_rim_m_per_s']:.3g}",
-        "loaded flanks": ", ".join(flanks),
+        "net input\ntorque N m": significant(summary["net_torque_N_m"]) + ("*" if summary["driven"] else ""),
+        "final\nspeed rpm": f"{summary['end_speed_rpm']:.4g}",
+        "max. mesh\nfreq. kHz": f"{1e-3 * summary['highest_mesh_frequency_Hz']:.3g}",
+        "max. tip\nspeed m/s": f"{summary['fastest_rim_m_per_s']:.3g}",
+        "loaded flank\nof gear 1": ", ".join(flanks),
     }

@@ -1,4 +1,4 @@
-"""The verb `export`: results put back into the industry file that the gearbox file was made of."""
+"""The command `export`: write results into a copy of the imported industry file."""
 
 from __future__ import annotations
 
@@ -28,11 +28,13 @@ def export(
     case: CaseArgument,
     rexs: Annotated[
         Path,
-        typer.Argument(metavar="FILE.rexs", help="The REXS file that the case was imported from.", show_default=False),
+        typer.Argument(
+            metavar="FILE.rexs", help="REXS file that the gearbox file was imported from.", show_default=False
+        ),
     ],
     to: Annotated[
         Path | None,
-        typer.Option("--to", metavar="FILE", help="File to write. (default: NAME-exugear beside FILE.rexs)"),
+        typer.Option("--to", metavar="FILE", help="File to write. (default: NAME-exugear, same folder as FILE.rexs)"),
     ] = None,
     out: OutOption = None,
     allow_dir: FilesBelowOption = None,
@@ -40,10 +42,10 @@ def export(
     distances: DistancesOption = DistanceRule.agreeing,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a copy of a REXS file with results: what REXS has names for, and the rest as custom_exugear attributes.
+    """Write results into a copy of a REXS file. They are REXS attributes where possible, else custom_exugear ones.
 
-    Geometry and static forces are always there; tables, modes, bearings and runs as far as the results folder has them.
-    --shifts and --distances are to be those of the import.
+    Geometry and static forces are always written; tables, modes, bearings and runs if the results folder has them. Use
+    --shifts and --distances of the import.
     """
     with exit_codes():
         from exugear.exchange.rexs.export.export import with_results
@@ -54,7 +56,7 @@ def export(
 
         target = to or rexs.with_name(_new_name(rexs.name))
         if target.exists():
-            raise BadInputError(f"{target}: is there already; name another file with --to")
+            raise BadInputError(f"{target}: exists already; specify another file with --to")
         gearbox = read_gearbox(case, allow_dir)
         try:
             exported = with_results(gearbox, out or default_folder(case), rexs, Rules(shifts.value, distances.value))
@@ -67,12 +69,12 @@ def export(
             print_json({"file": str(target), **counts, **lists})
             return
         for line in exported.left_out:
-            note(f"Left out: {line}", style="yellow")
+            note(f"Warning: not exported: {line}", style="yellow")
         for line in exported.replaced[:SHOWN]:
             note(f"Replaced: {line}")
         if len(exported.replaced) > SHOWN:
             note(f"and {len(exported.replaced) - SHOWN} more replaced")
-        say(f"{target}: {exported.named} attributes of REXS, {exported.own} beginning with custom_exugear_")
+        say(f"{target}: {exported.named} REXS attributes, {exported.own} custom_exugear_ attributes")
 
 
 def _new_name(name: str) -> str:

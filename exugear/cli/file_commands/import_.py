@@ -1,4 +1,4 @@
-"""The verb `import`: a gearbox file from an industry file."""
+"""The command `import`: a gearbox file from an industry file."""
 
 from __future__ import annotations
 
@@ -19,18 +19,16 @@ NAME = "gearbox.toml"
 
 
 def import_(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE.rexs", help="A REXS file: XML, JSON or zip.", show_default=False)
-    ],
+    file: Annotated[Path, typer.Argument(metavar="FILE.rexs", help="REXS file: XML, JSON or zip.", show_default=False)],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FOLDER", help="Folder for gearbox.toml. (default: the file's name without end)"),
+        typer.Option("--out", metavar="FOLDER", help="Folder for gearbox.toml. (default: file name without extension)"),
     ] = None,
     shifts: ShiftsOption = ShiftRule.file,
     distances: DistancesOption = DistanceRule.agreeing,
     as_json: JsonOption = False,
 ) -> None:
-    """Make a gearbox file of a REXS file (1.0 to 2.0): each value with its source, each assumption marked."""
+    """Convert a REXS file (1.0 to 2.0) to a gearbox file. Each value has its source; assumptions are marked."""
     with exit_codes():
         from exugear.exchange.rexs.to_case.loads import SPECTRUM
         from exugear.exchange.rexs.to_case.notes import Rules
@@ -59,23 +57,23 @@ def import_(
                 }
             )
             return
-        for line in counted([f"left out: {line}" for line in imported.lost]):
+        for line in counted([f"Warning: not imported: {line}" for line in imported.lost]):
             note(line, style="yellow")
         for line in imported.changed:
-            note(line, style="yellow")
+            note(f"Warning: {line}", style="yellow")
         besides = len(imported.ignored) - len(imported.lost)
         if besides:
-            note(f"left out besides, without effect on numbers here: {besides} lines in the head of {target.name}")
+            note(f"Also not imported, without effect on results: {besides} lines, listed at the top of {target.name}")
         say(
-            f"{target}: ratio {imported.gearbox.train.ratio:.6f}, {len(imported.gearbox.pairs)} gear pairs, "
-            f"{len(imported.gearbox.bearings)} bearings"
+            f"{target}: speed ratio output/input {imported.gearbox.train.ratio:.6g}, {len(imported.gearbox.pairs)} "
+            f"gear pairs, {len(imported.gearbox.bearings)} bearings"
         )
-        say(f"Values marked A are assumed: look them over, then: exugear check {target}")
+        say(f"Values marked A are assumed. Check them, then run: exugear check {target}")
 
 
 def _refuse_existing(path: Path) -> None:
     if path.exists():
-        raise BadInputError(f"{path}: is there already, and may have been edited; name another folder with --out")
+        raise BadInputError(f"{path}: exists already and may have been edited; specify another folder with --out")
 
 
 def _stem(file: Path) -> str:

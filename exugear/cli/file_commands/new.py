@@ -1,4 +1,4 @@
-"""The verb `new`: write a gearbox file to start from."""
+"""The command `new`: write a gearbox file to start from."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ _KINDS_TOLD = "; ".join(f"{kind}: {words}" for kind, words in KINDS.items())
 
 
 def new(
-    case: Annotated[Path, typer.Argument(metavar="FILE.toml", help="The file to write.", show_default=False)],
-    kind: Annotated[Kind, typer.Option(help=f"What it describes. {_KINDS_TOLD}.", show_default=False)],
+    case: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.", show_default=False)],
+    kind: Annotated[Kind, typer.Option(metavar="NAME", help=f"Template. {_KINDS_TOLD}.", show_default=False)],
     as_json: JsonOption = False,
 ) -> None:
-    """Write a commented gearbox file that runs as it is, to make one's own of."""
+    """Write a commented gearbox file to start from. It runs without changes."""
     with exit_codes():
         from exugear.gearbox.templates.kinds import template
         from exugear.project import default_folder
         from fe_ste.tools.files import write_file
 
         if case.suffix != ".toml":
-            raise BadInputError(f"{case}: name a file that ends with .toml")
+            raise BadInputError(f"{case}: specify a file name that ends with .toml")
         if case.exists() or case.is_symlink():
-            raise BadInputError(f"{case}: is there already and is not written over; name another file")
+            raise BadInputError(f"{case}: exists already and is not overwritten; specify another file")
         try:
             write_file(case, template(kind.value).encode())
         except OSError as error:
-            raise BadInputError(f"{case}: cannot be written ({error.strerror}); name another file") from error
+            raise BadInputError(f"{case}: cannot be written ({error.strerror}); specify another file") from error
         if as_json:
             print_json({"case": str(case), "kind": kind.value})
             return

@@ -1,4 +1,4 @@
-"""The verb `schema`: describe every key of the gearbox file, for editors or for people."""
+"""The command `schema`: describe every key of the gearbox file, for editors or as a page."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from exugear.cli.console import BadInputError, exit_codes, say
 
 
 def schema(
-    page: Annotated[bool, typer.Option("--page", help="A page in Markdown instead, for people.")] = False,
+    page: Annotated[bool, typer.Option("--page", help="Write a human-readable Markdown page instead.")] = False,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="File to write. (default: standard output)")
     ] = None,
 ) -> None:
-    """Describe every key of the gearbox file as a JSON schema, which editors read."""
+    """Describe every key of the gearbox file as a JSON schema. Editors use it to check and complete files."""
     with exit_codes():
         from exugear.gearbox.sections.schema.keys import json_schema
         from exugear.gearbox.sections.schema.keys import page as described
@@ -30,5 +30,5 @@ def schema(
         try:
             write_file(out, text.encode())
         except OSError as error:
-            raise BadInputError(f"--out {out}: cannot be written ({error.strerror}); name another file") from error
+            raise BadInputError(f"--out {out}: cannot be written ({error.strerror}); specify another file") from error
         say(f"Written: {out}")

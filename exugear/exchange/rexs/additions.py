@@ -62,7 +62,7 @@ def by_place(additions: Iterable[Addition]) -> dict[tuple[int | None, int], dict
     for addition in additions:
         names = gathered.setdefault((addition.load_case, addition.component), {})
         if addition.name in names:
-            raise RexsError(f"component {addition.component}: two results would be called {addition.name}")
+            raise RexsError(f"component {addition.component}: two results have the name {addition.name}")
         names[addition.name] = addition
     return gathered
 

@@ -85,7 +85,7 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
     for case, component in placed:
         if component not in model.components or not (case is None or case in cases):
             raise RexsError(
-                f"{path}: there is no component {component}" + ("" if case is None else f", load case {case}")
+                f"{path}: component {component} does not exist" + ("" if case is None else f", load case {case}")
             )
     if not _is_archive(content):
         return _put_in(content, placed)
@@ -146,15 +146,15 @@ def _member(content: bytes) -> tuple[str, bytes]:
     with _damage_told(), zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
         if len(members) > MOST_MEMBERS:
-            raise RexsError(f"the archive has {len(members)} members; {MOST_MEMBERS} are the most")
+            raise RexsError(f"the archive has {len(members)} members; at most {MOST_MEMBERS} are permitted")
         if len({member.header_offset for member in members}) < len(members):
-            raise RexsError("the archive is damaged: two of its members lie at one place")
+            raise RexsError("the archive is damaged: two of its members overlap")
         models = [member for member in members if member.filename.lower().endswith(_ENDINGS) and not member.is_dir()]
         if len(models) != 1:
             names = ", ".join(plain(model.filename) for model in models[:5]) or "none"
-            raise RexsError(f"the archive must hold one model ({', '.join(_ENDINGS)}); it holds {names}")
+            raise RexsError(f"the archive must contain one model ({', '.join(_ENDINGS)}); it contains {names}")
         if models[0].flag_bits & 1:
-            raise RexsError("the archive is encrypted; only open ones can be read")
+            raise RexsError("the archive is encrypted; decrypt it first")
         _check_size(models[0].file_size)
         with archive.open(models[0]) as file:
             unpacked = file.read(LARGEST + 1)

@@ -64,8 +64,8 @@ def decoded(content: bytes) -> Decoded:
         return Decoded(mark, encoding, content[len(mark) :].decode(encoding))
     except UnicodeDecodeError as error:
         raise RexsError(
-            f"the file is not in its encoding {encoding}: the byte 0x{content[len(mark) :][error.start]:02x} at "
-            f"{error.start + len(mark)} stands for nothing; REXS is written in UTF-8"
+            f"the file does not match its encoding {encoding}: invalid byte 0x{content[len(mark) :][error.start]:02x} "
+            f"at {error.start + len(mark)}; expected UTF-8"
         ) from None
 
 
@@ -81,7 +81,7 @@ def _without_mark(content: bytes) -> str:
         known = codecs.lookup(name).name
         if known in MULTI_BYTE or _SINGLE_BYTE.fullmatch(known):
             return known
-    raise RexsError(f"the file says that its encoding is '{plain(name)}', which cannot be read; expected UTF-8")
+    raise RexsError(f"the file declares the encoding '{plain(name)}', which is not supported; expected UTF-8")
 
 
 # XML and JSON of REXS into the tree of a model, with limits on what a stranger's file may ask for
@@ -109,7 +109,7 @@ def parse_model(content: bytes) -> Model:
         return _model(_header_of_json(content))
     if _start(content) == b"<":
         return _model(_header_of_xml(content))
-    raise RexsError("the file is neither XML nor JSON nor a zip archive of one of them: it is no REXS file")
+    raise RexsError("not a REXS file: neither XML nor JSON nor a zip archive of one of them")
 
 
 def is_json(content: bytes) -> bool:
@@ -148,7 +148,7 @@ def _model(raw: _Raw) -> Model:
         components[number] = Component(number, synonyms.TYPES.get(kind, kind), str(head.get("name") or ""), named)
         outside = [key for key in _FORBIDDEN if key in named]
         if outside:
-            faults.append(f"{components[number]}: {outside[0]} points outside the file, whose data alone are read")
+            faults.append(f"{components[number]}: {outside[0]} refers to data outside the file, which are not read")
     relations = [_relation(head, references, components, faults) for head, references in raw.relations]
     if faults:
         raise RexsError(*faults)
@@ -183,7 +183,7 @@ def _relation(
         number = _identifier(reference.get("id"), "a reference")
         roles[synonyms.ROLES.get(role, role)] = number
         if number not in components:
-            faults.append(f"relation {plain(head.get('id'))} ({plain(kind)}): there is no component {number}")
+            faults.append(f"relation {plain(head.get('id'))} ({plain(kind)}): component {number} does not exist")
     order = head.get("order")
     return Relation(synonyms.RELATIONS.get(kind, kind), 0 if order is None else _identifier(order, "an order"), roles)
 
@@ -232,7 +232,7 @@ def _header_of_json(content: bytes) -> _Raw:
     except UnicodeDecodeError:
         raise RexsError("the file is not UTF-8, as JSON must be") from None
     except json.JSONDecodeError as error:
-        raise RexsError(f"the file is no JSON: {error.msg} in line {error.lineno}") from None
+        raise RexsError(f"not a JSON file: {error.msg} in line {error.lineno}") from None
     except RecursionError:
         raise RexsError("the file is nested far deeper than any REXS file") from None
     model = _table(_table(tree, "the file").get("model"), "model")
@@ -256,12 +256,12 @@ def _whole_number(digits: str) -> int | float:
 
 
 def _no_number(text: str) -> float:
-    raise RexsError(f"the file holds '{text}', which is no finite number")
+    raise RexsError(f"the file contains '{text}', which is not a finite number")
 
 
 def _table(value: Any, what: str) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise RexsError(f"{what} is no JSON object: this is no REXS file")
+        raise RexsError(f"not a REXS file: {what} is not a JSON object")
     return value
 
 
@@ -269,7 +269,7 @@ def _tables(parent: Mapping[str, Any], key: str) -> Iterator[dict[str, Any]]:
     """Objects of a list, which may be missing."""
     values = _table(parent, key).get(key) or []
     if not isinstance(values, list):
-        raise RexsError(f"{key} is no list: this is no REXS file")
+        raise RexsError(f"not a REXS file: {key} is not a list")
     return (_table(value, f"an entry of {key}") for value in values)
 
 
@@ -318,7 +318,7 @@ class _Element:
 def _header_of_xml(content: bytes) -> _Raw:
     model = _elements(content)
     if model.tag != "model":
-        raise RexsError(f"the outermost element is '{plain(model.tag)}', not 'model': this is no REXS file")
+        raise RexsError(f"not a REXS file: the root element is '{plain(model.tag)}', not 'model'")
     get = model.attributes.get
     relations = [one for group in model.all("relations") for one in group.all("relation")]
     components = [one for group in model.all("components") for one in group.all("component")]
@@ -368,7 +368,7 @@ def _elements(content: bytes) -> _Element:
         open_elements.append(element)
 
     def refuse(*_: object) -> None:
-        raise RexsError("the file has a DOCTYPE or an entity of its own, which no REXS file has and none may")
+        raise RexsError("the file has a DOCTYPE or an entity, which REXS files must not have")
 
     parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True
@@ -381,7 +381,7 @@ def _elements(content: bytes) -> _Element:
         parser.Parse(decoded(content).text, True)
     except expat.ExpatError as error:
         reason = expat.errors.messages.get(error.code, "cannot be parsed")
-        raise RexsError(f"the file is no XML: {reason} in line {error.lineno}") from None
+        raise RexsError(f"not an XML file: {reason} in line {error.lineno}") from None
     return top.children[0]
 
 

@@ -125,7 +125,7 @@ class RexsError(ValueError):
         self.faults = tuple(dict.fromkeys(faults))
         more = len(self.faults) - SHOWN_FAULTS
         many = "s" if more > 1 else ""
-        rest = [f"and {more} more fault{many}"] if more > 0 else []
+        rest = [f"and {more} more error{many}"] if more > 0 else []
         super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
 
 
@@ -243,7 +243,7 @@ class Component:
         """
         value = self.quantity(key)
         if value is not None and value != round(value):
-            raise RexsError(f"{self}: {key} = {value:g} is no whole number")
+            raise RexsError(f"{self}: {key} = {value:g} is not a whole number")
         if value is None:
             return None
         return round(value)
@@ -302,7 +302,7 @@ class Component:
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            raise RexsError(f"{self}: {key} = '{plain(value)}' is no finite number")
+            raise RexsError(f"{self}: {key} = '{plain(value)}' is not a finite number")
         if abs(number) > LARGEST_NUMBER:
             raise RexsError(f"{self}: {key} = '{plain(value)}' is larger than any quantity of a gearbox")
         return number

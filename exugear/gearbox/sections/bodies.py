@@ -127,14 +127,14 @@ class SolidSeatSection(Section):
     @model_validator(mode="after")
     def _kind(self) -> SolidSeatSection:
         if self.same_as is not None and self.model_fields_set != {"same_as"}:
-            raise ValueError("same_as stands alone: the seat that it names has the dimensions")
+            raise ValueError("same_as cannot be combined with other keys: the dimensions of the other seat apply")
         if self.inner_diameter_mm is not None:
             if self.width_mm is not None:
                 raise ValueError("a flat seat (inner_diameter_mm) has no width_mm")
             if self.diameter_mm is None or self.diameter_mm <= self.inner_diameter_mm:
-                raise ValueError("a flat seat needs a diameter_mm above its inner_diameter_mm")
+                raise ValueError("a flat seat requires a diameter_mm above its inner_diameter_mm")
         if self.sectors is not None and self.sectors % 2 == 0:
-            raise ValueError("sectors must be odd: what lies between them is then smooth")
+            raise ValueError("sectors must be odd, so that interpolation between them is smooth")
         return self
 
 
@@ -204,29 +204,29 @@ class BodySection(Section):
     @model_validator(mode="after")
     def _place(self) -> BodySection:
         if self.shape is not None and self.solid is not None:
-            raise ValueError("give a shape or a solid, not both")
+            raise ValueError("set a shape or a solid, not both")
         if self.flexibility != "none" and self.shape is None and self.solid is None:
-            raise ValueError(f"flexibility {self.flexibility!r} needs a shape: give a [.shape] or a [.solid] table")
+            raise ValueError(f"flexibility {self.flexibility!r} requires a shape; add a [.shape] or a [.solid] table")
         if self.flexibility in ("nonrotating", "ffrf") and self.fixed:
-            raise ValueError(f"flexibility {self.flexibility!r} is for bodies that turn: a fixed body takes 'elastic'")
+            raise ValueError(f"flexibility {self.flexibility!r} is for rotating bodies; set 'elastic' for a fixed body")
         if self.shape is not None and (self.fixed or self.spin_only or self.carrier is not None):
-            raise ValueError("a shape is for a turning body on a fixed axis, not a fixed, spin-only or planet body")
+            raise ValueError("a shape is for a rotating body on a fixed axis, not a fixed, spin-only or planet body")
         if self.solid is not None and (self.spin_only or self.carrier is not None):
             raise ValueError("a solid is for a body on a fixed axis or a fixed body, not a spin-only or planet body")
         planet = (self.carrier is not None, self.orbit_radius_mm is not None, bool(self.planet_angles_deg))
         if any(planet) and not all(planet):
-            raise ValueError("a planet needs all of carrier, orbit_radius_mm and planet_angles_deg")
+            raise ValueError("a planet requires carrier, orbit_radius_mm and planet_angles_deg")
         placeless = self.spin_only or (self.fixed and not self.gears_z_mm)
         if all(planet) == (self.axis_position_mm is not None) and (all(planet) or not placeless):
-            raise ValueError("give either axis_position_mm = [x, y] or the three keys of a planet")
+            raise ValueError("set either axis_position_mm = [x, y] or the three keys of a planet")
         if self.fixed and self.inertia:
-            raise ValueError("a fixed body has no inertia: leave the section out or set fixed = false")
+            raise ValueError("a fixed body has no inertia; remove the section or set fixed = false")
         if self.spin_only and self.gears_z_mm:
-            raise ValueError("a spin-only body carries no gears: it has no position in space")
+            raise ValueError("a spin-only body has no position in space and cannot carry gears")
         follows = self.shape is not None or (self.gears_z_mm and self.carrier is not None)
         if not self.fixed and not self.inertia and not follows:
             raise ValueError(
-                "a moving body needs an inertia table, e.g. [bodies.NAME.inertia.assemblies], or a shape from which "
-                "its inertia follows; that of a planet follows from its gears"
+                "a moving body requires an inertia table, e.g. [bodies.NAME.inertia.assemblies], or a shape from "
+                "which its inertia is computed; the inertia of a planet is computed from its gears"
             )
         return self

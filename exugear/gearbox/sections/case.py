@@ -64,9 +64,11 @@ class LoadCaseSection(Section):
             self.drive_stiffness_N_m_per_rad is not None,
         )
         if any(drive) and not all(drive):
-            raise ValueError("a speed-driven case needs driven_body, end_speed_rpm and drive_stiffness_N_m_per_rad")
+            raise ValueError(
+                "a speed-driven load case requires driven_body, end_speed_rpm and drive_stiffness_N_m_per_rad"
+            )
         if not self.torques_N_m and self.torque_series is None and not any(drive):
-            raise ValueError("give torques_N_m, torque_series or a driven_body")
+            raise ValueError("set torques_N_m, torque_series or driven_body")
         return self
 
 
@@ -92,7 +94,7 @@ class ForceSection(Section):
     @model_validator(mode="after")
     def _acts(self) -> ForceSection:
         if not any((*self.force_N, *self.moment_N_m)):
-            raise ValueError("give a force_N = [x, y, z] or a moment_N_m = [x, y] that is not zero")
+            raise ValueError("set force_N = [x, y, z] or moment_N_m = [x, y], not all zero")
         return self
 
 
@@ -179,7 +181,7 @@ class OperationSection(Section):
     @model_validator(mode="after")
     def _rising(self) -> OperationSection:
         if self.speed_range_rpm is not None and not self.speed_range_rpm[0] < self.speed_range_rpm[1]:
-            raise ValueError(f"speed_range_rpm = {list(self.speed_range_rpm)}: the lower speed comes first")
+            raise ValueError(f"speed_range_rpm = {list(self.speed_range_rpm)}: set the lower speed first")
         return self
 
 
@@ -220,9 +222,9 @@ class SteSection(Section):
             if values is None:
                 continue
             if list(values) != sorted(set(values)):
-                raise ValueError(f"{key} = {list(values)}: values must rise")
+                raise ValueError(f"{key} = {list(values)}: values must increase")
             if static not in values:
-                raise ValueError(f"{key} = {list(values)}: {static} must be among them, the static state")
+                raise ValueError(f"{key} = {list(values)}: must include {static}, the static state")
         return self
 
 

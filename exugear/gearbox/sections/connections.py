@@ -117,16 +117,19 @@ _PAIRED = frozenset({"cylindrical_roller", "needle_roller", "tapered_roller", "a
 _CYLINDERS = frozenset({"cylindrical_roller", "needle_roller"})
 _RADIAL = frozenset({"cylindrical_roller", "needle_roller", "deep_groove_ball"})
 TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
-    "element_length_mm": (_ROLLERS, "balls have none"),
-    "inner_groove_ratio": (_BALLS, "rollers run in no groove"),
-    "outer_groove_ratio": (_BALLS - _SELF_ALIGNING, "only balls run in grooves, self-aligning ones in a sphere"),
-    "osculation": (_BARRELS, "only barrel rollers have one"),
-    "profile": (_PROFILED, "balls have none, that of barrel rollers is their osculation"),
-    "row_count": (_RADIAL | _SELF_ALIGNING, "two rows with a contact angle are an arrangement, X or O"),
-    "ribs": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
-    "rib_contact_mm": (_CYLINDERS, "only cylindrical rollers run against ribs that hold the shaft"),
-    "locates_towards": (_ANGULAR | {"thrust_spherical_roller"}, "it holds both directions or none"),
-    "axial_preload_um": (_ANGULAR, "only a pair with contact angles can be set along the axis"),
+    "element_length_mm": (_ROLLERS, "not for ball bearings"),
+    "inner_groove_ratio": (_BALLS, "roller raceways have no groove"),
+    "outer_groove_ratio": (
+        _BALLS - _SELF_ALIGNING,
+        ("only ball bearings have grooves, and self-aligning ones have a sphere"),
+    ),
+    "osculation": (_BARRELS, "only for barrel rollers"),
+    "profile": (_PROFILED, "not for ball bearings; for barrel rollers it follows from the osculation"),
+    "row_count": (_RADIAL | _SELF_ALIGNING, "two rows with a contact angle form an X or O arrangement"),
+    "ribs": (_CYLINDERS, "only cylindrical roller bearings have ribs that locate the shaft"),
+    "rib_contact_mm": (_CYLINDERS, "only cylindrical roller bearings have ribs that locate the shaft"),
+    "locates_towards": (_ANGULAR | {"thrust_spherical_roller"}, "it locates the shaft in both directions or in none"),
+    "axial_preload_um": (_ANGULAR, "only a pair with contact angles can be preloaded axially"),
 }
 """Keys of a catalogue section that only some types have, and why."""
 CONTACT_ANGLES_DEG: dict[str, tuple[float, float]] = {
@@ -212,39 +215,44 @@ class CatalogueSection(Section):
     def _keys_of_the_type(self) -> CatalogueSection:
         for key, (types, why) in TYPES_OF_KEYS.items():
             if key in self.model_fields_set and getattr(self, key) is not None and self.type not in types:
-                raise ValueError(f"{key} makes no sense for type = {self.type!r}: {why}; leave it out")
+                raise ValueError(f"{key} is not applicable to type = {self.type!r}: {why}; remove the key")
         if self.arrangement != "single" and self.type not in _PAIRED:
             raise ValueError(
-                f"arrangement = {self.arrangement!r} makes no sense for type = {self.type!r}: use 'single'"
+                f"arrangement = {self.arrangement!r} is not applicable to type = {self.type!r}; set 'single'"
             )
         if self.type in _ANGULAR and self.arrangement in ("X", "O") and "locates_towards" in self.model_fields_set:
-            raise ValueError(f"locates_towards makes no sense for arrangement = {self.arrangement!r}: it holds both")
+            raise ValueError(
+                f"locates_towards is not applicable to arrangement = {self.arrangement!r}, which locates in both "
+                "directions; remove the key"
+            )
         if self.rib_contact_mm is not None and self.ribs == "none":
-            raise ValueError("rib_contact_mm needs ribs = '+z', '-z' or 'both'")
+            raise ValueError("rib_contact_mm requires ribs = '+z', '-z' or 'both'")
         if self.axial_preload_um != 0.0 and self.arrangement not in ("X", "O"):
-            raise ValueError("axial_preload_um needs arrangement = 'X' or 'O': one bearing alone has none")
+            raise ValueError("axial_preload_um requires arrangement = 'X' or 'O'; a single bearing has none")
         if self.static_rating_kN and (self.fatigue_load_limit_kN or 0.0) >= self.static_rating_kN:
             raise ValueError(
                 f"fatigue_load_limit_kN = {self.fatigue_load_limit_kN:g} must be below static_rating_kN = "
-                f"{self.static_rating_kN:g}: it is some 1/22 of it for ball bearings, 1/8 for roller bearings"
+                f"{self.static_rating_kN:g}; usual: about 1/22 of it for ball bearings, 1/8 for roller bearings"
             )
         if self.axial_load_kN is not None and self.radial_load_kN is None:
-            raise ValueError(
-                "axial_load_kN stands beside radial_load_kN: give both, or none to take the load of the statics"
-            )
+            raise ValueError("axial_load_kN without radial_load_kN: set both, or none to use the static load")
         return self
 
     @model_validator(mode="after")
     def _rows(self) -> CatalogueSection:
         rows = self.row_count or (2 if self.type in _SELF_ALIGNING else 1)
         if self.type in _SELF_ALIGNING and (rows > 2 or self.row_distance_mm is not None):
-            raise ValueError(f"type = {self.type!r} has one or two rows, contact_angle_deg says how far apart")
+            raise ValueError(f"type = {self.type!r} has one or two rows; contact_angle_deg defines their distance")
         if self.type in _SELF_ALIGNING and rows == 1 and self.contact_angle_deg is not None:
-            raise ValueError("contact_angle_deg makes no sense for row_count = 1: the row stands in the middle")
+            raise ValueError("contact_angle_deg is not applicable to row_count = 1 (row in the middle); remove the key")
         if rows > 1 and self.arrangement != "single":
-            raise ValueError(f"row_count = {rows} stands beside arrangement = 'single' only: count the rows of both")
+            raise ValueError(
+                f"row_count = {rows} requires arrangement = 'single'; set the number of rows of the whole bearing"
+            )
         if self.row_distance_mm is not None and rows == 1 and self.arrangement == "single":
-            raise ValueError("row_distance_mm needs a second row: row_count = 2, or arrangement 'X', 'O' or 'tandem'")
+            raise ValueError(
+                "row_distance_mm requires a second row: row_count = 2, or arrangement 'X', 'O' or 'tandem'"
+            )
         return self
 
     @model_validator(mode="after")
@@ -277,7 +285,7 @@ class CatalogueSection(Section):
         if self.type not in CONTACT_ANGLES_DEG:
             if angle != 0.0:
                 raise ValueError(
-                    f"contact_angle_deg = {angle:g} makes no sense for type = {self.type!r}: it has none; leave it out"
+                    f"contact_angle_deg = {angle:g} is not applicable to type = {self.type!r}; remove the key"
                 )
             return self
         least, most = CONTACT_ANGLES_DEG[self.type]
@@ -293,7 +301,7 @@ class CatalogueSection(Section):
             return self
         shares = [share for share, _ in self.profile]
         if shares[0] != 0.0 or any(later <= earlier for earlier, later in itertools.pairwise(shares)):
-            raise ValueError(f"profile: shares of half the length = {shares} must begin at 0 and ascend, up to 1")
+            raise ValueError(f"profile: fractions of half the length = {shares} must start at 0 and increase, up to 1")
         return self
 
 
@@ -330,7 +338,7 @@ class BearingSection(Section):
     @model_validator(mode="after")
     def _source(self) -> BearingSection:
         if not self.is_known and not self.designation:
-            raise ValueError("give a [.stiffness] table or a [.catalogue] table")
+            raise ValueError("add a [.stiffness] table or a [.catalogue] table")
         return self
 
     @property
@@ -341,13 +349,13 @@ class BearingSection(Section):
     @model_validator(mode="after")
     def _law(self) -> BearingSection:
         if self.model == "iso16281" and self.catalogue is None:
-            raise ValueError("model = 'iso16281' needs a [.catalogue] table, whose rolling elements it follows")
+            raise ValueError("model = 'iso16281' requires a [.catalogue] table with the rolling elements")
         if self.model == "iso16281" and self.catalogue is not None and self.catalogue.radial_load_kN is not None:
             raise ValueError(
-                "model = 'iso16281' follows the load: leave catalogue.radial_load_kN and .axial_load_kN out"
+                "model = 'iso16281' uses the computed load; remove catalogue.radial_load_kN and .axial_load_kN"
             )
         if self.model != "iso16281" and "cage" in self.model_fields_set:
-            raise ValueError(f"cage = {self.cage!r} stands beside model = 'iso16281' only")
+            raise ValueError(f"cage = {self.cage!r} requires model = 'iso16281'")
         return self
 
 

@@ -78,16 +78,16 @@ class SourceSection(Section):
         ways = ("hours_per_year", "events_per_year", "hours_table", "wind")
         given = sum(getattr(self, way) is not None for way in ways)
         if (self.file is None) == (self.files is None):
-            raise ValueError("a source needs one of file and files")
+            raise ValueError("a source requires file or files; set one of them")
         if self.hours_table is not None and self.files is None:
-            raise ValueError("hours_table belongs to files; a single file has hours_per_year")
+            raise ValueError("hours_table applies to files; set hours_per_year for a single file")
         counted = self.file is not None and self.file.lower().endswith(".csv") and not given
         if self.kind == "fatigue" and given != 1 and not counted:
-            raise ValueError(f"a source of fatigue needs one of {', '.join(ways)}")
+            raise ValueError(f"a fatigue source requires one of {', '.join(ways)}")
         if self.kind == "fatigue" and self.partial_factor is not None:
-            raise ValueError("partial_factor belongs to extreme sources; leave it out")
+            raise ValueError("partial_factor applies to extreme sources only; remove the key")
         if self.kind == "extreme" and (given or self.partial_factor is None):
-            raise ValueError(f"an extreme source needs partial_factor, and none of {', '.join(ways)}")
+            raise ValueError(f"an extreme source requires partial_factor, and none of {', '.join(ways)}")
         if 0.0 in (self.torque_factor, self.speed_factor):
             raise ValueError("torque_factor and speed_factor must not be 0")
         return self
@@ -113,9 +113,9 @@ class LoadsSection(Section):
     def _wind(self) -> LoadsSection:
         asked = [name for name, source in self.sources.items() if source.wind is not None]
         if asked and self.wind is None:
-            raise ValueError(f"sources.{asked[0]}.wind needs the section [loads.wind] with mean_m_per_s")
+            raise ValueError(f"sources.{asked[0]}.wind requires the section [loads.wind] with mean_m_per_s")
         if self.wind is not None and not asked:
-            raise ValueError("wind: no source names a channel of the wind speed (wind = ...)")
+            raise ValueError("wind: no source has a channel of the wind speed; set wind = ... in a source")
         return self
 
 
@@ -152,29 +152,29 @@ class StrengthSection(Section):
     def _renamed(cls, content: Any) -> Any:
         if isinstance(content, dict) and "roughness_um" in content:
             raise ValueError(
-                f"roughness_um = {content['roughness_um']}: is called roughness_Rz_um now; of Ra it is roughness_Ra_um"
+                f"roughness_um = {content['roughness_um']}: renamed; set roughness_Rz_um, or roughness_Ra_um for Ra"
             )
         return content
 
     @model_validator(mode="after")
     def _roughness(self) -> StrengthSection:
         if (self.roughness_Rz_um is None) == (self.roughness_Ra_um is None):
-            raise ValueError("give one of roughness_Rz_um and roughness_Ra_um")
+            raise ValueError("set one of roughness_Rz_um and roughness_Ra_um")
         if (self.root_factor is None) == (self.root_roughness_Rz_um is None):
-            raise ValueError("give one of root_factor and root_roughness_Rz_um")
+            raise ValueError("set one of root_factor and root_roughness_Rz_um")
         return self
 
     @model_validator(mode="after")
     def _curves(self) -> StrengthSection:
         own = (self.contact_curve is not None, self.bending_curve is not None)
         if (self.curve is None) != all(own) or (self.curve is not None and any(own)):
-            raise ValueError("give curve, or contact_curve and bending_curve")
+            raise ValueError("set curve, or contact_curve and bending_curve")
         for key in ("contact_curve", "bending_curve"):
             points = getattr(self, key) or ()
             cycles = [point[0] for point in points]
             factors = [point[1] for point in points]
             if cycles != sorted(set(cycles)) or factors != sorted(factors, reverse=True):
-                raise ValueError(f"{key}: cycles must rise and factors must not")
+                raise ValueError(f"{key}: cycles must increase and factors must not increase")
         return self
 
 
@@ -246,6 +246,6 @@ class LubricantSection(Section):
         if hot is not None and hot >= self.viscosity_40_mm2_per_s:
             raise ValueError(
                 f"viscosity_100_mm2_per_s = {hot:g} must be below viscosity_40_mm2_per_s = "
-                f"{self.viscosity_40_mm2_per_s:g}: oil gets thinner when it gets hot"
+                f"{self.viscosity_40_mm2_per_s:g}"
             )
         return self

@@ -7,8 +7,8 @@ from importlib.resources import files
 KINDS = {
     "pair": "one helical pair on ball bearings",
     "parallel": "two helical stages on three parallel shafts",
-    "planetary": "a planetary stage with three planets, the ring held",
-    "wind": "a planetary and two parallel stages, of the size of a 1 MW wind turbine",
+    "planetary": "a planetary stage with three planets and a fixed ring gear",
+    "wind": "a planetary and two parallel stages, size of a 1 MW wind turbine",
 }
 """What each kind is, in words."""
 
@@ -23,6 +23,6 @@ def template(kind: str) -> str:
     Examples
     --------
     >>> template("pair").splitlines()[0]
-    '# One helical gear pair on ball bearings: an example to start from.'
+    '# One helical gear pair on ball bearings: a template for your own gearbox.'
     """
     return files(__package__).joinpath(f"{kind}.toml").read_text(encoding="utf-8")

@@ -133,7 +133,7 @@ def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
     """
     if body in gearbox.case.static_load.locked:
         held = ", ".join(gearbox.case.static_load.locked)
-        raise gearbox.fault(f"loads.body = {body!r}: static_load.locked holds {held}; name the body at the other end")
+        raise gearbox.fault(f"loads.body = {body!r}: static_load.locked locks {held}; set the body at the other end")
     return {body: 1.0}
 
 
@@ -368,7 +368,7 @@ def draw_duration(distribution: DurationDistribution, body: str, path: str | Pat
                 above.step(
                     lasting, 1e-3 * np.abs(distribution.torque[own][order]), where="pre", color=colour, label=name
                 )
-        above.set(xlabel="hours with at least this torque", ylabel="torque without sign / kN m", xscale="log")
+        above.set(xlabel="hours with at least this torque", ylabel="torque magnitude / kN m", xscale="log")
         above.xaxis.set_major_formatter("{x:g}")
         above.set_title("duration")
         above.legend()

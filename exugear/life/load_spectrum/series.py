@@ -259,7 +259,8 @@ class SeriesReader:
         if first is None or last is None or begin is None or last == first:
             length = series.time[-1] - series.time[0]
             raise self.gearbox.fault(
-                f"{self.key}.skip_s = {self.source.skip_s:g}: leaves nothing of a series of {length:g} s ({path.name})"
+                f"{self.key}.skip_s = {self.source.skip_s:g}: no samples remain of a series of {length:g} s ("
+                f"{path.name})"
             )
         found = wind / lasting_wind if lasting_wind else math.nan
         return ReadSummary(first - begin, last - first, found, counts)
@@ -273,7 +274,7 @@ class SeriesReader:
         """Names and quantities of the channels: torque, speed, five of the hub if any, wind if asked for."""
         if self.source.skip_s is None:
             raise self.gearbox.fault(
-                f"{self.key}.skip_s: this key is missing; say how much of the beginning is left out, 0 for nothing"
+                f"{self.key}.skip_s: this key is missing; set the time to skip at the start, 0 for none"
             )
         own = {}
         if series.path.suffix.lower() == ".csv":
@@ -284,7 +285,7 @@ class SeriesReader:
             if name is None:
                 shown = ", ".join(series.names[:8])
                 raise self.gearbox.fault(
-                    f"{self.key}.{quantity}: this key is missing; name a channel of the file, such as {shown}"
+                    f"{self.key}.{quantity}: this key is missing; set a channel of the file, such as {shown}"
                 )
             found.append((name, quantity))
         found += [(name.removeprefix("-"), quantity) for name, quantity in self._hub()]
@@ -316,8 +317,8 @@ class SeriesReader:
         if bad.size:
             row = int(bad[0])
             raise LoadFileError(
-                f"{path}: the speed at {time[row]:g} s (step {before + row + 1}) is {size[row] / RPM:.3g} rpm; up to "
-                f"{LARGEST_SPEED:g} rpm can be meant"
+                f"{path}: the speed at {time[row]:g} s (step {before + row + 1}) is {size[row] / RPM:.3g} rpm; "
+                f"plausible are up to {LARGEST_SPEED:g} rpm"
             )
         so_far = np.maximum.accumulate(np.append(top, size))
         if before + len(speed) >= LONG_SERIES:
@@ -325,8 +326,8 @@ class SeriesReader:
             if stopped.size:
                 row = int(stopped[0]) + 1
                 raise LoadFileError(
-                    f"{path}: the speed falls from {size[row - 1] / RPM:.4g} rpm to 0 within the step to {time[row]:g} "
-                    f"s (step {before + row + 1}): a dropout; no shaft stops so"
+                    f"{path}: the speed falls from {size[row - 1] / RPM:.4g} rpm to 0 within the step to {time[row]:g}"
+                    f" s (step {before + row + 1}): a signal dropout; correct the file"
                 )
         return float(so_far[-1])
 
@@ -341,14 +342,14 @@ class SeriesReader:
             hub[:, places] = values[:, 2 : 2 + len(places)] * (signs * self.source.hub_factor * partial)
         for name, loads, largest, unit in (
             ("torque", torque[:, None], LARGEST_TORQUE, "N m"),
-            ("load of the hub", hub, LARGEST_FORCE, "N or N m"),
+            ("rotor load", hub, LARGEST_FORCE, "N or N m"),
         ):
             bad = np.argwhere(np.abs(loads) > largest)
             if bad.size:
                 row = int(bad[0][0])
                 raise LoadFileError(
-                    f"{path}: the {name} at {time[row]:g} s is {abs(loads[tuple(bad[0])]):.3g} {unit}; up to "
-                    f"{largest:g} can be meant; look at its unit and factor"
+                    f"{path}: the {name} at {time[row]:g} s is {abs(loads[tuple(bad[0])]):.3g} {unit}; plausible are "
+                    f"up to {largest:g}; check its unit and factor"
                 )
         return Samples(torque, values[:, 1] * self.source.speed_factor, lasting, hub)
 

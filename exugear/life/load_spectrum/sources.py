@@ -217,7 +217,7 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
     """
     loads = section_of(gearbox)
     if loads.body not in gearbox.spinning:
-        raise gearbox.fault(f"loads.body = {loads.body!r} does not turn; bodies are {', '.join(gearbox.spinning)}")
+        raise gearbox.fault(f"loads.body = {loads.body!r}: does not rotate; bodies are {', '.join(gearbox.spinning)}")
     paths = {name: _paths(gearbox, f"loads.sources.{name}", source) for name, source in loads.sources.items()}
     total = sum(map(len, paths.values()))
     done = 0
@@ -234,7 +234,7 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
     sources = tuple(draft.source(by_wind) for draft in drafts)
     yearly = sum(float(source.hours.sum()) for source in sources) / loads.life_years
     if yearly > HOURS_PER_YEAR * (1.0 + 1e-9):
-        raise gearbox.fault(f"loads.sources: {yearly:.6g} hours a year in all; a year has {HOURS_PER_YEAR:g}")
+        raise gearbox.fault(f"loads.sources: {yearly:.6g} hours per year in total; a year has {HOURS_PER_YEAR:g}")
     is_output = loads.body == gearbox.case.overall.output
     return tuple(
         replace(source, remarks=(*source.remarks, *_doubt_about_torque_sign(source, is_output))) for source in sources
@@ -250,7 +250,7 @@ def section_of(gearbox: Gearbox) -> LoadsSection:
         There is none.
     """
     if gearbox.case.loads is None:
-        raise gearbox.fault("loads: this section is missing; [loads] names the body and the files of its loads")
+        raise gearbox.fault("loads: this section is missing; add [loads] with the loaded body and the load files")
     return gearbox.case.loads
 
 
@@ -258,10 +258,13 @@ def distribution(gearbox: Gearbox, sources: tuple[LoadSource, ...]) -> DurationD
     """Load duration distribution of all sources of fatigue together."""
     worn = [source for source in sources if source.kind == "fatigue"]
     if not worn:
-        raise gearbox.fault("loads.sources: none is of kind 'fatigue'; without one no part wears")
+        raise gearbox.fault("loads.sources: no source of kind 'fatigue'; set one, fatigue damage requires it")
     torque, speed, hours = (np.concatenate([getattr(one, key) for one in worn]) for key in ("torque", "speed", "hours"))
     if not np.any(torque * speed * hours):
-        raise gearbox.fault("loads.sources: no source of fatigue has torque, speed and hours at once: no part wears")
+        raise gearbox.fault(
+            "loads.sources: no fatigue source has torque, speed and hours at the same time; no fatigue damage can be "
+            "computed"
+        )
     largest = max(max(one.largest, -one.least) for one in worn)
     return load_duration(torque, speed, hours, section_of(gearbox).bins, largest)
 
@@ -281,7 +284,7 @@ def _paths(gearbox: Gearbox, key: str, source: SourceSection) -> list[Path]:
         path = gearbox.file(f"{key}.file", source.file, LARGEST_SERIES)
         if path.suffix.lower() not in (*SERIES_ENDINGS, *REXS_ENDINGS):
             known = ", ".join((*SERIES_ENDINGS, *REXS_ENDINGS))
-            raise gearbox.fault(f"{key}.file = {source.file!r}: files of loads end in {known}")
+            raise gearbox.fault(f"{key}.file = {source.file!r}: load files end in {known}")
         return [path]
     folder = Path(gearbox.source).parent
     pattern = str(source.files)
@@ -290,14 +293,15 @@ def _paths(gearbox: Gearbox, key: str, source: SourceSection) -> list[Path]:
     except (ValueError, NotImplementedError, OSError) as error:
         raise gearbox.fault(f"{key}.files = {pattern!r}: {error}") from None
     if not names:
-        raise gearbox.fault(f"{key}.files = {pattern!r}: no file has such a name in {folder}")
+        raise gearbox.fault(f"{key}.files = {pattern!r}: no matching file in {folder}")
     if len(names) > MOST_FILES:
         raise gearbox.fault(f"{key}.files = {pattern!r}: {len(names)} files; at most {MOST_FILES} are read")
     paths = [gearbox.file(f"{key}.files", name, LARGEST_SERIES) for name in names]
     other = next((name for name in names if Path(name).suffix.lower() not in SERIES_ENDINGS), None)
     if other is not None:
         raise gearbox.fault(
-            f"{key}.files = {pattern!r}: {other} is none of {', '.join(SERIES_ENDINGS)}; say which, as in *.outb"
+            f"{key}.files = {pattern!r}: {other} does not end in one of {', '.join(SERIES_ENDINGS)}; specify the "
+            "ending, such as *.outb"
         )
     return paths
 
@@ -330,7 +334,7 @@ class _Draft:
 
     def _take_series(self, path: Path) -> None:
         if self.section.kind == "fatigue" and not self._weighed:
-            raise self.gearbox.fault(f"{self.key}.hours_per_year: this key is missing; a series needs it")
+            raise self.gearbox.fault(f"{self.key}.hours_per_year: this key is missing; a time series requires it")
         pool = Pool(self.section.kind == "extreme")
         taken = self._reader.take(path, pool)
         self._skipped = max(self._skipped, taken.skipped)
@@ -373,8 +377,8 @@ class _Draft:
             hours = _hours_in(row)
             if hours is None or row[0] in found:
                 raise self.gearbox.fault(
-                    f"{key}: {path}: line {number} has {shortened(','.join(row), 80)}; needs a file, each once, and "
-                    f"its hours a year from 0 to {HOURS_PER_YEAR:g}"
+                    f"{key}: {path}: line {number} has {shortened(','.join(row), 80)}; required are a file, each "
+                    f"once, and its hours per year from 0 to {HOURS_PER_YEAR:g}"
                 )
             found[row[0]] = hours
         return found
@@ -398,7 +402,9 @@ class _Draft:
         bad = np.flatnonzero(~(np.isfinite(values).all(axis=1) & (values[:, 2] >= 0.0)))
         if bad.size:
             told = ",".join(f"{value:g}" for value in values[bad[0]])
-            raise LoadFileError(f"{path}: line {bad[0] + 2} has {told}; needs three finite numbers, hours not negative")
+            raise LoadFileError(
+                f"{path}: line {bad[0] + 2} has {told}; three finite numbers are required, hours not negative"
+            )
         if not values[:, 2].sum() > 0.0:
             raise LoadFileError(f"{path}: all hours are 0")
         return self._scaled(path, values[:, 0], values[:, 1] * RPM, values[:, 2])
@@ -411,17 +417,19 @@ class _Draft:
             bad = np.flatnonzero(np.abs(values) > largest)
             if bad.size:
                 raise LoadFileError(
-                    f"{path}: row {bad[0] + 1} has {values[bad[0]]:.3g} {unit}; up to {largest:g} {unit} can be meant; "
-                    "look at its unit and at torque_factor and speed_factor"
+                    f"{path}: row {bad[0] + 1} has {values[bad[0]]:.3g} {unit}; plausible are up to {largest:g} {unit}"
+                    "; check its unit, torque_factor and speed_factor"
                 )
         return Samples(found, turning, hours, np.zeros((len(found), 0)))
 
     def _check_table(self, path: Path) -> None:
         for superfluous in ("skip_s", "torque", "speed", "events_per_year", "wind", "hub_forces", "hub_moments"):
             if getattr(self.section, superfluous) is not None:
-                raise self.gearbox.fault(f"{self.key}.{superfluous}: makes no sense for a table of loads; leave it out")
+                raise self.gearbox.fault(
+                    f"{self.key}.{superfluous}: not applicable to a table of loads; remove the key"
+                )
         if self.section.files is not None:
-            raise self.gearbox.fault(f"{self.key}.files: {path.name} is a table of counted loads; give it by `file`")
+            raise self.gearbox.fault(f"{self.key}.files: {path.name} is a table of counted loads; set it in `file`")
 
     def source(self, by_wind: Mapping[float, float]) -> LoadSource:
         """All that was read, in hours of the life."""
@@ -469,8 +477,8 @@ class _Draft:
             total = float(hours.sum())
             if abs(total - found) > 1e-3 * found:
                 self._remarks = (
-                    f"{self.name}: hours of {self._digests[0][0]}, {total:.6g} in all, are shares of the {found:.6g} h "
-                    "that hours_per_year gives in the life",
+                    f"{self.name}: hours of {self._digests[0][0]}, {total:.6g} in total, are used as fractions of the "
+                    f"{found:.6g} h that result from hours_per_year",
                 )
             hours = hours / total * found
         elif self.section.kind == "extreme":
@@ -559,6 +567,6 @@ def _doubt_about_torque_sign(source: LoadSource, is_output: bool) -> Iterator[st
         signs = ("a negative torque at a positive speed", "a positive torque at a negative speed")[backwards > 0.0]
         hours = f"{100.0 * (backwards or share):.3g} % of its hours"
         yield (
-            f"Warning: {source.name}: {source.file} has {signs} for {hours}, so that power flows back from the loaded "
-            "body; check the signs of both columns (torque_factor = -1 or speed_factor = -1 turns one)"
+            f"Warning: {source.name}: {source.file} has {signs} for {hours}, so power flows back from the loaded "
+            "body; check the signs of both columns (torque_factor = -1 or speed_factor = -1 inverts one)"
         )

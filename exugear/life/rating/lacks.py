@@ -28,7 +28,7 @@ def lacks_of_life(gearbox: Gearbox) -> dict[str, tuple[str, ...]]:
     --------
     >>> gearbox = Gearbox.from_toml("exugear/gearbox/templates/planetary.toml")
     >>> lacks_of_life(gearbox)["loads"]
-    ('loads: this section is missing; [loads] names the body and the files of its loads',)
+    ('loads: this section is missing; add [loads] with the loaded body and the load files',)
     """
     checks: tuple[Callable[[Gearbox], object], ...] = (section_of, _checked_by_keys, _checked_by_keys)
     if _are_quick(gearbox):

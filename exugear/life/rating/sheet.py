@@ -173,7 +173,7 @@ def _flank(
     found = rate(rules, loads)
     lacking = dict(rules.lacking())
     if rules.strength is None:
-        lacking["S_H, S_F"] = f"not rated: no [rating.gears.{tooth.gear}] says what it withstands"
+        lacking["S_H, S_F"] = f"not rated: no strength; add [rating.gears.{tooth.gear}]"
     return FlankSheet(
         gear=tooth.gear,
         family=tooth.family,
@@ -249,7 +249,7 @@ def _load_in_words(gearbox: Gearbox, counted: CountedLoads) -> str:
     hours = float(counted.distribution.hours.sum())
     if gearbox.case.loads is not None:
         count = len(counted.points.torque)
-        return f"spectrum on {counted.body}: {count} loads, {hours:,.0f} h; factors are those of the load that decides"
+        return f"spectrum on {counted.body}: {count} loads, {hours:,.0f} h; factors are those of the decisive load"
     source = counted.sources[0]
     torque = f"{1e-3 * source.largest:.6g} kN m on {counted.body}"
     return f"nominal load: {torque} at {source.fastest / RPM:.4g} rpm, {hours:,.0f} h"
@@ -261,20 +261,22 @@ def _shortfalls(rating: RatingSection, flanks: list[FlankSheet]) -> Iterator[str
             found = flank.standard[name]
             if found < asked:
                 part = f"{flank.gear} {flank.flank} {flank.family}"
-                yield f"{part}: {name} = {found:.3g} by the standard, {asked:g} is asked for"
+                yield f"{part}: {name} = {found:.3g} to the standard, required {asked:g}"
 
 
 def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
-    yield "K_gamma and misalignment are those of the static balance on bearings, with the mesh stiffness of ISO 6336-1"
-    yield "C_R = 1: gears are solid discs; helix and profile modifications are not in K_v, K_Hbeta and K_Halpha"
-    yield "Y_B is that of rims of rings and planets; other gears are held on shafts. Z_W = Z_X = 1"
+    yield "K_gamma and misalignment: static balance with elastic bearings and the mesh stiffness of ISO 6336-1"
+    yield (
+        "C_R = 1: gears are solid discs; helix and profile modifications are not included in K_v, K_Hbeta and K_Halpha"
+    )
+    yield "Y_B: rim thickness of rings and planets; other gears are solid on shafts. Z_W = Z_X = 1"
     if gearbox.case.loads is None:
         if rating.nominal_hours is None:
             yield "nominal_hours of [rating] is missing: teeth are rated for at least 1e10 load cycles"
     elif rating.application_factor != 1.0:
         yield "application_factor is for nominal loads: K_A = 1 under [loads]"
     if rating.dynamic_factor is None:
-        yield "K_v that is not the standard's is minimum_dynamic_factor: no run or response is looked at here"
+        yield "K_v other than to the standard: minimum_dynamic_factor (runs and responses are not evaluated here)"
 
 
 # What the finite elements say beside the standard: of a stored life, or under the nominal load by tables
@@ -327,7 +329,7 @@ def remarks_on(stresses: Mapping[str, MeshCycleStress]) -> list[str]:
     """Say of which gears that stand aligned the finite elements are."""
     straight = [name for name, stress in stresses.items() if len(stress.misalignment) < 2]
     if straight:
-        return [f"sigma and K_Hbeta by finite elements of {', '.join(straight)} are of aligned gears"]
+        return [f"finite element sigma and K_Hbeta of {', '.join(straight)} are for aligned gears"]
     return []
 
 
@@ -362,13 +364,13 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
         )
     if len(torques) != 1:
         raise gearbox.fault(
-            f"static_load.torques_N_m: {', '.join(torques) or 'nothing'} has a torque; without [loads] gears are rated "
-            "under a load on one body, give [loads]"
+            f"static_load.torques_N_m: {', '.join(torques) or 'nothing'} has a torque; without [loads] the rating "
+            "requires a load on one body; add [loads]"
         )
     body, torque = next(iter(torques.items()))
     speed = abs(gearbox.train.rolling_speeds(overall.input, rated * RPM).get(body, 0.0))
     if speed == 0.0 or torque == 0.0:
-        raise gearbox.fault(f"static_load.torques_N_m.{body} = {torque:g}: {body} has no power at rated speed")
+        raise gearbox.fault(f"static_load.torques_N_m.{body} = {torque:g}: {body} transmits no power at rated speed")
     teeth = tooth_exposures(gearbox, body)
     least = min((one.cycles for one in teeth if one.cycles > 0.0), default=1.0)
     torque *= factor

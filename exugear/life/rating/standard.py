@@ -123,12 +123,12 @@ class FlankRules:
         """Why factors are not rated, by their name."""
         lines = {}
         if self.pair.gear.internal:
-            lines["K_v"] = "not rated: c' and the mass of rings are left out; K_v of [rating] is taken"
+            lines["K_v"] = "not rated: c' and mass of ring gears are not modelled; K_v of [rating] is used"
         elif self.classes is None:
-            lines["K_v"] = "not rated: tolerance_class of both gears is missing; K_v of [rating] is taken"
+            lines["K_v"] = "not rated: set tolerance_class of both gears; K_v of [rating] is used"
         if self.classes is None:
-            lines["K_Halpha"] = "not rated: tolerance_class of both gears is missing; 1 is taken"
-            lines["K_Hbeta"] = "of deflections alone: tolerance_class of both gears is missing"
+            lines["K_Halpha"] = "not rated: set tolerance_class of both gears; 1 is used"
+            lines["K_Hbeta"] = "deflections only: set tolerance_class of both gears to include deviations"
         return lines
 
 

@@ -49,7 +49,7 @@ def choice_of(attributes: Mapping[str, Any]) -> Choice:
 
 def words_of(choice: Choice) -> str:
     """Return a choice for headings."""
-    return f"{choice.variant}, law {choice.mesh_model}, inertias {choice.inertias}"
+    return f"{choice.variant}, mesh model {choice.mesh_model}, inertia set {choice.inertias}"
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Context:
 
 # Results in the folder that belong to its case: tables, modes and runs
 
-OTHER_INPUT = "was computed from another input; compute it again"
+OTHER_INPUT = "was computed from another input; recompute it"
 _UNFIT = (GearboxFileError, MeshError, VariantError, BearingError, BalanceError, KeyError)
 """What the case of the folder may say to the choice that a file was computed of."""
 
@@ -233,7 +233,7 @@ def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
     load_case = attributes.get("load_case")
     try:
         if load_case is not None and load_case not in context.gearbox.load_cases:
-            raise GearboxFileError(f"the case has no load case {load_case!r}")
+            raise GearboxFileError(f"the gearbox file has no load case {load_case!r}")
         if input_hash(context.assembled(choice_of(attributes)), load_case) == attributes.get("input_hash"):
             return True
         reason = OTHER_INPUT
@@ -249,7 +249,7 @@ def _note_distrust(context: Context, path: Path, attributes: Mapping[str, Any]) 
     if verdict:
         name = context.name_of(path)
         context.notes.distrusted.append(f"{name}: {verdict}")
-        context.notes.statements.append(f"Not to be trusted: {name}: {verdict}")
+        context.notes.statements.append(f"Invalid: {name}: {verdict}")
 
 
 def run_key(attributes: Mapping[str, Any]) -> tuple[str, str, str]:

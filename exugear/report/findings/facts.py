@@ -81,6 +81,8 @@ NO_GAIN = 0.1
 AROUND_RATED = 1.25
 """Speed up to which a resonance counts as one of the rated speed, over that speed."""
 
+MOST_WORDS = 25
+"""Words of a card's sentence."""
 LOUDER = 1.0
 """dB by which a resonance that the run-up does not show is louder than those that it shows, to be told first."""
 
@@ -103,6 +105,22 @@ class SummaryCard:
     def line(self) -> str:
         """The whole fact as one line."""
         return f"{self.kind}: {self.figure} {self.beside}. {self.sentence}"
+
+
+def _short(*sentences: str) -> str:
+    """Join sentences as long as a card has room for them, the first ones always.
+
+    Examples
+    --------
+    >>> _short("Order sun_planet.", "", "One word more than a card takes: " + MOST_WORDS * "word ")
+    'Order sun_planet.'
+    """
+    text = sentences[0]
+    for sentence in filter(None, sentences[1:]):
+        longer = f"{text} {sentence}"
+        if len(longer.split()) <= MOST_WORDS:
+            text = longer
+    return text
 
 
 def amplitude_text(level: float) -> str:
@@ -146,11 +164,10 @@ def facts_of_response(words: Labels, response: xr.Dataset) -> tuple[SummaryCard,
         return ()
     level = 20.0 * math.log10(top.amplitude / 1e-6)
     said = (
-        f"Excited by {words.told(top.line)}. The overall transmission error swings by {amplitude_text(level)} "
-        f"({figure_text(level)} dB) at constant speed."
+        f"Order {words.told(top.line)}. Overall TE {amplitude_text(level)} ({figure_text(level)} dB), constant speed."
     )
     beside = f"at {speed_text(top.speed)}, {Variant.of(choice_of(response.attrs).variant).label}"
-    return (SummaryCard("Loudest resonance", frequency_text(top.frequency), beside, said, "steady"),)
+    return (SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "steady"),)
 
 
 def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | None:
@@ -159,59 +176,57 @@ def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | 
     top = group.loudest
     if top is None:
         highest = max(float(run.spectra.speed.max()) for run in group.runs.values())
-        with_all = "" if group.responses else " with every window"
-        said = f"No resonance stands out up to {speed_text(highest)}{with_all}."
-        return SummaryCard("Loudest resonance", "none", "that stands out", said, "ranking")
+        with_all = "" if group.responses else " with all window lengths"
+        said = f"No resonance found up to {speed_text(highest)}{with_all}."
+        return SummaryCard("Highest resonance", "none", "found", said, "ranking")
     unseen = _unseen(context, words, group, top)
     if unseen is not None:
         return unseen
-    said = (
-        f"Excited by {words.line_sentence(top.peak.line)}. The overall transmission error swings by "
-        f"{amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(group, top)}{_moves(words, group, top)}."
-        f"{_speed_relative_to_rated(context, group)}"
+    said = _short(
+        f"Order {words.line(top.peak.line)}.",
+        f"Overall TE {amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(group, top)}.",
+        *_speed_relative_to_rated(context, group),
+        _moves(words, group, top),
     )
     beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
-    return SummaryCard("Loudest resonance", frequency_text(top.frequency), beside, said, "rings")
+    return SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "rings")
 
 
 def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
-    """Tell what moves in the mode of a resonance, after a colon; nothing where none is known."""
+    """Describe the mode of a resonance in a sentence; empty where none is known."""
     modes = group.runs[group.main].modes
     if resonance.finding.mode is not None and modes is not None:
-        return f": {words.moves(modes, resonance.finding.mode)}"
+        return f"Mode: {words.moves(modes, resonance.finding.mode)}."
     if resonance.finding.mode_name:
-        return f": {words.told(resonance.finding.mode_name)}"
+        return f"Mode: {words.told(resonance.finding.mode_name)}."
     return ""
 
 
 def _operating_resonance(words: Labels, group: RunGroup, ranking: Ranking) -> SummaryCard:
     """Tell the resonance that comes first by any of three quantities at constant speed, where the gearbox works."""
     low, high = (speed_text(speed) for speed in ranking.speeds)
-    where = f"from {low} to {high}" + ("" if ranking.whole else ", the speeds of operation")
+    where = f"{low} to {high}" + ("" if ranking.whole else " (operating range)")
     if not ranking.resonances:
-        return SummaryCard("Loudest resonance", "none", "that stands out", f"No peak stands out {where}.", "ranking")
+        return SummaryCard("Highest resonance", "none", "found", f"No resonance at {where}.", "ranking")
     top = ranking.resonances[0]
     parts = [quantity_text(words, name, own, ranking) for name, own in top.loudness.items()]
     near = (own for own in group.ranked[group.main] if abs(own.frequency / top.frequency - 1.0) < SAME_MODE)
     moves = next((told for told in (_moves(words, group, own) for own in near) if told), "")
-    mode = f" What moves{moves}." if moves else ""
-    said = f"Excited by {words.told(top.line)}. At constant speed, {where}: {'; '.join(parts)}.{mode}"
+    said = _short(f"Order {words.told(top.line)}.", *(f"{part[:1].upper()}{part[1:]}." for part in parts), moves)
     beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
-    return SummaryCard("Loudest resonance", frequency_text(top.frequency), beside, said, "ranking")
+    return SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "ranking")
 
 
 def quantity_text(words: Labels, name: str, loudness: Loudness, ranking: Ranking) -> str:
     """Amplitude of a resonance in one of the three quantities, with its place and where it is largest."""
     count = sum(other.loudness[name].place is not None for other in ranking.resonances)
-    place = "no peak of its own" if loudness.place is None else f"place {loudness.place} of {count}"
+    place = "no peak" if loudness.place is None else f"rank {loudness.place}/{count}"
     if name == "error":
-        return f"the overall transmission error swings by ±{figure_text(1e6 * loudness.amplitude)} µm ({place})"
+        return f"overall TE ±{figure_text(1e6 * loudness.amplitude)} µm ({place})"
     at = words.of(loudness.at)
     if name == "force":
-        return f"the largest bearing force by ±{figure_text(1e-3 * loudness.amplitude)} kN, {at} ({place})"
-    return (
-        f"the {ranking.accelerates} accelerate at bearings by ±{figure_text(loudness.amplitude)} m/s², {at} ({place})"
-    )
+        return f"bearing force ±{figure_text(1e-3 * loudness.amplitude)} kN ({place}), {at}"
+    return f"acceleration ±{figure_text(loudness.amplitude)} m/s² ({place})"
 
 
 def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonance) -> SummaryCard | None:
@@ -221,41 +236,39 @@ def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonan
     if found is None or found[1].level < top.loudness + LOUDER:
         return None
     line, at = found
-    said = (
-        f"Excited by {words.line_sentence(line)}. The overall transmission error swings by {amplitude_text(at.level)} "
-        f"({figure_text(at.level)} dB) at constant speed. The run-up is too fast to tell it from what is near: the "
-        f"loudest there is {frequency_text(top.finding.resonance.frequency)} with {amplitude_text(top.peak.level)}."
+    said = _short(
+        f"Order {words.line(line)}.",
+        f"Overall TE {amplitude_text(at.level)} ({figure_text(at.level)} dB), constant speed.",
+        f"Not resolved in the run-up; highest there: {frequency_text(top.finding.resonance.frequency)}, "
+        f"{amplitude_text(top.peak.level)}.",
     )
     beside = f"at {speed_text(at.speed)}, {Variant.of(group.main).label}"
-    return SummaryCard("Loudest resonance", frequency_text(at.frequency), beside, said, "steady")
+    return SummaryCard("Highest resonance", frequency_text(at.frequency), beside, said, "steady")
 
 
 def _how(group: RunGroup, resonance: RankedResonance) -> str:
     """Tell what a level was read from, unless it is a run-up alone."""
     if group.responses:
-        return " at constant speed"
+        return ", constant speed"
     if resonance.constant is None:
         return ""
-    return f" at constant speed, {amplitude_text(resonance.peak.level)} in the run-up"
+    return f", {amplitude_text(resonance.peak.level)} in the run-up"
 
 
-def _speed_relative_to_rated(context: Context, group: RunGroup) -> str:
+def _speed_relative_to_rated(context: Context, group: RunGroup) -> tuple[str, ...]:
+    """Compare the speed of the highest resonance with the rated speed, in sentences."""
     rated = context.gearbox.case.operation.rated_speed_rpm
     if rated is None or group.loudest is None:
-        return ""
+        return ()
     times = abs(group.loudest.speed) / RPM / rated
+    compared = f"Speed: {figure_text(times, 2)} × rated."
     if times <= AROUND_RATED:
-        return f" That is {figure_text(times, 2)} times the rated speed."
+        return (compared,)
     near = next((own for own in group.ranked[group.main] if own.steady and _is_near_rated(own, rated)), None)
-    said = "nothing stands out"
+    said = "none"
     if near is not None:
-        frequency = frequency_text(near.frequency)
-        level = amplitude_text(near.loudness)
-        said = f"the loudest is {frequency} at {speed_text(near.speed)} with {level}"
-    return (
-        f" That is {figure_text(times, 2)} times the rated speed; up to {100.0 * (AROUND_RATED - 1.0):.0f} % over "
-        f"rated {said}."
-    )
+        said = f"{frequency_text(near.frequency)}, {amplitude_text(near.loudness)}"
+    return compared, f"Up to {AROUND_RATED:g} × rated: {said}."
 
 
 def _is_near_rated(resonance: RankedResonance, rated: float) -> bool:
@@ -274,22 +287,23 @@ def _compliance(group: RunGroup) -> SummaryCard | None:
     change = top.peak.level - stiff.peak.level
     fresh = sum(own.steady and REFERENCE_VARIANT in own.lacking for own in group.ranked[group.main])
     gone = sum(own.steady and group.main in own.lacking for own in reference)
-    counted = "" if group.responses else " Counted are those that windows of five lengths show."
-    said = (
-        f"On ideal joints the loudest is {frequency_text(stiff.finding.resonance.frequency)} at "
-        f"{speed_text(stiff.peak.speed)} with {amplitude_text(stiff.peak.level)}. "
-        f"{Variant.of(group.main).label.capitalize()} {_resonances(fresh)} that the rigid model lacks, "
-        f"and {gone} of its own disappear.{counted}"
+    counted = "" if group.responses else " (found with all window lengths)"
+    elastic = Variant.of(group.main).is_elastic
+    said = _short(
+        f"Torsional model: highest resonance {frequency_text(stiff.finding.resonance.frequency)} at "
+        f"{speed_text(stiff.peak.speed)}, {amplitude_text(stiff.peak.level)}.",
+        f"{'Flexible bodies add' if elastic else 'Bearing stiffness adds'} {_resonances(fresh)} and "
+        f"{'remove' if elastic else 'removes'} {gone}{counted}.",
     )
     sign = "−" if change < 0.0 else "+"
-    kind = "What elastic bodies do" if Variant.of(group.main).is_elastic else "What the bearings do"
-    return SummaryCard(kind, f"{sign}{figure_text(abs(change), 2)} dB", "at the loudest peak", said, "ranking")
+    kind = "Effect of flexible bodies" if elastic else "Effect of bearing stiffness"
+    return SummaryCard(kind, f"{sign}{figure_text(abs(change), 2)} dB", "at the highest peak", said, "ranking")
 
 
 def _resonances(count: int) -> str:
     if count == 1:
-        return f"{count} resonance appears"
-    return f"{count} resonances appear"
+        return f"{count} resonance"
+    return f"{count} resonances"
 
 
 def _lever(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]) -> SummaryCard | None:
@@ -303,13 +317,13 @@ def _lever(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]
     heaviest = next((lever for lever in levers if lever.kind == "inertia"), None)
     if stiffest is None:
         return None
-    said = f"It holds {100.0 * stiffest.share:.0f} % of the strain energy of the loudest mode."
-    if heaviest is not None:
-        said += f" 10 % more inertia of {heaviest.what}: {shift_text(heaviest)}."
-    said += _quieter(words, group, modes, top.finding.mode, variations)
-    return SummaryCard(
-        "What moves it", shift_text(stiffest), f"for 10 % more stiffness of {stiffest.what}", said, "change"
+    lighter = "" if heaviest is None else f"Inertia of {heaviest.what} +10 %: {shift_text(heaviest)}."
+    said = _short(
+        f"Strain energy {100.0 * stiffest.share:.0f} %.",
+        *_quieter(words, group, modes, top.finding.mode, variations),
+        lighter,
     )
+    return SummaryCard("Sensitivity", shift_text(stiffest), f"for +10 % stiffness of {stiffest.what}", said, "change")
 
 
 def shift_text(lever: Sensitivity) -> str:
@@ -326,30 +340,28 @@ def shift_text(lever: Sensitivity) -> str:
 
 def _quieter(
     words: Labels, group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence[ModelVariations]
-) -> str:
+) -> tuple[str, ...]:
     own = next((one.variations for one in variations if one.choice == group.choice(group.main)), ())
     if not own:
-        return ""
+        return ()
     frequency = float(modes["frequency"][mode])
     changes = [best_change(variation, frequency) for variation in own]
     # More damping always helps; whether anything else does is the question.
     others = [change for change in changes if not change.label.startswith(DAMPING)]
-    said = f" {best_words(words, max(others, key=lambda change: change.gain))}" if others else ""
+    best = (best_words(words, max(others, key=lambda change: change.gain)),) if others else ()
     damping = [change for change in changes if change.label.startswith(DAMPING) and change.gain > 0.0]
-    return said + "".join(
-        f" With {words.change(change.label, change.value, change.default)}: −{figure_text(change.gain, 2)} dB."
-        for change in damping
-    )
+    changed = ((words.change(change.label, change.value, change.default), change.gain) for change in damping)
+    return best + tuple(f"{text[:1].upper()}{text[1:]}: −{figure_text(gain, 2)} dB." for text, gain in changed)
 
 
 def best_words(words: Labels, best: BestChange) -> str:
     """Say whether the best change of a parameter is worth it."""
     change = words.change(best.label, best.value, best.default)
     if best.gain < NO_GAIN:
-        return "Makes no difference to what lies within an octave of it."
+        return "No effect on the response within one octave."
     if best.gain < GAIN:
         return (
-            f"Nothing that was varied makes what lies within an octave of it {GAIN:g} dB quieter: where the mode "
-            f"fades, another takes over. The most, {figure_text(best.gain, 2)} dB, comes by {change}."
+            f"No single change lowers the response within one octave by {GAIN:g} dB; best: {change}, −"
+            f"{figure_text(best.gain, 2)} dB."
         )
-    return f"What lies within an octave of it becomes {figure_text(best.gain, 2)} dB quieter by {change}."
+    return f"Best change: {change}, −{figure_text(best.gain, 2)} dB within one octave."

@@ -146,7 +146,10 @@ class RunGroup:
     def title(self) -> str:
         """What its runs have in common, in words."""
         factors = sorted({f"{float(run.attributes['housing_factor']):g}" for run in self.runs.values()})
-        return f"{self.source}, law {self.mesh_model}, inertias {self.inertias}, housing factor {', '.join(factors)}"
+        return (
+            f"{self.source}, mesh model {self.mesh_model}, inertia set {self.inertias}, housing stiffness factor "
+            f"{', '.join(factors)}"
+        )
 
 
 def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
@@ -189,10 +192,10 @@ def _group_runs(
 def _group_responses(
     context: Context, key: tuple[str, str, str], responses: Mapping[str, xr.Dataset], results: StoredResults
 ) -> RunGroup:
-    context.tell(f"lines at constant speed, {', '.join(key)}")
+    context.tell(f"orders at constant speed, {', '.join(key)}")
     own = {str(variant): responses[variant] for variant in OFFERED if variant in responses}
     runs = {variant: _spectra_of_response(context, data, results) for variant, data in own.items()}
-    return _group(f"constant speed, level {key[0]}", key, runs, (), {}, own, list(own.values())[-1])
+    return _group(f"constant speed, method {key[0]}", key, runs, (), {}, own, list(own.values())[-1])
 
 
 def _group(

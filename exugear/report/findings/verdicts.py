@@ -58,7 +58,7 @@ class CheckResult:
     @property
     def line(self) -> str:
         """As a line of text."""
-        return f"{'Passed' if self.passed else 'Mind'}: {self.words}"
+        return f"{'Passed' if self.passed else 'Warning'}: {self.words}"
 
 
 @dataclass(frozen=True)
@@ -89,18 +89,24 @@ def verdicts_of(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
     verdicts = [*own, *_check_resonances(group)]
     verdicts.append(
         CheckResult(
-            False, f"damping is assumed (meshes {1e6 * case.damping.mesh_time_s:g} µs): levels are only as good"
+            False,
+            (
+                f"mesh damping is assumed (stiffness-proportional, {1e6 * case.damping.mesh_time_s:g} µs). Resonance "
+                "amplitudes depend on it directly"
+            ),
         )
     )
     sets = context.gearbox.inertia_sets
     if len(sets) > 1:
-        verdicts.append(CheckResult(False, f"inertias are one of {len(sets)} sets ({', '.join(sets)}): see the others"))
+        verdicts.append(
+            CheckResult(False, (f"one of {len(sets)} inertia sets ({', '.join(sets)}) is used; compare the others"))
+        )
     rated = case.operation.rated_speed_rpm
     fastest = float(run.spectra.speed.max()) / RPM
     if rated is None:
-        verdicts.append(CheckResult(False, "the case names no rated speed ([operation] rated_speed_rpm)"))
+        verdicts.append(CheckResult(False, "no rated speed; set rated_speed_rpm in [operation]"))
     elif fastest > BEYOND_RATED * rated:
-        verdicts.append(CheckResult(False, f"speeds go to {figure_text(fastest / rated, 2)} times the rated one"))
+        verdicts.append(CheckResult(False, f"speeds up to {figure_text(fastest / rated, 2)} times the rated speed"))
     return tuple(sorted(verdicts, key=lambda own: not own.passed))
 
 
@@ -109,24 +115,28 @@ def _check_run(run: VariantRun, figures: RunFigures) -> list[CheckResult]:
     verdicts = (
         []
         if math.isnan(residual)
-        else [CheckResult(residual < ENERGY, f"the balance of energy closes within {100.0 * residual:.1g} %")]
+        else [CheckResult(residual < ENERGY, f"energy balance closed to {100.0 * residual:.1g} %")]
     )
     doubtful = verdict_of(run.attributes)
     if doubtful:
-        verdicts.append(CheckResult(False, f"the run is not to be trusted: {doubtful}"))
+        verdicts.append(CheckResult(False, f"the run is invalid: {doubtful}"))
     for doubt in ("table_doubt", "band_doubt", "bearing_doubt"):
         if run.attributes.get(doubt):
             verdicts.append(CheckResult(False, str(run.attributes[doubt])))
     if pulling > 0.0:
-        verdicts.append(CheckResult(False, f"teeth had to pull for {figure_text(pulling)} s: they would have parted"))
+        verdicts.append(CheckResult(False, f"tensile mesh force for {figure_text(pulling)} s (contact loss neglected)"))
     if apart > 0.0:
-        verdicts.append(CheckResult(True, f"teeth were apart for {figure_text(apart)} s, and the law knows it"))
+        verdicts.append(CheckResult(True, f"contact loss for {figure_text(apart)} s (included in the mesh model)"))
     if not pulling and not apart:
-        verdicts.append(CheckResult(True, f"no tooth had to pull, {Variant.of(run.variant).label}"))
+        verdicts.append(CheckResult(True, f"no tensile mesh force, {Variant.of(run.variant).label}"))
     if outside > 0.0:
-        verdicts.append(CheckResult(False, f"a mesh was outside its table for {figure_text(outside)} s"))
+        verdicts.append(
+            CheckResult(
+                False, (f"a mesh was outside the range of its table for {figure_text(outside)} s (extrapolated)")
+            )
+        )
     if not int(run.attributes["complete"]):
-        verdicts.append(CheckResult(False, f"the run was stopped at {figure_text(figures.end)} s"))
+        verdicts.append(CheckResult(False, f"the run was aborted at {figure_text(figures.end)} s"))
     return verdicts
 
 
@@ -134,33 +144,34 @@ def _check_response(response: xr.Dataset) -> list[CheckResult]:
     error = float(np.nanmax(response["energy_error"]))
     growth = float(response.attrs["growth_rate"])
     verdicts = [
-        CheckResult(error < STEADY_ENERGY, f"what damping takes is what the meshes give within {100.0 * error:.1g} %"),
+        CheckResult(
+            error < STEADY_ENERGY,
+            (f"energy balance closed to {100.0 * error:.1g} % (power supplied by the meshes = power dissipated)"),
+        ),
         CheckResult(
             growth <= 0.0, f"disturbances {'decay' if growth <= 0.0 else 'grow: the steady state does not last'}"
         ),
     ]
     unsolved = json.loads(response.attrs["not_converged"])
     if unsolved:
-        verdicts.append(
-            CheckResult(False, f"no steady state was found at {len(unsolved)} speeds, which are left blank")
-        )
+        verdicts.append(CheckResult(False, f"no steady state found at {len(unsolved)} speeds (blank in the diagrams)"))
     remarks = [str(words) for words in response["remark"].to_numpy() if str(words)]
     if remarks:
-        verdicts.append(CheckResult(False, f"speeds with remarks: {len(remarks)}, the first: {remarks[0]}"))
+        verdicts.append(CheckResult(False, f"{len(remarks)} speeds with warnings, first: {remarks[0]}"))
     for pull in () if LAWS[str(response.attrs["mesh_model"])].loses_contact else pulls(response):
         where = f"{pull.count} of {response.sizes['point']} speeds, longest at {abs(pull.speed) / RPM:.4g} rpm"
-        said = f"teeth of {pull.mesh} would have to pull at {where}: they would part, and levels there are not real"
+        said = f"tensile mesh force in {pull.mesh} at {where}: contact loss is neglected, amplitudes there are invalid"
         verdicts.append(CheckResult(False, said))
     for swing in bearing_swings(response):
         said = (
-            f"vibration takes up to {100.0 * swing.share:.0f} % of the static load of the bearing {swing.bearing} (at "
-            f"{abs(swing.speed) / RPM:.4g} rpm): linear bearings make levels there too high"
+            f"dynamic load of bearing {swing.bearing} up to {100.0 * swing.share:.0f} % of its static load ("
+            f"{abs(swing.speed) / RPM:.4g} rpm). Outside the linear range; amplitudes there are overestimated"
         )
         verdicts.append(CheckResult(False, said))
     apart = float(np.nanmax(response["contact_loss_fraction"], initial=0.0))
     if apart > 0.0:
         verdicts.append(
-            CheckResult(True, f"teeth are apart for up to {100.0 * apart:.2g} % of the time, and the law knows")
+            CheckResult(True, f"contact loss for up to {100.0 * apart:.2g} % of the time (included in the mesh model)")
         )
     return verdicts
 
@@ -174,12 +185,17 @@ def _check_resonances(group: RunGroup) -> list[CheckResult]:
     verdicts: list[CheckResult] = []
     if not group.responses:
         verdicts.append(
-            CheckResult(steady == count, f"{steady} of the {count} loudest stay with windows of other lengths")
+            CheckResult(
+                steady == count, (f"{steady} of the {count} highest resonances are found with all window lengths")
+            )
         )
     if group.runs[group.main].modes is None and not group.responses:
-        return [*verdicts, CheckResult(False, "no modes were computed (exugear modes): nothing tells what moves")]
+        return [*verdicts, CheckResult(False, "no modes computed; run `exugear modes` for mode shapes")]
     matched = sum(bool(own.finding.mode_name) for own in loudest)
-    return [*verdicts, CheckResult(matched >= MATCHED * count, f"{matched} of the {count} loudest match an eigenmode")]
+    return [
+        *verdicts,
+        CheckResult(matched >= MATCHED * count, (f"{matched} of the {count} highest resonances match an eigenmode")),
+    ]
 
 
 # How modes move with what was assumed, over whole ranges, and whether anything grows quieter by it

@@ -15,7 +15,7 @@ from exugear.results.spectra.waterfall import OrderLine
 
 MOTIONS = {
     "spin": ("rotates", "rotate"),
-    "radial": ("moves sideways", "move sideways"),
+    "radial": ("moves radially", "move radially"),
     "axial": ("moves axially", "move axially"),
     "tilt": ("tilts", "tilt"),
     "bending": ("bends", "bend"),
@@ -62,8 +62,8 @@ class Labels:
         Examples
         --------
         >>> words = Labels(Gearbox.from_toml("cases/grc750/gearbox.toml"))
-        >>> words.told("2 x high_speed"), words.told("lss axial 94 %; strained: lss_bc 99 %")
-        ('2 × high-speed', 'low-speed shaft axial 94 %; strained: low-speed bearing B/C 99 %')
+        >>> words.told("2 x high_speed"), words.told("lss axial 94 %; strain energy: lss_bc 99 %")
+        ('2 × high-speed', 'low-speed shaft axial 94 %; strain energy: low-speed bearing B/C 99 %')
         """
         named = _NAME.sub(lambda found: self.of(found[0]) if self.family(found[0]) in self._named else found[0], text)
         return named.replace(" x ", " × ")

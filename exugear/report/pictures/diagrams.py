@@ -125,7 +125,7 @@ def plot_waterfalls(
         If there is no run, or the runs differ in unit or reference and so cannot share a scale.
     """
     if not runs:
-        raise ValueError("plot_waterfalls: no run given")
+        raise ValueError("plot_waterfalls: no run specified")
     if len({(run.unit, run.reference) for run in runs.values()}) > 1:
         raise ValueError("plot_waterfalls: the runs differ in unit or reference; they share no scale")
     reference = next(iter(runs.values())).reference_text  # one for all

@@ -360,7 +360,7 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
         The assembly has no elastic bodies, or the mode does not move them.
     """
     if not assembly.elastic_bodies:
-        raise ValueError(f"variant {assembly.variant} has no elastic bodies to draw; use the variant flexible")
+        raise ValueError(f"variant {assembly.variant} has no flexible bodies to draw; use the variant flexible")
     deformed = []
     fixed = {body.name: body.axis for body in assembly.bodies if body.fixed}
     for name, coordinates in assembly.elastic_slices.items():
@@ -371,7 +371,7 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
         deformed.append((surface, surface.displacement @ motion, surface.energy_density(motion)))
     largest = max(float(np.linalg.norm(moved, axis=1).max()) for _, moved, _ in deformed)
     if not largest > 0.0:
-        raise ValueError("the mode does not move the elastic bodies")
+        raise ValueError("the mode does not deform the flexible bodies")
     factor = amplitude * max(float(np.ptp(surface.points[:, 2])) for surface, _, _ in deformed) / largest
     brightest = _density_below(
         np.concatenate([density for _, _, density in deformed]),
@@ -508,7 +508,7 @@ def _add(plotter: pyvista.Plotter, scene: ElasticScene) -> tuple[list[pyvista.Po
 
 
 def _figure(image: Pixels, pixel: float, title: str) -> Figure:
-    label = f"Strain energy density / that of {BRIGHTEST:g} % of the surface"
+    label = f"Strain energy density / {BRIGHTEST:g} % quantile of the surface"
     return mode_figure(image, pixel, fill(title, LINE), label)
 
 

@@ -31,21 +31,21 @@ from fe_ste.tools.files import write_file
 
 # Frame of the stage of a page, where a mode moves, with its controls
 
-HINT = "Drag turns, right drag or two fingers move, wheel or pinch zooms; arrow keys turn."
+HINT = "Drag: rotate. Right drag or two fingers: pan. Wheel or pinch: zoom. Arrow keys: rotate."
 
 
 def stage_figure() -> str:
     """Make the frame; the scripts ``stage`` and ``mode_view`` fill it."""
     element = html.element
-    canvas = element("canvas", "", id="view-3d", tabindex=0, role="img", aria_label="Mode in motion")
-    still = element("img", id="still", alt="Mode at its largest deflection")
+    canvas = element("canvas", "", id="view-3d", tabindex=0, role="img", aria_label="Mode shape, animated")
+    still = element("img", id="still", alt="Mode shape at maximum deflection")
     missing = element("p", "This browser has no WebGL 2: the mode cannot be drawn.", id="no-gl", hidden=True)
     stage = element("div", canvas + still + missing, class_="stage")
     slider = element("input", type="range", id="amplitude", min=0, max=3, step=0.05, value=1)
     amplitude = element("label", f"Amplitude {slider}")
     play = element("button", "Pause", type="button", id="play", aria_pressed="true")
     by_body = element("label", element("input", type="checkbox", id="by-body") + " body colours")
-    ends = element("span", "rests <i></i> moves most", class_="ends")
+    ends = element("span", "0 <i></i> max. displacement", class_="ends")
     controls = element("div", play + amplitude + by_body + ends, class_="controls")
     chips = element("div", "", class_="chips", id="bodies", role="group", aria_label="Bodies shown")
     title = element("strong", "Mode", id="mode-title")
@@ -342,11 +342,11 @@ def _body(heading: str, titles: Sequence[tuple[float, str]]) -> str:
         {
             "No.": Cell(str(number + 1), number),
             "Frequency / Hz": Cell(f"{frequency:.1f}", frequency, f"mode:{MODEL}:{number}"),
-            "What moves": words,
+            "Mode shape": words,
         }
         for number, (frequency, words) in enumerate(titles)
     ]
-    table = html.table(rows, ("What moves",), caption="Modes", name="modes", sortable=True)
+    table = html.table(rows, ("Mode shape",), caption="Modes", name="modes", sortable=True)
     theme = html.element("button", "◐", type="button", id="theme", aria_label="Dark or light colours")
     tools = html.element("div", theme, class_="page-tools scripts-only")
     brand = html.element("div", html.element("h1", html.text(heading)), class_="brand")

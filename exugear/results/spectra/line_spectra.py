@@ -44,7 +44,7 @@ class LineSpectra(Waterfall):
     @property
     def description(self) -> str:
         """Source and reference in words, for captions."""
-        return f"Lines at constant speeds, 0 dB = {self.reference_text}"
+        return f"Orders at constant speeds, 0 dB = {self.reference_text}"
 
 
 def line_spectra(

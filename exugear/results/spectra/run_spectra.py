@@ -172,7 +172,7 @@ def run_signals(path: str | Path) -> RunSignals:
     data, attributes = read_arrays(Path(path), _NAMES)
     time, speed, overall = (data[name] for name in _NAMES)
     if time.size < 2:
-        raise ValueError(f"{path}: holds {time.size} samples, too few for a spectrum; run for longer")
+        raise ValueError(f"{path}: contains {time.size} samples, too few for a spectrum; run a longer duration")
     span = float(np.ptp(time))
     return RunSignals(Path(path), attributes, (time.size - 1) / span, span, speed, overall)
 
@@ -249,7 +249,7 @@ class VariantRun(ReprMixin):
     def conditions(self) -> str:
         """Load case, law and inertia set in words."""
         load_case, law, inertias = (self.attributes[key] for key in ("load_case", "mesh_model", "inertias"))
-        return f"load case {load_case}, law {law}, inertias {inertias}"
+        return f"load case {load_case}, mesh model {law}, inertia set {inertias}"
 
     def findings(self, picks: Sequence[Pick] | None = None) -> tuple[Finding, ...]:
         """Resonances, by frequency, of all peaks or of some of them, each with its mode."""

@@ -154,7 +154,7 @@ def sweep_matched_window(sweep_rate: float) -> float:
     68
     """
     if not abs(sweep_rate) > 0.0:
-        raise ValueError("sweep rate = 0: a steady tone has no best window, choose its length")
+        raise ValueError("sweep rate = 0: set the window length")
     return 1.0 / math.sqrt(abs(sweep_rate))
 
 
@@ -291,7 +291,7 @@ def waterfall(
     if signal.shape != shaft.shape or signal.ndim != 1:
         raise ValueError(f"values {signal.shape} and speed {shaft.shape} must be two rows of equal length")
     if length < 8 or signal.size < length:
-        raise ValueError(f"window_length = {window_length} s is {length} samples: it needs 8 to {signal.size}")
+        raise ValueError(f"window_length = {window_length} s is {length} samples; 8 to {signal.size} are required")
     if not 0.0 <= overlap < 1.0:
         raise ValueError(f"overlap = {overlap} must lie in [0, 1)")
     frames = overlapping_frames(signal, length, overlap)

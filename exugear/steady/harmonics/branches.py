@@ -122,7 +122,9 @@ def trace(
         if found is None:
             length *= 0.5
             if length < 1e-3 * step:
-                raise HarmonicBalanceError(f"branch: no solution near {parameters[-1]:.6g}; it may end or bend sharply")
+                raise HarmonicBalanceError(
+                    f"continuation: no solution near {parameters[-1]:.6g}; the branch may end or turn sharply"
+                )
             continue
         y, p, corrections = found
         size = np.hypot(_size(y - lines[-1]) / scales.lines, (p - parameters[-1]) / scales.parameter)
@@ -152,7 +154,7 @@ def _solution_at(residual: Residual, solve: Solve, lines: Complexes, parameter: 
         if _size(missing) <= SOLVED * scales.lines:
             return lines
         lines = lines + solve(change, -missing, STEP_TOLERANCE)
-    raise HarmonicBalanceError(f"branch: no solution at {parameter:.6g}, where it was to begin")
+    raise HarmonicBalanceError(f"continuation: no solution at the start {parameter:.6g}")
 
 
 def _corrected(

@@ -98,8 +98,8 @@ def solve_lines(
             basis = np.concatenate([basis, np.empty_like(basis)])
         basis[n + 1] = w / length
     raise HarmonicBalanceError(
-        f"harmonic balance: the residual stays at {abs(rest[most]) / max(size, 1e-300):.1e} of its start after "
-        f"{most} products"
+        f"harmonic balance: not converged, the residual remains at {abs(rest[most]) / max(size, 1e-300):.1e} of its "
+        f"initial value after {most} products"
     )
 
 

@@ -416,7 +416,7 @@ def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = Fals
             if (taken[(apart @ generator) % samples] == 1).all():
                 return TorusSampling(lines, generator, samples)
         samples = _smooth(int(samples * GROWTH) + 2)
-    raise LatticeError(f"no lattice was found for {len(whole)} lines")
+    raise LatticeError(f"no sampling lattice found for {len(whole)} spectral lines")
 
 
 def _smooth(least: int) -> int:

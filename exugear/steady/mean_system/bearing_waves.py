@@ -229,7 +229,7 @@ def bearing_waves(meshes: MeshWaves) -> BearingWaves | None:
             waves.append(BearingWave(family, tuple(numbers), law, 0, 1.0, None))
             continue
         if sorted(bodies) != sorted(planets.names):
-            raise SteadyError(f"bearings.{family}: non-linear on some of the planets only, which makes them unequal")
+            raise SteadyError(f"bearings.{family}: nonlinear on some of the planets only; all planets must be equal")
         ordered = tuple(numbers[bodies.index(name)] for name in planets.names)
         norms = (planets.shapes(0.0)[0] ** 2).sum(axis=0)
         for number in range(planets.waves if planets.carrier in carriers else len(WAVES)):

@@ -53,8 +53,8 @@ PLACES = 4
 A thousandth of a light resonance's amplitude hangs on it: 5e-6 of a frequency."""
 
 ELASTIC_RING = (
-    "the ring gear is elastic, and meshes travel around its seats: stiffness changes with the carrier's angle, "
-    "which the steady response cannot treat; make the ring's body rigid (flexibility = 'none')"
+    "the ring gear is flexible: stiffness varies with the carrier angle, which the steady-state response cannot "
+    "treat; set flexibility = 'none' for the ring's body"
 )
 LEAST_ENERGY = 1e-6
 """Share of the kinetic energy from which what a line does in the mean is looked at."""
@@ -279,7 +279,7 @@ def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
     if any(_has_sectors(assembly.gearbox, mesh) for mesh in assembly.gearbox.meshes if mesh.gear in elastic):
         return ELASTIC_RING
     turning = {name for body in assembly.bodies if body.carrier is not None for name in (body.name, body.carrier)}
-    return ", ".join(f"bodies.{name}: elastic and turning with planets" for name in elastic if name in turning)
+    return ", ".join(f"bodies.{name}: flexible and rotating with planets" for name in elastic if name in turning)
 
 
 def _has_sectors(gearbox: Gearbox, mesh: Mesh) -> bool:
@@ -294,22 +294,22 @@ def _check(assembly: Assembly) -> None:
     gearbox = assembly.gearbox
     if gearbox.train.degrees_of_freedom != 1:
         raise SteadyError(
-            f"the gear train has {gearbox.train.degrees_of_freedom} degrees of freedom; the steady response over one "
-            "speed needs one: fix a body or couple two"
+            f"the gear train has {gearbox.train.degrees_of_freedom} degrees of freedom; the steady-state response "
+            "requires one: fix a body or couple two"
         )
     if not gearbox.meshes:
-        raise SteadyError("the train has no meshes, and so nothing that excites it; run a load case in time instead")
+        raise SteadyError("the gear train has no meshes and no excitation; use `exugear run` instead")
     if assembly.travelling.first.size:
         raise SteadyError(ELASTIC_RING)
     if gearbox.deviations:
         raise SteadyError(
-            "deviations: errors of pitch and run-out return with the wheels' turns, which the steady response does not "
-            "take as causes; leave them out, or run the load case in time"
+            "deviations: pitch deviations and run-out excite at shaft orders, which the steady-state response does "
+            "not include; remove them, or use `exugear run`"
         )
     if gearbox.pin_offsets:
         raise SteadyError(
-            "pins: planets with position errors share the load unequally and their matrices turn with the carrier, "
-            "which the steady response cannot treat; leave the errors out, or run the load case in time"
+            "pins: position errors cause unequal planet loads that rotate with the carrier, which the steady-state "
+            "response cannot treat; remove them, or use `exugear run`"
         )
     _check_rows(assembly)
 
@@ -322,13 +322,13 @@ def _check_rows(assembly: Assembly) -> None:
         support = assembly.supports[n]
         if rolling.cage_ratio[n]:
             raise SteadyError(
-                f"bearings.{support.family}.cage = 'turning': elements that pass are a cause of their own beside the "
-                "meshes, which the steady response cannot treat; take cage = 'averaged', or run the load case in time"
+                f"bearings.{support.family}.cage = 'turning': ball-pass excitation, which the steady-state response "
+                "cannot treat; set cage = 'averaged', or use `exugear run`"
             )
         if not load_stands_still(support, bodies):
             raise SteadyError(
-                f"bearings.{support.family}.model = 'iso16281': its elements turn with {support.on} against the load, "
-                "which the steady response cannot treat; take model = 'linear', or run the load case in time"
+                f"bearings.{support.family}.model = 'iso16281': its elements rotate with {support.on} relative to the "
+                "load, which the steady-state response cannot treat; set model = 'linear', or use `exugear run`"
             )
 
 
@@ -438,7 +438,7 @@ def _static(
         u = u + step[:n]
         torque = torque + largest * float(step[n])
     if not best < BALANCED:
-        raise BalanceError(f"static state at {speed:.4g} rad/s: the residual stays at {best:.1e} of the load")
+        raise BalanceError(f"static state at {speed:.4g} rad/s: the residual remains at {best:.1e} of the load")
     return u, torque
 
 
@@ -473,8 +473,8 @@ def _checked_change(here: Floats, there: Floats, most: float) -> float:
     change = float(np.abs((there - here) / np.outer(size, size)).max())
     if change > most:
         raise SteadyError(
-            f"the stiffness changes by {100.0 * change:.2g} % as the carrier turns (unequal planets, or a support "
-            "that turns with them), which the steady response cannot treat; run the load case in time instead"
+            f"the stiffness varies by {100.0 * change:.2g} % over a carrier revolution (unequal planets, or a support "
+            "that rotates with them), which the steady-state response cannot treat; use `exugear run` instead"
         )
     return change
 

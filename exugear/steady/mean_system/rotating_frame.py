@@ -103,8 +103,8 @@ def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
         elastic = [name for name in (carrier, *(p.name for p in planets)) if name in assembly.elastic_bodies]
         if elastic:
             raise SteadyError(
-                f"bodies.{elastic[0]}: elastic and turning with planets, its shape has no constant stiffness seen from "
-                f"the housing; the steady response wants it rigid (flexibility = 'none')"
+                f"bodies.{elastic[0]}: flexible and rotating with planets, so its stiffness is not constant in the "
+                "fixed frame; set flexibility = 'none' for the steady-state response"
             )
         _check_spacing(family, planets)
         names = tuple(planet.name for planet in planets)
@@ -116,13 +116,13 @@ def planet_sets(assembly: Assembly) -> tuple[PlanetSet, ...]:
 def _check_spacing(family: str, planets: Sequence[Body]) -> None:
     if len(planets) < FEWEST:
         raise SteadyError(
-            f"bodies.{family}: {len(planets)} planets; the matrices of fewer than {FEWEST} equally spaced ones turn "
-            "with their carrier, which the steady response cannot treat; run the load case in time instead"
+            f"bodies.{family}: {len(planets)} planets; with fewer than {FEWEST} equally spaced planets the matrices "
+            "vary with the carrier angle, which the steady-state response cannot treat; use `exugear run` instead"
         )
     if not equally_spaced(planets):
         raise SteadyError(
-            f"bodies.{family}.planet_angles_deg: planets are not equally spaced, so that the matrices turn with their "
-            "carrier, which the steady response cannot treat; run the load case in time instead"
+            f"bodies.{family}.planet_angles_deg: with unequally spaced planets the matrices vary with the carrier "
+            "angle, which the steady-state response cannot treat; use `exugear run` instead"
         )
 
 

@@ -240,9 +240,9 @@ def _two_designs(section: CatalogueSection, taken: KnownRating) -> str:
         return ""
     name, rating = other
     return (
-        f"makers print two designs of {section.designation}: C_r = {1e-3 * taken.dynamic:g} kN "
-        f"({', '.join(taken.makers)}) is taken, the reinforced one, {name}, has {1e-3 * rating.dynamic:g} kN "
-        f"({', '.join(rating.makers)}); write that designation, or dynamic_rating_kN, if it is meant"
+        f"manufacturers list two designs of {section.designation}: C_r = {1e-3 * taken.dynamic:g} kN ("
+        f"{', '.join(taken.makers)}) is used; the reinforced design {name} has {1e-3 * rating.dynamic:g} kN ("
+        f"{', '.join(rating.makers)}); set that designation, or dynamic_rating_kN, to use it"
     )
 
 
@@ -313,25 +313,26 @@ def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -
     assert section is not None
     remarks = []
     if point.is_unloaded:
-        remarks.append("carries hardly anything: stiffness at a hundredth of its dynamic rating")
+        remarks.append("is almost unloaded: stiffness computed at 1 % of its dynamic rating")
     elif not is_preloaded(rows) and math.hypot(point.radial_load, float(point.load[2])) < minimum_load(
         ratings.dynamic, section.type
     ):
-        remarks.append("carries less than what rolling elements need to roll, by the usual rule: they may slide")
+        remarks.append("load below the usual minimum load: rolling elements may slide")
     if reaction is not None:
         found = math.hypot(reaction[0], reaction[1])
         if max(found, point.radial_load) > STATED_FACTOR * min(found, point.radial_load):
             remarks.append(
-                f"radial_load_kN = {1e-3 * point.radial_load:.4g} is stated, the static load gives {1e-3 * found:.4g}"
+                f"radial_load_kN = {1e-3 * point.radial_load:.4g} is specified; the static load results in "
+                f"{1e-3 * found:.4g}"
             )
     if holds_one_way(rows):
         sense = "+z" if rows[0].contact_angle > 0.0 else "-z"
-        remarks.append(f"holds its inner ring along the axis in one direction only, against a push towards {sense}")
+        remarks.append(f"locates its inner ring axially in one direction only, against a load towards {sense}")
     static = equivalent_static_load(rows, section.type, point.radial_load, abs(float(point.load[2])))
     if static > ratings.static:
         estimated = " estimated" if ratings.estimated else ""
         remarks.append(
-            f"equivalent static load {1e-3 * static:.4g} kN is beyond its{estimated} static rating "
+            f"equivalent static load {1e-3 * static:.4g} kN exceeds its{estimated} static rating "
             f"{1e-3 * ratings.static:.4g} kN"
         )
     return remarks

@@ -171,14 +171,14 @@ def law_in_words(bearing: Bearing, stands_still: bool = True) -> str:
     >>> from exugear.gearbox.gearbox import Gearbox
     >>> bearings = {bearing.family: bearing for bearing in Gearbox.from_toml("cases/grc750/gearbox.toml").bearings}
     >>> [law_in_words(bearings[name]) for name in ("plc_a", "pl_a")]
-    ['linear, at a stated load, through the origin', 'linear, at the static load']
+    ['linear, at a specified load, through the origin', 'linear, at the static load']
     """
     if bearing.catalogue is None:
-        return "linear, stiffness given"
+        return "linear, specified stiffness"
     if bearing.model == "iso16281":
-        return f"rows by ISO/TS 16281, cage {bearing.cage}"
+        return f"rolling elements to ISO/TS 16281, cage {bearing.cage}"
     if not is_catalogued(bearing):
-        return "linear, at a stated load, through the origin"
+        return "linear, at a specified load, through the origin"
     return f"linear, at the static load{'' if stands_still else ', across the axis through the origin'}"
 
 
@@ -213,9 +213,9 @@ def misplaced_factor(bearing: Bearing) -> str:
     rows = () if bearing.catalogue is None else catalogue_rows(bearing.catalogue)
     if bearing.model == "iso16281" and bearing.factor != 1.0 and any(row.radial_clearance > 0.0 for row in rows):
         return (
-            f'bearings.{bearing.family}: model = "iso16281" with clearance and the housing factor {bearing.factor:g}: '
-            "a clearance closes without load, so the factor does not apply; set housing_factor_applies = false, or "
-            "use the variant flexible with an elastic housing"
+            f'bearings.{bearing.family}: model = "iso16281" with clearance and the housing stiffness factor '
+            f"{bearing.factor:g}: the factor cannot be applied, since a clearance closes without load; set "
+            "housing_factor_applies = false, or use the variant flexible with a flexible housing"
         )
     return ""
 
@@ -464,31 +464,31 @@ def unsupported(gearbox: Gearbox, variant: str) -> str:
         held = {*gearbox.apart, *(joint.body for joint in gearbox.joints)}
         missing = [b.name for b in gearbox.bodies() if not (b.fixed or b.spin_only or b.name in held)]
         if missing:
-            return f"no joint holds {', '.join(missing)}; add one under [joints]"
+            return f"no joint supports {', '.join(missing)}; add one in [joints]"
         coupled = [bearing.name for bearing in gearbox.bearings if bearing.family in gearbox.case.couplings]
         if coupled:
             return (
-                f"couplings.{coupled[0]} holds a body that turns on one that stands, which this variant does not have; "
-                "take the variant bushing"
+                f"couplings.{coupled[0]} connects a rotating body to a fixed one, which this variant cannot model; "
+                "use the variant bushing"
             )
         sprung = list(gearbox.held_by_torsion)
         if sprung:
             return (
-                f"{', '.join(sprung)}: held against turning by the torsion of a bearing or mount, which this variant "
-                f"does not have; take the variant bushing, or let the body stand (bodies.{sprung[0]}.fixed = true)"
+                f"{', '.join(sprung)}: rotation constrained by the torsion of a bearing or mount, which this variant "
+                f"cannot model; use the variant bushing, or set bodies.{sprung[0]}.fixed = true"
             )
         return ""
     if gearbox.unknown_bearings:
         names = ", ".join(f"bearings.{name} ({text})" for name, text in gearbox.unknown_bearings.items())
-        return f"only the designation is known of {names}; give each a [.catalogue] or a [.stiffness] table"
+        return f"only the designation is known of {names}; add a [.catalogue] or a [.stiffness] table to each"
     if not gearbox.bearings:
         return "the gearbox file has no [bearings]"
     if chosen.is_elastic and not elastic:
-        return 'no body is elastic; give one a shape and flexibility = "elastic"'
+        return 'no flexible body is defined; add [bodies.NAME.shape] and set flexibility = "elastic"'
     mounted = {mount.body for mount in mounts_at_work(gearbox)}
     for body in gearbox.bodies():
         if chosen.is_elastic and body.fixed and body.name in elastic and body.name not in mounted:
-            return f"body {body.name} is elastic, but nothing holds it; add [mounts] on the ground"
+            return f"body {body.name} is flexible, but nothing supports it; add [mounts] on the ground"
     return ""
 
 

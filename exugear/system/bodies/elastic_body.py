@@ -191,8 +191,8 @@ class FloatingCoordinates:
         remainder = np.abs(orders - whole_orders).max()
         if remainder > ORDER_TOLERANCE:
             raise ReductionError(
-                f"body {body.name}: a turn leaves {remainder:.1e} of its modes over; it must be "
-                "a body of revolution, with a finer mesh"
+                f"body {body.name}: rotation changes its modes by {remainder:.1e}; it must be a body of revolution; "
+                "refine the mesh"
             )
         self.size, self.count = len(body.mode_coordinates), FRAME_COORDINATES + len(body.stiffness)
         seats = len(body.seats)
@@ -259,5 +259,5 @@ class FloatingCoordinates:
             if np.abs(change).max() < CORRECTION_TOLERANCE * max(1.0, abs(near)):
                 break
         else:
-            raise ReductionError(f"body {self.body.name}: its state is none of small tilts and deformations")
+            raise ReductionError(f"body {self.body.name}: tilts or deformations are not small")
         return q, np.asarray(np.linalg.lstsq(self.motion(q, rest, near).jacobian, velocities)[0], dtype=np.float64)

@@ -97,7 +97,7 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
     body = gearbox.body(name)
     shape = _shape_of(gearbox, body)
     if frame_of(gearbox, body) == "carrier":
-        raise gearbox.fault(f"bodies.{body.family}.shape: the body carries planets; give a .solid table instead")
+        raise gearbox.fault(f"bodies.{body.family}.shape: the body carries planets; use a [.solid] table instead")
     sections = tuple(map(_section_of, shape.sections))
     seats = tuple(narrowed(sections, seat) for seat in _seats(gearbox, body, shape))
     names = [seat.name for seat in seats]
@@ -111,7 +111,9 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
     shared = _shared(seats)
     blanks = {shared.get(seat, seat): blank_of(blank) for seat, blank in shape.blanks.items()}
     if len(blanks) < len(shape.blanks):
-        raise gearbox.fault(f"{key}.blanks: two of {', '.join(shape.blanks)} sit on one seat; give one blank for both")
+        raise gearbox.fault(
+            f"{key}.blanks: two of {', '.join(shape.blanks)} are at one seat; define one blank for both"
+        )
     return ShaftModel(
         name=name,
         sections=sections,
@@ -154,8 +156,8 @@ def narrowed_seats(gearbox: Gearbox, name: str) -> Iterator[str]:
         across = 500.0 * (seat.width - narrowed(sections, seat).width)
         if across > 0.0:
             yield (
-                f"bodies.{body.family}.shape: the seat of {seat.name} reaches {across:.3g} mm across a shoulder or the "
-                f"end of the shaft; it ends there, and as far from its middle on the other side"
+                f"bodies.{body.family}.shape: the seat of {seat.name} extends {across:.3g} mm beyond a shoulder or "
+                "the shaft end; it is shortened symmetrically to that point"
             )
 
 
@@ -163,7 +165,7 @@ def _shape_of(gearbox: Gearbox, body: Body) -> ShapeSection:
     """Section of a body's shape, which must be there."""
     shape = gearbox.case.bodies[body.family].shape
     if shape is None:
-        raise gearbox.fault(f"bodies.{body.family}: no shape; give a [bodies.{body.family}.shape] table")
+        raise gearbox.fault(f"bodies.{body.family}: no shape; add a [bodies.{body.family}.shape] table")
     return shape
 
 
@@ -215,7 +217,7 @@ def solid_of_shaft(model: ShaftModel, size: MeshSize = SOLID_SIZE) -> SolidModel
     for seat in model.seats:
         section = shaft.section_under(seat)
         if section.is_cone:
-            raise ShaftError(f"seat {seat.name}: it lies on a cone, and seats of a solid are cylinders")
+            raise ShaftError(f"seat {seat.name}: lies on a cone; seats of a solid must be cylindrical")
         hole = section.inner_diameter / 2.0 if seat.width == 0.0 else 0.0
         seats.append(SolidSeat(seat.name, (x, y, z + seat.z), section.outer_diameter / 2.0, seat.width, hole))
     return SolidModel(
@@ -260,12 +262,12 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
     key = f"bodies.{body.family}.solid"
     solid = section.solid
     if solid is None:
-        raise gearbox.fault(f"bodies.{body.family}: no solid; give a [{key}] table")
+        raise gearbox.fault(f"bodies.{body.family}: no solid; add a [{key}] table")
     frame = frame_of(gearbox, body)
     if section.flexibility in ("nonrotating", "ffrf") and frame != "nonrotating":
         raise gearbox.fault(
-            f"bodies.{body.family}.flexibility = {section.flexibility!r}: the body carries planets and is seen from "
-            "its own turning frame; use 'elastic'"
+            f"bodies.{body.family}.flexibility = {section.flexibility!r}: the body carries planets and is described "
+            "in its own rotating frame; set 'elastic'"
         )
     file = SolidFile(
         gearbox.file(f"{key}.file", solid.file, LARGEST_SOLID),
@@ -276,12 +278,12 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
     )
     if not file.is_geometry and not file.is_mesh:
         endings = ", ".join((*GEOMETRY, *MESHES))
-        raise gearbox.fault(f"{key}.file = {solid.file!r}: no format that is read; its name must end in {endings}")
+        raise gearbox.fault(f"{key}.file = {solid.file!r}: unknown format; its name must end in {endings}")
     if file.is_geometry and solid.element_size_mm is None:
-        raise gearbox.fault(f"{key}.element_size_mm: this key is missing; {solid.file} has to be meshed")
+        raise gearbox.fault(f"{key}.element_size_mm: this key is missing; it is required to mesh {solid.file}")
     band = solid.band_Hz or gearbox.case.elasticity.band_Hz
     if band >= gearbox.case.elasticity.limit_Hz:
-        raise gearbox.fault(f"{key}.band_Hz = {band:g}: it must be below elasticity.limit_Hz")
+        raise gearbox.fault(f"{key}.band_Hz = {band:g}: must be below elasticity.limit_Hz")
     seats, sectors, shared = _solid_seats(gearbox, body, solid)
     names = [seat.name for seat in seats]
     if solid.torque_seat is not None and solid.torque_seat not in names:
@@ -372,7 +374,7 @@ def _solid_seats(
         if other not in names:
             raise gearbox.fault(f"{key}.{name}.same_as = {other!r}: no such seat; seats are {', '.join(names)}")
     if not seats:
-        raise gearbox.fault(f"{key}: nothing sits on the body; give at least one seat")
+        raise gearbox.fault(f"{key}: the body has no seat; define at least one")
     return seats, sectors, shared_seats
 
 
@@ -392,8 +394,10 @@ def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, secti
     given = (("diameter_mm", diameter), ("width_mm", width), ("position_mm", position))
     missing = [word for word, value in given if value is None]
     if missing or diameter is None or width is None or position is None:
-        what = "a seat that no gear, bearing or mount of the body has the name of" if item is None else item.noun
-        raise gearbox.fault(f"{key}: {what} {name!r} needs its seat; give {' and '.join(missing)} in [{key}]")
+        what = "seat without gear, bearing or mount" if item is None else item.noun
+        raise gearbox.fault(
+            f"{key}: {what} {name!r} requires its position and size; set {' and '.join(missing)} in [{key}]"
+        )
     return SolidSeat(name, position, diameter / 2.0, width, 0.5 * MM * (section.inner_diameter_mm or 0.0))
 
 
@@ -523,9 +527,7 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
         return
     model = shaft_model(gearbox, name)
     if not model.seats:
-        raise gearbox.fault(
-            f"bodies.{family}.shape: nothing sits on the body; give it a gear, a bearing or torque_z_mm"
-        )
+        raise gearbox.fault(f"bodies.{family}.shape: the body has no seat; add a gear, a bearing or torque_z_mm")
     try:
         start = MM * _shape_of(gearbox, gearbox.body(name)).start_z_mm
         check_shaft(model.sections, model.seats, start=start)

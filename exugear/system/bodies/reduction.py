@@ -264,7 +264,7 @@ def reduce_component(
     """
     moved = seats @ rigid
     if np.linalg.matrix_rank(moved) < rigid.shape[1]:
-        raise ReductionError("the seats do not hold all rigid motions; give at least one more seat")
+        raise ReductionError("the seats do not constrain all rigid-body motions; define at least one more seat")
     constraint, relief = constraint_and_inertia_relief_modes(mass, stiffness, seats, rigid, backend)
     rows = scipy.sparse.csr_array(seats)
     loaded_mass = scipy.sparse.csr_array(mass + rows.T @ scipy.sparse.csr_array(blanks) @ rows)
@@ -385,7 +385,9 @@ def _lanczos_sweep(
         images.append(vector_image / length)
         vector = shifted.solve(images[-1])
         diagonal.append(float(images[-1] @ vector))
-    raise ReductionError(f"more vibrations below {band:g} Hz than {MOST_LANCZOS_STEPS} steps find; lower the band")
+    raise ReductionError(
+        f"more normal modes below {band:g} Hz than {MOST_LANCZOS_STEPS} steps find; set a lower band_Hz"
+    )
 
 
 def _converged(diagonal: list[float], beside: list[float], shift: float, band: float) -> tuple[Floats, Floats] | None:

@@ -44,16 +44,17 @@ class ShaftSection:
         if self.length <= 0.0 or self.outer_diameter <= 0.0 or not 0.0 <= self.inner_diameter < self.outer_diameter:
             raise ShaftError(
                 f"section of length {self.length:g} m and diameters {self.outer_diameter:g} over "
-                f"{self.inner_diameter:g} m: it needs a positive length and a wall"
+                f"{self.inner_diameter:g} m: a positive length and wall thickness are required"
             )
         if not 0.0 <= self.inner_end < self.outer_end:
             raise ShaftError(
-                f"section that ends with diameters {self.outer_end:g} over {self.inner_end:g} m: it needs a wall there"
+                f"section that ends with diameters {self.outer_end:g} over {self.inner_end:g} m: a positive wall "
+                "thickness is required there"
             )
         if (self.inner_diameter == 0.0) != (self.inner_end == 0.0):
             raise ShaftError(
-                f"section with a bore of {self.inner_diameter:g} m where it begins and {self.inner_end:g} m where it "
-                "ends: a cone's point cannot be meshed; give both ends a diameter, or cut the section there"
+                f"section with a bore of {self.inner_diameter:g} m at its start and {self.inner_end:g} m at its end: "
+                "a cone tip cannot be meshed; set a bore diameter at both ends, or split the section"
             )
 
     @property
@@ -124,8 +125,8 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand, start: float = 0.0)
     told = f"{1e3 * (start + low):.6g}", f"{1e3 * (start + high):.6g}"
     if low < -SAME or high > places[-1] + SAME:
         raise ShaftError(
-            f"seat {seat.name}: it reaches from z = {told[0]} to {told[1]} mm, the shaft from "
-            f"{1e3 * start:.6g} to {1e3 * (start + places[-1]):.6g} mm"
+            f"seat {seat.name}: extends from z = {told[0]} to {told[1]} mm, the shaft from {1e3 * start:.6g} to "
+            f"{1e3 * (start + places[-1]):.6g} mm"
         )
     under = [
         number
@@ -185,8 +186,8 @@ def check_shaft(
     elements = length / size.axial * radius / size.radial
     if elements > MOST_ELEMENTS:
         raise ShaftError(
-            f"a shaft of {length:g} m and {2.0 * radius:g} m diameter needs {elements:.0f} elements over its section; "
-            f"{MOST_ELEMENTS} are the most"
+            f"a shaft of {length:g} m length and {2.0 * radius:g} m diameter requires {elements:.0f} elements over "
+            f"its section; at most {MOST_ELEMENTS} are permitted"
         )
 
 
@@ -202,4 +203,6 @@ def check_sections(sections: tuple[ShaftSection, ...]) -> None:
         raise ShaftError("a shaft needs at least one section")
     for number, (left, right) in enumerate(itertools.pairwise(sections), start=1):
         if min(left.outer_end, right.outer_diameter) <= max(left.inner_end, right.inner_diameter):
-            raise ShaftError(f"sections {number} and {number + 1} do not touch: the bore of one clears the other")
+            raise ShaftError(
+                f"sections {number} and {number + 1} are not connected: one fits into the bore of the other"
+            )

@@ -203,7 +203,7 @@ def second_order(points: Floats, cells: Integers, kind: str) -> Any:
     determinant = bent.mapping().detDF(skfem.quadrature.get_quadrature(bent.elem(), 4)[0])
     turned = np.flatnonzero((determinant.min(axis=1) < 0.0) == (determinant.max(axis=1) > 0.0))
     if turned.size:
-        raise SolidError(f"element {turned[0]} of {len(cells)} is turned inside out; mesh finer where it is curved")
+        raise SolidError(f"element {turned[0]} of {len(cells)} is inverted; refine the mesh at curved faces")
     return bent
 
 
@@ -292,7 +292,7 @@ def seat_rows(solid: Solid, seats: Sequence[SolidSeat]) -> Floats:
         No seat, a seat without facets, or two seats that share some.
     """
     if not seats:
-        raise SolidError("a body needs at least one seat")
+        raise SolidError("a body requires at least one seat")
     facets = {seat.name: _facets(solid.mesh, seat) for seat in seats}
     taken: dict[int, str] = {}  # seat by facet
     for name, numbers in facets.items():

@@ -94,7 +94,7 @@ def mesh_geometry(path: Path, size: float, curvature: int = 12, unit: float = 1e
         raise SolidError(f"{path}: no such file")
     kind = path.suffix.lower()
     if kind not in GEOMETRY:
-        raise SolidError(f"{path}: no geometry; its name must end in {', '.join(GEOMETRY)}")
+        raise SolidError(f"{path}: unknown geometry format; its name must end in {', '.join(GEOMETRY)}")
     if kind == SCRIPT and not scripts:
         raise SolidError(f"{path.name}: {UNPERMITTED}")
 
@@ -171,12 +171,12 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
     """
     kind = MESHES.get(path.suffix.lower())
     if kind is None:
-        raise SolidError(f"{path}: no mesh that is read; its name must end in {', '.join(MESHES)}")
+        raise SolidError(f"{path}: unknown mesh format; its name must end in {', '.join(MESHES)}")
     meshio = _library("meshio")
     if not path.is_file():
         raise SolidError(f"{path}: no such file")
     if kind == "abaqus" and _includes(path):
-        raise SolidError(f"{path}: refers to another file by *INCLUDE; put all of the mesh into one file")
+        raise SolidError(f"{path}: refers to another file by *INCLUDE; write the whole mesh into one file")
     try:
         content = getattr(meshio, kind).read(str(path))
     except Exception as error:  # its readers let out whatever damaged content makes them stumble on
@@ -189,7 +189,9 @@ def read_solid(path: Path, unit: float = 1.0) -> Any:
             solid.setdefault(block.type, []).append(block.data)
     if len(solid) != 1:
         found = ", ".join(solid or sorted({block.type for block in content.cells})) or "nothing"
-        raise SolidError(f"{path}: found {found}; a solid needs elements of one kind among {', '.join(CORNERS)}")
+        raise SolidError(
+            f"{path}: contains {found}; a solid must have elements of one of the types {', '.join(CORNERS)}"
+        )
     kind, blocks = solid.popitem()
     return second_order(unit * np.asarray(content.points), np.concatenate(blocks).astype(np.int64), kind)
 

@@ -279,8 +279,8 @@ def _check_revolution(model: SolidModel, component: ReducedComponent) -> None:
         change = float((np.abs(turn @ at_seats @ turn.T - at_seats) / np.outer(diagonal, diagonal)).max())
         if change > ASYMMETRY_TOLERANCE or off_axis:
             raise ReductionError(
-                f"body {model.name}: a quarter turn changes its {name} by {change:.1e}, but the frame 'nonrotating' "
-                "is for bodies of revolution; take a finer mesh, or describe the shaft by a [.shape] table"
+                f"body {model.name}: a rotation by 90 degrees changes its {name} by {change:.1e}, but 'nonrotating' "
+                "requires a body of revolution; refine the mesh, or describe the shaft by a [.shape] table"
             )
 
 

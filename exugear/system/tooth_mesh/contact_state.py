@@ -185,8 +185,8 @@ class StaticContacts:
     def remarks(self) -> tuple[str, ...]:
         """Say of which meshes there is none, why, and what they do instead."""
         return tuple(
-            f"mesh {name}: no contact at its static misalignment ({why}); its teeth resist misalignment as if they "
-            "bore evenly along the face"
+            f"mesh {name}: no contact solution at its static misalignment ({why}); tilting stiffness of an even load "
+            "distribution along the face width is used"
             for name, why in self.unsolved.items()
         )
 
@@ -197,8 +197,8 @@ class StaticContacts:
         if self.contacts:
             words.append(f"finite elements at the static misalignment: {', '.join(self.contacts)}")
         if self.unsolved:
-            words.append(f"as if they bore evenly, contact not solved: {', '.join(self.unsolved)}")
-        return "; ".join(words) or "by the mesh law alone"
+            words.append(f"even load distribution, contact not converged: {', '.join(self.unsolved)}")
+        return "; ".join(words) or "from the mesh model alone"
 
 
 def static_contacts(places: Mapping[str, MeshPlace], positions: int = POSITIONS) -> StaticContacts:
@@ -222,7 +222,7 @@ def static_contacts(places: Mapping[str, MeshPlace], positions: int = POSITIONS)
         if force > 0.0:
             wanted[name] = contact_input(members[0].table, force, misalignment, distance, positions)
         else:
-            unsolved[name] = "presses no teeth together"
+            unsolved[name] = "no torque"
     solved = dict(zip(wanted, known_contacts(list(wanted.values())), strict=True))
     unsolved |= {name: str(found) for name, found in solved.items() if isinstance(found, ContactError)}
     contacts = {name: found for name, found in solved.items() if isinstance(found, MeanContact)}
@@ -288,7 +288,7 @@ class MeshLoadState(ReprMixin):
     """Why no contact was solved; empty where it was."""
 
     def _line(self) -> str:
-        return f" of {self.name!r}: open by {1e6 * self.opening:.3g} um, K_Hbeta {self.face_load_factor:.3g}"
+        return f" of {self.name!r}: gap {1e6 * self.opening:.3g} um, K_Hbeta {self.face_load_factor:.3g}"
 
 
 def with_contact(duty: MeshLoadState, place: MeshPlace | None, flank: int) -> MeshLoadState:

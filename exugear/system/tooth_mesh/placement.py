@@ -211,8 +211,8 @@ def _place_wheels(mesh: Mesh, flank: int, orientation: dict[tuple[str, str], flo
     misfit = math.remainder(placed[0] - placed[1], 1.0) if len(placed) == 2 else 0.0
     if abs(misfit) > PHASE_TOLERANCE:
         raise MeshError(
-            f"mesh {mesh.name}: the gears do not fit, loaded flanks miss each other by {misfit:.4f} of a "
-            "mesh cycle; check planet angles and tooth thicknesses"
+            f"mesh {mesh.name}: the gears do not assemble, loaded flanks are off by {misfit:.4f} of a mesh cycle; "
+            "check planet angles and tooth thicknesses"
         )
     phase = placed[0] % 1.0 if placed else 0.0
     for number, wheel in wheels:

@@ -83,8 +83,8 @@ def doubts_of_references(summaries: Iterable[dict[str, Any]]) -> list[str]:
         difference = summary["difference_of_means_percent"]
         if difference is not None and abs(difference) > 100.0 * LARGEST_DIFFERENCE:
             doubts.append(
-                f"{summary['pair']}: the mean is {difference:+.1f} % off that of the tables, on which dynamics rest; "
-                f"the meshes explain up to {100.0 * LARGEST_DIFFERENCE:g} %"
+                f"{summary['pair']}: the mean differs by {difference:+.1f} % from the table used for dynamics; up to "
+                f"{100.0 * LARGEST_DIFFERENCE:g} % is explained by the element meshes"
             )
     return doubts
 

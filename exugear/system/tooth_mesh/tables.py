@@ -213,17 +213,14 @@ def requested_tables(
 
 def without_table(gearbox: Gearbox, names: Iterable[str]) -> str:
     """Say why the first of these pairs without a table has none, and what would be right; empty if all have one."""
-    law = "take a mesh law that needs a stiffness alone (line_of_action, constant, tangential, iso6336)"
+    law = "use a mesh model that requires only a stiffness (line_of_action, constant, tangential, iso6336)"
     for name in names:
         if gearbox.case.pairs[name].stiffness is not None:
-            return (
-                f"pairs.{name}.stiffness: is stated, so the pair has no table; leave it out to have one computed, "
-                f"or {law}"
-            )
+            return f"pairs.{name}.stiffness: is specified, so the pair has no table; remove it to compute one, or {law}"
         if not gearbox.pairs[name].static_torque > 0.0:
             return (
-                f"pairs.{name}: carries no torque in [static_load]; a table needs one, for it belongs to one loaded "
-                f"flank; put a torque on what it drives, or {law}"
+                f"pairs.{name}: no torque in [static_load]; a table requires one, since it is for one loaded flank; "
+                f"set a torque on the driven body, or {law}"
             )
     return ""
 
@@ -304,9 +301,9 @@ def fitting_table(
     wanted = wanted_table(gearbox, name, table.dataset.sizes["pmc"], grid)
     fits = _with_named_axes(gearbox, table, wanted) if grid else _holds(table, wanted)
     if not (table.input_hash == wanted.hash or fits):
-        raise TableError(f"{path}: was computed from another input; compute it again")
+        raise TableError(f"{path}: was computed from another input; recompute it")
     if grid and axes is not None and not reaches(table, wanted_table(gearbox, name, wanted.positions, grid, axes)):
-        raise TableError(f"{path}: its axes end too near to the static state; compute it again")
+        raise TableError(f"{path}: its axes end too close to the static state; recompute it")
     return table
 
 
@@ -451,16 +448,16 @@ def remarks_about_table(name: str, table: MeshTable) -> Iterator[str]:
     if missing:
         first = f", first {table.failures[0]}" if table.failures else ""
         yield (
-            f"{name}: {missing} of {states} states are not solved{first}; they are marked in the table, others stand "
-            "in for them, and what comes near them says so"
+            f"{name}: {missing} of {states} states not converged{first}; they are marked in the table and "
+            "interpolated from converged neighbours; results near them are marked"
         )
     shares = table.dataset[CUT_OFF].to_numpy()
     cut = int(np.count_nonzero(shares > 0.0))
     largest = float(np.nanmax(shares, initial=0.0))
     if cut:
         yield (
-            f"{name}: in {cut} of {states} states contact passes a form circle and is cut off there; up to "
-            f"{_percent(largest)} of the load would be beyond, {_percent(static_cut_off(table))} in the static state"
+            f"{name}: in {cut} of {states} states contact extends beyond a form diameter and is truncated there; up "
+            f"to {_percent(largest)} of the load is truncated, {_percent(static_cut_off(table))} in the static state"
         )
 
 
@@ -468,20 +465,20 @@ def doubts_about_table(name: str, table: MeshTable) -> Iterator[str]:
     """Say why the table of a pair is not to be trusted; a line each, none if it is."""
     missing, states = _missing(table)
     if missing > MOST_MISSING * states:
-        yield f"{name}: {missing} of {states} states are not solved, more than {_percent(MOST_MISSING)}"
+        yield f"{name}: {missing} of {states} states not converged, more than {_percent(MOST_MISSING)}"
         yield from (f"{name}: {line}" for line in table.failures)
         return
     static = table.static_state
     lost = int(np.count_nonzero(~static["converged"].to_numpy().astype(bool)))
     positions = static.sizes["pmc"]
     if lost > MOST_MISSING * positions:
-        yield f"{name}: {lost} of {positions} positions of the static state are not solved"
+        yield f"{name}: {lost} of {positions} positions of the static state not converged"
     share = static_cut_off(table)
     if share > DOUBTFUL_CUT_OFF:
         yield (
-            f"{name}: in the static state {_percent(share)} of the load would be beyond a form circle, where a "
-            f"tip presses on a fillet (limit {_percent(DOUBTFUL_CUT_OFF)}); a tip of the mate that ends earlier, or a "
-            "tool with a smaller tip radius, keeps clear"
+            f"{name}: in the static state {_percent(share)} of the load is beyond a form diameter, where a tip would "
+            f"press on a fillet (limit {_percent(DOUBTFUL_CUT_OFF)}); reduce the tip diameter of the mating gear, or "
+            "the tip radius of the tool"
         )
 
 
@@ -513,7 +510,7 @@ class Shuttling:
     Examples
     --------
     >>> Shuttling("helical", 1.8e-3, 4.3).in_words
-    'helical: the load moves by +-1.8 mm along the face in each mesh cycle'
+    'helical: load centroid shuttles by ±1.8 mm along the face width in each mesh cycle'
     """
 
     pair: str
@@ -526,7 +523,10 @@ class Shuttling:
     @property
     def in_words(self) -> str:
         """Say how far."""
-        return f"{self.pair}: the load moves by +-{1e3 * self.amplitude:.2g} mm along the face in each mesh cycle"
+        return (
+            f"{self.pair}: load centroid shuttles by ±{1e3 * self.amplitude:.2g} mm along the face width in each mesh "
+            "cycle"
+        )
 
 
 def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[Shuttling, ...]:

@@ -411,7 +411,7 @@ def fastest_motion(assembly: Assembly) -> str:
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
     >>> fastest_motion(assemble(gearbox, Choice("rigid"), stiffness))
-    'the fastest motion, 9.25e+03 rad/s, is of hss.spin against high_speed'
+    'the fastest motion, 9.25e+03 rad/s, is that of hss.spin against high_speed'
     """
     linear = _linearised_equations(assembly)
     basis, matrix = _free_motions(linear, assembly.motions)
@@ -425,7 +425,7 @@ def fastest_motion(assembly: Assembly) -> str:
         for name, k in linear.stiffness.items()
     }
     holding = max(strained, key=lambda name: strained[name]) if strained else "nothing"
-    return f"the fastest motion, {rate:.3g} rad/s, is of {coordinate_labels(assembly)[moving]} against {holding}"
+    return f"the fastest motion, {rate:.3g} rad/s, is that of {coordinate_labels(assembly)[moving]} against {holding}"
 
 
 def _stable(method: Method, values: Complexes, step: float, factor: float) -> bool:
@@ -562,12 +562,12 @@ def unstable(integration: Integration) -> str:
     >>> unstable(Integration(RUNGE_KUTTA, 2.5e-5, 1.3, 0.0, 0.0, fastest_rate=8e4))
     ''
     >>> unstable(Integration(RUNGE_KUTTA, 2.5e-5, 0.0, 0.0, 0.0, fastest_rate=2e5))
-    'step = 2.5e-05 s is not stable: the fastest motion has 2e+05 rad/s; use 1e-05 s or less'
+    'step = 2.5e-05 s is unstable: the fastest motion has 2e+05 rad/s; use 1e-05 s or less'
     """
     if integration.margin >= 1.0:
         return ""
     rate = integration.fastest_rate
     return (
-        f"step = {integration.step:g} s is not stable: the fastest motion has {rate:.4g} rad/s; "
-        f"use {2.0 / rate:.2g} s or less"
+        f"step = {integration.step:g} s is unstable: the fastest motion has {rate:.4g} rad/s; use {2.0 / rate:.2g} s "
+        "or less"
     )

@@ -272,10 +272,10 @@ def unsupported_reason(assembly: Assembly) -> str:
     equations need it; what is left to refuse are constraints.
     """
     if assembly.variant.is_constrained:
-        return "the variant jointed keeps ideal joints as constraints, which an explicit method cannot solve"
+        return "the variant jointed has ideal joints as constraints, which an explicit method cannot solve"
     if assembly.floating:
         family = assembly.gearbox.body(next(iter(assembly.floating))).family
-        return f"bodies.{family}.flexibility = 'ffrf' runs in Exudyn only, 'nonrotating' in both"
+        return f"bodies.{family}.flexibility = 'ffrf' requires Exudyn, 'nonrotating' runs in both"
     return ""
 
 

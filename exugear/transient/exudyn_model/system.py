@@ -82,9 +82,9 @@ class ExudynSystem:
         self.parts = Parts(self.mbs, assembly)
         self._minimal = assembly.variant.spins_only
         if assembly.elastic_bodies and mesh_route != "element":
-            raise VariantError("mesh_route 'loads' needs rigid bodies: use the variant jointed or bushing")
+            raise VariantError("mesh_route 'loads' requires rigid bodies; use the variant jointed or bushing")
         if self._minimal and mesh_route != "element":
-            raise VariantError("mesh_route 'loads' needs bodies: use the variant jointed or bushing")
+            raise VariantError("mesh_route 'loads' requires bodies; use the variant jointed or bushing")
         chosen = assembly.meshes if meshes is None else meshes
         at_work = chosen if with_meshes else None
         if self._minimal:

@@ -48,7 +48,7 @@ def changed_case(tmp_path, old, new):
 def test_check_prints_the_ratio_and_the_pairs():
     outcome = exugear("check", CASE)
     assert outcome.exit_code == 0, outcome.stderr
-    assert "81.490683" in outcome.stdout
+    assert "ratio output/input 81.4907 (i = 0.01227)" in outcome.stdout
     assert "sun_planet" in outcome.stdout
     assert outcome.stderr == ""
 
@@ -115,10 +115,7 @@ def test_every_file_of_a_verb_is_offered_as_one():
 
 
 def test_no_help_text_loses_a_section_in_brackets_as_if_it_were_markup():
-    for command in app.registered_commands:
-        assert "[" not in (command.callback.__doc__ or "").replace("\\[", "").split("Parameters")[0], (
-            command.callback.__name__
-        )
+    assert "section [loads]" in exugear("loads", "--help").stdout
 
 
 def test_the_version_is_that_of_the_distribution():
@@ -168,7 +165,7 @@ def test_a_second_run_keeps_what_fits_and_another_number_of_positions_does_not(c
     written = table.stat().st_mtime_ns
     outcome = exugear("ste", case, "--positions", 8, "--out", out)
     assert outcome.exit_code == 0
-    assert "kept" in outcome.stderr
+    assert "cached" in outcome.stderr
     assert table.stat().st_mtime_ns == written
     gearbox = Gearbox.from_toml(case)
     assert requested_tables(gearbox, out, positions=8)[0].stored
@@ -198,8 +195,8 @@ def test_another_process_draws_the_same_curves(computed, tmp_path, monkeypatch):
     ("options", "said"),
     [
         (["--mesh", "bevel"], "'bevel'; the pairs are spur"),
-        (["--positions", "3"], "--positions 3: a table for dynamics needs at least 8"),
-        (["--method", "nonlinear", "--grid"], "leave --grid out"),
+        (["--positions", "3"], "--positions 3: a table for dynamics requires at least 8"),
+        (["--method", "nonlinear", "--grid"], "remove --grid"),
         (["--method", "nonlinear", "--mesh", "bevel"], "'bevel'; the pairs are spur"),
         (["--method", "guess"], "superelement"),
     ],
@@ -245,7 +242,10 @@ def test_methods_that_do_not_agree_end_with_code_1(spur_case, tmp_path, monkeypa
     monkeypatch.setattr("exugear.system.tooth_mesh.reference_tables.NonlinearInput", crude)
     outcome = exugear("ste", spur_case, "--method", "nonlinear", "--positions", 1, "--out", tmp_path)
     assert outcome.exit_code == 1
-    assert "spur: the mean is -" in outcome.stderr and "% off that of the tables" in outcome.stderr
+    assert (
+        "spur: the mean differs by -" in outcome.stderr
+        and "% from the table used for dynamics; up to" in outcome.stderr
+    )
     assert (tmp_path / "tables" / "spur-nonlinear.nc").exists()
 
 

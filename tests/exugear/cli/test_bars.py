@@ -13,20 +13,20 @@ from exugear.system.tooth_mesh.placement import MeshError
 def test_work_inside_of_other_work_adds_a_row_to_its_display(capsys):
     bars = Bars()
     with bars.row() as outer:
-        outer("steady response")
+        outer("steady state")
         display = bars.display()
         with bars.row() as inner:
             inner("table", 3, 4)
         assert bars.display() is display, "the console refuses a second one"
-        outer("steady response", 1, 2)
+        outer("steady state", 1, 2)
         assert [(task.description, task.completed, task.total) for task in display.tasks] == [
-            ("steady response", 1, 2),
+            ("steady state", 1, 2),
             ("table", 3, 4),
         ]
     with bars.row() as later:
         later("run")
         assert bars.display() is not display
-    assert "steady response" in capsys.readouterr().err
+    assert "steady state" in capsys.readouterr().err
 
 
 def test_a_row_that_has_nothing_to_say_shows_nothing(capsys):

@@ -75,21 +75,23 @@ def test_check_tells_load_and_range_of_what_is_estimated_and_writes_nothing(case
     with_little, with_much = ball["estimated"]["radial_clearance_mm"]["radial_stiffness_N_per_m"]
     assert with_little == pytest.approx(ball["radial_stiffness_N_per_m"])  # none is what is taken
     assert with_much < with_little
-    assert any("taper_1: holds its inner ring along the axis in one direction only" in w for w in summary["warnings"])
+    assert any("taper_1: locates its inner ring axially in one direction only" in w for w in summary["warnings"])
     assert [path.name for path in case.parent.iterdir()] == [case.name]
 
 
 def test_check_compares_a_stated_load_with_the_reaction(case: Path) -> None:
     stated = rewritten(case, ("[bearings.ball.catalogue]\n", "[bearings.ball.catalogue]\nradial_load_kN = 9.0\n"))
     warnings = json.loads(exugear("check", stated, "--json").stdout)["warnings"]
-    assert any("bearings.ball: radial_load_kN = 9 is stated, the static load gives 2." in line for line in warnings)
+    assert any(
+        "bearings.ball: radial_load_kN = 9 is specified; the static load results in 2." in line for line in warnings
+    )
 
 
 def test_a_load_beyond_the_static_rating_is_told(case: Path) -> None:
     heavy = rewritten(case, ("torques_N_m = { shaft_1 = 100.0 }, locked", "torques_N_m = { shaft_1 = 1200.0 }, locked"))
     warnings = json.loads(exugear("check", heavy, "--json").stdout)["warnings"]
     assert any(
-        "ball: equivalent static load" in line and "beyond its estimated static rating" in line for line in warnings
+        "ball: equivalent static load" in line and "kN exceeds its estimated static rating" in line for line in warnings
     )
 
 
@@ -98,12 +100,15 @@ def test_what_holds_no_axial_load_fails_with_the_bearings_named(case: Path) -> N
     loose = rewritten(case, ('locates_towards = "-z"', 'locates_towards = "+z"'))
     failed = exugear("bearings", loose, "--out", case.parent / "out")
     assert failed.exit_code == 1
-    assert "taper_1, taper_2: held along the axis in one direction only" in failed.stderr
+    assert (
+        "taper_1, taper_2: located axially in one direction only; check arrangements and `locates_towards`"
+        in failed.stderr
+    )
     said = json.loads(exugear("check", loose, "--json").stdout)
     assert any("taper_1, taper_2" in line for line in said["warnings"])
 
 
-@pytest.mark.parametrize(("options", "words"), [(["--variant", "rigid"], "ideal joints in place of bearings")])
+@pytest.mark.parametrize(("options", "words"), [(["--variant", "rigid"], "ideal joints instead of bearings")])
 def test_bearings_refuses_what_has_none(case: Path, options: list[str], words: str) -> None:
     refused = exugear("bearings", case, "--out", case.parent / "out", *options)
     assert refused.exit_code == 2
@@ -142,11 +147,11 @@ def test_a_report_leaves_out_what_no_longer_balances(
     assert exugear("modes", case, "--variant", "bushing", "--mesh-model", "iso6336", "--out", out).exit_code == 0
 
     def unbalanced(*arguments: object) -> None:
-        raise BalanceError("static state: no balance found")
+        raise BalanceError("static state: static equilibrium not found, the residual remains at")
 
     monkeypatch.setattr(place, unbalanced)
     reported = exugear("report", out, "--near", 500.0)
     assert isinstance(reported.exception, SystemExit | None)
-    assert "no balance found" in reported.stderr
+    assert ": static equilibrium not found, the residual remains at" in reported.stderr
     assert "Traceback" not in reported.stderr
     assert reported.exit_code == code

@@ -48,7 +48,7 @@ def test_a_run_says_how_far_it_is_from_exudyn_and_the_report_shows_it(case):
     assert found.duration == pytest.approx(0.02, abs=2e-3)
     assert exugear("report", out).exit_code == 0
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert "The same run by Exudyn" in page and "user functions give the mesh forces" in page
+    assert "Comparison with Exudyn" in page and "with mesh forces from user functions; maximum difference:" in page
 
 
 def test_a_run_of_another_input_is_not_compared_and_the_report_says_so(case):

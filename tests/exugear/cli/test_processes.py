@@ -82,7 +82,7 @@ with exit_codes():
     process = begun(program=program)
     _, said = process.communicate(timeout=30.0)
     assert process.returncode == 130
-    assert said == "Stopped: finished results are kept; the same command goes on from there\n"
+    assert said == "Stopped: finished results are kept; run the same command to resume\n"
 
 
 def test_ctrl_c_that_a_library_made_an_error_of_ends_the_work_with_130(capsys):
@@ -264,7 +264,7 @@ def test_what_cannot_be_said_on_standard_error_costs_nothing(case):
         run = ("run", case, "--variant", "rigid", "--mesh-model", "iso6336", "--duration", 0.01, "--out", out)
         outcome = outcome_into(subprocess.PIPE, *run, stderr=full)
         assert outcome.returncode == 0
-        assert "Results in" in outcome.stdout
+        assert "Results: " in outcome.stdout
         assert outcome_into(subprocess.PIPE, "check", "missing.toml", stderr=full).returncode == 2
 
 

@@ -50,31 +50,49 @@ def refusal(content: Content, keys: dict[str, Any], bearing: dict[str, Any] | No
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ({"contact_angle_deg": 10.0}, "contact_angle_deg = 10 makes no sense for type = 'cylindrical_roller'"),
+        ({"contact_angle_deg": 10.0}, "contact_angle_deg = 10 is not applicable to type = 'cylindrical_roller'"),
         ({"type": "tapered_roller", "contact_angle_deg": 0.0}, "must lie between 5 and 45 for type = 'tapered_roller'"),
         ({"type": "tapered_roller", "contact_angle_deg": 50.0}, "contact_angle_deg = 50 must lie between 5 and 45"),
         ({"type": "four_point_ball", "contact_angle_deg": 5.0}, "contact_angle_deg = 5 must lie between 10 and 45"),
-        ({"type": "spherical_roller", "arrangement": "O"}, "arrangement = 'O' makes no sense for type"),
-        ({"type": "deep_groove_ball", "arrangement": "tandem"}, "arrangement = 'tandem' makes no sense for type"),
-        ({"inner_groove_ratio": 0.52}, "inner_groove_ratio makes no sense for type = 'cylindrical_roller'"),
-        ({"type": "self_aligning_ball", "outer_groove_ratio": 0.52}, "outer_groove_ratio makes no sense for type"),
-        ({"type": "deep_groove_ball", "element_length_mm": 9.0}, "element_length_mm makes no sense for type"),
-        ({"type": "deep_groove_ball", "profile": "none"}, "profile makes no sense for type = 'deep_groove_ball'"),
-        ({"osculation": 0.98}, "osculation makes no sense for type = 'cylindrical_roller'"),
-        ({"locates_towards": "-z"}, "locates_towards makes no sense for type = 'cylindrical_roller'"),
+        ({"type": "spherical_roller", "arrangement": "O"}, "arrangement = 'O' is not applicable to type ="),
+        ({"type": "deep_groove_ball", "arrangement": "tandem"}, "arrangement = 'tandem' is not applicable to type ="),
+        ({"inner_groove_ratio": 0.52}, "inner_groove_ratio is not applicable to type = 'cylindrical_roller'"),
+        ({"type": "self_aligning_ball", "outer_groove_ratio": 0.52}, "outer_groove_ratio is not applicable to type ="),
+        ({"type": "deep_groove_ball", "element_length_mm": 9.0}, "element_length_mm is not applicable to type ="),
+        ({"type": "deep_groove_ball", "profile": "none"}, "profile is not applicable to type = 'deep_groove_ball'"),
+        ({"osculation": 0.98}, "osculation is not applicable to type = 'cylindrical_roller'"),
+        ({"locates_towards": "-z"}, "locates_towards is not applicable to type = 'cylindrical_roller'"),
         (
             {"type": "tapered_roller", "locates_towards": "+z", "arrangement": "O"},
-            "locates_towards makes no sense for arr",
+            "locates_towards is not applicable to arrangement =",
         ),
-        ({"type": "tapered_roller", "row_count": 2}, "row_count makes no sense for type = 'tapered_roller'"),
-        ({"axial_preload_um": 5.0}, "axial_preload_um makes no sense for type = 'cylindrical_roller'"),
-        ({"type": "tapered_roller", "axial_preload_um": 5.0}, "axial_preload_um needs arrangement = 'X' or 'O'"),
-        ({"row_distance_mm": 20.0}, "row_distance_mm needs a second row"),
-        ({"row_count": 2, "arrangement": "X"}, "row_count = 2 stands beside arrangement = 'single' only"),
+        ({"type": "tapered_roller", "row_count": 2}, "row_count is not applicable to type = 'tapered_roller'"),
+        ({"axial_preload_um": 5.0}, "axial_preload_um is not applicable to type = 'cylindrical_roller'"),
+        (
+            {"type": "tapered_roller", "axial_preload_um": 5.0},
+            "axial_preload_um requires arrangement = 'X' or 'O'; a single bearing has none",
+        ),
+        (
+            {"row_distance_mm": 20.0},
+            "row_distance_mm requires a second row: row_count = 2, or arrangement 'X', 'O' or 'tandem'",
+        ),
+        (
+            {"row_count": 2, "arrangement": "X"},
+            "row_count = 2 requires arrangement = 'single'; set the number of rows of the whole bearing",
+        ),
         ({"type": "spherical_roller", "row_count": 3}, "has one or two rows"),
-        ({"type": "spherical_roller", "row_distance_mm": 9.0}, "contact_angle_deg says how far apart"),
-        ({"type": "spherical_roller", "row_count": 1, "contact_angle_deg": 9.0}, "the row stands in the middle"),
-        ({"radial_load_kN": None, "axial_load_kN": 1.0}, "axial_load_kN stands beside radial_load_kN"),
+        (
+            {"type": "spherical_roller", "row_distance_mm": 9.0},
+            "has one or two rows; contact_angle_deg defines their distance",
+        ),
+        (
+            {"type": "spherical_roller", "row_count": 1, "contact_angle_deg": 9.0},
+            "contact_angle_deg is not applicable to row_count = 1",
+        ),
+        (
+            {"radial_load_kN": None, "axial_load_kN": 1.0},
+            "axial_load_kN without radial_load_kN: set both, or none to use the static load",
+        ),
     ],
 )
 def test_keys_that_make_no_sense_are_refused(content: Content, keys: dict[str, Any], said: str) -> None:
@@ -93,8 +111,8 @@ def test_keys_that_make_no_sense_are_refused(content: Content, keys: dict[str, A
         ({"element_count": 2}, "element_count"),
         ({"type": "deep_groove_ball", "inner_groove_ratio": 0.5}, "inner_groove_ratio"),
         ({"type": "deep_groove_ball", "outer_groove_ratio": 0.49}, "outer_groove_ratio"),
-        ({"profile": [[0.0, 0.0], [0.5, 1.0], [0.5, 2.0]]}, "profile: shares of half the length"),
-        ({"profile": [[0.1, 0.0], [1.0, 5.0]]}, "must begin at 0 and ascend"),
+        ({"profile": [[0.0, 0.0], [0.5, 1.0], [0.5, 2.0]]}, "profile: fractions of half the length ="),
+        ({"profile": [[0.1, 0.0], [1.0, 5.0]]}, "must start at 0 and increase, up to 1"),
         ({"profile": [[0.0, 0.0], [1.1, 5.0]]}, "profile"),
         ({"profile": [[0.0, 0.0]]}, "profile"),
         ({"profile": "convex"}, "profile"),
@@ -110,9 +128,13 @@ def test_dimensions_that_cannot_be_are_refused(content: Content, keys: dict[str,
 @pytest.mark.parametrize(
     ("keys", "bearing", "said"),
     [
-        ({}, {"model": "iso16281"}, "leave catalogue.radial_load_kN and .axial_load_kN out"),
-        ({}, {"model": "iso16281", "catalogue": None}, "model = 'iso16281' needs a [.catalogue] table"),
-        ({}, {"cage": "turning"}, "cage = 'turning' stands beside model = 'iso16281' only"),
+        (
+            {},
+            {"model": "iso16281"},
+            "model = 'iso16281' uses the computed load; remove catalogue.radial_load_kN and .axial_load_kN",
+        ),
+        ({}, {"model": "iso16281", "catalogue": None}, "table with the rolling elements"),
+        ({}, {"cage": "turning"}, "cage = 'turning' requires model = 'iso16281'"),
         ({}, {"law": "linear"}, "law"),
     ],
 )
@@ -134,7 +156,7 @@ def test_keys_of_a_type_alone_name_types_that_exist() -> None:
     assert known <= set(Path("docs/reference/bearings.md").read_text(encoding="utf-8").replace("`", " ").split())
 
 
-@pytest.mark.parametrize(("distance", "said"), [(0.0, "0 mm away"), (7.0, "7 mm away"), (17.0, None)])
+@pytest.mark.parametrize(("distance", "said"), [(0.0, "0 mm apart"), (7.0, "7 mm apart"), (17.0, None)])
 def test_two_bearings_at_one_place_are_refused_by_name(content: Content, distance: float, said: str | None) -> None:
     folder, case = content[0], copy.deepcopy(content[1])
     second = copy.deepcopy(case["bearings"]["bearing_2"])
@@ -143,6 +165,6 @@ def test_two_bearings_at_one_place_are_refused_by_name(content: Content, distanc
         Gearbox.from_dict(case, str(folder / "case.toml"))
         return
     with pytest.raises(
-        GearboxFileError, match=f"case.toml: bearings.bearing_3.z_mm.*is where bearings.bearing_2 is, {said}"
+        GearboxFileError, match=f"case.toml: bearings.bearing_3.z_mm.*is at the position of bearings.bearing_2 .{said}"
     ):
         Gearbox.from_dict(case, str(folder / "case.toml"))

@@ -29,7 +29,9 @@ def test_gears_of_25_degrees_have_the_largest_rounding_that_fits() -> None:
     gearbox = Gearbox.from_dict(content(normal_pressure_angle_deg=25.0), "case.toml")
     assert [gear.rack.tip_radius for gear in gearbox.gears.values()] == pytest.approx([0.318, 0.318], abs=1e-3)
     told = [line for line in remarks(gearbox) if "rack.tip_radius" in line]
-    assert len(told) == 2 and all("the default of 0.38" in line and " is taken" in line for line in told)
+    assert len(told) == 2 and all(
+        "the default of 0.38" in line and ", the largest possible value, is used" in line for line in told
+    )
 
 
 @pytest.mark.parametrize("rack", [{"tip_radius": 0.38}, {"tip_radius": 0.32}])

@@ -76,9 +76,7 @@ def test_the_springs_that_stand_for_the_main_shaft_do_not_act_beside_it(grc: Gea
     assert [mount.name for mount in grc.mounts] == ["arm_left", "arm_right", "main_shaft_support"]
     assert [m.name for m in grc.varied({"bodies.main_shaft.enabled": True}).mounts] == ["arm_left", "arm_right"]
     # The body has its rotor: a second one has nothing left to hold on to.
-    with pytest.raises(
-        GearboxFileError, match="rotor are joined.*main_shaft stands aside while bodies.main_shaft is enabled"
-    ):
+    with pytest.raises(GearboxFileError, match="main_shaft is disabled while bodies.main_shaft is enab"):
         grc.varied({"bodies.main_shaft.enabled": True, "bodies.rotor.enabled": True})
 
 
@@ -88,12 +86,12 @@ def test_two_paths_of_torsion_are_named(grc: Gearbox) -> None:
     joined = {"bodies": ["rotor", "carrier"], "stiffness_N_m_per_rad": 8e7}
     with pytest.raises(
         GearboxFileError,
-        match="couplings hub, shrink_disc_torsion, main_shaft form a loop: rotor and carrier are joined twice",
+        match="couplings hub, shrink_disc_torsion, main_shaft form a loop:",
     ):
         order = {name: grc.content["couplings"][name] for name in ("brake_coupling", "shrink_disc_torsion")}
         grc.varied({**both, "couplings": {**order, "hub": hub, "main_shaft": joined}})
     with pytest.raises(
-        GearboxFileError, match="torsion 1e\\+09 N m/rad between carrier and main_shaft, which both turn"
+        GearboxFileError, match="09 N m/rad between carrier and main_shaft, which both rotate; set it in a"
     ):
         grc.varied({"bodies.main_shaft.enabled": True, "bearings.shrink_disc.stiffness": {"torsion_N_m_per_rad": 1e9}})
 
@@ -122,15 +120,22 @@ def _set(content: dict, dotted: str, value: object) -> dict:
         ("bodies.hss.inertia.assemblies.axial_kg_m2", 8.0, ["triangle inequality"]),
         ("bodies.hss.inertia.assemblies.mass_kg", 0.0, ["mass_kg = 0.0", "between 1e-06 and 1e+07"]),
         ("bodies.brake.inertia.gears", {}, ["bodies.brake.inertia.gears.axial_kg_m2", "missing"]),
-        ("couplings.brake_coupling.bodies", ["hss", "hss"], ["brake", "one connected whole"]),
+        (
+            "couplings.brake_coupling.bodies",
+            ["hss", "hss"],
+            [
+                "brake",
+                "; the gear train must be connected. A body held only by",
+            ],
+        ),
         ("couplings.brake_coupling.seat", "hss_x", ["couplings.brake_coupling.seat = 'hss_x'", "hss_bc"]),
         ("couplings.brake_coupling.instead_of", "nobody", ["couplings.brake_coupling.instead_of", "'nobody'"]),
         ("couplings.hss_a", {"bodies": ["hss", "ims"], "stiffness_N_m_per_rad": 1.0}, ["couplings.hss_a", "rename"]),
         ("bearings.hss_a.body", "nobody", ["bearings.hss_a", "'nobody'"]),
         ("joints.hss.body", "ims", ["joints.hss.body = 'ims'", "redundant"]),
         ("meshes.high_speed.position_angle_deg", 10.0, ["position_angle_deg = 10.0", "-30.2066"]),
-        ("meshes.sun_planet.phase", [0.1, 0.2], ["3 meshes need 3 phases"]),
-        ("static_load.locked", [], ["not held"]),
+        ("meshes.sun_planet.phase", [0.1, 0.2], ["3 meshes require 3 phases"]),
+        ("static_load.locked", [], ["does not balance the torques"]),
         ("load_cases.reference.torques_N_m", {"nobody": 1.0}, ["load_cases.reference", "'nobody'"]),
         ("overall.output", "housing", ["overall.output = 'housing'"]),
         ("housing.factor", 0.0, ["housing.factor = 0.0"]),

@@ -167,7 +167,7 @@ def test_python_permits_scripts_by_a_parameter(tmp_path: Path) -> None:
     assert not mark.exists()
     mesh_geometry(plate, 0.025, scripts=True)
     assert mark.exists()
-    with pytest.raises(SolidError, match=r"no geometry; its name must end in \.geo, \.step"):
+    with pytest.raises(SolidError, match=": unknown geometry format; its name must end in .geo, .step"):
         mesh_geometry(plate.rename(tmp_path / "plate.txt"), 0.025)
 
 
@@ -250,7 +250,7 @@ def test_files_that_are_named_lie_below_the_gearbox_file_unless_permitted(tmp_pa
         case = with_files(inside, **{kind: name})
         outcome = exugear("check", case)
         assert outcome.exit_code == 2
-        assert f"{key} = '{name}': lies outside the gearbox file's folder" in said(outcome)
+        assert f"{key} = '{name}': is outside the folder of the gearbox file" in said(outcome)
         assert "--allow-dir DIR or EXUGEAR_ALLOW_DIR" in said(outcome)
         assert exugear("check", case, "--allow-dir", outside).exit_code == 0
         assert exugear("check", case, EXUGEAR_ALLOW_DIR=str(tmp_path)).exit_code == 0
@@ -260,7 +260,7 @@ def test_files_that_are_named_lie_below_the_gearbox_file_unless_permitted(tmp_pa
         outcome = exugear("check", with_files(inside, **{kind: name}))
         assert outcome.exit_code == 2
         assert len(outcome.stderr.splitlines()) == 1
-        assert re.search("no such file|File name too long|no control characters|at most 1000", said(outcome))
+        assert re.search("no such file|File name too long|control characters|at most 1000", said(outcome))
     outcome = exugear("check", case, "--allow-dir", tmp_path / "nowhere")
     assert outcome.exit_code == 2
     assert "nowhere: no such folder" in said(outcome)
@@ -278,7 +278,7 @@ def test_a_report_follows_the_same_rule(tmp_path: Path, monkeypatch: Any) -> Non
     assert exugear("modes", case, *permitted).exit_code == 0
     outcome = exugear("report", out)
     assert outcome.exit_code == 2
-    assert f"{SERIES_KEY} = '../measured/torque.csv': lies outside" in said(outcome)
+    assert f"{SERIES_KEY} = '../measured/torque.csv': is outside" in said(outcome)
     assert not (out / "report.html").exists()
 
 
@@ -324,4 +324,7 @@ def test_names_are_short_enough_for_files(tmp_path: Path) -> None:
     case.write_text(SPUR_CASE.replace("run_up =", f"{81 * 'n'} ="), encoding="utf-8")
     outcome = exugear("check", case)
     assert outcome.exit_code == 2
-    assert "is 80 long at most" in said(outcome)
+    assert (
+        "a name consists of letters, digits and underscores, begins with a letter, and has at most 80 characters"
+        in said(outcome)
+    )

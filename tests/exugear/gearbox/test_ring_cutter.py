@@ -43,11 +43,15 @@ def test_an_addendum_is_the_tip_diameter_of_the_same_cutter():
 @pytest.mark.parametrize(
     ("cutter", "changes", "message"),
     [
-        ({"teeth": 30, "tip_radius": 0.2, "addendum": 1.2, "tip_diameter_mm": 97.0}, {}, "give addendum or tip_diam"),
+        (
+            {"teeth": 30, "tip_radius": 0.2, "addendum": 1.2, "tip_diameter_mm": 97.0},
+            {},
+            "set addendum or tip_diameter_mm, not both: each defines the tip of the cutter",
+        ),
         (
             {"teeth": 30, "tip_radius": 0.2, "addendum": 1.2},
             {"root_diameter_mm": 260.0},
-            "root_diameter_mm follows from cutter.addendum: leave one of them out",
+            "root_diameter_mm follows from cutter.addendum; remove one of them",
         ),
         ({"teeth": 30, "tip_radius": 0.9}, {}, "cutter.tip_radius = 0.9 does not fit on the cutter's tip: at most 0"),
         ({"tip_radius": 0.2}, {}, "gears.ring.cutter.teeth: this key is missing"),
@@ -61,7 +65,7 @@ def test_cutters_that_cannot_be_are_refused(cutter: dict[str, Any], changes: dic
 def test_a_cutter_of_an_external_gear_is_refused():
     content = tomllib.loads(template("planetary"))
     content["gears"]["sun"]["cutter"] = {"teeth": 30, "tip_radius": 0.2}
-    with pytest.raises(GearboxFileError, match=r"gears.sun: a cutter makes rings \(internal = true\)"):
+    with pytest.raises(GearboxFileError, match=r"gears.sun: a cutter is for ring gears \(internal = true\)"):
         Gearbox.from_dict(content, "case.toml")
 
 

@@ -51,7 +51,11 @@ def test_published_pairs_without_backlash_are_taken_and_told(
     pair = gearbox.gear_pairs["spur"]
     assert math.degrees(pair.working_pressure_angle) == pytest.approx(angle, abs=2e-4)
     assert 0.0 <= pair.circumferential_backlash < 1e-11
-    (line,) = (line for line in remarks(gearbox) if "within the rounding of the digits" in line)
+    (line,) = (
+        line
+        for line in remarks(gearbox)
+        if "µm, within the rounding of the input; zero backlash is used, with teeth thinner by that amount" in line
+    )
     assert line.startswith("gears.wheel: ")
 
 

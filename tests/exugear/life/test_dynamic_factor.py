@@ -110,10 +110,8 @@ def test_a_run_at_constant_speed_and_the_steady_response_there_give_one_factor(t
     assert run.complete
     assert middle > 1.02
     assert settled == pytest.approx(middle, rel=3e-3)
-    assert (
-        of_response.source
-        == f"the steady response (nonlinear) at 3 speeds of shaft_1 from {0.9 * speed:.4g} to {1.1 * speed:.4g} rpm"
-    )
+    span = f"from {0.9 * speed:.4g} to {1.1 * speed:.4g} rpm"
+    assert of_response.source == f"the steady-state response (nonlinear) at 3 speeds of shaft_1 {span}"
     assert of_run.source.startswith("the run run_up over ")
     other = assemble(steady.varied({"damping.mesh_time_s": 5e-6}), CHOICE, STIFFNESS)
     with pytest.raises(GearboxFileError, match="belongs to another input"):

@@ -149,7 +149,7 @@ def test_loads_far_beyond_a_table_are_refused_before_any_work(tmp_path):
         if not refused:
             check_reach(gearbox, checked_loads(gearbox), {"spur": 100.0})
             continue
-        with pytest.raises(GearboxFileError, match=r"0.87 kN m on shaft_1 are 8.7 times .* static_load.torques_N_m"):
+        with pytest.raises(GearboxFileError, match=r"0.87 kN m on shaft_1 is 8.7 times .* static_load.torques_N_m"):
             project.life()
         assert not project.folder.exists()
 
@@ -178,7 +178,7 @@ def test_infinite_damage_is_the_first_thing_told_with_the_stress_that_causes_it(
     shown = exugear(*arguments)
     assert shown.exit_code == 1, shown.output
     first = shown.stdout.splitlines()[0]
-    assert first.startswith("pinion + spur: infinite damage: a contact stress of ")
+    assert first.startswith("spur: infinite damage: the loads cause a contact stress of")
     data = read_life(next(out.glob("*/*/life.nc")))
     stress = float(data["flank_contact_worn"].sel(flank="pinion + spur"))
     assert f"{1e-6 * stress:.4g} MPa" in first
@@ -199,7 +199,7 @@ def test_infinite_damage_is_in_report_and_picture(broken):
     report = write_report(out)
     page = report.path.read_text(encoding="utf-8")
     section = page[page.index('<section id="life"') :]
-    assert section.index("infinite damage: a contact stress of") < section.index("<table")
+    assert section.index(": infinite damage: the loads cause a contact stress of") < section.index("<table")
     assert any("infinite" in line for line in report.statements)
     data = read_life(next(out.glob("*/*/life.nc")))
     draw_life(data)
@@ -229,10 +229,10 @@ def test_bearing_lives_below_the_hours_asked_for_are_shortfalls_and_limit(tmp_pa
     hours = 1.01 * one.basic_hours
     assert one.reference_hours > hours
     told = list(shortfalls(rating_of(gearbox), [], [one], hours))
-    assert len(told) == 1 and told[0].startswith(f"bearing_1: L10 = {one.basic_hours:,.0f} h, {hours:,.0f} h")
+    assert len(told) == 1 and told[0].startswith(f"bearing_1: L10 = {one.basic_hours:,.0f} h, required {hours:,.0f} h")
     assert not list(shortfalls(rating_of(gearbox), [], [one], 0.99 * one.basic_hours))
     weak = list(shortfalls(rating_of(gearbox), [], [replace(one, static_safety=0.9)], 1.0))
-    assert weak == ["bearing_1: S_0 = 0.9, 1 is asked for"]
+    assert weak == ["bearing_1: S_0 = 0.9, required 1"]
 
 
 def test_l10_is_among_what_limits():

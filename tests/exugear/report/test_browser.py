@@ -152,7 +152,7 @@ def test_rows_are_sorted_and_filtered(view: View) -> None:
     told = [float(text.split()[0]) for text in table.locator("tbody td:nth-child(2)").all_inner_texts()]
     assert told == sorted(told, reverse=True)
     assert table.locator("th[aria-sort=descending]").count() == 1
-    view.page.locator("#filter").fill("nothing has this name")
+    view.page.locator("#filter").fill("nothing has the same name; rename one")
     assert table.locator("tbody tr:visible").count() == 0
     view.page.locator("#filter").fill("")
     view.page.locator("#rated").click()

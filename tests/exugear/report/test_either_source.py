@@ -58,7 +58,7 @@ def test_the_ranking_of_steady_responses_alone_is_that_of_the_largest_amplitudes
     report = write_report(folder)
     assert report.left_out == ()
     (group,) = data_of(report.path)["groups"]
-    assert group["source"] == "constant speed, level parametric"
+    assert group["source"] == "constant speed, method parametric"
     assert list(group["variants"]) == list(VARIANTS)
     gearbox = Gearbox.from_toml(folder / "spur.toml")
     for variant in VARIANTS:
@@ -76,21 +76,24 @@ def test_the_ranking_of_steady_responses_alone_is_that_of_the_largest_amplitudes
 def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_a_file_of_modes(folder):
     report = write_report(folder)
     page = html.unescape(report.path.read_text(encoding="utf-8"))
-    (card,) = [line for line in report.statements if line.startswith("Loudest resonance")]
-    for words in ("At constant speed, from 50 rpm to 8000 rpm: the overall transmission error", "(place 1 of"):
+    (card,) = [line for line in report.statements if line.startswith("Highest resonance")]
+    for words in ("Overall TE ±", "(rank 1/"):
         assert words in card
-    assert "the shafts accelerate at bearings by" in card and "What moves: shaft" in card
-    assert "Accelerations are those of the shafts at bearings" in page
+    assert "Acceleration ±" in card
+    kinds = ("Highest resonance", "Effect of", "Sensitivity")
+    for line in (line for line in report.statements if line.startswith(kinds)):
+        assert len(line.split(". ", 1)[1].split()) <= 25, line
+    assert "within each quantity; sorted by the best rank. Accelerations: of the shafts at bearings." in page
     for words in (
-        "Read from: constant speed, level parametric",
-        "On bearings, inertias disc, constant speed, level parametric",
-        "Transverse forces on bearings, constant speed, level parametric",
-        "No run-up of this case is here",
-        "what damping takes is what the meshes give within",
+        "Source: constant speed, method parametric",
+        "On bearings, inertia set disc, constant speed, method parametric",
+        "Transverse forces on bearings, constant speed, method parametric",
+        "No run-up; run `exugear run`",
+        "energy balance closed to",
     ):
         assert words in page, words
-    assert "no modes were computed" not in page
-    assert "unsteady" not in page.partition('id="trust"')[0]
+    assert "no modes computed; run `exugear modes` for mode shapes" not in page
+    assert "window-dependent" not in page.partition('id="trust"')[0]
 
 
 @pytest.mark.validation
@@ -102,23 +105,23 @@ def test_with_run_ups_beside_them_both_sources_can_be_chosen(folder, tmp_path):
     simulated(gearbox, Choice("bushing", LAW, load_case="run_up"), stiffness, both)
     report = write_report(both)
     groups = data_of(report.path)["groups"]
-    assert [group["source"] for group in groups] == ["run-up run_up", "constant speed, level parametric"]
+    assert [group["source"] for group in groups] == ["run-up run_up", "constant speed, method parametric"]
     assert 'id="group"' in report.path.read_text(encoding="utf-8")
     # The command line tells of the run-up, which stands beside the level at constant speed in one sentence.
-    assert len([line for line in report.statements if line.startswith("Loudest resonance")]) == 1
+    assert len([line for line in report.statements if line.startswith("Highest resonance")]) == 1
 
 
 def test_lines_that_mesh_frequencies_share_and_remarks_on_speeds_are_told(folder, monkeypatch):
     def read(path: Path) -> Any:
         data = load_response(path)
         remark = data["remark"].astype(object)
-        remark[3] = "passing planets put 1.2 % of the overall transmission error beside these lines"
+        remark[3] = "passing planets add 1.2 % of the overall transmission error at other orders"
         return data.assign(remark=remark).assign_attrs(shared_lines="2 x spur = 1 x other")
 
     monkeypatch.setattr("exugear.report.findings.context.load_response", read)
     page = html.unescape(write_report(folder).path.read_text(encoding="utf-8"))
-    assert "mesh frequencies share lines: 2 × spur = 1 × other" in page
-    assert page.count("passing planets put 1.2 % of the overall") >= 2
+    assert "Note: coinciding orders of several meshes: 2 × spur = 1 × other" in page
+    assert page.count("passing planets add 1.2 % of the overall transmission error at other orders") >= 2
 
 
 def into_the_corner(view: View) -> None:
@@ -139,7 +142,7 @@ class TestInABrowser:
         view = opened(browser, size)
         view.open(write_report(folder).path)
         assert view.page.evaluate("document.documentElement.scrollWidth - window.innerWidth") <= 0
-        assert "Read from: constant speed" in view.page.locator("#waterfall .hint").inner_text()
+        assert "Source: constant speed" in view.page.locator("#waterfall .hint").inner_text()
         view.page.locator("#waterfall").scroll_into_view_if_needed()
         into_the_corner(view)
         coloured = view.page.evaluate(

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from exugear.cli import console
+from exugear.cli import console, tables
 from exugear.report.pictures.diagrams import plot_campbell
 from exugear.report.pictures.scene import mode_figure
 from exugear.report.web import html as page
@@ -186,13 +186,14 @@ def printed(line: Any, monkeypatch: pytest.MonkeyPatch, width: int = 80) -> str:
     shown = io.StringIO()
     for name in ("results", "messages"):
         monkeypatch.setattr(console, name, Console(file=shown, force_terminal=True, color_system=None, width=width))
+    monkeypatch.setattr(tables, "results", console.results)
     line()
     return shown.getvalue()
 
 
 def test_tables_and_bars_show_text_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [{"pair": f"{MARKUP} {STEERING}", "what": "[/]"}]
-    shown = printed(lambda: console.print_table(MARKUP, rows, ("what",)), monkeypatch, 200)
+    shown = printed(lambda: tables.print_table(MARKUP, rows, ("what",)), monkeypatch, 200)
     assert shown.count(MARKUP) == 2
     assert tame(shown)
 

@@ -142,14 +142,14 @@ def test_results_of_an_earlier_version_of_a_method_do_not_fit(out: Path, monkeyp
     monkeypatch.setattr("exugear.system.system.RUN", 1000)
     outcome = exugear("report", out)
     assert outcome.exit_code == 2
-    assert f"{MODES}: was computed from another input; compute it again" in outcome.stderr
-    assert f"{RUN}: was computed from another input; compute it again" in outcome.stderr
+    assert f"{MODES}: was computed from another input; recompute it" in outcome.stderr
+    assert f"{RUN}: was computed from another input; recompute it" in outcome.stderr
 
 
 def test_a_file_of_an_earlier_version_says_so(out: Path) -> None:
     path = out / MODES
     write_dataset(path, load_modes(path).assign_attrs(method_version=0))
-    with pytest.raises(FileError, match=f"computed by version 0 of its method, now at {METHOD}; compute it again"):
+    with pytest.raises(FileError, match=f"computed by version 0 of its method, now at {METHOD}; recompute it"):
         load_modes(path)
     load_run(out / RUN).to_netcdf(out / RUN, engine="h5netcdf")  # as earlier versions wrote it
     with pytest.raises(FileError, match="written by an earlier version"):
@@ -161,7 +161,7 @@ def test_a_run_read_without_labels_has_the_same_numbers(out: Path) -> None:
     arrays, attributes = read_run(out / RUN, ("time", "overall_dte", "kinetic_energy"))
     assert all(np.array_equal(values, labelled[name]) for name, values in arrays.items())
     assert {key: attributes[key] for key in labelled.attrs} == labelled.attrs
-    with pytest.raises(FileError, match="holds no heat"):
+    with pytest.raises(FileError, match="contains no heat"):
         read_run(out / RUN, ("heat",))
 
 

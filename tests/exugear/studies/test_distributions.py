@@ -134,10 +134,16 @@ def test_settings_set_several_keys_by_one_name(tmp_path):
     [
         ({"parameters": {"a": {"path": "housing.facter", "values": [1.0]}}}, "did you mean housing.factor"),
         ({"parameters": {"a": {"path": "bearings.bearing_3.z_mm", "values": [1.0]}}}, "bearings.bearing_1.z_mm"),
-        ({"parameters": {"a": {"path": "housing.factor", "values": [1.0], "step": 0.1}}}, "values and step is given"),
-        ({"parameters": {"a": {"path": "housing.factor"}}}, "give one of values, range"),
-        ({"parameters": {"a": {"values": [1.0]}}}, "give path or paths"),
-        ({"parameters": {"a": {"path": "housing.factor", "normal": {"deviation": 0.1}}}}, "say how often, samples"),
+        ({"parameters": {"a": {"path": "housing.factor", "values": [1.0], "step": 0.1}}}, "values and step is set"),
+        ({"parameters": {"a": {"path": "housing.factor"}}}, "set exactly one of values, range"),
+        (
+            {"parameters": {"a": {"values": [1.0]}}},
+            "set path or paths; settings contain their own paths and require neither",
+        ),
+        (
+            {"parameters": {"a": {"path": "housing.factor", "normal": {"deviation": 0.1}}}},
+            "has a distribution; set the number of draws, such as samples = 64",
+        ),
         ({"samples": 8}, "no parameter has a distribution"),
         ({"outputs": {"f": {"quantity": "frequencis"}}}, "did you mean 'frequencies'?"),
         ({"outputs": {"f": {"quantity": "frequencies", "cont": 3}}}, "did you mean 'count'?"),
@@ -158,7 +164,7 @@ def test_a_study_that_cannot_be_is_told_with_file_key_and_remedy(tmp_path, chang
 def test_a_sobol_sequence_of_an_uneven_number_of_points_is_refused():
     content = {"name": "a", "case": "b", "samples": 100, "sampling": "sobol", "outputs": {"f": {}}}
     content["parameters"] = {"a": {"path": "p", "normal": {"deviation": 1.0}}}
-    with pytest.raises(StudyError, match="even over a power of two"):
+    with pytest.raises(StudyError, match=": a Sobol sequence requires a power of two"):
         parse_study(content, "s")
 
 

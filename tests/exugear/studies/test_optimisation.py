@@ -79,5 +79,5 @@ def test_points_on_a_front_are_beaten_by_none():
 
 
 def test_parameters_of_a_search_need_limits(tmp_path):
-    with pytest.raises(ValueError, match="needs the limits of each parameter"):
+    with pytest.raises(ValueError, match="an optimisation requires bounds for each parameter; set a key uniform for"):
         Study.from_dict({**study_content(tmp_path), "optimise": {"minimise": ["nearest"]}})

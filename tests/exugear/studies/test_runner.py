@@ -201,14 +201,17 @@ def test_a_point_that_kills_every_worker_is_given_up_and_no_other_is_blamed(tmp_
 
     found = executors.compute_points(task_of(study, tmp_path / "out"), points, opened, lambda record: None)
     assert [name for name, record in found.items() if record.error] == [points[3].point]
-    assert "lost 3 times" in found[points[3].point].error
+    assert "unexpectedly 3 times" in found[points[3].point].error
     assert breaking.batches[-1] == [points[3].point]
 
 
 def test_an_executor_that_was_given_is_not_started_again(tmp_path):
     study = small_study(tmp_path)
     first = next(study.hashed_points())[0]
-    with pytest.raises(ExecutorError, match="what is finished is kept"):
+    with pytest.raises(
+        ExecutorError,
+        match="the executor lost its workers; finished points are stored, start again with another executor",
+    ):
         run_study(study, tmp_path / "out", given(Breaking(first), 1))
 
 

@@ -26,28 +26,28 @@ def nearest(**options):
     ("changes", "words"),
     [
         *(
-            ({"outputs": {name: FREQUENCIES}}, f"outputs.{name}: this name is that of what is told of each point")
+            ({"outputs": {name: FREQUENCIES}}, f"outputs.{name}: this is the name of the results of each point")
             for name in ("error", "seconds", "memory", "doubts")
         ),
-        ({"parameters": {"error": SEAT}}, "parameters.error: this name is that of what is told of each point"),
-        ({"parameters": {"mode": SEAT}}, "parameters.mode: this name is that of a dimension of outputs.frequency"),
-        ({"parameters": {"forces": SEAT}}, "outputs.forces: parameters.forces has this name, too"),
-        ({"parameters": {"sample": DRAWN}, "samples": 4}, "parameters.sample: this name is that of the draws"),
+        ({"parameters": {"error": SEAT}}, "parameters.error: this is the name of the results of each point"),
+        ({"parameters": {"mode": SEAT}}, "parameters.mode: this is the name of a dimension of outputs.frequency"),
+        ({"parameters": {"forces": SEAT}}, "outputs.forces: parameters.forces has the same name; rename one"),
+        ({"parameters": {"sample": DRAWN}, "samples": 4}, "parameters.sample: this is the name of the draws"),
         (
             {"parameters": {"a": SEAT, "b": SEAT}},
-            "parameters.b: sets housing.factor, and parameters.a housing.factor; give it to one of them",
+            "parameters.b: sets housing.factor, and parameters.a housing.factor; remove one of them",
         ),
         (
             {"parameters": {"a": {"paths": ["housing.factor", "housing.factor"], "values": [0.2, 0.4]}}},
-            "parameters.a: sets housing.factor twice; name it once",
+            "parameters.a: sets housing.factor twice; remove one",
         ),
         (
             {"parameters": {"a": SEAT | {"values": [0.3, 0.5, 0.3]}}},
-            "parameters.a: values 1 and 3 are one and the same point, housing.factor = 0.3",
+            "parameters.a: values 1 and 3 are the same point, housing.factor = 0.3",
         ),
         (
             {"parameters": {"a": {"path": "housing.factor", "range": {"first": 0.3, "last": 0.3, "count": 2}}}},
-            "parameters.a: values 1 and 2 are one and the same point",
+            "parameters.a: values 1 and 2 are the same point,",
         ),
         (
             {"outputs": {"f": FREQUENCIES | {"count": -1}}},
@@ -74,7 +74,7 @@ def nearest(**options):
         ),
         (
             {"outputs": {"f": {"quantity": "loudest_frequency", "from_Hz": 900.0, "to_Hz": 100.0}}},
-            "outputs.f.from_Hz = 900: lies above to_Hz = 100",
+            "outputs.f.from_Hz = 900: must be below to_Hz = 100",
         ),
     ],
 )

@@ -208,24 +208,39 @@ def test_a_search_over_tolerances_that_is_begun_again_computes_nothing_twice(tmp
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"optimise": {"minimise": ["f"], "limits": {"g": {"min": 1.0}}}}, "optimise.limits: no output 'g'"),
-        ({"optimise": {"minimise": ["f"], "limits": {"f": {}}}}, "set min, max or both"),
-        ({"optimise": {"minimise": ["f"], "limits": {"f": {"min": 2.0, "max": 1.0}}}}, "min must not be above"),
+        ({"optimise": {"minimise": ["f"], "limits": {"g": {"min": 1.0}}}}, "optimise.limits: no result 'g'"),
+        ({"optimise": {"minimise": ["f"], "limits": {"f": {}}}}, "set `least`, `most` or both"),
+        (
+            {"optimise": {"minimise": ["f"], "limits": {"f": {"min": 2.0, "max": 1.0}}}},
+            "`least` must not be above `most`",
+        ),
         ({"optimise": {"minimise": ["f"], "limits": {"f": {"min": float("nan")}}}}, "finite number"),
-        ({"optimise": {"minimise": ["f", "f"]}}, "f against itself"),
+        ({"optimise": {"minimise": ["f", "f"]}}, "f is listed twice; set two different results, or one"),
         ({"optimise": {"minimise": ["f"], "population": 4}}, "population = 4"),
-        ({"optimise": {"minimise": ["many"]}}, "outputs.many has a number for each mode; a search needs a single one"),
-        ({"optimise": {"minimise": ["f"], "percentile": 95.0}}, "is taken over tolerances"),
-        ({"tolerances": {"made": MADE}}, "say how many draws each point has"),
-        ({"tolerances": {"made": MADE}, "samples": 12, "sampling": "sobol"}, "a power of two of points"),
-        ({"tolerances": {"made": {"path": "housing.factor", "values": [1.0]}}, "samples": 8}, "give it a distribution"),
+        (
+            {"optimise": {"minimise": ["many"]}},
+            ": outputs.many has a value for each mode; an optimisation requires a single one",
+        ),
+        ({"optimise": {"minimise": ["f"], "percentile": 95.0}}, "optimise.percentile: requires tolerances; add"),
+        ({"tolerances": {"made": MADE}}, "tolerances: set the number of draws per point, such as samples = 32"),
+        (
+            {"tolerances": {"made": MADE}, "samples": 12, "sampling": "sobol"},
+            ": a Sobol sequence requires a power of two",
+        ),
+        (
+            {"tolerances": {"made": {"path": "housing.factor", "values": [1.0]}}, "samples": 8},
+            ": set a distribution: normal, uniform or iso1328",
+        ),
         ({"tolerances": {"made": {**MADE, "acts": "replaces"}}, "samples": 8}, "tolerances.made: replaces housing.fac"),
         ({"tolerances": {"made": {**MADE, "path": "housing.facter"}}, "samples": 8}, "did you mean housing.factor"),
         ({"tolerances": {"made": {**MADE, "path": "name"}}, "samples": 8}, "no number there"),
-        ({"tolerances": {"sample": MADE}, "samples": 8}, "tolerances.sample: this name is that of the draws"),
-        ({"tolerances": {"seat": MADE}, "samples": 8}, "tolerances.seat: parameters.seat has this name, too"),
-        ({"tolerances": {"f_high": MADE}, "samples": 8}, "tolerances.f_high: this name is that of a percentile of out"),
-        ({"optimise": None, "tolerances": {"made": MADE}}, "tolerances: belong to a search"),
+        ({"tolerances": {"sample": MADE}, "samples": 8}, "tolerances.sample: this is the name of the draws"),
+        (
+            {"tolerances": {"seat": MADE}, "samples": 8},
+            "tolerances.seat: parameters.seat has the same name; rename one",
+        ),
+        ({"tolerances": {"f_high": MADE}, "samples": 8}, "tolerances.f_high: this is the name of a percentile of out"),
+        ({"optimise": None, "tolerances": {"made": MADE}}, "; otherwise define the draws as parameters"),
     ],
 )
 def test_searches_that_cannot_be_are_refused_on_reading(tmp_path, changes, words):
@@ -277,7 +292,7 @@ def test_the_verb_tells_percentiles_limits_and_front(tmp_path):
 def test_a_search_that_finds_nothing_within_its_limits_ends_with_1_and_says_so(tmp_path):
     outcome = verb(tmp_path, damped(tmp_path, {"frequency": {"min": 1e6, "max": 2e6}}))
     assert outcome.exit_code == 1
-    assert "points that were looked at keeps the limits frequency from 1e+06 to 2e+06; widen" in outcome.stderr
+    assert "evaluated points meets the limits frequency min 1e+06 max 2e+06; widen" in outcome.stderr
     data = load_study(tmp_path / "out" / "study.nc")
     assert not data["meets_limits"].any() and not data["on_front"].any()
     assert (tmp_path / "out" / "pictures" / "search.png").is_file()

@@ -49,4 +49,4 @@ def test_names_of_meshes_keep_their_digits_and_those_of_planets_are_one() -> Non
     ):
         stiffness = mesh_stiffness(gearbox, "constant", ".")
         (name, *_) = modes_of(assemble(gearbox, Choice("rigid", "constant"), stiffness)).names[-1:]
-        assert f"strained: {told} " in name or "strained: planet_ring " in name
+        assert f"strain energy: {told} " in name or "strain energy: planet_ring " in name

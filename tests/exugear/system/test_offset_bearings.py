@@ -210,7 +210,7 @@ def test_a_stated_load_has_no_direction_and_its_law_passes_the_origin(tmp_path):
     n = assembly.connector_names.index("ball")
     assert not assembly.connectors.offset[n].any()
     assert assembly.connectors.offset[assembly.connector_names.index("taper_1")].any()
-    assert "ball: linear, at a stated load, through the origin" in assembly.bearing_laws
+    assert "ball: linear, at a specified load, through the origin" in assembly.bearing_laws
     assert "taper_1: linear, at the static load" in assembly.bearing_laws
 
 

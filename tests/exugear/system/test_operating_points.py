@@ -140,7 +140,10 @@ def test_an_elastic_housing_takes_non_linear_bearings_with_clearance(grc):
 
 def test_a_shaft_that_is_held_one_way_only_is_named_with_its_bearings(tmp_path):
     loose = bearing_gearbox(tmp_path, bearings__taper_1__catalogue__locates_towards="+z")
-    with pytest.raises(BalanceError, match="taper_1, taper_2: held along the axis in one direction only"):
+    with pytest.raises(
+        BalanceError,
+        match="taper_1, taper_2: located axially in one direction only; check arrangements and `locates_towards`",
+    ):
         on_bearings(loose)
 
 

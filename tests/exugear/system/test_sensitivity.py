@@ -74,8 +74,8 @@ def test_the_housing_factor_counts_only_where_there_are_bearings(spur):
         variant: [parameter.label for parameter in assumed_parameters(spur, Choice(variant), stiffness)]
         for variant in ("rigid", "bushing")
     }
-    assert "housing factor" not in labels["rigid"]
-    assert "housing factor" in labels["bushing"]
+    assert "housing stiffness factor" not in labels["rigid"]
+    assert "housing stiffness factor" in labels["bushing"]
     assert not any(label.startswith("planet") for label in labels["bushing"])
 
 

@@ -196,7 +196,7 @@ def test_a_second_process_on_a_run_is_turned_away_and_changes_nothing(case: Path
             for more in ((), ("--resume",)):
                 second = run(case, out, *more)
                 assert second.exit_code == 1
-                assert "another process is at work on it" in second.stderr
+                assert ": in use by another process; wait until it ends, or stop it" in second.stderr
             assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
         finally:
             go.touch()
@@ -211,12 +211,12 @@ def test_what_an_earlier_version_left_is_refused_and_what_is_complete_is_said(ca
     (directory / "run.partial.nc").write_bytes(b"HDF")
     outcome = run(case, tmp_path, "--resume")
     assert outcome.exit_code == 2
-    assert "run.partial.nc: was written by an earlier version, which cannot be gone on with" in outcome.stderr
+    assert "run.partial.nc: was written by an earlier version and cannot be resumed" in outcome.stderr
     assert run(case, tmp_path, "--duration", 0.02).exit_code == 0
     assert [path.name for path in directory.iterdir()] == ["run.nc"]
     outcome = run(case, tmp_path, "--resume")
     assert outcome.exit_code == 2
-    assert "run.nc: is complete, nothing was stopped" in outcome.stderr
+    assert "run.nc: is complete; nothing to resume" in outcome.stderr
     (directory / "run.nc").write_bytes(b"")
     outcome = run(case, tmp_path, "--resume")
     assert outcome.exit_code == 2
@@ -263,7 +263,7 @@ def test_pieces_of_two_runs_never_mix(case: Path, tmp_path: Path) -> None:
     assert 0 < cut.sizes["time"] < whole.sizes["time"]
     assert np.array_equal(cut["overall_dte"], whole["overall_dte"][: cut.sizes["time"]])
     (one / "000001.npz").unlink()
-    with pytest.raises(FileError, match="holds no piece of a run"):
+    with pytest.raises(FileError, match=": contains no part of a run"):
         load_run(one)
 
 

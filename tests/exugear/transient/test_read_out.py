@@ -71,7 +71,7 @@ def deviations(found: SimpleNamespace, rows: NDArray, name: str) -> NDArray:
 @pytest.mark.parametrize(
     ("method", "step", "factor"),
     [(adams(5), 1 / 60e3, 3), (adams(5), 1 / 60e3, 1), (adams(6), 1 / 40e3, 2), (stabilised(), 1 / 60e3, 3)],
-    ids=["as chosen", "every step", "longer steps", "stabilised"],
+    ids=["as chosen", "; correct the file", "longer steps", "stabilised"],
 )
 def test_signals_on_bearings_are_those_of_the_states(
     grc: Gearbox, stiffness: dict, method: Method, step: float, factor: int

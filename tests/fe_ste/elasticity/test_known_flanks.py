@@ -154,7 +154,7 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "file"))
     (flank,) = known_flanks([(HELICAL_12, 1)], COARSE)
     assert flank.gear == HELICAL_12
-    assert "each flank cannot be kept" in caplog.text
+    assert "each flank cannot be stored" in caplog.text
 
 
 def test_files_used_least_lately_are_removed(kept: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -139,7 +139,7 @@ def tight_internal_distance(pinion: Gear, gear: Gear) -> float:
 # --- refusals -------------------------------------------------------------------------------------
 
 REFUSED_GEARS: dict[str, tuple[dict[str, Any], str]] = {
-    "no teeth": ({"teeth": 0}, r"gear 'wheel': teeth = 0 must be a whole number of at least 5"),
+    "no torque": ({"teeth": 0}, r"gear 'wheel': teeth = 0 must be a whole number of at least 5"),
     "negative teeth": ({"teeth": -20}, r"teeth = -20 must be a whole number"),
     "half a tooth": ({"teeth": 20.5}, r"teeth = 20\.5 must be a whole number"),
     "teeth as a truth value": ({"teeth": True}, r"teeth = True must be a whole number"),

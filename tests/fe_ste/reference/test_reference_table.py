@@ -51,11 +51,11 @@ def test_a_table_says_what_it_is_and_names_its_units(path):
 def test_a_table_is_refused_for_another_input_and_as_one_of_the_superelement(path, tmp_path):
     with pytest.raises(TableError, match="another input"):
         NonlinearTable.open(path, dataclasses.replace(WANTED, torque=101.0))
-    with pytest.raises(TableError, match="holds no static transmission error table"):
+    with pytest.raises(TableError, match="is not a file of static transmission error table"):
         MeshTable.open(path, TableInput(pair=PAIR, torque=(100.0,), positions=2))
     with pytest.raises(TableError, match="no such file"):
         NonlinearTable.open(tmp_path / "none.nc")
-    (tmp_path / "text.nc").write_text("no netCDF")
+    (tmp_path / "text.nc").write_text(": is not a netCDF file")
     with pytest.raises(TableError, match="no checksum at its end"):
         NonlinearTable.open(tmp_path / "text.nc")
 

@@ -152,7 +152,7 @@ def test_a_full_disk_costs_the_cache_and_not_the_work(small: Path) -> None:
         check=False,
     )
     assert outcome.stdout == "3.0\n", outcome.stderr
-    assert outcome.stderr.count("compiled kernels cannot be kept (File too large)") == 1
+    assert outcome.stderr.count("compiled kernels cannot be stored (File too large)") == 1
 
 
 def test_few_folders_of_older_sources_stay(small: Path) -> None:

@@ -317,7 +317,7 @@ def test_a_folder_that_cannot_be_written_costs_nothing_but_time(
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "file"))
     (contact,) = known_contacts([WANTED])
     assert isinstance(contact, MeanContact)
-    assert "each contact cannot be kept" in caplog.text
+    assert "each contact cannot be stored" in caplog.text
 
 
 def test_a_full_disk_costs_nothing_but_time(

@@ -166,5 +166,5 @@ def test_too_many_unsolved_states_are_refused() -> None:
     solved[:, :, :, 3] = False
     pmc = np.arange(24) / 24
     ste, slope, tilting = shape(*np.meshgrid(pmc, CENTRE, TILT, FORCE, indexing="ij"))
-    with pytest.raises(InterpolationError, match="600 of 2400 states are not solved"):
+    with pytest.raises(InterpolationError, match="600 of 2400 states not converged"):
         SteSurface.from_nodes(CENTRE, TILT, FORCE, ste, 1.0 / slope, tilting, solved=solved)

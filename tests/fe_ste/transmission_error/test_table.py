@@ -139,7 +139,7 @@ def test_no_damaged_or_edited_table_is_used(table: MeshTable, tmp_path: Path) ->
 
 def test_netcdf_without_a_table_is_refused(tmp_path: Path) -> None:
     write_dataset(tmp_path / "other.nc", xr.Dataset({"other": ("x", [1.0])}))
-    with pytest.raises(TableError, match="holds no static transmission error table"):
+    with pytest.raises(TableError, match="is not a file of static transmission error table"):
         MeshTable.open(tmp_path / "other.nc")
 
 

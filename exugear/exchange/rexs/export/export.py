@@ -110,7 +110,7 @@ class StoredResults:
         data = load_run(path, ("mesh_force",))
         case = str(data.attrs["load_case"])
         if case not in self.gearbox.load_cases:
-            raise GearboxFileError(f"the case has no load case {case!r}")
+            raise GearboxFileError(f"the gearbox file has no load case {case!r}")
         self._check(_choice(data.attrs), data.attrs, case)
         return replace(_choice(data.attrs), load_case=case), data
 
@@ -136,7 +136,7 @@ class StoredResults:
             stiffness = mesh_stiffness(self.gearbox, choice.mesh_model, self.folder)
             self._assemblies[choice] = assemble(self.gearbox, choice, stiffness, bodies)
         if input_hash(self._assemblies[choice], load_case) != attributes.get("input_hash"):
-            raise GearboxFileError("was computed from another input; compute it again")
+            raise GearboxFileError("was computed from another input; recompute it")
 
 
 def _choice(attributes: Mapping[str, Any]) -> Choice:
@@ -171,8 +171,8 @@ def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
         missing = [name for name in own if name not in others]
         if missing:
             faults.append(
-                f"{gearbox.source}: {kind} {', '.join(missing)} do not come from this file, whose {kind} are imported "
-                f"as {', '.join(others)}; keep the names of the import"
+                f"{gearbox.source}: {kind} {', '.join(missing)} do not originate from this file, whose {kind} are "
+                f"imported as {', '.join(others)}; keep the names of the import"
             )
     for name in gearbox.gears.keys() & imported.gears.keys():
         gear = gearbox.gears[name]
@@ -181,7 +181,7 @@ def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
             if not math.isclose(getattr(gear, key), getattr(other, key), rel_tol=EQUAL):
                 faults.append(
                     f"{gearbox.source}: gears.{name} has {key} = {getattr(gear, key):g}, in this file it is "
-                    f"{getattr(other, key):g}: results of another gear do not belong into it"
+                    f"{getattr(other, key):g}; export results of the same gear only"
                 )
     if faults:
         raise RexsError(*faults)

@@ -175,9 +175,9 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
             bodies.append(Body(names[root], tuple(_axial(parts)), _axis(places, parts, pins), fixed))
             stopped = [str(part) for part in parts if part.number in held]
             if stopped and not _is_fixed(parts, ()):
-                notes.changed.append(f"{', '.join(stopped)}: held, since the file defines its speed as 0")
+                notes.changed.append(f"{', '.join(stopped)}: fixed, since the file defines its speed as 0")
         elif root not in planets and not _is_fixed(parts, held):
-            notes.lost.append(f"{', '.join(str(part) for part in parts)}: in no mesh, turns idly")
+            notes.lost.append(f"{', '.join(str(part) for part in parts)}: in no mesh, rotates without load")
     by_root = {union.root(part.number): body for body in bodies for part in body.parts}
     carried = [
         one for members in sets for one in _split_by_orbit(places, members, _carrier(model, union, by_root, members))
@@ -219,8 +219,9 @@ def _joined(model: Model, notes: Notes) -> _Union:
         held = {union.root(end.number) for end in (inner, outer)}
         if casings and union.root(casings[0]) in held and len(held) > 1:
             notes.changed.append(
-                f"{connection}: holds {inner} against turning and yields otherwise; taken as rigid, since a body that "
-                "does not turn stands still here: loads of its gears that even out in the gearbox do so less"
+                f"{connection}: constrains the rotation of {inner} and is elastic otherwise; modelled as rigid, since "
+                "a body that does not rotate is fixed here: load sharing of its gears is less even than in the "
+                "gearbox"
             )
             union.join(inner.number, outer.number)
     return union
@@ -279,11 +280,11 @@ def _axis(places: Places, parts: Sequence[Component], pins: set[int]) -> tuple[f
     own = sorted((p for p in parts if p.type in rank and p.number not in pins), key=lambda part: rank[part.type])
     own = [part for part in own if part.given("support_vector")]
     if not own:
-        raise RexsError(f"{parts[0]}: nothing tells where its axis lies")
+        raise RexsError(f"{parts[0]}: the position of its axis is not defined")
     x, y, _ = places.position(own[0])
     for part in own[1:]:
         if math.dist((x, y), places.position(part)[:2]) > COAXIAL:
-            raise RexsError(f"{part}: is joined rigidly to {own[0]} and does not share its axis")
+            raise RexsError(f"{part}: is rigidly connected to {own[0]} but not on its axis")
     return x, y
 
 
@@ -294,7 +295,7 @@ def _planet_sets(
     sets: dict[tuple[object, ...], list[tuple[int, Component]]] = {}
     for relation in model.relations_of("planet_shaft"):
         if not {"shaft", "planetary_stage"} <= relation.roles.keys() or relation.roles["shaft"] not in union:
-            raise RexsError("a relation 'planet_shaft' does not say which shaft and which planetary_stage it joins")
+            raise RexsError("a relation 'planet_shaft' lacks the shaft or the planetary_stage")
         shaft = model.components[relation.roles["shaft"]]
         root = union.root(shaft.number)
         gears = sorted(
@@ -336,7 +337,7 @@ def _carrier(
     carriers = [by_root[root] for root in roots if root in by_root]
     if not carriers:
         raise RexsError(
-            f"{model.components[stage]}: no planet_carrier_shaft or planet_pin tells which carrier {shaft} turns on"
+            f"{model.components[stage]}: no planet_carrier_shaft or planet_pin defines the carrier of {shaft}"
         )
     return carriers[0]
 

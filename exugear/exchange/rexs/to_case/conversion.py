@@ -136,7 +136,7 @@ def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Seq
     plates = [one for part in body.of_type("side_plate") if (one := plate(model, places, part, notes)) is not None]
     inertia = inertia_of([*sections, *tubes.values(), *plates])
     if inertia.mass <= 0.0:
-        raise RexsError(f"{body.parts[0]}: neither sections nor gears nor plates give its inertia")
+        raise RexsError(f"{body.parts[0]}: inertia is not defined by sections, gears or plates")
     made_of = [
         f"{len(found)} {name}{'s' if len(found) > 1 else ''}"
         for name, found in (("section", sections), ("gear tube", tubes), ("plate", plates))
@@ -144,10 +144,10 @@ def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Seq
     ]
     block.blocks[f"inertia.{INERTIAS}"] = Block("", _inertia_entries(inertia, ", ".join(made_of)))
     if _has_shape(model, body, sections):
-        block.entries["flexibility"] = derived("elastic", "in the variant flexible: its sections follow each other")
+        block.entries["flexibility"] = derived("elastic", "in the variant flexible: its sections in sequence")
         block.blocks["shape"] = _shape(model, body, sections, notes)
         block.blocks["shape.blanks"] = Block(
-            "gears as tubes from their seats to their reference circles",
+            "gears as hollow cylinders from seat to reference diameter",
             {teeth.names[number]: _blank(tube) for number, tube in tubes.items() if tube.mass > 0.0},
         )
         if not block.blocks["shape.blanks"].entries:
@@ -417,7 +417,7 @@ def _refuse_types(model: Model, notes: Notes) -> None:
             notes.faults.add(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
     notes.faults.tell()
     if not any(True for _ in model.relations_of("stage")) or not model.of_type(*GEARS):
-        notes.faults.add("the file holds no stage of two cylindrical gears: there is no gearbox to import")
+        notes.faults.add("the file has no stage of two cylindrical gears; nothing to import")
 
 
 def _refuse_misplaced(model: Model, notes: Notes) -> None:
@@ -500,8 +500,8 @@ class _Draft:
             return
         blocks = dict(self.groups)["bodies"]
         for body, reason in reasons.items():
-            self.notes.changed.append(f"bodies.{body}: rigid in the variant flexible, too: {reason}")
-            blocks[f"bodies.{body}"].entries["flexibility"] = assumed("none", "its sections give no seats, see above")
+            self.notes.changed.append(f"bodies.{body}: also rigid in the variant flexible: {reason}")
+            blocks[f"bodies.{body}"].entries["flexibility"] = assumed("none", "its sections define no seats, see above")
 
     def rated_gears(self) -> dict[str, tuple[Component, bool]]:
         """Gears by name, and whether their teeth bend both ways: those with several mates do."""
@@ -551,7 +551,7 @@ def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str
         ),
         "static_load": Block(
             "the state that tables are computed for",
-            {"torques_N_m": static, "locked": derived([ends.output], "the output holds what the input gives")},
+            {"torques_N_m": static, "locked": derived([ends.output], "the output balances the input")},
         ),
     }
     for unit in model.of_type("gear_unit")[:1]:
@@ -569,13 +569,13 @@ def _head(model: Model, source: str, notes: Notes) -> list[str]:
     """Comment at the beginning: origin, what marks mean, and all that a reader must know."""
     lines = [
         f"Imported from {plain(Path(source).name)}: REXS {model.version}, written by {plain(model.program)}.",
-        "After each value stands the attribute that gives it, after each table the component.",
-        "D is computed here from what the file gives, A is assumed: the file does not give it. Check all A.",
+        "The comment after each value is its attribute, the comment after each table its component.",
+        "D: computed from values of the file. A: assumed, not in the file. Check all A.",
         "Axes: z along the shafts, x and y are v and w of the gear unit; mm.",
     ]
     for title, found in (
         ("Replaced or assumed", notes.changed),
-        ("Said twice, compared", notes.checked),
+        ("Defined twice, compared", notes.checked),
         ("Left out", [*notes.lost, *notes.ignored]),
     ):
         if found:
@@ -609,9 +609,11 @@ def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes:
             if not base or body == ends.input or body not in mode:
                 continue
             rolls = base * mode[body] / mode[ends.input]
-            notes.checked.append(f"{load.name}: {body} turns at {speed:.6g} rpm, the train rolls at {rolls:.6g} rpm")
+            notes.checked.append(
+                f"{load.name}: {body} rotates at {speed:.6g} rpm, kinematics result in {rolls:.6g} rpm"
+            )
             if abs(rolls - speed) > SPEED_TOLERANCE * max(abs(rolls), abs(speed)):
                 notes.faults.add(
-                    f"{load.name}: the file turns {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
-                    f"train rolls at {rolls:g} rpm"
+                    f"{load.name}: the file has {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
+                    f"kinematics result in {rolls:g} rpm"
                 )

@@ -71,7 +71,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
             part, both = _stage(model, relation.roles)
             pair = frozenset(first.get(gear.number, gear.number) for gear in both)
             if len(pair) == 1:
-                raise RexsError(f"{part}: planets of one set mesh with each other, which cannot be")
+                raise RexsError(f"{part}: planets of one set mesh with each other; correct the stage")
             met.setdefault(pair, (part, [model.components[number] for number in sorted(pair)]))
             _check_direction(places, part, both, notes)
     notes.faults.tell()
@@ -96,7 +96,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     owners = {number: body for number in gears if (body := bodies.of(model.components[number])) is not None}
     lost = [str(gears[number].part) for number in gears if number not in owners]
     if lost:
-        raise RexsError(f"{', '.join(lost)}: no relation tells on which shaft it sits")
+        raise RexsError(f"{', '.join(lost)}: no relation defines its shaft")
     return Teeth(
         gears,
         _gear_names(gears, stages, owners),
@@ -136,7 +136,9 @@ def _check_direction(places: Places, stage: Component, gears: Sequence[Component
     # From v over w, with u: the angle of the second gear's centre as seen from the first, zero along w.
     angle = math.degrees(math.atan2(other[0] - one[0], other[1] - one[1]))
     if stated is not None and abs(math.remainder(stated - angle, 360.0)) > ANGLE_TOLERANCE:
-        notes.checked.append(f"{stage}: turned by {stated:g} deg as it says, by {angle:.4f} deg as its gears stand")
+        notes.checked.append(
+            f"{stage}: rotated by {stated:g} deg in the file, by {angle:.4f} deg from the gear positions"
+        )
 
 
 def _ordered(
@@ -155,7 +157,7 @@ def _ordered(
             apart = math.dist(places.position(one)[:2], places.position(other)[:2])
             both = gears[pinion.number], gears[gear.number]
             if both[1].internal and both[1].teeth <= both[0].teeth:
-                raise RexsError(f"{part}: a ring of {both[1].teeth} teeth has no room for {both[0].teeth}")
+                raise RexsError(f"{part}: a ring gear of {both[1].teeth} teeth is too small for {both[0].teeth}")
             distance = centre_distance(part, apart, both, notes)
             common = _common_face(places, part, *both)
             stages.append(Stage(part, pinion.number, gear.number, distance, apart, common))
@@ -176,7 +178,7 @@ def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Tooth
     if stated is not None and stated < min(least, overlap) - FACE_TOLERANCE:
         return read(tidy(stated), "common_face_width")
     if 0.0 < overlap < least - FACE_TOLERANCE:
-        return derived(overlap, "overlap of the faces as they stand")
+        return derived(overlap, "overlap of the face widths at their positions")
     return None
 
 
@@ -227,8 +229,8 @@ def axes_to_move(
         if moving.name in settled:
             if abs(apart - stage.distance.value) > PLACE_TOLERANCE:
                 raise RexsError(
-                    f"{stage.part}: its centre distance of {stage.distance.value:g} mm and those of the other stages "
-                    "cannot all be; import with --distances positions, or correct them"
+                    f"{stage.part}: its centre distance of {stage.distance.value:g} mm contradicts the other stages; "
+                    "import with --distances positions, or correct them"
                 )
             continue
         share = stage.distance.value / apart - 1.0
@@ -352,7 +354,7 @@ def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder
     if gear.root_form is not None:
         entries["root_form_diameter_mm"] = gear.root_form
     rack = {"addendum": 1.0, "dedendum": gear.dedendum.value, "tip_radius": gear.tip_radius.value}
-    tip = "addendum: tip_diameter_mm counts" if gear.tip is not None else "addendum: A"
+    tip = "addendum: tip_diameter_mm is used" if gear.tip is not None else "addendum: A"
     parts = (tip, f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
     entries["rack"] = Entry(rack, "; ".join(" ".join(part.split()) for part in parts))
     if gear.cutter is not None:
@@ -362,7 +364,7 @@ def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder
     if table is not None:
         entries["material"] = table
     elif is_rigid(material):
-        notes.changed.append(f"{gear.part}: its material stands for 'rigid', taken as steel")
+        notes.changed.append(f"{gear.part}: its material means 'rigid'; steel is used")
     return entries
 
 
@@ -373,10 +375,12 @@ def _held(gear: Toothing, z: float, sections: Sequence[Cylinder]) -> Entry:
     rim = 0.0 if seat is None else 0.5 * abs(root - seat)
     fits = seat is not None and ((seat > root) if gear.internal else (0.0 < seat < root))
     if fits and seat is not None and rim >= LEAST_RIM * gear.module.value:
-        return derived(tidy(seat), "seat on its shaft" if not gear.internal else "bore that holds the ring")
+        return derived(
+            tidy(seat), "seat on its shaft" if not gear.internal else ("outside diameter of the ring, in its seat")
+        )
     if gear.internal:
         return assumed(tidy(round(root + 6.0 * gear.module.value, 4)), "root diameter and a rim of 3 normal modules")
-    why = f"{HELD_SHARE:g} root diameters: one with its shaft, or no seat given"
+    why = f"{HELD_SHARE:g} root diameters: integral with its shaft, or no seat specified"
     return assumed(tidy(round(HELD_SHARE * root, 4)), why)
 
 

@@ -151,7 +151,7 @@ def _point_force(model: Model, places: Places, bodies: Bodies, load: Component, 
     body = _owner(model, bodies, load)
     size = " and ".join(f"{np.linalg.norm(one):g} {unit}" for one, unit in ((force, "N"), (moment, "N m")) if one.any())
     if shaft is None or body is None:
-        notes.lost.append(f"{load}: {size}; what it acts on stands still, is a planet, or is left out")
+        notes.lost.append(f"{load}: {size}; the body it acts on is fixed, is a planet, or is not imported")
         return None
     axes = places.axes(shaft)
     z = places.position(shaft)[2] + places.sense(shaft) * (load.quantity("u_coordinate_on_shaft", "mm") or 0.0)
@@ -215,8 +215,8 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
     links = {body.name: links[body.name] for body in turning if body.name in links}
     if len(links) < 2:
         raise RexsError(
-            f"only {', '.join(links) or 'nothing'} can turn in mesh, all else is joined with the casing: "
-            "a gearbox has an input and an output; open one of the connections with the casing"
+            f"only {', '.join(links) or 'nothing'} can rotate, all other bodies are connected to the casing: a "
+            "gearbox requires an input and an output; remove one connection with the casing"
         )
     defined = {b.name for b in turning for part in b.parts if part.flag("defines_speed") is True}
     loaded = [
@@ -232,9 +232,9 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
     why = "bodies with an external_load; the input has the torque or defines the speed"
     if not others:
         others = [name for name, count in links.items() if count == 1 and name != first]
-        why = "the file loads one body only; the output is the other end of the train"
+        why = "the file has a load on one body only; the output is the other end of the train"
     if not others:
-        raise RexsError("no external_load tells which shafts are driven and loaded: add one on each of them")
+        raise RexsError("no external_load defines the driven and loaded shafts; add one on each of them")
     return Ends(first, others[-1], why)
 
 
@@ -242,7 +242,7 @@ def static_load(loads: Sequence[Loads], ends: Ends) -> Entry:
     """Torque of the static state: the largest of all load cases at the input."""
     torques = [load.torques[ends.input] for load in loads if load.torques.get(ends.input)]
     if not torques:
-        return assumed({ends.input: UNKNOWN_TORQUE}, "the file gives no torque: SET IT")
+        return assumed({ends.input: UNKNOWN_TORQUE}, "no torque in the file: SET IT")
     source = "torque_around_u_axis, or power over speed" + ("; the largest of the load cases" if len(loads) > 1 else "")
     return read({ends.input: max(torques, key=abs)}, source)
 
@@ -299,7 +299,7 @@ def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: f
 
 
 def _balanced(ends: Ends, torque: float, ratio: float) -> Entry:
-    return derived({ends.input: torque, ends.output: _rounded(-torque / ratio)}, "the output holds the balance")
+    return derived({ends.input: torque, ends.output: _rounded(-torque / ratio)}, "the output balances the torques")
 
 
 def _run_up(ends: Ends, torque: float, ratio: float, speed: float) -> Block:
@@ -312,7 +312,7 @@ def _run_up(ends: Ends, torque: float, ratio: float, speed: float) -> Block:
             "start_speed_rpm": assumed(tidy(LEAST_SHARE * speed), ""),
             "end_speed_rpm": derived(tidy(speed), "the fastest of the file"),
             "drive_stiffness_N_m_per_rad": assumed(
-                tidy(max(100.0 * abs(torque), 10.0)), "the torque of the static state twists it by 0.01 rad"
+                tidy(max(100.0 * abs(torque), 10.0)), "twist 0.01 rad under the torque of the static state"
             ),
             "duration_s": assumed(5.0, ""),
         },
@@ -364,7 +364,7 @@ def life_blocks(
     body, life, lines = rows
     of_life = {"body": Entry(body), "life_years": life}
     file = read(SPECTRUM, "load_case: torque, speed and operating_time_fraction of each")
-    source_block = Block("", {"file": file, "hours_per_year": assumed(HOURS_PER_YEAR, "always at work")})
+    source_block = Block("", {"file": file, "hours_per_year": assumed(HOURS_PER_YEAR, "always active")})
     blocks["loads"] = Block("", of_life, {"sources.load_spectrum": source_block})
     blocks["rating"] = _rating(model, gears)
     lubricant = _lubricant(model)
@@ -382,7 +382,7 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
     if body is None or not sum(shares) or not all(speeds):
         return None
     hours = next((h for unit in model.of_type("gear_unit") if (h := unit.quantity("operating_time", "h"))), None)
-    life = assumed(USUAL_YEARS, "the file gives no operating_time")
+    life = assumed(USUAL_YEARS, "no operating_time in the file")
     if hours:
         life = derived(_rounded(hours / HOURS_PER_YEAR), f"operating_time of {hours:g} h")
     each = [(hours or life.value * HOURS_PER_YEAR) * share / sum(shares) for share in shares]
@@ -418,14 +418,14 @@ def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
     viscosity = (
         read(tidy(min(viscosities)), "viscosity_at_40_degree_celsius of the lubricant")
         if viscosities
-        else assumed(USUAL_VISCOSITY, "the file gives no lubricant")
+        else assumed(USUAL_VISCOSITY, "no lubricant in the file")
     )
     keys = ("dynamic_factor_iso_6336_2006", "dynamic_factor_din_3990_1987")
     factors = [one for stage in model.of_type("cylindrical_stage") for key in keys if (one := stage.quantity(key))]
     dynamic = (
         read(tidy(max(1.0, *factors)), "the largest dynamic_factor of the stages")
         if factors
-        else assumed(USUAL_DYNAMIC_FACTOR, "the file gives none; a run or `steady` gives it, see dynamic_factor_run")
+        else assumed(USUAL_DYNAMIC_FACTOR, "not in the file; computed by a run or `steady`, see dynamic_factor_run")
     )
     block = Block("", {"dynamic_factor": dynamic, "viscosity_40_mm2_per_s": viscosity})
     for name, (gear, both_ways) in gears.items():
@@ -455,7 +455,7 @@ def _strength(material: Component | None, parts: Sequence[Component], both_ways:
         if stated is not None and TOLERANCE_CLASSES[0] <= stated <= TOLERANCE_CLASSES[1]:
             entries.setdefault("tolerance_class", read(stated, key))
     if both_ways:
-        entries["mean_stress_factor"] = assumed(BOTH_WAYS, "Y_M of ISO 6336-3, annex B, for teeth that bend both ways")
+        entries["mean_stress_factor"] = assumed(BOTH_WAYS, "Y_M of ISO 6336-3, annex B, for alternating bending")
     return Block(str(material), entries)
 
 
@@ -469,9 +469,9 @@ def _roughnesses(parts: Sequence[Component]) -> dict[str, Entry]:
     if "roughness_Ra_um" in entries:  # as before; a file that gives both means the same by them
         entries.pop("roughness_Rz_um", None)
     elif "roughness_Rz_um" not in entries:
-        entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "the file gives none")
+        entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "not in the file")
     if "root_roughness_Rz_um" not in entries:
-        entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 by ISO 6336-3")
+        entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 to ISO 6336-3")
     return entries
 
 
@@ -481,7 +481,7 @@ def _curves(kind: str, flank_limit: float) -> dict[str, Entry]:
     if kind.lower() in ("", "false", "none"):
         hard = flank_limit >= HARD_FLANK
         kind = "case_hardened" if hard else "through_hardened"
-        source = f"no heat treatment given; {flank_limit:g} MPa are those of {'' if hard else 'un'}hardened flanks"
+        source = f"no heat treatment in the file; {flank_limit:g} MPa is for {'' if hard else 'un'}hardened flanks"
     found = next((curves for word, curves in CURVES.items() if word in kind), None)
     if found is None:
         return {"curve": assumed("case_hardened", source)}

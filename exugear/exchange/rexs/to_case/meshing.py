@@ -64,7 +64,7 @@ def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothi
     """
     stated = stage.quantity("center_distance", "mm")
     if apart <= PLACE_TOLERANCE:
-        raise RexsError(f"{stage}: both of its gears stand on one axis; correct support_vector of one of them")
+        raise RexsError(f"{stage}: both gears are on one axis; correct support_vector of one of them")
     if stated is None:
         return derived(tidy(round(apart, 9)), "distance of the gears' positions")
     stated = abs(stated)
@@ -76,7 +76,7 @@ def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothi
     if rule == "agreeing" and stated > PLACE_TOLERANCE:
         rule = _confirmed(pair, stated, apart)
         why = "with which the profile shifts agree"
-    both = f"center_distance = {stated:g} mm, but its gears stand {apart:.4f} mm apart"
+    both = f"center_distance = {stated:g} mm, but the distance of the gear positions is {apart:.4f} mm"
     if rule == "agreeing":
         raise RexsError(
             f"{stage}: {both}; correct one of them, or import with --distances positions or --distances file"
@@ -86,7 +86,7 @@ def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothi
     )
     if rule == "positions":
         return derived(tidy(round(apart, 9)), f"distance of the gears' positions, {why}; center_distance {stated:g}")
-    return Entry(tidy(stated), f"center_distance, {why}; the gears stand {apart:.4f} apart")
+    return Entry(tidy(stated), f"center_distance, {why}; distance of the gear positions {apart:.4f}")
 
 
 def _confirmed(
@@ -223,8 +223,8 @@ def _replaceable(
 def _replacement(before: Toothing, after: Toothing) -> str:
     assert before.shift is not None and after.shift is not None
     return (
-        f"{before.part}: addendum_modification_coefficient = {before.shift.value:g} contradicts the centre distances, "
-        f"taken as one that the program left out: {after.shift.value:.6f} without backlash"
+        f"{before.part}: addendum_modification_coefficient = {before.shift.value:g} contradicts the centre distances "
+        f"and is treated as missing: {after.shift.value:.6f} for zero backlash"
     )
 
 
@@ -239,7 +239,7 @@ def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
     sign = -1.0 if gear.internal else 1.0
     total = shift_sum(pinion, gear, stage.distance.value)
     if pinion.shift is None and gear.shift is None:
-        gear = dataclasses.replace(gear, shift=assumed(0.0, "the file gives none for either gear of the stage"))
+        gear = dataclasses.replace(gear, shift=assumed(0.0, "not in the file for either gear of the stage"))
         gears[stage.gear] = gear
     if pinion.shift is None and gear.shift is not None:
         shift = derived(tidy(round(total - sign * gear.shift.value, 9)), "from the centre distance, without backlash")
@@ -252,15 +252,15 @@ def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
 
 def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> None:
     stated, total = _shift_sums(gears, stage)
-    notes.checked.append(f"{stage.part}: sum of profile shifts {stated:.6f}, centre distance asks for {total:.6f}")
+    notes.checked.append(f"{stage.part}: sum of profile shifts {stated:.6f}, the centre distance requires {total:.6f}")
     if abs(stated - total) > SHIFT_TOLERANCE:
         option = ""
         if notes.rules.shifts == "file":
             option = ", or import with --shifts centre-distance, which replaces a shift of 0, or else one of the two"
         raise RexsError(
-            f"{stage.part}: the profile shifts sum to {stated:.5f}, but its centre distance of "
-            f"{stage.distance.value:g} mm asks for {total:.5f}; correct addendum_modification_coefficient "
-            f"or center_distance{option}"
+            f"{stage.part}: the sum of profile shifts is {stated:.5f}, but the centre distance of "
+            f"{stage.distance.value:g} mm requires {total:.5f}; correct addendum_modification_coefficient or "
+            f"center_distance{option}"
         )
 
 
@@ -391,7 +391,7 @@ def told_if_impossible(*gears: Toothing) -> Iterator[None]:
     except (ArithmeticError, ValueError) as error:
         parts = " and ".join(str(gear.part) for gear in gears)
         raise RexsError(
-            f"{parts}: tooth numbers, diameters, shift and tool make no gear together ({error}); correct them"
+            f"{parts}: tooth numbers, diameters, profile shift and tool are inconsistent ({error}); correct them"
         ) from None
 
 
@@ -404,7 +404,7 @@ def with_possible_cutter(gear: Toothing, notes: Notes) -> Toothing:
         check_gear(dataclasses.replace(made, held_diameter=10.0 * made.reference_radius))
     except GeometryError as error:
         why = str(error).removeprefix("gear '': ")
-        notes.changed.append(f"{gear.part}: its cutter is left out, the fillet is an arc instead; {why}")
+        notes.changed.append(f"{gear.part}: its cutter is not imported, the root fillet is an arc instead; {why}")
         return dataclasses.replace(gear, cutter=None)
     return gear
 
@@ -420,7 +420,7 @@ def with_fitting_tool(gear: Toothing, notes: Notes) -> Toothing:
     radius = math.floor(1e4 * most) / 1e4
     if not gear.tip_radius.kind:
         notes.changed.append(
-            f"{gear.part}: a tool with a corner of {gear.tip_radius.value:g} has no tip; {radius:g} taken"
+            f"{gear.part}: a tool tip radius of {gear.tip_radius.value:g} does not fit; {radius:g} is used"
         )
     said = f"{gear.tip_radius.value:g} does not fit on a tool of {gear.pressure_angle.value:g} deg"
     return dataclasses.replace(gear, tip_radius=assumed(radius, said))
@@ -430,16 +430,14 @@ def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
     """Keep a root form diameter where it ends the flank before the fillet does; undercut ends it by itself."""
     bare = unchecked("", dataclasses.replace(gear, root_form=None))
     if bare.is_undercut:
-        notes.checked.append(
-            f"{gear.part}: undercut by its tool; its flank begins at a diameter of {2e3 * bare.form_radius:.4f} mm"
-        )
+        notes.checked.append(f"{gear.part}: undercut by its tool; root form diameter {2e3 * bare.form_radius:.4f} mm")
     if gear.root_form is None:
         gear = dataclasses.replace(gear, root_form=_flank_end(gear, bare))
     if gear.root_form is None:
         return gear
     beyond = (MM * gear.root_form.value - 2.0 * bare.form_radius) * bare.outward
     notes.checked.append(
-        f"{gear.part}: root form diameter {gear.root_form.value:.6g} mm, its tool's rounding gives "
+        f"{gear.part}: root form diameter {gear.root_form.value:.6g} mm, from the tip radius of its tool "
         f"{2e3 * bare.form_radius:.6g} mm"
     )
     if beyond > FORM_TOLERANCE * bare.normal_module:
@@ -523,10 +521,10 @@ def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: 
                 continue
             own = 2e3 * unchecked("", cleared[tip]).tip_radius
             notes.changed.append(
-                f"{cleared[tip].part}: tip diameter {bound:g} mm instead of {own:.4f} mm, which reaches the form "
-                f"circle of {cleared[mate].part} or comes too near to it"
+                f"{cleared[tip].part}: tip diameter {bound:g} mm instead of {own:.4f} mm, which reaches or is too "
+                f"close to the form diameter of {cleared[mate].part}"
             )
-            entry = assumed(bound, f"{own:.4f} would come too near to the form circle of {cleared[mate].part}")
+            entry = assumed(bound, f"{own:.4f} would be too close to the form diameter of {cleared[mate].part}")
             cleared[tip] = dataclasses.replace(cleared[tip], tip=entry)
     return cleared
 
@@ -539,8 +537,8 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
     for one, of in ((pinion, stage.pinion), (gear, stage.gear)):
         if one.tip_radius <= one.base_radius:
             raise RexsError(
-                f"{gears[of].part}: its tip circle of {2e3 * one.tip_radius:.6g} mm lies inside of its base circle of "
-                f"{2e3 * one.base_radius:.6g} mm: no flank is left; correct tip_diameter or its tooth data"
+                f"{gears[of].part}: its tip diameter of {2e3 * one.tip_radius:.6g} mm is inside its base diameter of "
+                f"{2e3 * one.base_radius:.6g} mm; correct tip_diameter or its tooth data"
             )
     tip = gear if which == stage.gear else pinion
     margin = (MARGIN if gears[which].tip else pair_relations.ROOT_MARGIN) * tip.normal_module
@@ -587,7 +585,7 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
     left, right = (_modification_by_type(model, gear.part, side) for side in ("left", "right"))
     for kind, part in {**right, **left}.items():
         if kind not in READ and kind not in UNSIGNED:
-            notes.changed.append(f"{part} of {gear.part}: not imported; give it in [gears.NAME.modification]")
+            notes.changed.append(f"{part} of {gear.part}: not imported; set it in [gears.NAME.modification]")
     entries: dict[str, Entry] = {}
     for kind in READ:
         one = left.get(kind)
@@ -598,7 +596,7 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
             raise RexsError(f"{gear.part}: left and right flank differ in {kind}; only equal flanks can be imported")
         found = dict(_entries(gear, one, notes))
         if not found:
-            notes.changed.append(f"{one} of {gear.part}: not imported, its numbers say nothing that can be read here")
+            notes.changed.append(f"{one} of {gear.part}: not imported, its numbers cannot be interpreted")
         entries |= found
     return entries | dict(_blanks(gear, left, right, notes))
 
@@ -614,10 +612,10 @@ def _blanks(
             continue
         said = ", ".join(dict.fromkeys(f"{_um(amount):g} um" for amount in amounts if amount))
         notes.changed.append(
-            f"{part} of {gear.part}: its amount of {said} is not taken, as REXS does not say which end a positive one "
-            f"takes material off; set {key} in [gears.NAME.modification], which does"
+            f"{part} of {gear.part}: its amount of {said} is not imported, since REXS does not define at which end a "
+            f"positive value removes material; set {key} in [gears.NAME.modification]"
         )
-        yield key, assumed(0.0, f"SET IT: {said} by {part}, the end unknown")
+        yield key, assumed(0.0, f"SET IT: {said} by {part}, end unknown")
 
 
 def _modification_by_type(model: Model, gear: Component, side: str) -> dict[str, Component]:

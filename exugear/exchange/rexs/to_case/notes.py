@@ -114,7 +114,7 @@ def within(value: float, part: object, key: str, low: float, high: float) -> flo
         It lies outside of low and high.
     """
     if not low <= value <= high:
-        raise RexsError(f"{part}: {key} = {value:g} cannot be; expected {low:g} to {high:g}")
+        raise RexsError(f"{part}: {key} = {value:g} is impossible; expected {low:g} to {high:g}")
     return value
 
 
@@ -241,7 +241,7 @@ class Places(ReprMixin):
             It has no position.
         """
         if not part.given("support_vector"):
-            raise RexsError(f"{part}: support_vector is missing, so that it has no place")
+            raise RexsError(f"{part}: support_vector is missing, so its position is unknown")
         x, y, z = (self._axes @ self._frame(part, 0)[0]).tolist()
         by = self._moved.get(part.number, (0.0, 0.0))
         x = x + by[0]
@@ -279,13 +279,13 @@ class Places(ReprMixin):
         if part.number in self._frames:
             return self._frames[part.number]
         if depth > LONGEST_CHAIN:
-            raise RexsError(f"{part}: is placed by a chain of components that does not end")
+            raise RexsError(f"{part}: its position refers to a circular chain of components")
         origin = np.array(part.vector("support_vector") or (0.0, 0.0, 0.0))
         axes = _own_axes(part)
         reference = part.whole("reference_component_for_position")
         if reference is not None and reference != part.number:
             if reference not in self._model.components:
-                raise RexsError(f"{part}: is placed by component {reference}, which is not there")
+                raise RexsError(f"{part}: its position refers to component {reference}, which does not exist")
             base, turned = self._frame(self._model.components[reference], depth + 1)
             origin = base + turned @ origin
             axes = turned @ axes
@@ -300,8 +300,8 @@ def _refuse_lost_vectors(model: Model) -> None:
     if lost:
         more = f" and {len(lost) - 3} more" if len(lost) > 3 else ""
         raise RexsError(
-            f"positions are not three numbers for {', '.join(str(part) for part in lost[:3])}{more}: the program that "
-            "wrote the file lost its arrays; export it anew"
+            f"positions are not three numbers for {', '.join(str(part) for part in lost[:3])}{more}: arrays were lost "
+            "in the exporting program; export it again"
         )
 
 
@@ -311,7 +311,7 @@ def _own_axes(part: Component) -> Floats:
     w = np.array(part.vector("w_axis_vector") or (0.0, 0.0, 1.0))
     lengths = np.linalg.norm(u), np.linalg.norm(w)
     if min(lengths) < 1e-9 or abs(u @ w) > 1e-6 * lengths[0] * lengths[1]:
-        raise RexsError(f"{part}: u_axis_vector and w_axis_vector are not at right angles")
+        raise RexsError(f"{part}: u_axis_vector and w_axis_vector are not perpendicular")
     u = u / lengths[0]
     w = w / lengths[1]
     return np.column_stack([u, np.cross(w, u), w])

@@ -163,7 +163,7 @@ def _pieces(section: Component, count: int, notes: Notes) -> list[tuple[float, f
     end = begin if end is None else end
     bore_end = bore if bore_end is None else bore_end
     if length <= 0.0 or min(begin, end) <= 0.0 or bore >= begin or bore_end >= end:
-        raise RexsError(f"{section}: length and diameters of {length:g}, {begin:g} and {bore:g} mm make no section")
+        raise RexsError(f"{section}: length and diameters of {length:g}, {begin:g} and {bore:g} mm are not a section")
     if begin == end and bore == bore_end:
         return [(start, length, (begin, None), (bore, None))]
     return [(start, length, (begin, end), (bore, bore_end))]
@@ -176,9 +176,9 @@ def _density(model: Model, part: Component, notes: Notes) -> float:
     if density is not None:
         return density
     if is_rigid(material):
-        notes.changed.append(f"{part}: its material stands for 'rigid' and has no density: taken without mass")
+        notes.changed.append(f"{part}: its material means 'rigid' and has no density: no mass")
         return 0.0
-    line = f"density of steel, {STEEL:g} kg/m3, where the file gives none"
+    line = f"density of steel, {STEEL:g} kg/m3, where not in the file"
     if line not in notes.changed:
         notes.changed.append(line)
     return STEEL
@@ -239,7 +239,7 @@ def levelled(sections: Sequence[Cylinder], seats: Iterable[tuple[str, float, flo
             continue
         least = min(outers)
         most = max(outers)
-        notes.changed.append(f"{name}: shaft of {least:g} to {most:g} mm under it taken as {most:g}")
+        notes.changed.append(f"{name}: shaft of {least:g} to {most:g} mm under it modelled as {most:g}")
         pieces = [dataclasses.replace(one, outer=most, outer_end=None) if one in under else one for one in pieces]
     return _merged(pieces)
 
@@ -253,11 +253,11 @@ def _lengthened(pieces: list[Cylinder], name: str, seat: tuple[float, float], no
     beyond = seat[1] - last.start - last.length
     if TOUCHING < before <= most:
         first = dataclasses.replace(first, start=tidy(seat[0]), length=tidy(first.length + before))
-        notes.changed.append(f"{name}: reaches {before:.4g} mm beyond the shaft, which is made so much longer")
+        notes.changed.append(f"{name}: extends {before:.4g} mm beyond the shaft, which is lengthened accordingly")
         pieces = [first, *pieces[1:]]
     if TOUCHING < beyond <= most:
         last = dataclasses.replace(pieces[-1], length=tidy(pieces[-1].length + beyond))
-        notes.changed.append(f"{name}: reaches {beyond:.4g} mm beyond the shaft, which is made so much longer")
+        notes.changed.append(f"{name}: extends {beyond:.4g} mm beyond the shaft, which is lengthened accordingly")
         pieces = [*pieces[:-1], last]
     return pieces
 

@@ -135,13 +135,13 @@ def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Compon
 def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, notes: Notes) -> Block | None:
     both = ends(model, part)
     if both is None:
-        raise RexsError(f"{part}: no relation 'side' tells what it holds and on what")
+        raise RexsError(f"{part}: no relation 'side' defines the supported and the supporting body")
     inner, outer = (None if end.type == "gear_casing" else bodies.of_any(end) for end in both)
     if any(body is not None and bodies.of(end) is None for end, body in zip(both, (inner, outer), strict=True)):
         return None  # of a planet that is like the first
     inner, outer = (None if body is not None and body.fixed else body for body in (inner, outer))
     if inner is outer:
-        notes.lost.append(f"{part}: holds nothing that turns, or both of its rings are on one body")
+        notes.lost.append(f"{part}: supports no rotating body, or both of its rings are on one body")
         return None
     if inner is None or (outer is not None and outer.carrier == inner.name):
         inner, outer = outer, inner
@@ -154,7 +154,7 @@ def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, note
         block.entries["designation"] = inside["designation"].entries["designation"]
         block.blocks.clear()
     if outer is None and bodies.of(both[0]) is None:
-        block.entries["outer_ring"] = read("body", "outer_part turns")
+        block.entries["outer_ring"] = read("body", "outer_part rotates")
     return block
 
 
@@ -167,8 +167,8 @@ def _check_place(places: Places, part: Component, both: tuple[Component, Compone
         expected = places.position(shaft)[2] + places.sense(shaft) * along
         if abs(expected - places.position(part)[2]) > PLACE_TOLERANCE:
             notes.checked.append(
-                f"{part}: stands at z = {places.position(part)[2]:g} mm by support_vector, which is taken, and at "
-                f"{expected:g} mm by u_coordinate_on_shaft_{side}_side"
+                f"{part}: z = {places.position(part)[2]:g} mm from support_vector (used), {expected:g} mm from "
+                f"u_coordinate_on_shaft_{side}_side"
             )
 
 
@@ -185,7 +185,7 @@ def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[st
     if part.type == "concept_bearing":
         entries = _stiffness(part, notes)
         if not entries:
-            raise RexsError(f"{part}: holds nothing, neither radially nor axially nor against tilting")
+            raise RexsError(f"{part}: has no radial, axial or tilting stiffness")
         return {"stiffness": Block("", entries)}
     kind = ROLLING_TYPES.get(part.text("bearing_type"))
     sizes = _sizes(part, kind, notes)
@@ -198,14 +198,14 @@ def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[st
     if not sizes and part.quantity("radial_stiffness", "N / m"):
         return {"stiffness": Block("", _stiffness(part, notes))}
     if not kind:
-        why = f"a {part.text('bearing_type') or part.type} has no law here: give its stiffness"
+        why = f"a {part.text('bearing_type') or part.type} has no bearing model; set its stiffness"
     elif paired:
         why = (
-            f"a bearing of {rows} rows with contact angles, of which axial_force_absorption_of_row does not tell how "
-            "they stand: give its catalogue with arrangement X, O or tandem"
+            f"a bearing of {rows} rows with contact angles, whose orientation is not defined by "
+            "axial_force_absorption_of_row; set its catalogue with arrangement X, O or tandem"
         )
     else:
-        why = "the file gives no dimensions, and no table here has them: give its catalogue, or its stiffness"
+        why = "no dimensions in the file or in the built-in tables; set its catalogue data or its stiffness"
     notes.changed.append(f"{part}: BLANK, {why}; until then only the variant rigid runs")
     return {"designation": Block("", {"designation": Entry(_designation(part), f"BLANK: {why}")})}
 
@@ -261,7 +261,7 @@ def _sizes(part: Component, kind: str | None, notes: Notes) -> dict[str, Entry]:
     boundary = boundary_of(_designation(part))
     if boundary is None or boundary.type != kind:
         return {}
-    source = f"{boundary.source} by the designation {_designation(part)}: the file gives no dimensions"
+    source = f"{boundary.source} from the designation {_designation(part)}: no dimensions in the file"
     notes.changed.append(f"{part}: {boundary.bore:g} x {boundary.outer:g} x {boundary.width:g} mm by {source}")
     sizes = {"bore_mm": boundary.bore, "outer_diameter_mm": boundary.outer, "width_mm": boundary.width}
     return {key: assumed(value, source) for key, value in sizes.items()}
@@ -312,7 +312,9 @@ def _catalogue(
             entries[ours] = read(tidy(rating), key)
     limit, static = (entries.get(key) for key in ("fatigue_load_limit_kN", "static_rating_kN"))
     if limit is not None and static is not None and limit.value >= static.value:
-        notes.changed.append(f"{part}: fatigue_limit_load of {limit.value:g} kN is above its static rating, left out")
+        notes.changed.append(
+            f"{part}: fatigue_limit_load of {limit.value:g} kN is above its static rating and is not imported"
+        )
         del entries["fatigue_load_limit_kN"]
     if not arrangement:
         _tell_axial(part, kind, sense, entries, notes)
@@ -332,7 +334,9 @@ def _tell_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry
             towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
             entries["ribs"] = read(towards, f"axial_force_absorption {absorbed}")
     elif absorbed in ("positive", "negative", "no_direction"):
-        notes.changed.append(f"{part}: axial_force_absorption {absorbed}, but the law of a {kind} holds both ways")
+        notes.changed.append(
+            f"{part}: axial_force_absorption {absorbed}, but the model of a {kind} locates in both directions"
+        )
 
 
 def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
@@ -355,7 +359,7 @@ def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str
         most = int(math.pi / math.asin(diameter.value / pitch.value))
         if count > most:
             fitting = f"{count} of {diameter.value:g} mm do not fit on {pitch.value:g} mm"
-            notes.changed.append(f"{row}: {fitting}, {most} rolling elements taken; ratings of the file stay")
+            notes.changed.append(f"{row}: {fitting}, {most} rolling elements used; ratings of the file are kept")
             entries["element_count"] = assumed(most, fitting)
     return entries
 
@@ -392,7 +396,7 @@ def _put_within(
     if limits[0] <= ratio <= limits[1]:
         entries[key] = derived(tidy(round(ratio, 6)), source)
     else:
-        notes.changed.append(f"{row}: {source} is {ratio:.4g}, which cannot be; the usual {key} is taken")
+        notes.changed.append(f"{row}: {source} is {ratio:.4g}, which is impossible; the usual {key} is used")
 
 
 def _parts_of(model: Model, owner: Component, kind: str) -> Sequence[Component]:
@@ -427,9 +431,9 @@ def _stiffness(part: Component, notes: Notes) -> dict[str, Entry]:
         if value is None and key == "axial_stiffness" and not holds:
             continue
         if key == "axial_stiffness" and one_way:
-            notes.changed.append(f"{part}: holds the axis {absorbed} along u only, here both ways")
+            notes.changed.append(f"{part}: locates the axis {absorbed} along u only, here in both directions")
         if value is None or value >= RIGID_ABOVE[key]:
-            said = "the file gives none" if value is None else f"{key} of {value:g} means rigid"
+            said = "not in the file" if value is None else f"{key} of {value:g} means rigid"
             entries[ours] = assumed(RIGID[key], said)
         elif value > 0.0:
             entries[ours] = read(tidy(value), key)

@@ -208,7 +208,7 @@ def _pressure_angle(gear: Component, flank: Component | None) -> Entry:
         value = part.quantity(key, "deg") if part else None
         if part is not None and value is not None:
             return read(tidy(within(value, part, key, *PRESSURE_ANGLES)), f"{key} of the flank")
-    return assumed(20.0, "the file gives none")
+    return assumed(20.0, "not in the file")
 
 
 def _helix_angle(gear: Component, mates: Sequence[Component]) -> Entry:
@@ -244,7 +244,7 @@ def _tip(gear: Component, reference: float, notes: Notes) -> Entry | None:
     tip = _diameter(gear, "tip_diameter")
     if tip is None or PLAUSIBLE_TIP[0] <= tip.value / reference <= PLAUSIBLE_TIP[1]:
         return tip
-    notes.changed.append(f"{gear}: tip_diameter of {tip.value:g} mm cannot be meant, replaced by that of the rack")
+    notes.changed.append(f"{gear}: tip_diameter of {tip.value:g} mm is implausible, replaced by the value of the rack")
     return None
 
 
@@ -266,7 +266,7 @@ def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | N
         elif addendum:
             cutter["addendum"] = tidy(addendum)
     said = [f"tip radius: {' '.join(rounded.comment.split())}"] if rounded.kind else []
-    said += ["profile shift: A none given"] if shift is None else []
+    said += ["profile shift: A not in the file"] if shift is None else []
     return read(cutter, "; ".join([f"number_of_teeth, tip and its radius of {tool}", *said]))
 
 
@@ -274,9 +274,9 @@ def _tool_factor(tool: Component | None, internal: bool, key: str, usual: float)
     """Factor of the tool that makes the root: of a rack, which an internal gear has none of."""
     value = tool.quantity(key) if tool else None
     if tool is None or value is None or value < 0.0:
-        return assumed(usual, "the file gives no tool")
+        return assumed(usual, "no tool in the file")
     if internal:
-        return assumed(tidy(value), f"{key} of {tool}, for an arc as fillet where no cutter is given")
+        return assumed(tidy(value), f"{key} of {tool}, for an arc as fillet without cutter data")
     return read(tidy(value), f"{key} of {tool}")
 
 
@@ -284,7 +284,7 @@ def _rounded(radius: Entry) -> Entry:
     """Return the radius of the tool's corner; a sharp one gets a radius, as the tooth model wants a fillet."""
     if radius.value >= LEAST_RADIUS:
         return radius
-    return assumed(LEAST_RADIUS, f"the file says {radius.value:g}, a corner too sharp for the tooth model")
+    return assumed(LEAST_RADIUS, f"{radius.value:g} in the file, too small a radius for the tooth model")
 
 
 def _allowances(gear: Component, angle: float, helix: float, internal: bool) -> Entry | None:
@@ -313,7 +313,7 @@ def _thinning(gear: Component, module: float, allowances: Entry | None, helix: f
         mean = 0.5e-3 * sum(allowances.value.values())
         return read(tidy(-mean / math.cos(helix)), "mean of the tooth thickness allowances")
     series = gear.text("tooth_thickness_deviation_tolerance_series_din_3967_1978")
-    why = f"the file gives only the tolerance {series}" if series not in ("", "False") else "the file gives none"
+    why = f"only the tolerance {series} in the file" if series not in ("", "False") else "not in the file"
     return assumed(tidy(round(THINNING * module, 6)), f"{THINNING:g} normal modules; {why}")
 
 

@@ -73,7 +73,7 @@ export function drawCampbell() {
 
 /** @param {import("./page_data.js").ModelData} model @param {Crossing[]} crossings */
 function rowsOf(model, crossings) {
-  const head = ["order", "speed / rpm", "frequency / Hz", "amplification", "what moves"];
+  const head = ["order", "speed / rpm", "frequency / Hz", "amplification", "mode shape"];
   const rows = crossings.map(({ line, mode, speed, frequency }) => {
     const own = model.modes[mode];
     return [pageData.lines[line].short, Number(speed.toPrecision(6)), frequency, own.amplification, own.words];

@@ -103,7 +103,7 @@ function draw(cuts) {
   );
   const caption = need("cuts").querySelector(".hint");
   if (caption) caption.textContent = cuts.map((cut) => `${styleOf(cut)}: ${cut.label}`).join(". ");
-  addTools(need("cuts").querySelector(".tools"), () => "Level along the orders", {
+  addTools(need("cuts").querySelector(".tools"), () => "Order cuts", {
     rows: () => cutRows(cuts, joined),
     canvas: () => /** @type {HTMLCanvasElement} */ (box().querySelector("canvas")),
     extra: zoomButtons(box()),

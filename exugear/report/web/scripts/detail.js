@@ -16,7 +16,7 @@ export function drawDetail() {
   const step = make(
     "div",
     { class: "tools" },
-    make("button", { type: "button", "aria-label": "Resonance before", click: () => move(-1) }, "‹"),
+    make("button", { type: "button", "aria-label": "Previous resonance", click: () => move(-1) }, "‹"),
     make("button", { type: "button", "aria-label": "Next resonance", click: () => move(1) }, "›"),
   );
   const where = `± ${figureText(own.tolerance)} Hz at ${figureText(own.speed, 4)} rpm`;
@@ -30,7 +30,7 @@ export function drawDetail() {
 function modeWords() {
   const model = pageData.models[state.model];
   const mode = model?.modes[state.mode];
-  if (!model || !mode) return [make("p", {}, "No resonance stands out.")];
+  if (!model || !mode) return [make("p", {}, "No resonance found.")];
   return [
     make("h3", {}, `Mode at ${figureText(mode.frequency, 5)} Hz`),
     make("p", {}, `${model.words}: ${mode.words}; damping ${figureText(100 * mode.damping, 2)} %.`),

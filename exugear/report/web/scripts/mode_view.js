@@ -60,7 +60,7 @@ export async function drawMode() {
   const title = find("mode-title");
   if (!model || !title) return;
   const mode = model.modes[state.mode];
-  title.textContent = mode ? `Mode at ${mode.frequency.toFixed(1)} Hz` : "No mode belongs to it";
+  title.textContent = mode ? `Mode at ${mode.frequency.toFixed(1)} Hz` : "No matching mode";
   if (!stage) return;
   stage.canvas.setAttribute("aria-label", mode ? `Mode at ${figureText(mode.frequency, 5)} Hz: ${mode.words}` : "At rest");
   const current = stage;
@@ -69,7 +69,7 @@ export async function drawMode() {
   addTools(need("mode-tools"), () => title.textContent ?? "Mode", {
     rows: motionRows,
     canvas: () => current.canvas,
-    extra: [make("button", { type: "button", "aria-label": "Look from the start", click: () => lookAgain(current) }, "⤢")],
+    extra: [make("button", { type: "button", "aria-label": "Reset view", click: () => lookAgain(current) }, "⤢")],
   });
 }
 

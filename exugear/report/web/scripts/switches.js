@@ -70,9 +70,9 @@ export function beginSwitches() {
 async function copyAddress() {
   try {
     await navigator.clipboard.writeText(location.href);
-    say("The link is copied");
+    say("Link copied");
   } catch {
-    say("Copy the address of this page: it holds the view");
+    say("Copy the address of this page; it contains the view");
   }
 }
 

@@ -29,7 +29,7 @@ function chooseByName(choice) {
   if (kind === "channel") choose({ group: rest[0], variant: rest[1], channel: last, view: "variant" });
   const lead = { mode: "mode", channel: "waterfall" }[kind];
   if (lead) find(lead)?.scrollIntoView({ block: "nearest" });
-  if (kind === "resonance") say(`Resonance ${Number(last) + 1} is chosen`);
+  if (kind === "resonance") say(`Resonance ${Number(last) + 1} selected`);
 }
 
 /** @param {HTMLTableElement} table */

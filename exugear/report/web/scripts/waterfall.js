@@ -229,14 +229,14 @@ function tell(channel, variant, other) {
   const named = need("waterfall").querySelector("figcaption strong");
   if (named) named.textContent = title;
   const hint = need("waterfall").querySelector(".hint");
-  if (hint) hint.textContent = `Read from: ${source}. ${HINT}`;
+  if (hint) hint.textContent = `Source: ${source}. ${HINT}`;
   const loudest = inRange().slice(0, 3).map(({ place }) => resonanceWords(place)).join("; ");
   box().setAttribute("aria-label", `${title}, ${source}. ${loudest}. Arrow keys move, plus and minus zoom, 0 shows all.`);
   const { top, field } = heat;
   const bar = make("i", { class: "bar" });
   bar.style.background = `linear-gradient(to right, ${mapColours(Boolean(other)).join(",")})`;
   const ends = other
-    ? [`${other} louder by ${DIFFERENCE} dB`, `${variant} louder`]
+    ? [`${other} higher by ${DIFFERENCE} dB`, `${variant} higher`]
     : [`${top - SPAN} dB`, `${top} dB re 1 ${field.channel.unit}`];
   need("waterfall-scale").replaceChildren(ends[0], bar, ends[1]);
   addTools(need("waterfall").querySelector(".tools"), () => title, {

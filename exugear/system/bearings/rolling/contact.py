@@ -344,7 +344,7 @@ def equilibrium(
     if not np.any(applied):
         raise BearingError("bearing: force = 0; without load or preload a rolling bearing has no stiffness")
     if applied[2] != 0.0 and not any(_holds(row, applied[2]) for row in bearing.rows):
-        raise BearingError(f"bearing: no row holds an axial force of {applied[2]:.6g} N")
+        raise BearingError(f"bearing: no row carries an axial force of {applied[2]:.6g} N")
     contacts = row_contacts(bearing.rows, first_roller_angle)
     displacement = _balance(contacts, applied, np.asarray(tilt, dtype=np.float64))
     _check_shoulders(contacts, displacement, applied)
@@ -360,8 +360,8 @@ def _holds(row: RollingRow, axial_force: float) -> bool:
 
 def _no_equilibrium(force: Floats) -> BearingError:
     return BearingError(
-        f"bearing: no equilibrium with the force {force.tolist()} N; "
-        "a single row with a contact angle needs an axial force that covers what its radial load induces"
+        f"bearing: no equilibrium with the force {force.tolist()} N; a single row with a contact angle requires an "
+        "axial force above that induced by its radial load"
     )
 
 

@@ -109,7 +109,7 @@ def reference_life(
     1.0
     """
     if len(loads) != len(rows):
-        raise BearingError(f"reference life: {len(loads)} arrays of loads for {len(rows)} rows; give one for each")
+        raise BearingError(f"reference life: {len(loads)} arrays of loads for {len(rows)} rows; specify one for each")
     rating = basic_dynamic_rating(rows, bearing_type) if dynamic_rating is None else dynamic_rating
     powers = (4.0, 4.5) if isinstance(rows[0], RollerRow) else (3.0, 10.0 / 3.0)
     inner, outer = powers if inner_ring_turns_against_load else powers[::-1]
@@ -175,7 +175,8 @@ def _stress_loads(row: RollingRow, load: Floats) -> Floats:
     fits = stressed.ndim == 2 if isinstance(row, RollerRow) else stressed.shape[1:] in ((), (1,))
     if not fits or stressed.size == 0 or len(stressed) % row.element_count:
         raise BearingError(
-            f"reference life: loads of shape {stressed.shape} for a row of {row.element_count} elements; give {wanted}"
+            f"reference life: loads of shape {stressed.shape} for a row of {row.element_count} elements; specify "
+            f"{wanted}"
         )
     stressed = stressed.reshape(len(stressed), -1)
     if not np.all(np.isfinite(stressed)) or np.any(stressed < 0.0):

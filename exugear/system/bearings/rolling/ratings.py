@@ -364,7 +364,7 @@ def _common_row(rows: Sequence[RollingRow], bearing_type: BearingType) -> Roller
     if not 0.0 < first.diameter_ratio < 1.0 or is_thrust:
         degrees = math.degrees(abs(first.contact_angle))
         raise BearingError(
-            f"load rating: contact_angle = {degrees:.4g} degrees makes a thrust bearing; radial ratings end at 45"
+            f"load rating: contact_angle = {degrees:.4g} degrees is a thrust bearing; radial ratings apply up to 45"
         )
     if len({_rated_dimensions(row) for row in rows}) > 1:
         raise BearingError("load rating: the rows of one bearing must be alike; rate rows that differ one by one")

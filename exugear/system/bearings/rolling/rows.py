@@ -148,7 +148,7 @@ class BallRow(RollingRow):
         super().__post_init__()
         for key in ("inner_conformity", "outer_conformity"):
             if not getattr(self, key) > 0.5:
-                raise BearingError(f"ball row: {key} = {getattr(self, key)!r} must be above 0.5, or no ball fits in")
+                raise BearingError(f"ball row: {key} = {getattr(self, key)!r} must be above 0.5")
 
     @property
     def groove_distance(self) -> float:
@@ -371,7 +371,7 @@ class TaperedRollerBearing:
         """Check the boundary dimensions and the row that follows from them."""
         _check_boundary_dimensions(self.bore, self.outside_diameter, self.width)
         if self.contact_angle == 0.0:
-            raise BearingError("tapered roller bearing: contact_angle = 0 makes it a cylindrical one")
+            raise BearingError("tapered roller bearing: contact_angle = 0 is a cylindrical roller bearing")
         _ = self.rows
 
     @property

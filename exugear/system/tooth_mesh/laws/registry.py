@@ -43,24 +43,24 @@ class LawProperties:
 
 
 _TABLE_OF_LAWS = (
-    LawProperties("kinematic", "gears only roll; variant `rigid` alone", has_force=False, needs_tables=False),
-    LawProperties("constant", "as `line_of_action` with the mean of load over deflection, a straight line"),
-    LawProperties("iso6336", "as `constant`, stiffness by ISO 6336-1 method B", needs_tables=False),
+    LawProperties("kinematic", "kinematic constraint; variant `rigid` only", has_force=False, needs_tables=False),
+    LawProperties("constant", "as `line_of_action`, with the mean of load over deflection (linear)"),
+    LawProperties("iso6336", "as `constant`, stiffness to ISO 6336-1 method B", needs_tables=False),
     LawProperties(
         "tangential",
-        "the published tangential law: deflection along the pitch circle, force with radial and axial parts; "
+        "tangential model as published: deflection along the pitch circle, force with radial and axial components; "
         "not conservative",
     ),
     LawProperties(
         "line_of_action",
-        "load over deflection over the mesh cycle by secant and tangent of the table, stiffness against misalignment; "
-        "all motions along the line of action",
+        "load over deflection over the mesh cycle from secant and tangent of the table, stiffness against "
+        "misalignment; all motions along the line of action",
         moves_load=True,
     ),
     LawProperties(
         "table",
-        "the whole table: force by load, position, centre distance and misalignment; "
-        "teeth part and touch on the other flank",
+        "the whole table: force by load, position, centre distance and misalignment; contact loss and contact on the "
+        "opposite flank",
         needs_axes=True,
         loses_contact=True,
         signals_positions=True,
@@ -88,5 +88,5 @@ def law_of(name: str) -> Law:
         from exugear.system.tooth_mesh.placement import MeshError
 
         known = ", ".join(law.name for law in LAWS.values() if law.has_force)
-        raise MeshError(f"mesh law {name!r} has no force element; laws are {known}")
+        raise MeshError(f"mesh model {name!r} has no force element; choose one of {known}")
     return cast("Law", import_module(f"{__package__}.{name}").LAW)

@@ -57,7 +57,7 @@ def mesh_stiffness(
         return {}
     reader = law_of(law)
     if LAWS[law].needs_tables and directory is None:
-        raise MeshError(f"mesh law {law!r} needs STE tables: give the directory they were written to")
+        raise MeshError(f"mesh model {law!r} requires transmission error tables; specify their folder")
     at_work = {mesh.pair.name for mesh in gearbox.meshes}
     return {name: reader.read(gearbox, name, Path(directory or ".")) for name in gearbox.pairs if name in at_work}
 

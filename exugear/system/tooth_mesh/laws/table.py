@@ -149,7 +149,7 @@ class Table(Law):
 
 def _surface_of(mesh: Mesh, data: MeshData) -> SteSurface:
     if not isinstance(data, SteSurface):
-        raise MeshError(f"pair {mesh.pair.name}: the law table needs its table, not a stiffness")
+        raise MeshError(f"pair {mesh.pair.name}: the mesh model table requires a table, not a stiffness")
     return data
 
 

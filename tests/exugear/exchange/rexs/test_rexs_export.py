@@ -354,7 +354,7 @@ def test_the_verb_writes_a_new_file_and_never_over_one(tmp_path):
     written = to.read_bytes()
     again = runner.invoke(app, [*arguments, "--to", str(to)])
     assert again.exit_code == 2
-    assert "is there already" in again.output
+    assert "exists already" in again.output
     assert to.read_bytes() == written
     wrong = runner.invoke(app, [arguments[0], arguments[1], str(DATA / SPECTRUM), "--to", str(tmp_path / "wrong.rexs")])
     assert wrong.exit_code == 2

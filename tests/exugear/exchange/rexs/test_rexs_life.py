@@ -90,7 +90,7 @@ def test_the_verbs_import_and_count_the_loads_and_never_write_over_a_table(tmp_p
     (other / "load_spectrum.csv").write_text("mine")
     outcome = exugear("import", path, "--out", other)
     assert outcome.exit_code == 2
-    assert "is there already" in outcome.output
+    assert "exists already" in outcome.output
     assert (other / "load_spectrum.csv").read_text() == "mine"
     assert not (other / "gearbox.toml").exists()
 

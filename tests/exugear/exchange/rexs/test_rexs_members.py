@@ -45,7 +45,7 @@ def test_a_ring_whose_speed_is_zero_is_held(speed: float | None, defines: bool |
     """i = 1 + 72 / 24 from the sun to the carrier with the ring at rest: 0.25 the other way round."""
     made = imported(planetary(speed, defines))
     assert made.gearbox.train.ratio == pytest.approx(0.25, rel=1e-9)
-    assert any("held, since the file defines its speed as 0" in line for line in made.changed)
+    assert any(": fixed, since the file defines its speed as 0" in line for line in made.changed)
     ring = next(body for body in made.gearbox.bodies() if "ring" in body.wheels)
     assert ring.fixed
 
@@ -89,7 +89,10 @@ def test_more_rolling_elements_than_fit_are_told_and_as_many_taken_as_fit() -> N
     made = imported(file)
     (catalogue,) = [one.catalogue for one in made.gearbox.bearings if one.catalogue is not None]
     assert catalogue.element_count == 31
-    assert any("32 of 5.7 mm do not fit on 57 mm, 31 rolling elements taken" in line for line in made.changed)
+    assert any(
+        "32 of 5.7 mm do not fit on 57 mm, 31 rolling elements used; ratings of the file are kept" in line
+        for line in made.changed
+    )
 
 
 def test_a_planet_of_shift_zero_follows_from_its_sun_and_the_ring_from_the_planet() -> None:

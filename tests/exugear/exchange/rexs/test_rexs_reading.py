@@ -106,10 +106,10 @@ REFUSED = {
     "external entity": (f'<!DOCTYPE model SYSTEM "file:///etc/passwd">{HEAD}</model>', "DOCTYPE"),
     "nesting": (HEAD + "<a>" * (DEEPEST + 1), "deeper"),
     "nesting of JSON": ('{"model":' * 200_000, "nested"),
-    "cut short": (HEAD, "no XML"),
-    "JSON cut short": ('{"model": {', "no JSON"),
+    "cut short": (HEAD, "not an XML file"),
+    "JSON cut short": ('{"model": {', "not a JSON file"),
     "another root": ("<html/>", "'html'"),
-    "JSON of something else": ("[1, 2]", "no REXS file"),
+    "JSON of something else": ("[1, 2]", "not a REXS file"),
     "text": ("hello", "neither XML nor JSON"),
     "nothing": ("", "neither XML nor JSON"),
     "newer": ('<model version="3.1"/>', "'3.1'; versions 1.0 to 2.0"),
@@ -120,12 +120,12 @@ REFUSED = {
     ),
     "an id of no component": (
         f'{HEAD}<relations><relation id="7" type="stage"><ref id="9" role="stage"/></relation></relations></model>',
-        "relation 7 .stage.: there is no component 9",
+        "relation 7 .stage.: component 9",
     ),
     "data outside": (
         f'{HEAD}<components><component id="1" type="shaft"><attribute id="data_source">../x.rexs</attribute>'
         "</component></components></model>",
-        "data_source points outside the file",
+        "data_source refers to data outside the file, which are not read",
     ),
     "damaged base64": (
         f'{HEAD}<components><component id="1" type="shaft"><attribute id="a"><array code="float64">AAA</array>'
@@ -137,7 +137,7 @@ REFUSED = {
         "</attribute></component></components></model>",
         "base64 is damaged",
     ),
-    "NaN": ('{"model": {"version": "1.4", "a": NaN}}', "no finite number"),
+    "NaN": ('{"model": {"version": "1.4", "a": NaN}}', "', which is not a finite number"),
 }
 
 
@@ -162,8 +162,8 @@ def archive(**members):
 def test_an_archive_holds_one_model_of_bounded_size_and_is_whole(tmp_path):
     path, model = tmp_path / "case.rexsz", '<model version="1.4"/>'
     for content, words in (
-        (archive(a_rexs=model, b_rexsj="{}"), "must hold one model"),
-        (archive(readme_txt=model), "it holds none"),
+        (archive(a_rexs=model, b_rexsj="{}"), "the archive must contain one model"),
+        (archive(readme_txt=model), "it contains none"),
         (archive(a_rexs=" " * (LARGEST + 1)), "larger than"),
         (archive(a_rexs=model)[:-30], "damaged"),
     ):
@@ -178,7 +178,7 @@ def test_a_value_that_is_no_number_names_its_component():
     model = model_of(
         '<component id="3" type="shaft" name="A"><attribute id="length" unit="mm">inf</attribute></component>'
     )
-    with pytest.raises(RexsError, match="shaft 3 'A': length = 'inf' is no finite number"):
+    with pytest.raises(RexsError, match="shaft 3 'A': length = 'inf' is not a finite number"):
         model.components[3].quantity("length", "mm")
 
 

@@ -83,3 +83,27 @@ def test_schema_prints_or_writes_the_same(tmp_path: Path) -> None:
     assert json.loads(printed.stdout) == json_schema()
     assert exugear("schema", "--out", tmp_path / "a" / "s.json").exit_code == 0
     assert (tmp_path / "a" / "s.json").read_text(encoding="utf-8") == printed.stdout
+
+
+def test_the_unit_of_a_key_is_that_at_the_end_of_its_name():
+    """Also of rates such as `..._per_s`, stresses and temperatures; a damping has N s/m by the keys of a stiffness."""
+    spelled = {"µ": "u", "²": "2", "³": "3", "°": "", "/": "_per_", " ": "_"}
+    ends = {"mm", "um", "deg", "rad", "m", "s", "s2", "GPa", "MPa", "C", "kg", "m2", "m3", "N", "kN", "rpm", "Hz"}
+    for key in keys():
+        unit = key.unit.replace(" s/", "/") if key.table.endswith(".damping") else key.unit
+        end = "".join(spelled.get(letter, letter) for letter in unit).replace("__", "_")
+        if end == "h":
+            end = "hours"
+        assert not end or key.name.endswith(f"_{end}"), key
+        if not end and "number" in key.kind:
+            assert key.name.rpartition("_")[2] not in ends, key
+
+
+def test_every_key_has_one_row_and_text_of_its_own_table():
+    for line in page().splitlines():
+        assert not line.startswith(" "), line
+        assert not line.startswith("|") or line.count(" | ") == 5, line
+    for table, model in tables().items():
+        about = model.__doc__ or ""
+        assert "of a gear." not in about or "gears" in table, table
+        assert "of a bearing." not in about or "bearings" in table, table

@@ -99,7 +99,7 @@ def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
     mine = tmp_path / "mine.toml"
     mine.write_text("mine", encoding="utf-8")
     refused = exugear("new", mine, "--kind", "pair")
-    assert refused.exit_code == 2 and "not written over" in refused.stderr
+    assert refused.exit_code == 2 and "not overwritten" in refused.stderr
     assert mine.read_text(encoding="utf-8") == "mine"
     assert exugear("new", tmp_path / "mine.txt", "--kind", "pair").exit_code == 2
 

@@ -101,7 +101,10 @@ def test_a_torque_reversal_loads_the_other_flanks(tmp_path):
 
 @pytest.mark.parametrize("line", ["0,10,1", "100,0,1"])
 def test_loads_that_wear_nothing_are_refused(tmp_path, line):
-    with pytest.raises(GearboxFileError, match="no source of fatigue has torque, speed and hours at once"):
+    with pytest.raises(
+        GearboxFileError,
+        match="loads.sources: no fatigue source has torque, speed and hours",
+    ):
         count_loads(loaded(tmp_path, f"torque_N_m,speed_rpm,hours\n{line}\n"))
 
 
@@ -134,8 +137,8 @@ HEADED = "time_s,carrier_N_m,carrier_rpm\n"
     ("text", "keys", "message"),
     [
         (f"{HEADED}0,1,1\n1,1,1\n2,1,1\n", {}, "skip_s: this key is missing"),
-        (f"{HEADED}0,1,1\n1,1,1\n2,1,1\n", {"skip_s": 5.0}, "leaves nothing of a series of 2 s"),
-        (f"{HEADED}0,1,1\n1,nan,1\n2,1,1\n", {"skip_s": 0.0}, "carrier_N_m holds no number at 1 s"),
+        (f"{HEADED}0,1,1\n1,1,1\n2,1,1\n", {"skip_s": 5.0}, ": no samples remain of a series of 2 s"),
+        (f"{HEADED}0,1,1\n1,nan,1\n2,1,1\n", {"skip_s": 0.0}, "carrier_N_m has no number at 1 s"),
         (f"{HEADED}0,1,1\n1,1\n2,1,1\n", {"skip_s": 0.0}, "line 3 has 2 columns"),
         ("time_s,carrier_N_m\n0,1\n1,1\n2,1\n", {"skip_s": 0.0}, "no channel 'carrier_rpm'"),
         ("time_s,carrier_kN,carrier_rpm\n0,1,1\n1,1,1\n2,1,1\n", {"skip_s": 0.0, "torque": "carrier_kN"}, "unit 'kN'"),
@@ -143,12 +146,16 @@ HEADED = "time_s,carrier_N_m,carrier_rpm\n"
         ("torque_N_m,speed_rpm,hours\n1,1,1\n2,2,-2\n", {}, "line 3 has 2,2,-2; .*hours not negative"),
         ("torque_N_m,speed_rpm,hours\n1,nan,1\n", {}, "line 2 has 1,nan,1"),
         ("torque_N_m,speed_rpm,hours\n1,1,0\n", {}, "all hours are 0"),
-        ("torque_N_m,speed_rpm,hours\n1e12,1,1\n", {}, "row 1 has 1e.12 N m; up to 1e.09"),
-        ("torque_N_m,speed_rpm,hours\n", {}, "has headings alone"),
+        ("torque_N_m,speed_rpm,hours\n1e12,1,1\n", {}, ": row 1 has 1e.12 N m; plausible are up to 1e.09"),
+        ("torque_N_m,speed_rpm,hours\n", {}, "has headings only"),
         ("torque_N_m;speed_rpm;hours\n1;1;1\n", {}, "separated by commas"),
-        ("torque_N_m,speed_rpm,speed_rpm\n1,1,1\n", {}, "two columns are called 'speed_rpm'"),
+        ("torque_N_m,speed_rpm,speed_rpm\n1,1,1\n", {}, ": two columns have the name 'speed_rpm'"),
         ("", {}, "is empty"),
-        ("torque_N_m,speed_rpm,hours\n1,1,1\n", {"skip_s": 3.0}, "skip_s: makes no sense for a table"),
+        (
+            "torque_N_m,speed_rpm,hours\n1,1,1\n",
+            {"skip_s": 3.0},
+            "skip_s: not applicable to a table of loads; remove the key",
+        ),
         ("torque_N_m,speed_rpm,hours\n1,1,1\n", {"hours_per_year": 8766.0, "file": "missing.csv"}, "no such file"),
     ],
 )
@@ -161,8 +168,8 @@ def test_bad_sources_are_one_error_each(tmp_path, text, keys, message):
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"kind": "extreme"}, "an extreme source needs partial_factor"),
-        ({"events_per_year": 3.0}, "needs one of hours_per_year, events_per_year"),
+        ({"kind": "extreme"}, "an extreme source requires partial_factor, and none of"),
+        ({"events_per_year": 3.0}, "requires one of hours_per_year, events_per_year"),
         ({"hours_per_year": 9000.0}, "must lie between 0 and 8766"),
         ({"torque_factor": 0.0}, "must not be 0"),
     ],
@@ -176,7 +183,7 @@ def test_more_hours_than_a_year_has_are_refused(tmp_path):
     gearbox = loaded(tmp_path, "torque_N_m,speed_rpm,hours\n1,1,1\n", hours_per_year=5000.0)
     content = {**gearbox.content}
     content["loads"]["sources"]["again"] = content["loads"]["sources"]["bench"]
-    with pytest.raises(GearboxFileError, match="10000 hours a year in all"):
+    with pytest.raises(GearboxFileError, match="10000 hours per year in total; a year has"):
         load_sources(Gearbox.from_dict(content, gearbox.source))
 
 

@@ -165,7 +165,7 @@ def test_hours_of_a_table_of_loads_are_hours_of_the_life(tmp_path):
     (found,) = load_sources(gearbox(tmp_path, one={"file": "table.csv", "hours_per_year": 1000.0}))
     assert found.hours.tolist() == [1500.0, 500.0]
     assert found.remarks == (
-        "one: hours of table.csv, 40 in all, are shares of the 2000 h that hours_per_year gives in the life",
+        "one: hours of table.csv, 40 in total, are used as fractions of the 2000 h that result from hours_per_year",
     )
     (found,) = load_sources(gearbox(tmp_path, one={"file": "table.csv", "hours_per_year": 20.0}))
     assert not found.remarks
@@ -195,16 +195,25 @@ SOURCE = {"skip_s": 0.0, "hours_per_year": 10.0}
 @pytest.mark.parametrize(
     ("keys", "message"),
     [
-        ({"files": "dlc/*.bin", "hours_per_year": 1.0}, r"files = 'dlc/\*.bin': no file has such a name"),
+        ({"files": "dlc/*.bin", "hours_per_year": 1.0}, ".bin': no matching file in"),
         ({"files": "/etc/*.csv", "hours_per_year": 1.0}, "Non-relative patterns"),
-        ({"files": "dlc/../../*", "hours_per_year": 1.0}, "lies outside the gearbox file's folder"),
-        ({"files": "dlc/*", "hours_per_year": 1.0}, "is none of .outb, .out, .csv"),
+        (
+            {"files": "dlc/../../*", "hours_per_year": 1.0},
+            "is outside the folder of the gearbox file; move it there, or",
+        ),
+        ({"files": "dlc/*", "hours_per_year": 1.0}, "does not end in one of .outb, .out, .csv"),
         ({"files": "dlc/*.outb", "hours_table": "short.csv"}, "has no line for wind_12.outb"),
         ({"files": "dlc/*.outb", "hours_table": "bad.csv"}, "line 2 has 'wind_12.outb,many'"),
         ({"files": "dlc/*.outb", "hours_table": "other.csv"}, "begins with file,hours_per_year"),
-        ({"files": "dlc/*.outb", "file": "dlc/wind_8.outb", "hours_per_year": 1.0}, "one of file and files"),
-        ({"files": "dlc/*.outb", "wind": "WindVxi"}, "needs the section .loads.wind."),
-        ({"file": "dlc/wind_8.outb", "hours_table": "short.csv"}, "hours_table belongs to files"),
+        (
+            {"files": "dlc/*.outb", "file": "dlc/wind_8.outb", "hours_per_year": 1.0},
+            "a source requires file or files; set one of them",
+        ),
+        ({"files": "dlc/*.outb", "wind": "WindVxi"}, "requires the section .loads.wind."),
+        (
+            {"file": "dlc/wind_8.outb", "hours_table": "short.csv"},
+            "hours_table applies to files; set hours_per_year for a single file",
+        ),
     ],
 )
 def test_bad_patterns_are_one_error_each(dlc, keys, message):
@@ -220,7 +229,7 @@ def test_bad_patterns_are_one_error_each(dlc, keys, message):
 
 def test_a_series_needs_its_hours(tmp_path):
     (tmp_path / "series.csv").write_text("time_s,carrier_N_m,carrier_rpm\n0,1,1\n1,1,1\n2,1,1\n")
-    with pytest.raises(GearboxFileError, match="hours_per_year: this key is missing; a series needs it"):
+    with pytest.raises(GearboxFileError, match=".hours_per_year: this key is missing; a time series requires it"):
         load_sources(gearbox(tmp_path, one={"file": "series.csv", "skip_s": 0.0}))
 
 
@@ -228,7 +237,10 @@ def test_a_link_that_leads_out_of_the_folder_is_refused(dlc, tmp_path_factory):
     outside = tmp_path_factory.mktemp("outside") / "stranger.outb"
     outside.write_bytes((dlc / "dlc" / "wind_8.outb").read_bytes())
     (dlc / "dlc" / "link.outb").symlink_to(outside)
-    with pytest.raises(GearboxFileError, match="lies outside the gearbox file's folder"):
+    with pytest.raises(
+        GearboxFileError,
+        match="is outside the folder of the gearbox file; move it there, or",
+    ):
         load_sources(gearbox(dlc, all=turbine("files", hours_per_year=10.0)))
 
 
@@ -295,11 +307,11 @@ def steady_rows(count: int = 400) -> list[str]:
 @pytest.mark.parametrize(
     ("place", "row", "message"),
     [
-        (30, "3.0,2000,1e300", r"speed at 3 s \(step 31\) is 1e\+300 rpm; up to 100000 rpm can be meant"),
-        (30, "3.0,2000,0", r"falls from 12 rpm to 0 within the step to 3 s \(step 31\): a dropout"),
+        (30, "3.0,2000,1e300", "300 rpm; plausible are up to 100000 rpm"),
+        (30, "3.0,2000,0", ": the speed falls from 12 rpm to 0 within the step to 3 s"),
         (30, "3.0,1e15,12", "torque at 3 s is 1e.15 N m"),
-        (30, "3.0,,12", "line 32 holds words"),
-        (30, "3.0,nan,12", r"holds no number at 3 s \(step 31\)"),
+        (30, "3.0,,12", ": line 32 has text where"),
+        (30, "3.0,nan,12", "has no number at 3 s"),
     ],
 )
 def test_what_no_shaft_does_is_refused_with_its_row(tmp_path, place, row, message):
@@ -314,7 +326,7 @@ def test_a_gap_in_time_is_refused_with_its_row(tmp_path):
     rows = steady_rows()
     del rows[250:330]
     (tmp_path / "series.csv").write_text(series(rows))
-    with pytest.raises(GearboxFileError, match=r"nothing between 24.9 and 33 s \(behind step 250\).*a dropout"):
+    with pytest.raises(GearboxFileError, match=": no samples between 24.9 and 33 s"):
         load_sources(gearbox(tmp_path, one={"file": "series.csv", **SOURCE}))
 
 

@@ -113,4 +113,4 @@ def test_a_mode_is_that_of_the_exact_frequency_not_of_the_run_up_s(runs):
 def test_without_a_run_up_the_loudest_is_told_by_the_response():
     (fact,) = facts_of_response(Labels(Gearbox.from_toml("cases/grc750/gearbox.toml")), response())
     assert fact.figure == "790 Hz"
-    assert "Excited by mesh." in fact.sentence and "±201 µm" in fact.sentence
+    assert "Order mesh." in fact.sentence and "±201 µm" in fact.sentence

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.report.findings import facts
 from exugear.report.findings.facts import levers_of
+from exugear.report.findings.loudness import Loudness, Ranking, Resonance
 from exugear.report.findings.verdicts import best_change, guarded
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.run_spectra import is_among, other_windows, survives
@@ -83,3 +87,23 @@ def test_words_are_labels_and_copies_are_numbered(gearbox):
     assert words.family("pl_a_3") == "pl_a"
     assert words.family("sun_planet_1") == "sun_planet"
     assert words.family("hss") == "hss"
+
+
+def test_a_card_has_25_words_at_most_whatever_the_names(gearbox):
+    """Names of four words at each place: what has no room is left to the table."""
+    names = ("generator side planet carrier", "rotor side cylindrical roller bearing")
+    words = Labels(gearbox)
+    loudness = {
+        "error": Loudness(55.6e-6, "", 1234),
+        "force": Loudness(12e3, names[1], 2345),
+        "acceleration": Loudness(129.0, names[1], None),
+    }
+    resonance = Resonance(f"2 x {names[0]} + {names[1]}", 66.0, 2.5, 185.0, loudness)
+    ranking = Ranking((resonance,), (1.0, 3.0), False, "shafts")
+    group = SimpleNamespace(main="bushing", ranked={"bushing": []})
+    fact = facts._in_operation(words, group, ranking)
+    assert fact.sentence.startswith("Order 2")
+    assert "TE ±55.6 µm (rank 1234/1)" in fact.sentence
+    assert len(fact.sentence.split()) <= facts.MOST_WORDS == 25
+    damping = facts._short("Strain energy 16 %.", *(f"A change of {name}: −2.5 dB." for name in 4 * names))
+    assert len(damping.split()) <= 25

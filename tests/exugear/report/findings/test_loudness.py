@@ -84,7 +84,7 @@ def test_the_range_of_operation_is_stated_or_follows_from_the_rated_speed(grc):
     assert operating_range(grc.varied({"operation.speed_range_rpm": [10.0, 30.0]})) == pytest.approx(
         (10.0 * RPM, 30.0 * RPM)
     )
-    with pytest.raises(GearboxFileError, match="lower speed comes first"):
+    with pytest.raises(GearboxFileError, match=": set the lower speed first"):
         grc.varied({"operation.speed_range_rpm": [30.0, 10.0]})
     with pytest.raises(GearboxFileError, match="speed_range_rpm"):
         grc.varied({"operation.speed_range_rpm": [-30.0, 10.0]})

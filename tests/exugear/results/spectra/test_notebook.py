@@ -17,7 +17,7 @@ def spectra(runs):
     run = swept_pair([600.0, 1300.0])
     time, speed, _ = run_up(duration=2.0)
     cut = order_cut(time, speed, RATE, OrderLine("<b>" + 300 * "long ", 60.0), window_length=0.1)
-    conditions = "load case run_up, law line_of_action, inertias gears"
+    conditions = "load case run_up, mesh model line_of_action, inertia set gears"
     return {
         "<Waterfall: 995 spectra of 820 lines, ": run,
         "<OrderCut: order 60 (<b>long long": cut,

@@ -65,5 +65,5 @@ def test_no_window_makes_a_chirp_narrower_than_the_root_of_its_rate():
 
 
 def test_steady_tone_has_no_matched_window():
-    with pytest.raises(ValueError, match="steady"):
+    with pytest.raises(ValueError, match="sweep rate = 0"):
         sweep_matched_window(0.0)

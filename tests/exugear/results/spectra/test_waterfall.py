@@ -49,8 +49,8 @@ def test_line_outside_the_band_has_no_level():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"window_length": 1e-4}, "is 1 samples: it needs 8 to 8192"),
-        ({"window_length": 9.0}, "is 73728 samples: it needs 8 to 8192"),
+        ({"window_length": 1e-4}, "s is 1 samples; 8 to 8192"),
+        ({"window_length": 9.0}, "s is 73728 samples; 8 to 8192"),
         ({"window_length": 0.1, "overlap": 1.0}, "overlap"),
     ],
 )

@@ -149,7 +149,7 @@ def test_a_start_that_leads_nowhere_is_told():
     def residual(x, parameter):
         return np.ones_like(x), lambda step: step
 
-    with pytest.raises(HarmonicBalanceError, match="no solution at 1"):
+    with pytest.raises(HarmonicBalanceError, match="continuation: no solution at the start 1"):
         trace(residual, np.zeros(2, dtype=complex), 1.0, 2.0, Scales(1.0, 1.0), step=0.1, longest=0.1)
 
 

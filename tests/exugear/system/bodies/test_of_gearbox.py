@@ -208,13 +208,13 @@ def test_a_bearing_longer_than_its_seat_is_refused_by_name(grc: Gearbox, stiffne
     ):
         flange = {"mass_kg": 1.0, "axial_kg_m2": 1.0, "transverse_kg_m2": 1.0}
         shaft_model(grc.varied({"bodies.hss.shape.blanks.flange": flange}), "hss")
-    with pytest.raises(GearboxFileError, match="needs a shape"):
+    with pytest.raises(GearboxFileError, match="requires a shape; add a"):
         grc.varied({"bodies.planet.flexibility": "elastic"})
     with pytest.raises(
         GearboxFileError, match=r"bodies\.carrier\.flexibility = 'nonrotating': the body carries planets"
     ):
         solid_body(grc.varied({"bodies.carrier.flexibility": "nonrotating"}), "carrier")
-    with pytest.raises(VariantError, match="no body is elastic"):
+    with pytest.raises(VariantError, match="no flexible body is defined; add"):
         assembled(grc.varied({f"bodies.{name}.flexibility": "none" for name in SHAFTS}), Choice("flexible"), stiffness)
 
 
@@ -286,7 +286,7 @@ def test_a_scene_shows_every_shaft_with_its_gears(flexible: Assembly, tmp_path: 
 
 
 def test_a_variant_without_elastic_bodies_has_no_such_scene(grc: Gearbox, stiffness: dict) -> None:
-    with pytest.raises(ValueError, match="variant bushing has no elastic bodies"):
+    with pytest.raises(ValueError, match="variant bushing has no flexible bodies to draw; use the variant flexible"):
         elastic_scene(assemble(grc, Choice("bushing"), stiffness), np.zeros(43))
 
 

@@ -127,7 +127,7 @@ def test_a_housing_neither_turns_nor_has_gyroscopic_forces(housed: Assembly) -> 
     assert not body.gyroscopic.any()
     speeds = {"shaft_1": 30.0, "shaft_2": -20.0}
     assert not housed.rolling_velocity(np.zeros(housed.size), speeds)[housed.elastic_slices["box"]].any()
-    with pytest.raises(VariantError, match="no turning body 'box' to load"):
+    with pytest.raises(VariantError, match="no rotating body 'box' to load; bodies are"):
         housed.torque_vector({"box": 1.0})
 
 
@@ -149,8 +149,8 @@ def test_modes_tell_of_the_housing(housed: Assembly) -> None:
     modes = modes_of(housed)
     assert np.allclose(modes.kinetic.sum(axis=(1, 2)), 1.0)
     assert modes.kinetic.min() >= 0.0
-    assert any("strained: box itself" in name for name in modes.names)
-    assert any("strained: foot" in name for name in modes.names)
+    assert any("strain energy: box itself" in name for name in modes.names)
+    assert any("strain energy: foot" in name for name in modes.names)
     assert any(name.startswith("box radial") for name in modes.names)
     names = [body.name for body in housed.bodies]
     shares = modes.kinetic[:, names.index("box")].max(axis=0)
@@ -309,26 +309,31 @@ def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatc
 
     solid, seats = "bodies.box.solid", box.content["bodies"]["box"]["solid"]["seats"]
     refused({f"{solid}.file": "none.vtu"}, r"bodies\.box\.solid\.file = 'none\.vtu': no such file")
-    refused({f"{solid}.file": "plate.xdmf"}, r"solid\.file = 'plate\.xdmf': no format .* must end in \.geo, \.step, ")
+    refused(
+        {f"{solid}.file": "plate.xdmf"}, r"solid\.file = 'plate\.xdmf': unknown format; .* must end in \.geo, \.step, "
+    )
     refused({f"{solid}.file": "plate.step"}, r"bodies\.box\.solid\.element_size_mm: this key is missing")
-    needs = r"seats\.bearing_1: bearing 'bearing_1' needs its seat; give diameter_mm and width_mm"
+    needs = r"seats\.bearing_1: bearing 'bearing_1' requires its position and size; set diameter_mm and width_mm"
     refused({f"{solid}.seats": {}}, needs)
-    refused({f"{solid}.seats": seats | {"lid": {"diameter_mm": 5.0}}}, r"seats\.lid: .* give width_mm and position_mm")
+    refused({f"{solid}.seats": seats | {"lid": {"diameter_mm": 5.0}}}, r"seats\.lid: .* set width_mm and position_mm")
     moved = seats["bearing_1"] | {"position_mm": [0.0, 0.0, 3.0]}
     refused({f"{solid}.seats.bearing_1": moved}, r"bodies\.box\.solid: seat bearing_1: no face of the mesh lies on it")
     refused({f"{solid}.seats.foot": {"same_as": "feet"}}, r"foot\.same_as = 'feet': no such seat; seats are bearing_1")
-    refused({f"{solid}.seats.foot": {"same_as": "bearing_1", "width_mm": 3.0}}, "same_as stands alone")
+    refused(
+        {f"{solid}.seats.foot": {"same_as": "bearing_1", "width_mm": 3.0}},
+        "same_as cannot be combined with other keys: the dimensions are those of the other seat",
+    )
     blank = {"mass_kg": 1.0, "axial_kg_m2": 1.0, "transverse_kg_m2": 1.0}
     refused({f"{solid}.blanks": {"lid": blank}}, r"blanks\.lid: no such seat; seats are bearing_1, bearing_2, foot")
     refused({f"{solid}.torque_seat": "lid"}, r"torque_seat = 'lid': no such seat")
-    refused({f"{solid}.band_Hz": 2e4}, r"band_Hz = 20000: it must be below elasticity\.limit_Hz")
-    refused({"mounts": {}}, "body box is elastic, but nothing holds it")
+    refused({f"{solid}.band_Hz": 2e4}, ".band_Hz = 20000: must be below elasticity.limit_Hz")
+    refused({"mounts": {}}, "body box is flexible, but nothing supports it; add")
     refused({"mounts.foot.body": "shaft_9"}, r"mounts\.foot: no body 'shaft_9'")
-    refused({"mounts.bearing_1": box.content["mounts"]["foot"]}, "bearings. has this name, too")
-    refused({"bodies.box.flexibility": "nonrotating"}, "a fixed body takes 'elastic'")
-    refused({"bodies.box.flexibility": "none"}, "no body is elastic")
+    refused({"mounts.bearing_1": box.content["mounts"]["foot"]}, "also a name in .bearings")
+    refused({"bodies.box.flexibility": "nonrotating"}, "is for rotating bodies; set 'elastic' for a fixed body")
+    refused({"bodies.box.flexibility": "none"}, "no flexible body is defined; add")
     shape = {"start_z_mm": 0.0, "sections": [{"length_mm": 10.0, "outer_diameter_mm": 10.0}]}
-    refused({"bodies.box.shape": shape}, "give a shape or a solid, not both")
+    refused({"bodies.box.shape": shape}, "set a shape or a solid, not both")
     if works("gmsh"):
         refused({f"{solid}.file": "plate.step", f"{solid}.element_size_mm": 20.0}, r"plate\.step: gmsh cannot")
 

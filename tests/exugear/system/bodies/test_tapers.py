@@ -131,8 +131,14 @@ def test_the_same_cone_as_a_solid_has_its_mass() -> None:
 @pytest.mark.parametrize(
     ("section", "message"),
     [
-        ((0.1, 0.06, 0.02, 0.01, 0.02), "ends with diameters 0.01 over 0.02 m: it needs a wall there"),
-        ((0.1, 0.06, 0.0, 0.06, 0.02), "a cone's point cannot be meshed"),
+        (
+            (0.1, 0.06, 0.02, 0.01, 0.02),
+            "section that ends with diameters 0.01 over 0.02 m: a positive wall thickness is required there",
+        ),
+        (
+            (0.1, 0.06, 0.0, 0.06, 0.02),
+            "m at its end: a cone tip cannot be meshed; set a bore diameter at both ends, or split the section",
+        ),
     ],
 )
 def test_cones_that_cannot_be_are_refused(section: tuple[float, ...], message: str) -> None:

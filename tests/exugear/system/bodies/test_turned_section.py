@@ -186,7 +186,11 @@ def _solid_frequencies(shaft: Shaft, segments: int, count: int) -> np.ndarray:
             "z = 170 to 210 mm, the shaft from 0 to 200 mm",
         ),
         (STEPPED, SeatBand("bearing", 0.2, 0.04), "bearing: a shoulder lies between z = 180 and 220 mm"),
-        ((ShaftSection(0.2, 0.06), ShaftSection(0.2, 0.1, 0.07)), SeatBand("a", 0.1), "do not touch"),
+        (
+            (ShaftSection(0.2, 0.06), ShaftSection(0.2, 0.1, 0.07)),
+            SeatBand("a", 0.1),
+            "are not connected: one fits into the bore of the other",
+        ),
         ((), SeatBand("a", 0.1), "at least one section"),
     ],
 )
@@ -197,5 +201,5 @@ def test_impossible_shafts_are_refused_by_name(sections, seat, message):
 
 @pytest.mark.parametrize("values", [(0.0, 0.1, 0.0), (0.1, 0.1, 0.1), (0.1, -0.1, 0.0)])
 def test_sections_without_a_wall_are_refused(values):
-    with pytest.raises(ShaftError, match="positive length and a wall"):
+    with pytest.raises(ShaftError, match="m: a positive length and wall thickness are required"):
         ShaftSection(*values)

@@ -45,7 +45,7 @@ def at_form_circle(gearbox: Gearbox, torque: float = 100.0) -> int:
 def test_a_small_margin_foretells_contact_at_the_form_circle_and_the_proposal_mends_it() -> None:
     gearbox = spur(0.9)
     assert pair_margins(gearbox.pairs["helical"]).form[0] < 0.01
-    (doubt,) = (line for line in remarks(gearbox) if "form circle" in line)
+    (doubt,) = (line for line in remarks(gearbox) if "% of the profile length from the root form diameter of" in line)
     assert doubt.startswith("gears.large.tip_diameter_mm = ")
     assert at_form_circle(gearbox) > 0
     assert not table_of(gearbox).failures
@@ -65,14 +65,15 @@ def test_a_pressure_that_no_steel_bears_is_a_warning() -> None:
         torque = (pressure / bearable) ** 2
         content["static_load"]["torques_N_m"] = dict.fromkeys(content["static_load"]["torques_N_m"], torque)
         gearbox = Gearbox.from_dict(content)
-        expected = f"pairs.helical: {1e-6 * pair_margins(gearbox.pairs['helical']).pitch_point_pressure:.4g} MPa"
+        stress = 1e-6 * pair_margins(gearbox.pairs["helical"]).pitch_point_pressure
+        expected = f"pairs.helical: Hertzian stress {stress:.4g} MPa"
         assert any(line.startswith(expected) for line in remarks(gearbox)) == told
 
 
 def test_a_thin_tip_is_a_warning_and_a_pointed_one_a_fault() -> None:
     thin = spur(1.2)
     assert pair_margins(thin.pairs["helical"]).tip_thickness[0] == pytest.approx(0.120, abs=1e-3)
-    assert any("0.120 normal modules thick; 0.2 is the usual least" in line for line in remarks(thin))
+    assert any("0.120 m_n; usual minimum 0.2 m_n, 0.4 m_n for case-hardened teeth" in line for line in remarks(thin))
     with pytest.raises(ValueError, match="at least 0.1 is needed"):
         spur(1.25)
 

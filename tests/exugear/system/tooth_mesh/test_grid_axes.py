@@ -103,7 +103,7 @@ def test_keys_of_the_file_are_taken_as_they_are_and_a_table_that_reaches_far_eno
     request.compute()
     twice, thrice = (axes_reaching(spur.pairs["spur"].pair, place, 0.0) for place in (12e-6, 20e-6))
     assert isinstance(fitting_table(spur, "spur", tmp_path, grid=True, axes=twice), MeshTable)
-    with pytest.raises(TableError, match="its axes end too near to the static state; compute it again"):
+    with pytest.raises(TableError, match=": its axes end too close to the static state; recompute it"):
         fitting_table(spur, "spur", tmp_path, grid=True, axes=thrice)
     (again,) = requested_tables(spur, tmp_path, grid=True, axes={"spur": thrice})
     assert again.stored is None and "too near" in again.replaces

@@ -42,14 +42,16 @@ def test_the_page_of_model_settings_lists_each_law_with_the_tables_that_it_needs
 
 @pytest.mark.parametrize("name", ["kinematic", "springs"])
 def test_what_has_no_force_is_refused_with_the_laws_that_have_one(name: str) -> None:
-    with pytest.raises(MeshError, match=rf"mesh law '{name}' has no force element; laws are {', '.join(WITH_FORCE)}"):
+    with pytest.raises(
+        MeshError, match=rf"mesh model '{name}' has no force element; choose one of {', '.join(WITH_FORCE)}"
+    ):
         law_of(name)
 
 
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_that_needs_tables_asks_for_their_folder(grc: Gearbox, name: str) -> None:
     if LAWS[name].needs_tables:
-        with pytest.raises(MeshError, match=f"mesh law '{name}' needs STE tables"):
+        with pytest.raises(MeshError, match=f"mesh model '{name}' requires transmission error tables"):
             mesh_stiffness(grc, name)
     else:
         assert len(mesh_stiffness(grc, name)) == (len(grc.pairs) if LAWS[name].has_force else 0)

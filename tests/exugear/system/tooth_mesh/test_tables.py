@@ -183,7 +183,7 @@ def test_table_of_the_other_flank_sees_the_modification_from_the_other_end(tmp_p
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (("tip_relief_length_mm = 2.0", "tip_relief_shape = 'linear'"), "tip relief needs"),
+        (("tip_relief_length_mm = 2.0", "tip_relief_shape = 'linear'"), "tip relief requires"),
         (
             ("tip_relief_length_mm = 2.0", "tip_relief_length_mm = 20.0"),
             "gears.pinion.modification: .* off the involute",
@@ -212,7 +212,7 @@ def test_bad_topography_names_file_line_and_value(tmp_path: Path) -> None:
     ("old", "new", "words"),
     [
         ("[0.2, 1.0]", "[0.2, 0.9]", "torque_factors"),
-        ("[0.2, 1.0]", "[1.0, 0.2]", "must rise"),
+        ("[0.2, 1.0]", "[1.0, 0.2]", ": values must increase"),
         ("[0.2, 1.0]", "[0.0, 1.0]", "torque_factors"),
         ("[0.0, 50.0]", "[-50.0, 50.0]", "centre_distance_offsets_um"),
         ("[0.0, 20.0]", "[0.0, nan]", "misalignment_um"),

@@ -254,9 +254,9 @@ def test_pitch_errors_put_sidebands_of_the_shaft_beside_the_mesh(pitched: Gearbo
     [
         ({"deviations": {"a": {"body": "hss", "cumulative_pitch_um": [1.0, 2.0]}}}, "2 values; hs_pinion has 22 teeth"),
         ({"deviations": {"a": {"body": "nowhere", "runout_um": 3.0}}}, "no such body"),
-        ({"deviations": {"a": {"body": "ims", "runout_um": 3.0}}}, "name one of"),
+        ({"deviations": {"a": {"body": "ims", "runout_um": 3.0}}}, ": choose one of"),
         ({"deviations": {"a": {"body": "hss"}}}, "cumulative_pitch_um, one number for each tooth, or runout_um"),
-        ({"pins": {"a": {"body": "hss", "radial_um": 3.0}}}, "no planet; planets are planet_1"),
+        ({"pins": {"a": {"body": "hss", "radial_um": 3.0}}}, ": not a planet; planets are planet_1"),
     ],
 )
 def test_impossible_errors_are_refused(grc: Gearbox, changes: dict, message: str) -> None:

@@ -273,9 +273,9 @@ def test_states_carry_loads_of_laminae_row_by_row():
 @pytest.mark.parametrize(
     ("rows", "force", "message"),
     [
-        ((ANGULAR,), (0.0, 0.0, -1e3), "no row holds an axial force of -1000 N"),
+        ((ANGULAR,), (0.0, 0.0, -1e3), "bearing: no row carries an axial force of -1000 N"),
         ((ANGULAR,), (5e3, 0.0, 0.0), "single row with a contact angle"),
-        ((ALIGNING,), (1e3, 0.0, 10.0), "no row holds an axial force"),
+        ((ALIGNING,), (1e3, 0.0, 10.0), "bearing: no row carries an axial force of"),
         ((DEEP_GROOVE,), (0.0, 0.0, 0.0), "force = 0"),
     ],
 )

@@ -190,5 +190,5 @@ def test_rows_that_the_standards_cannot_rate_are_refused():
         basic_dynamic_rating([row], "deep_groove_ball")
     with pytest.raises(BearingError, match="must be alike"):
         basic_static_rating([row, replace(row, element_count=13)], "cylindrical_roller")
-    with pytest.raises(BearingError, match="50 degrees makes a thrust bearing"):
+    with pytest.raises(BearingError, match="50 degrees is a thrust bearing; radial ratings apply up to 45"):
         basic_dynamic_rating([balls(12.0, 65.0, 14, 50.0)], "angular_contact_ball")

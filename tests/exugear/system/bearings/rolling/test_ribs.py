@@ -98,8 +98,8 @@ def test_the_contact_of_ribs_is_told_as_an_estimate():
 @pytest.mark.parametrize(
     ("keys", "words"),
     [
-        ({"rib_contact_mm": 3.0}, "rib_contact_mm needs ribs"),
-        ({"type": "tapered_roller", "ribs": "both"}, "ribs makes no sense for type = 'tapered_roller'"),
+        ({"rib_contact_mm": 3.0}, "rib_contact_mm requires ribs = '"),
+        ({"type": "tapered_roller", "ribs": "both"}, "ribs is not applicable to type = 'tapered_roller'"),
     ],
 )
 def test_ribs_where_there_are_none_are_refused(keys, words):

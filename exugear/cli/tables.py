@@ -1,0 +1,193 @@
+"""Tables on the console: whole numbers and whole headings in 79 columns; only names and texts are wrapped."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from rich.cells import cell_len, set_cell_size
+from rich.text import Text
+
+from exugear.cli.console import plain, results
+
+NARROWEST = 79
+"""Columns that a table may always take: a terminal of 80 has them."""
+GAP = 2
+HARD_SPACE = "\u00a0"
+"""Space in texts at which lines are broken only where nothing else helps; printed as a space."""
+SMALLEST_NAME = 10
+"""Columns that wrapped names and texts keep; a table without room for them is printed in parts below each other."""
+
+Row = Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: its heading in lines, its cells, and whether they are text that may be wrapped."""
+
+    heading: str
+    cells: tuple[str, ...]
+    is_text: bool
+
+    @property
+    def natural(self) -> int:
+        """Width without any wrapping."""
+        return max(_width(text) for text in (self.heading, *self.cells))
+
+    @property
+    def smallest(self) -> int:
+        """Width below which the heading, or a number, would be cut."""
+        if not self.is_text:
+            return self.natural
+        return max(_width(self.heading), min(self.natural, SMALLEST_NAME))
+
+
+def print_table(title: str, rows: Sequence[Row], texts: tuple[str, ...] = (), legend: str = "") -> None:
+    """Print rows under the keys of the first one, and a legend below them.
+
+    The first column is text, and so are those in `texts`; the others are numbers, which are never wrapped or cut.
+    """
+    limit = max(NARROWEST, results.width - 1)
+    results.print(Text("\n".join(["", *wrapped(plain(title), limit)]), style="bold"), soft_wrap=True)
+    columns = [_column(heading, rows, not place or heading in texts) for place, heading in enumerate(rows[0])]
+    for number, part in enumerate(_parts(columns, limit)):
+        if number:
+            results.print()
+        for line in _lines(part, _widths(part, limit)):
+            results.print(Text(line), soft_wrap=True)
+    if legend:
+        print_text(legend)
+
+
+def print_text(text: str, indent: str = "") -> None:
+    """Print sentences, wrapped; lines after the first are indented."""
+    limit = max(NARROWEST, results.width - 1) - len(indent)
+    lines = wrapped(plain(text), limit)
+    results.print(Text(f"\n{indent}".join(lines)), soft_wrap=True)
+
+
+def significant(value: float, digits: int = 4, decimals: int = 3) -> str:
+    """Write a number with some significant digits, without an exponent and with at most some decimals.
+
+    Large numbers keep all digits before the point; above nine of them, or where decimals would show a zero, the number
+    has an exponent.
+
+    Examples
+    --------
+    >>> significant(139.192), significant(-0.0), significant(0.53249), significant(2013.46, 5, 1)
+    ('139.2', '0.000', '0.532', '2013.5')
+    """
+    size = abs(value)
+    if not math.isfinite(value):
+        return f"{value:g}"
+    if size >= 1e9 or 0.0 < size < 0.5 * 10.0**-decimals:
+        return f"{value:.{digits - 1}g}"
+    before = math.floor(math.log10(size)) if size else 0
+    return f"{value + 0.0:.{min(max(digits - 1 - before, 0), decimals)}f}"
+
+
+def wrapped(text: str, width: int) -> list[str]:
+    """Break text into lines: at spaces, and in longer words after an underscore, a hyphen, a dot or a slash.
+
+    Examples
+    --------
+    >>> wrapped("2 x high_speed_stage", 12)
+    ['2 x high_', 'speed_stage']
+    """
+    lines = []
+    for paragraph in text.split("\n"):
+        line = ""
+        for piece in _pieces(paragraph, width):
+            if line and cell_len(line) + cell_len(piece.rstrip()) > width:
+                lines.append(line.rstrip())
+                line = piece.lstrip()
+            else:
+                line += piece
+        lines.append(line.rstrip())
+    return [line.replace(HARD_SPACE, " ") for line in lines]
+
+
+def _pieces(paragraph: str, width: int) -> Iterator[str]:
+    """Parts of a line between which it may be broken, none of them wider than a column."""
+    for word in re.findall(r" *[^ ]+ ?| +", paragraph):
+        if cell_len(word.strip()) <= width:
+            yield word
+            continue
+        for part in re.findall(r"[^_\-/.\u00a0]*[_\-/.\u00a0]|[^_\-/.\u00a0]+", word):
+            rest = part
+            while cell_len(rest.rstrip()) > width:
+                head = set_cell_size(rest, width).rstrip() or rest[0]
+                yield head
+                rest = rest[len(head) :]
+            yield rest
+
+
+def _column(heading: str, rows: Sequence[Row], is_text: bool) -> Column:
+    shown = "\n".join(plain(line.strip()) for line in heading.split("\n"))
+    return Column(shown, tuple(plain(row.get(heading, "")) for row in rows), is_text)
+
+
+def _width(text: str) -> int:
+    return max(cell_len(line) for line in text.split("\n"))
+
+
+def _parts(columns: list[Column], limit: int) -> Iterator[list[Column]]:
+    """Columns that fit beside each other; what does not fit follows below, under the first column again."""
+    part = columns[:1]
+    for column in columns[1:]:
+        if len(part) > 1 and _total([one.smallest for one in (*part, column)]) > limit:
+            yield part
+            part = columns[:1]
+        part = [*part, column]
+    yield part
+
+
+def _total(widths: Sequence[int]) -> int:
+    """Width of a line: a margin, the columns, and the gaps between them."""
+    return 1 + sum(widths) + GAP * (len(widths) - 1)
+
+
+def _widths(columns: Sequence[Column], limit: int) -> list[int]:
+    """Widths of columns: the widest texts give way first."""
+    widths = [column.natural for column in columns]
+    while _total(widths) > limit:
+        able = [place for place, column in enumerate(columns) if widths[place] > column.smallest]
+        if not able:
+            break
+        widths[max(able, key=lambda place: widths[place])] -= 1
+    return widths
+
+
+def _lines(columns: Sequence[Column], widths: Sequence[int]) -> Iterator[str]:
+    """Lines of a table: headings, a rule, rows."""
+    yield from _row([column.heading.split("\n") for column in columns], columns, widths, bottom=True)
+    yield " " + "─" * (_total(widths) - 1)
+    for number in range(len(columns[0].cells)):
+        cells = []
+        for place, (column, width) in enumerate(zip(columns, widths, strict=True)):
+            lines = wrapped(column.cells[number], width)
+            if not place and len(lines) > 1:
+                lines = lines[:1] + [" " * (cell_len(line) < width) + line for line in lines[1:]]
+            cells.append(lines)
+        yield from _row(cells, columns, widths)
+
+
+def _row(
+    cells: Sequence[list[str]], columns: Sequence[Column], widths: Sequence[int], *, bottom: bool = False
+) -> Iterator[str]:
+    """Lines of one row: texts begin at the left, numbers end at the right; headings end at the bottom."""
+    height = max(map(len, cells))
+    if bottom:
+        cells = [[*[""] * (height - len(lines)), *lines] for lines in cells]
+    for number in range(height):
+        line = ""
+        for lines, column, width in zip(cells, columns, widths, strict=True):
+            text = "".join(lines[number : number + 1])
+            blank = " " * (width - cell_len(text))
+            parts = (blank, text)
+            if column.is_text:
+                parts = (text, blank)
+            line += " " * GAP + "".join(parts)
+        yield line[GAP - 1 :].rstrip()
