@@ -199,7 +199,7 @@ class _Scanner:
         table: tuple[str, ...] = ()
         while self._skip() < len(self.text):
             if self.text[self.place] == "[":
-                self.place += 2 if self.text.startswith("[[", self.place) else 1
+                self.place += 1 + self.text.startswith("[[", self.place)
                 table = yield from self._key(())
                 self.place = self.text.index("]", self.place) + 1
                 self.place += self.text.startswith("]", self.place)

@@ -185,7 +185,9 @@ def _draw(study: Study, folder: Path, swept: StudyResult) -> list[Path]:
     if swept.dataset is None:
         return []
     search = study.file.optimise
-    minimised = () if search is None else tuple(_judged(study)[: len(search.minimise)])
+    minimised: tuple[str, ...] = ()
+    if search is not None:
+        minimised = tuple(_judged(study)[: len(search.minimise)])
     return draw_study(swept.dataset, folder, minimised)
 
 

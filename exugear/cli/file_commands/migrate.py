@@ -16,7 +16,7 @@ def migrate(
         Path | None, typer.Option("--out", metavar="FILE", help="File to write. (default: the same file)")
     ] = None,
 ) -> None:
-    """Rewrite a gearbox or study file of an earlier version with today's key names; comments are kept."""
+    """Update the key names of an older file; comments are kept."""
     with exit_codes():
         from exugear.gearbox.renames import MigrationError, migrated
         from fe_ste.tools.files import write_file
@@ -37,4 +37,7 @@ def migrate(
                 raise BadInputError(f"{target}: cannot be written ({error.strerror})") from error
         for change in changes:
             say(change)
-        say(f"{len(changes)} names replaced in {target}" if changes else f"{file}: no old names")
+        if changes:
+            say(f"{len(changes)} names replaced in {target}")
+        else:
+            say(f"{file}: no old names")

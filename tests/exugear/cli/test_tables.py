@@ -17,7 +17,8 @@ from rich.console import Console
 
 from exugear.cli import rating_tables, tables
 from exugear.cli.app import app
-from exugear.cli.commands import bearings, life, loads, modes, report, ste, steady, sweep
+from exugear.cli.commands import bearings, life, loads, modes, report, ste, steady
+from exugear.cli.commands import study as study_command
 from exugear.cli.file_commands import check
 from exugear.gearbox.variant import Variant
 from exugear.life.rating.sheet import FINITE_ELEMENTS, FlankSheet, RatingSheet
@@ -30,7 +31,7 @@ LINES = 40
 NAMES = [f"{stem}{n}".ljust(24, "x") for n, stem in enumerate(9 * ["intermediate_stage_"], start=1)]
 """Nine names of 24 characters."""
 LONG = NAMES[0]
-MODULES = (check, rating_tables, bearings, life, loads, modes, report, ste, steady, sweep)
+MODULES = (check, rating_tables, bearings, life, loads, modes, report, ste, steady, study_command)
 WHOLE = re.compile(r"^\d[\d.]*$")
 
 
@@ -308,16 +309,16 @@ def test_report(printed: Printed, tmp_path: Any) -> None:
     printed.check(1)
 
 
-def test_sweep(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_study(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [{"parameter": LONG, "result": NAMES[1], "change per\nstep %": "-123.456"}]
-    sweep.print_table("Sensitivity", rows, ("result",))
+    study_command.print_table("Sensitivity", rows, ("result",))
     dataset = xr.Dataset(
         {name: ("evaluation", np.full(1300, -1.2345e-123)) for name in NAMES}
         | {"on_front": ("evaluation", np.ones(1300, dtype=int))}
     )
     study: Any = SimpleNamespace(file=SimpleNamespace(parameters=NAMES[2:]), tolerances=None)
-    monkeypatch.setattr(sweep, "_judged", lambda study: NAMES[:2])
-    sweep._print_front(study, dataset)
+    monkeypatch.setattr(study_command, "_judged", lambda _: NAMES[:2])
+    study_command._print_front(study, dataset)
     printed.check(2)
 
 

@@ -333,8 +333,8 @@ def _relative_to_mating_rack(mate: Toothing, gear: Toothing) -> Toothing:
     depth = bare.outward * (1e3 * bare.reference_radius - 0.5 * root) / mate.module.value
     changes |= {
         "shift": derived(tidy(round(shift, 9)), "the same tooth thickness at the base circle"),
-        "tip": gear.tip or derived(tidy(round(2e3 * before.tip_radius, 6)), "that of its own rack"),
-        "root": gear.root or derived(tidy(round(root, 6)), "that of its own rack"),
+        "tip": gear.tip or derived(tidy(round(2e3 * before.tip_radius, 6)), "as of its own rack"),
+        "root": gear.root or derived(tidy(round(root, 6)), "as of its own rack"),
         "dedendum": derived(tidy(round(depth + bare.outward * shift, 9)), "the same root diameter"),
         "tip_radius": derived(
             tidy(round(gear.tip_radius.value * gear.module.value / mate.module.value, 9)), "the same length"

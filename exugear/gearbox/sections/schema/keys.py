@@ -156,10 +156,7 @@ def _example_of_table(examples: dict[str, Any], table: str) -> dict[str, Any]:
 def _key(table: str, name: str, field: FieldInfo, meaning: str, example: object) -> Key:
     found = _range(field.annotation) or next((entry for entry in field.metadata if isinstance(entry, Range)), None)
     told = "" if found is None else f"{found.least:g} to {found.most:g}"
-    unit = unit_of(name)
-    if table.endswith(".damping") and " s/" not in unit:  # the same keys as those of a stiffness
-        unit = unit.replace("/", " s/")
-    return Key(table, name, unit, _kind(field.annotation), told, _default(field), meaning, example)
+    return Key(table, name, unit_of(name), _kind(field.annotation), told, _default(field), meaning, example)
 
 
 def _range(kind: Any) -> Range | None:

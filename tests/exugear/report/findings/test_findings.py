@@ -101,7 +101,7 @@ def test_a_card_has_25_words_at_most_whatever_the_names(gearbox):
     resonance = Resonance(f"2 x {names[0]} + {names[1]}", 66.0, 2.5, 185.0, loudness)
     ranking = Ranking((resonance,), (1.0, 3.0), False, "shafts")
     group = SimpleNamespace(main="bushing", ranked={"bushing": []})
-    fact = facts._in_operation(words, group, ranking)
+    fact = facts._operating_resonance(words, group, ranking)
     assert fact.sentence.startswith("Order 2")
     assert "TE ±55.6 µm (rank 1234/1)" in fact.sentence
     assert len(fact.sentence.split()) <= facts.MOST_WORDS == 25
