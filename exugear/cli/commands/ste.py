@@ -271,7 +271,8 @@ TABLE_LEGEND = (
 )
 REFERENCE_LEGEND = (
     "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p), by the nonlinear reference analysis; "
-    "table: by the method of the tables, which the dynamic models use."
+    "table: by the method of the tables, which the dynamic models use. σ_H: contact stress of the most loaded tooth "
+    "pair, mean along its contact line, maximum over the positions."
 )
 
 
@@ -319,6 +320,8 @@ def _reference_row(summary: dict[str, Any]) -> dict[str, str]:
         "diff.\n%": _shown(summary, "difference_of_means_percent", "+.1f"),
         "TE p-p\nµm": _shown(summary, "ste_peak_to_peak_um", ".3f"),
         "table\np-p µm": _shown(summary, "superelement_peak_to_peak_um", ".3f"),
+        "σ_H\nMPa": _shown(summary, "contact_stress_MPa", ".0f"),
+        "table\nσ_H MPa": _shown(summary, "superelement_contact_stress_MPa", ".0f"),
         "posit.\nconv.": _solved(summary),
     }
 

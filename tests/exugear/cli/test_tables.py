@@ -160,6 +160,8 @@ def test_ste(printed: Printed) -> None:
             "ste_peak_to_peak_um": 12.345,
             "mesh_stiffness_mean_N_per_m": 12345.6e6,
             "max_pressure_MPa": 12345.0,
+            "contact_stress_MPa": 12345.0,
+            "superelement_contact_stress_MPa": 12345.0,
             "pitch_point_pressure_MPa": 1234.0,
             "superelement_mean_um": 123.45,
             "superelement_peak_to_peak_um": 12.345,
