@@ -321,7 +321,7 @@ def test_faults_name_body_key_and_what_would_be_right(tmp_path: Path, monkeypatc
     refused({f"{solid}.seats.foot": {"same_as": "feet"}}, r"foot\.same_as = 'feet': no such seat; seats are bearing_1")
     refused(
         {f"{solid}.seats.foot": {"same_as": "bearing_1", "width_mm": 3.0}},
-        "same_as cannot be combined with other keys: the dimensions are those of the other seat",
+        "same_as cannot be combined with other keys: the dimensions of the other seat apply",
     )
     blank = {"mass_kg": 1.0, "axial_kg_m2": 1.0, "transverse_kg_m2": 1.0}
     refused({f"{solid}.blanks": {"lid": blank}}, r"blanks\.lid: no such seat; seats are bearing_1, bearing_2, foot")
