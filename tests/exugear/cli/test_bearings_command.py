@@ -38,7 +38,7 @@ def rewritten(case: Path, *changes: tuple[str, str]) -> Path:
 
 def non_linear(case: Path) -> Path:
     for name in NAMES:
-        rewritten(case, (f"[bearings.{name}]\n", f'[bearings.{name}]\nlaw = "iso16281"\ncage = "turning"\n'))
+        rewritten(case, (f"[bearings.{name}]\n", f'[bearings.{name}]\nmodel = "iso16281"\ncage = "turning"\n'))
     return case
 
 
@@ -126,7 +126,7 @@ def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
     assert ran.exit_code == 0, ran.stderr
     run = load_run(next(out.rglob("run.nc")))
     modes = load_modes(next(out.rglob("modes.nc")))
-    words = "; ".join(f"{name}: rows by ISO/TS 16281, cage turning" for name in NAMES)
+    words = "; ".join(f"{name}: rolling elements to ISO/TS 16281, cage turning" for name in NAMES)
     assert run.attrs["bearing_laws"] == modes.attrs["bearing_laws"] == words
     assert abs(energy_residual(run)) < 1e-5
     force = np.linalg.norm(run["support_force"].to_numpy()[:, :, :2], axis=2)

@@ -77,7 +77,7 @@ def test_a_floating_frame_asks_for_exudyn_before_anything_is_computed(tmp_path):
     outcome = exugear("run", case, "--variant", "flexible", "--load-case", "run_up")
     assert outcome.exit_code == 2
     message = " ".join(outcome.stderr.split())
-    assert "bodies.shaft.flexibility = 'ffrf' runs in Exudyn only; add --solver exudyn" in message
+    assert "bodies.shaft.flexibility = 'ffrf' requires Exudyn; add --solver exudyn" in message
     assert list(tmp_path.iterdir()) == [case]
     outcome = iso("run", case, "--variant", "flexible", "--solver", "exudyn", "--duration", 0.002, "--json")
     assert outcome.exit_code == 0, outcome.stderr
@@ -124,7 +124,7 @@ def test_missing_tables_are_computed_first_and_kept_for_the_next_verb(case, tmp_
     first = exugear("modes", case, "--variant", "rigid", "--out", out)
     assert first.exit_code == 0, first.stderr
     assert "spur" in first.stderr
-    assert "computed first" in first.stderr
+    assert "computing it first" in first.stderr
     written = (out / "tables" / "spur.nc").stat().st_mtime_ns
     second = exugear("run", case, "--variant", "rigid", "--duration", 0.01, "--out", out)
     assert second.exit_code == 0, second.stderr

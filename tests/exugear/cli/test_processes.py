@@ -149,7 +149,7 @@ def stopped_run(case, number, delay=None):
 def test_a_run_that_is_terminated_keeps_what_it_reached(case):
     code, said, _, partial = stopped_run(case, signal.SIGTERM)
     assert code == 130, said
-    assert "go on from there with:\nexugear run " in said
+    assert "resume with:\nexugear run " in said
     assert load_run(partial).sizes["time"] > 0
 
 
@@ -305,7 +305,7 @@ def test_what_is_compiled_is_told_before_it_is_and_ctrl_c_ends_it(tmp_path):
         process.send_signal(signal.SIGINT)
         said = process.stderr.read()
     told = " ".join(told.split())
-    assert "of the equations of motion, 10 to 25 s for each sort of model; once per installation" in told
+    assert "of the equations of motion (10 to 25 s per model type); once per installation" in told
     assert process.returncode == 130, said
     assert "Stopped" in said
     assert not list((tmp_path / "out").rglob("run*"))

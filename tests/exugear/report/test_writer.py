@@ -80,11 +80,11 @@ def test_the_page_stands_alone_and_names_its_assumptions(results):
 def test_cards_and_checks_on_the_page_are_the_sentences_of_the_command_line(results):
     report = write_report(results, target=1000.0)
     page = html.unescape(report.path.read_text(encoding="utf-8"))
-    facts = [line for line in report.statements if line.startswith(("Loudest resonance", "What the bearings do"))]
+    facts = [line for line in report.statements if line.startswith(("Highest resonance", "Effect of bearing"))]
     assert len(facts) == 2
     for line in facts:
         assert line.split(". ", 1)[1] in page
-    checks = [line for line in report.statements if line.startswith(("Passed: ", "Mind: "))]
+    checks = [line for line in report.statements if line.startswith(("Passed: ", "Warning: "))]
     assert len(checks) >= 4
     for line in checks:
         assert line.split(": ", 1)[1].removesuffix(".") in page
@@ -138,7 +138,7 @@ sections = [{ length_mm = 80.0, outer_diameter_mm = 25.0 }]
     assert set(kept.iterdir()) == before
     page = report.path.read_text(encoding="utf-8")
     assert "Flexible in the variant flexible: shaft_1" in page
-    assert "With elastic bodies, inertias disc" in page
+    assert "Variant flexible, mesh model" in page and "inertia set disc" in page
     assert any("shaft_1 itself" in name for name in modes.names)
 
 

@@ -121,7 +121,7 @@ def test_check_prints_torque_speed_and_flanks_of_each_load_case(grc):
     flanks = {"sun_planet": "-", "ring_planet": "+", "intermediate": "+", "high_speed": "-"}
     assert all(row["loaded_flanks"] == flanks and row["doubts"] == [] for row in rows.values())
     table = exugear("check", grc.source).stdout
-    assert "-4472.05" in table and "sun_planet -" in table
+    assert "-4472" in table and "sun_planet -" in table
 
 
 def test_check_asks_about_the_sign_of_a_torque_that_loads_the_other_flanks(tmp_path):

@@ -79,7 +79,7 @@ class Told:
     def __init__(self, outcome: Any) -> None:
         self.exit_code, self.exception = outcome.exit_code, outcome.exception
         lines = outcome.stderr.splitlines(keepends=True)
-        self.stderr = "".join(line for line in lines if line.strip() and not line.startswith(": load files end in"))
+        self.stderr = "".join(line for line in lines if line.strip() and not line.startswith("load files "))
 
 
 def passes(case: Path, out: Path, told: str) -> bool:

@@ -351,7 +351,7 @@ def test_a_run_beside_states_that_are_not_solved_says_so(
     assert 0.0 < beside.pop("high_speed") < 0.1
     assert not any(beside.values())
     assert not run.trusted and not int(data.attrs["valid"])
-    assert "high_speed read table states next to non-converged ones" in data.attrs["verdict"]
+    assert "high_speed read table states next to non-converged ones" in data.attrs["validity_message"]
     plain = simulate(grc, Choice(variant, "table"), tables, tmp_path / f"{variant}-plain", duration=0.1)
     assert plain.trusted
     other = xr.load_dataset(plain.path, engine="h5netcdf")

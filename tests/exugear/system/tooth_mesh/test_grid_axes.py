@@ -106,7 +106,7 @@ def test_keys_of_the_file_are_taken_as_they_are_and_a_table_that_reaches_far_eno
     with pytest.raises(TableError, match=": its axes end too close to the static state; recompute it"):
         fitting_table(spur, "spur", tmp_path, grid=True, axes=thrice)
     (again,) = requested_tables(spur, tmp_path, grid=True, axes={"spur": thrice})
-    assert again.stored is None and "too near" in again.replaces
+    assert again.stored is None and "too close" in again.replaces
     named = _case(tmp_path, SPUR_CASE.replace("ste = { ", "ste = { misalignment_um = [-20.0, -5.0, 0.0, 20.0], "))
     own = Gearbox.from_toml(named)
     with pytest.raises(TableError, match="another input"):

@@ -315,7 +315,7 @@ def test_unstable_step_is_refused(grc: Gearbox, stiffness: dict, tmp_path: Path)
 @pytest.mark.validation
 def test_what_it_cannot_take_is_refused_with_the_way_out(grc: Gearbox, stiffness: dict, tmp_path: Path) -> None:
     assert unsupported_reason(assemble(grc, Choice("bushing"), stiffness)) == ""
-    with pytest.raises(RunError, match="jointed keeps ideal joints as constraints.*use --solver exudyn"):
+    with pytest.raises(RunError, match="jointed has ideal joints as constraints.*use --solver exudyn"):
         simulate(grc, Choice("jointed"), stiffness, tmp_path, duration=0.01, solver="compiled")
     with pytest.raises(RunError, match="user-function loads exist in Exudyn only.*use --solver exudyn"):
         simulate(grc, Choice("bushing"), stiffness, tmp_path, duration=0.01, solver="compiled", mesh_route="loads")
