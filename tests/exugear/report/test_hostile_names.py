@@ -116,7 +116,7 @@ def test_every_verb_ends_well_and_prints_names_and_paths_as_they_are(results: tu
     assert "".join(title.split()) in "".join(checked.split())
     for printed in (modes, run, view, report):
         assert r"[/] :skull: \x1b[1m/" in printed
-    assert f"No pictures: no picture {MARKUP}" in view
+    assert f"no pictures: no picture {MARKUP}" in view
 
 
 def test_json_is_ascii_and_holds_names_as_they_are(results: tuple[Path, list[Any]]) -> None:
