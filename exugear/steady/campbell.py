@@ -133,7 +133,7 @@ def _matches(one: Found, other: Found) -> tuple[Integers, Integers, Floats]:
 
 
 def _clarity(one: Found, other: Found, narrowest: float) -> float:
-    """Least MAC of modes that are one across a step, or less than `CLEAR` where a veering may hide in it."""
+    """Minimum MAC of modes that are one across a step, or less than `CLEAR` where a veering may hide in it."""
     rows, columns, values = _matches(one, other)
     before, after = (own[0][places].imag for own, places in ((one, rows), (other, columns)))
     far = np.triu(np.subtract.outer(before, before), 1)
@@ -213,7 +213,7 @@ class ModeNamer:
         self._senses = {name: float(np.sign(own * speed)) for name, own in frame.speeds.items()}
 
     def named(self, shape: Complexes) -> NamedMode:
-        """Name a shape (size,) of the mean system."""
+        """Name a mode shape (size,) of the averaged system."""
         kinetic = self._kinetic(shape)
         return NamedMode(self._kind(shape, kinetic), self._words(shape, kinetic), self.whirl(shape))
 
@@ -361,7 +361,7 @@ class Campbell(ReprMixin, line=": {names!n} modes at {speeds!n} speeds"):
 
 
 def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float) -> ModeTracks:
-    """Follow the modes of a mean system between two speeds of the input (rad/s), up to a frequency (Hz)."""
+    """Follow the modes of an averaged system between two speeds of the input (rad/s), up to a frequency (Hz)."""
 
     def modes_at(speed: float) -> Found:
         values, right, left = mean_modes(system, speed)
@@ -372,7 +372,7 @@ def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float
 
 
 def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
-    """Campbell diagram of the modes of a mean system, followed over speed."""
+    """Campbell diagram of the modes of an averaged system, tracked over speed."""
     low = tracks.speeds[0]
     high = tracks.speeds[-1]
     namer = ModeNamer(system, high if abs(high) > abs(low) else low)

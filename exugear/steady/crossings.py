@@ -351,7 +351,7 @@ def _share(part: complex, total: complex) -> float:
 def _modes(
     gearset: HarmonicBalanceModel, speed: float, frequency: float, loads: Complexes, row: Floats, total: complex
 ) -> tuple[tuple[float, float], ...]:
-    """Shares of the modes of the mean system, those of negative frequency counted with their partners."""
+    """Shares of the modes of the averaged system, those of negative frequency counted with their partners."""
     values, right, left = mean_modes(gearset.system, speed)
     size = gearset.system.size
     pushed = np.linalg.solve(gearset.system.mass, loads)

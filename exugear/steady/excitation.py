@@ -85,7 +85,7 @@ class Interface:
     torque_per_force: Floats
     """(m, f) torque of the drive per steady force, N m/N."""
     bearings: BearingMean | None
-    """Non-linear bearings in the mean system."""
+    """Non-linear bearings in the averaged system."""
 
     @cached_property
     def deflection(self) -> Complexes:
@@ -370,7 +370,7 @@ class HarmonicBalanceModel:
 
     @property
     def system(self) -> MeanSystem:
-        """The mean system."""
+        """The averaged (time-invariant) system."""
         return self.waves.system
 
     @cached_property
@@ -472,7 +472,7 @@ class HarmonicBalanceModel:
         return found
 
     def forward(self, speed: float) -> Booleans:
-        """Tell which waves' meshes (m,) run through their cycles forward at a speed of the input."""
+        """Return which waves' meshes (m,) run through their cycles forward at a speed of the input."""
         return np.array([wave.sense for wave in self.waves.waves]) * math.copysign(1.0, speed) > 0.0
 
     def ports_at(self, speed: float) -> MeshInterface:
@@ -517,7 +517,7 @@ class HarmonicBalanceModel:
         )
 
     def _bearings_at(self, speed: float) -> BearingMean:
-        """Bearings in the mean system at a speed of the input, rad/s."""
+        """Bearings in the averaged system at an input speed, rad/s."""
         return BearingMean(*(self.system.at(np.array(own), speed) for own in zip(*self._bearing_means, strict=True)))
 
     def row_of_overall(self, speed: float) -> Floats:

@@ -201,7 +201,7 @@ class HarmonicResidual:
         return values, self.lattice.values(rates_of(self.gearset, self.interface, readings))
 
     def forces(self, readings: Complexes) -> tuple[Complexes, Tangent, Floats]:
-        """Find the forces (n, m, f) beyond the mean system, and how they follow small changes of the readings.
+        """Find the forces (n, m, f) beyond the averaged system, and how they follow small changes of the readings.
 
         The last result is the whole forces (s, u, f) in time, in all places.
         """
@@ -306,7 +306,7 @@ class HarmonicResidual:
         return np.concatenate(parts, axis=2)
 
     def _varies(self, wave: int, base: int) -> bool:
-        """Tell whether the law of a wave varies with a base: bearings do with all of them."""
+        """Return whether the law of a wave varies with a base: bearings do with all of them."""
         return wave >= self.meshes or self.gearset.waves.waves[wave].base == base
 
     def _mean_slopes(self, change: Complexes) -> Complexes:
@@ -325,7 +325,7 @@ class HarmonicResidual:
         return found
 
     def _mean_part(self, readings: Complexes) -> Complexes:
-        """Find the forces (n, m, f) of the mean system under readings (n, m, r)."""
+        """Find the forces (n, m, f) of the averaged system under readings (n, m, r)."""
         slopes = self._mean_slopes(readings - self.static)
         slopes[0] += self.mean_force
         return slopes
@@ -612,7 +612,7 @@ def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool
 
 
 def mean_growth(gearset: HarmonicBalanceModel) -> float:
-    """Fastest growth of the mean system over its speeds, 1/s; free rolling left out."""
+    """Fastest growth of the averaged system over its speeds, 1/s; free rolling left out."""
     rates = []
     for speed in gearset.system.speeds:
         values = gearset.system.eigenvalues(float(speed))

@@ -35,7 +35,7 @@ BESIDE = 0.03
 
 @dataclass(frozen=True)
 class Peak:
-    """A line of a signal where it is loudest."""
+    """A line of a signal at the speed of its largest amplitude."""
 
     line: str
     """Such as ``2 x intermediate``."""
@@ -105,7 +105,7 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
 
 @dataclass(frozen=True)
 class Sideband:
-    """A line beside a peak, at the speed of the peak."""
+    """Sideband of a peak, at the speed of the peak."""
 
     line: str
     """Its name, as of `Peak`; of a planet's sidebands the signal."""
@@ -326,7 +326,7 @@ class ComparedPeak:
     severity: float | None
     """Of the sweep, as `exugear.results.spectra.resonances.sweep_severity` has it."""
     run_rank: int
-    """Place among the peaks by the run-up's amplitude, 1 for the loudest."""
+    """Rank among the peaks by the run-up's amplitude, 1 for the largest."""
 
 
 def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -> OrderCut:

@@ -83,7 +83,7 @@ def gearset_of(
 
 @dataclass(frozen=True, eq=False)
 class ContactLossState:
-    """A steady state of a gearbox whose teeth may part."""
+    """Steady state of a gearbox with possible tooth contact loss."""
 
     gearset: HarmonicBalanceModel
     """With the lines that it took."""
@@ -267,7 +267,7 @@ class PointSolver:
         return replace(unstable, remark=f"{grows}; {verdict}")
 
     def _grows(self, state: ContactLossState) -> bool:
-        """Tell whether a disturbance of a state grows within a run in time."""
+        """Return whether a disturbance of a state grows within a run in time."""
         slowest = abs(state.response.interface.speed) * float(self.gearset.waves.base_orders.min())
         return state.growth * 2.0 * np.pi / slowest > GROWING
 
@@ -363,7 +363,7 @@ def _refined(gearset: HarmonicBalanceModel, speed: float, start: Complexes | Non
 
 
 def _parted(response: Response) -> bool:
-    """Tell whether teeth or rolling elements part."""
+    """Return whether teeth or rolling elements lose contact."""
     return bool(response.apart.any() or response.free.any())
 
 

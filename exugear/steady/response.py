@@ -41,7 +41,7 @@ class Response:
     deflection: Complexes
     """(n, m) deflections that the laws read, m."""
     excess: Complexes
-    """(n, m, f) forces beyond those of the mean system, in the law's coordinates, N and N m."""
+    """(n, m, f) forces beyond those of the averaged system, in the law's coordinates, N and N m."""
     force: Complexes
     """(n, m) forces of the meshes on the line of action, N."""
     products: int

@@ -50,7 +50,7 @@ class BearingWave:
 
 
 class BearingMean(NamedTuple):
-    """Bearings in the mean system at one speed; b waves."""
+    """Bearings in the averaged system at one speed; b waves."""
 
     readings: Floats
     rates: Floats
@@ -67,7 +67,7 @@ class BearingMean(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BearingWaves:
-    """All waves of the non-linear bearings of a mean system."""
+    """All waves of the non-linear bearings of an averaged system."""
 
     system: MeanSystem
     waves: tuple[BearingWave, ...]

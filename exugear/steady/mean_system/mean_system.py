@@ -62,7 +62,7 @@ LEAST_ENERGY = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class MeanSystem(ReprMixin):
-    """Mean system of an assembly over speed."""
+    """Averaged (time-invariant) system of an assembly over speed."""
 
     frame: RotatingFrame
     speeds: Floats
@@ -161,7 +161,7 @@ class MeanSystem(ReprMixin):
         return np.asarray(columns[:, None] * solved)
 
     def eigenvalues(self, speed: float) -> Complexes:
-        """Eigenvalues of the mean system at a speed of the input, 1/s; free rolling among them."""
+        """Eigenvalues of the averaged system at an input speed, 1/s; free rolling among them."""
         n = self.size
         lower = np.linalg.solve(self.mass, np.hstack([-self.stiffness_at(speed), -self.damping_at(speed)]))
         return np.asarray(scipy.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), lower])))
@@ -483,7 +483,7 @@ def _checked_change(here: Floats, there: Floats, most: float) -> float:
 
 
 def mean_modes(system: MeanSystem, speed: float) -> tuple[Complexes, Complexes, Complexes]:
-    """Vibrations of a mean system at a speed of the input (rad/s), as `vibrations` gives them."""
+    """Vibrations of an averaged system at a speed of the input (rad/s), as `vibrations` gives them."""
     return vibrations(system.mass, system.damping_at(speed), system.stiffness_at(speed))
 
 
