@@ -246,10 +246,10 @@ def _check_diagonal(matrix: SparseMatrix) -> None:
 
 
 def _check_recovers_known_solution(matrix: SparseMatrix, factorisation: Factorisation) -> None:
-    """Close and refuse a factor that does not give a known solution back.
+    """Close and reject a factor that does not reproduce a known solution.
 
-    Rounding leaves a singular matrix with tiny pivots of either sign, so pivots alone do not tell: a part of
-    the null space in the answer does.
+    Rounding gives a singular matrix tiny pivots of either sign, so pivots alone do not show that it is singular; a
+    component of the null space in the solution does.
     """
     known = np.random.default_rng(0).uniform(-1.0, 1.0, matrix.shape[0])
     error = np.abs(factorisation.solve(matrix @ known) - known).max()
@@ -261,7 +261,7 @@ def _check_recovers_known_solution(matrix: SparseMatrix, factorisation: Factoris
 
 
 def _point_out_mkl() -> None:
-    """Tell pypardiso where the wheel puts MKL, or it walks all of the environment for each solver it makes."""
+    """Set the path to MKL for pypardiso, which otherwise searches the whole environment for each solver it creates."""
     libraries = sorted(Path(sys.prefix).glob("lib/libmkl_rt.so*"))
     if libraries:
         os.environ.setdefault("PYPARDISO_MKL_RT", str(libraries[0]))
@@ -482,7 +482,7 @@ class _Plan:
         return Front(eliminated, np.flatnonzero(border), children, cells[:0] if children else cells)
 
     def _best_cut(self, cells: Integers, inner: Booleans, border: Booleans) -> tuple[Integers, Integers]:
-        """Cut with the least work of the front between both parts, and of a front with that border in either."""
+        """Partition with minimum work for the front between both parts and for fronts with that border in either."""
         blocks = np.flatnonzero(inner | border)
         block, cell = np.nonzero(self._couples[np.ix_(cells, blocks)].T)
         starts = np.searchsorted(block, np.arange(len(blocks)))

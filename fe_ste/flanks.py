@@ -6,8 +6,8 @@ that is linear in roll length is linear along the path of contact.
 
 File. Comma-separated text. The first row is a free heading such as ``radius_mm`` and then the axial positions in mm,
 from the middle of the face width, rising. Each further row is a radius in mm, rising, and then the material removed
-along the flank normal in um, one value for each axial position; material that stands proud is negative. Empty rows and
-rows that begin with ``#`` are skipped::
+along the flank normal in um, one value for each axial position; protruding material is negative. Empty rows and rows
+that begin with ``#`` are skipped::
 
     radius_mm, -10.0,  0.0, 10.0
     71.5,        4.0,  3.0,  5.0
@@ -15,8 +15,8 @@ rows that begin with ``#`` are skipped::
     78.0,        6.0,  5.5,  7.0
 
 They are too small to change the compliance, and add to the gap of the conjugate flanks: a pitch deviation to that of
-one tooth pair, a displaced axis to that of all pairs alike. Gaps here are lengths on the transverse line of action,
-as transmission errors are, positive where the loaded flanks of gear 1 and gear 2 stand further apart.
+one tooth pair, a displaced axis to that of all pairs alike. Gaps here are lengths on the transverse line of action, as
+transmission errors are, positive where the loaded flanks of gear 1 and gear 2 are further apart.
 
 To first order in a gap, the transmission error under constant load grows by the gap times the part that its pair
 takes of a little more load (`tangent_load_share` of a table), and under constant rotation the strain energy falls by
@@ -49,7 +49,7 @@ from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 class FlankTopography(ReprMixin):
     """Material removed over a grid, linear between its points in roll length and axial position.
 
-    Beyond the grid the values of its edge go on.
+    Outside the grid the values at its edge apply.
 
     Raises
     ------
@@ -71,7 +71,7 @@ class FlankTopography(ReprMixin):
     """Along the flank normal, m, a row for each radius."""
 
     def __post_init__(self) -> None:
-        """Refuse grids that are none."""
+        """Refuse invalid grids."""
         for name, values in (("radius", self.radius), ("axial", self.axial)):
             if len(values) < 2 or not all(b > a for a, b in itertools.pairwise(values)):
                 raise GeometryError(f"topography: {name} must hold two rising values or more, m, not {list(values)}")
@@ -84,7 +84,7 @@ class FlankTopography(ReprMixin):
 
     @classmethod
     def from_csv(cls, path: str | Path) -> FlankTopography:
-        """Read a topography from a file; its form stands at the head of this module.
+        """Read a topography from a file; the docstring of this module gives its format.
 
         Raises
         ------
@@ -202,7 +202,7 @@ class Relief:
     """
 
     amount: float
-    """Material removed at the tip, or at the form circle for a root relief, m."""
+    """Material removed at the tip, or at the root form diameter for a root relief, m."""
     start_radius: float
     """Radius at which the relief begins, m."""
     shape: ReliefShape = ReliefShape.LINEAR
@@ -236,20 +236,20 @@ class FlankModification(ReprMixin):
 
     tip_relief: Relief | None = None
     root_relief: Relief | None = None
-    """Reliefs towards the tip and towards the form circle."""
+    """Reliefs towards the tip and towards the root form diameter."""
     profile_crowning: float = 0.0
     """Parabola over the roll length from form to tip circle, zero in its middle, m at either end."""
     lead_crowning: float = 0.0
     """Parabola over the face width, zero at mid-face, m at either end."""
     profile_slope: float = 0.0
-    """Linear over the roll length; m removed at the tip, or at the form circle if negative."""
+    """Linear over the roll length; m removed at the tip, or at the root form diameter if negative."""
     helix_slope: float = 0.0
     """Linear over the face width; m removed at the +z end, or at the -z end if negative."""
     twist: float = 0.0
-    """Helix slope that turns over along the profile: m removed at the tip of the +z end and at the form circle of
-    the -z end, nothing at the other two corners, half at mid-flank; the other way round if negative."""
+    """Helix slope that reverses along the profile: m removed at the tip of the +z end and at the form diameter of the
+    -z end, nothing at the other two corners, half at mid-flank; the other way round if negative."""
     topography: FlankTopography | None = None
-    """A measured or designed grid, which may also hold material that stands proud."""
+    """A measured or designed grid, which may also contain protruding material."""
 
     def __post_init__(self) -> None:
         """Refuse amounts that make no sense."""
@@ -374,12 +374,12 @@ def radius_at_roll_length_from_tip(gear: Gear, roll_length: float) -> float:
 
 
 def radius_at_roll_length_from_root(gear: Gear, roll_length: float) -> float:
-    """Radius on the flank at a distance from the form circle in roll length, to start a root relief.
+    """Return the radius on the flank at a roll length from the root form diameter, to start a root relief.
 
     Parameters
     ----------
     gear : the gear
-    roll_length : roll length from the form circle into the flank, m
+    roll_length : roll length from the root form diameter into the flank, m
 
     Returns
     -------
@@ -409,7 +409,7 @@ def _radius_at(gear: Gear, roll_length: float) -> float:
 
 
 def pitch_gap(gear: Gear, deviation: Floats) -> Floats:
-    """Gap that flanks bring about which lie behind their places by an arc of the reference circle.
+    """Return the gap caused by flanks that lag behind their nominal positions by an arc of the reference circle.
 
     Parameters
     ----------
@@ -423,7 +423,7 @@ def pitch_gap(gear: Gear, deviation: Floats) -> Floats:
 
     Notes
     -----
-    A turn by deviation / r moves an involute by r_b / r times the arc: cos(alpha_t) of it.
+    A rotation by deviation / r moves an involute by r_b / r times the arc: cos(alpha_t) of it.
 
     Examples
     --------
@@ -484,9 +484,9 @@ def runout_displacement(eccentricity: float, phase: float, rotation: float) -> t
 
 
 def displaced_axis(pair: GearPair, along: float, across: float) -> tuple[float, float]:
-    """Centre distance and gap of a pair whose gear 2 is displaced while both gears keep their rotations.
+    """Return centre distance and gap of a pair whose gear 2 is displaced while both gears keep their rotations.
 
-    Serves runout (displacements of the gears against each other, gear 2 less gear 1) and planet pins out of place.
+    Used for runout (relative displacement of the gears, gear 2 minus gear 1) and position errors of planet pins.
 
     Parameters
     ----------
@@ -497,15 +497,15 @@ def displaced_axis(pair: GearPair, along: float, across: float) -> tuple[float, 
     Returns
     -------
     centre_distance : m
-    gap : m on the transverse line of action, positive where the loaded flanks part
+    gap : m on the transverse line of action, positive where the loaded flanks separate
 
     Notes
     -----
-    As the line of centres turns by psi, both gears have turned back against it: the loaded flanks part by
-    (r_b2 +- r_b1) psi. As the working pressure angle becomes alpha', they part by
-    (r_b2 + r_b1) [inv(alpha') - inv(alpha)] in an external pair, and come nearer by (r_b2 - r_b1) times that in an
-    internal one. First order: cos(alpha) across +- sin(alpha) along. A table's states at other centre distances
-    count from the rolling position there, so that this gap comes in addition.
+    As the line of centres turns by psi, both gears have turned back against it: the loaded flanks separate by (r_b2 +-
+    r_b1) psi. As the working pressure angle becomes alpha', they separate by (r_b2 + r_b1) [inv(alpha') - inv(alpha)]
+    in an external pair, and come nearer by (r_b2 - r_b1) times that in an internal one. First order: cos(alpha) across
+    +- sin(alpha) along. A table's states at other centre distances count from the rolling position there, so that this
+    gap comes in addition.
 
     Examples
     --------

@@ -1,15 +1,15 @@
-"""Root stress of a gear by loads on its flanks: the gauges' stress in the closed ring, tooth by tooth.
+"""Root stress of a gear under loads on its flanks: stress at the gauges in the closed ring, tooth by tooth.
 
-Open sectors overestimate it: with free cut faces a tooth's root carries what the ring would share. By three, five,
-seven and nine teeth a high-speed pinion has 473, 218, 200 and 196 MPa where the ring has 188.
+Open sectors overestimate it: with free cut faces a tooth's root carries what the ring would share. With three, five,
+seven and nine teeth the result for a high-speed pinion is 473, 218, 200 and 196 MPa, for the ring 188 MPa.
 
 A gauge lies on each edge of the section's surface between flank and root land, on both sides of the tooth, at each
 layer of nodes. It reads the strains of the surface there along the section, along the face, and the shear between them.
-Edges at the corner where the blocks of tooth and rim meet are left out: the mesh is least regular there.
+Edges at the corner where the blocks of tooth and rim meet are omitted: the mesh is most distorted there.
 
-Line loads act along the contact lines. Hertzian stress is that of the line load and the curvature there, inside the
-path of contact: tip edges that dig into unmodified flanks have no Hertzian stress, and what they carry outside the path
-is told as a share of the load. Roots feel line loads as forces, whatever their width.
+Line loads act along the contact lines. Hertzian stress follows from the line load and the curvature there, inside the
+path of contact: tip-edge contact on unmodified flanks has no Hertzian stress, and the load carried outside the path is
+reported as a share of the load. Roots feel line loads as forces, whatever their width.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ class RootGauges(ReprMixin, line=" of {gear.name!r}: {places.edges!n} edges, {ax
         return loads.ravel()
 
     def principal(self, loads: dict[int, Floats]) -> tuple[Floats, Floats]:
-        """Largest and least principal stress, (teeth, g, l), Pa, of all teeth that loaded ones reach.
+        """Largest and smallest principal stress, (teeth, g, l), Pa, of all teeth that the loaded ones affect.
 
         Parameters
         ----------
@@ -242,7 +242,7 @@ PATH_MARGIN = 0.05
 CLEAR_OF_FILLET = 0.5
 """Modules along the flank from its end above the fillet within which a load acts no nearer to the gauges."""
 PITCH_ZONE = 0.05
-"""Part of the path on either side of the pitch point whose stress is told beside the largest."""
+"""Part of the path on either side of the pitch point whose stress is reported in addition to the largest."""
 
 
 @dataclass(frozen=True)
@@ -261,7 +261,7 @@ class MeshCycleStress(ReprMixin, line=": {torque!n} torques, {misalignment!n} mi
     """(k, m) highest over mean line load along the face."""
     root: Floats
     compression: Floats
-    """(k, m, 2) largest principal stress at the roots of gear 1 and 2, and the least one, Pa."""
+    """(k, m, 2) largest principal stress at the roots of gear 1 and 2, and the smallest one, Pa."""
 
     def at(self, values: Floats, power: float, torque: Floats, misalignment: Floats) -> Floats:
         """One of the stresses at torques (N m) and misalignments (rad), broadcast against each other.
@@ -270,8 +270,8 @@ class MeshCycleStress(ReprMixin, line=": {torque!n} torques, {misalignment!n} mi
         ----------
         values : (k, m, ...) of these fields
         power
-            With which the stress grows with torque at constant load sharing: 1/2 of Hertz, 1 of bending. What is left
-            is linear between the torques and misalignments of the table, and constant beyond them.
+            Exponent of torque in the stress at constant load sharing: 1/2 for Hertz, 1 for bending. The remaining
+            factor is linear between the torques and misalignments of the table, and constant outside them.
         """
         torque, misalignment = np.broadcast_arrays(np.abs(torque), misalignment)
         scaled = values / (self.torque**power).reshape(-1, *(1,) * (values.ndim - 1))
@@ -365,7 +365,7 @@ def _path_of_gear(pair: GearPair, path: Floats) -> Floats:
 
 
 def _zones(pair: GearPair, path: Floats) -> tuple[Booleans, Booleans]:
-    """Tell which places lie inside the path but for its margins, and which near the pitch point."""
+    """Return which points lie inside the path without its margins, and which near the pitch point."""
     length = pair.path_end - pair.path_start
     margin = PATH_MARGIN * length
     reach = PITCH_ZONE * length
@@ -376,7 +376,7 @@ def _zones(pair: GearPair, path: Floats) -> tuple[Booleans, Booleans]:
 def _root_extremes(
     pair: GearPair, gauges: tuple[RootGauges, RootGauges], loads: Floats, path: Floats, tooth: Floats, axial: Floats
 ) -> tuple[Floats, Floats]:
-    """Largest and least principal stress at the roots of both gears, (k, m, 2) each."""
+    """Largest and smallest principal stress at the roots of both gears, (k, m, 2) each."""
     width = pair.face_width / len(axial)
     length = width / math.cos(pair.pinion.base_helix_angle)
     rolls = (path / pair.pinion.base_radius, _path_of_gear(pair, path) / pair.gear.base_radius)
@@ -400,10 +400,10 @@ def _root_extremes(
 
 
 def _clear_of_fillet(gauges: RootGauges, roll: Floats) -> Floats:
-    """Roll angles no nearer to the end of the flank at the fillet than `CLEAR_OF_FILLET`.
+    """Return roll angles limited to a distance `CLEAR_OF_FILLET` from the end of the flank at the fillet.
 
-    Gauges beside a load read what it presses in, three times what it bends where a mate's tip edge digs in there. As
-    far as the load is moved its lever grows: a little too much bending under loads that bend least.
+    Gauges next to a load also measure its local indentation, three times the bending under tip-edge contact there. The
+    shift of the load lengthens its lever arm: slightly too much bending for the loads with the smallest bending moment.
     """
     gear = gauges.gear
     flank = gauges.roll

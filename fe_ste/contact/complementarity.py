@@ -28,8 +28,8 @@ class ContactSolution(ReprMixin):
 
     Notes
     -----
-    The energy force C force / 2 + gap force is least under the sum of the forces. Its least value has the derivative
-    `force` by the gap and the approach by the load, so that the mixed derivatives are the same.
+    The energy force C force / 2 + gap force is minimised for the given sum of the forces. Its minimum has the
+    derivative `force` by the gap and the approach by the load, so that the mixed derivatives are the same.
     """
 
     approach: float
@@ -59,7 +59,7 @@ def solve_complementarity(
 
     Parameters
     ----------
-    compliance : (n, n) symmetric positive definite, m/N. What is above the diagonal is not read.
+    compliance : (n, n) symmetric positive definite, m/N. Entries above the diagonal are not read.
     gap : (n,) m
     load : sum of the forces, N, positive
     guess : (n,) cells taken to be in contact at the start

@@ -1,29 +1,30 @@
-"""Where flanks meet: frame, signs and the gap between rigid flanks over the plane of action.
+"""Kinematics of meshing flanks: frame, signs and the gap between rigid flanks over the plane of action.
 
-Frame. Gear 1 turns counter-clockwise and drives. The x axis runs from its centre to the pitch point, z along the
-axes, z = 0 in the middle of the common face width. An external gear 2 stands at +x, an internal one at -x. The flanks
-in contact are the counter-clockwise flanks of gear 1 and of an external gear 2, and the clockwise flanks of an
-internal gear 2's teeth. Tooth pair 0 touches at the pitch point for rotation 0; pair j is j base pitches ahead on the
-path of contact.
+Frame. Gear 1 turns counter-clockwise and drives. The x axis runs from its centre to the pitch point, z along the axes,
+z = 0 in the middle of the common face width. An external gear 2 lies at +x, an internal one at -x. The flanks in
+contact are the counter-clockwise flanks of gear 1 and of an external gear 2, and the clockwise flanks of an internal
+gear 2's teeth. Tooth pair 0 touches at the pitch point for rotation 0; pair j is j base pitches ahead on the path of
+contact.
 
 Signs. The position in the mesh cycle (pmc) is the part of a pitch by which gear 1 has turned in its driving sense from
-rotation 0. Gear 1 is held, gear 2 turns about its axis under a torque that presses its flank on gear 1. The approach
-and the static transmission error are that rotation as a length, from the position in which the unmodified rigid
-flanks would roll: positive, the loaded gear yields. Approach and gap are lengths on the contact normal, the
+rotation 0. Gear 1 is fixed, gear 2 turns about its axis under a torque that presses its flank on gear 1. The approach
+and the static transmission error are that rotation as a length, from the position in which the unmodified rigid flanks
+would roll: positive where the loaded gear deflects. Approach and gap are lengths on the contact normal, the
 transmission error on the transverse line of action, which is longer by 1 / cos(beta_b). A gap is positive where the
-flanks stand apart. Misalignment (rad) is the rotation of the axes against each other in the plane of action, positive
-where it opens the gap at the +z end.
+flanks are separated. Misalignment (rad) is the relative rotation of the axes in the plane of action, positive for a gap
+at the +z end.
 
-Involutes. A point of a flank is told by its roll angle tan(alpha), alpha the profile angle at its radius r:
-r = r_b sqrt(1 + tan(alpha)^2), and its polar angle falls with inv(alpha) = tan(alpha) - alpha (ISO 21771).
+Involutes. A point of a flank is described by its roll angle tan(alpha), alpha the profile angle at its radius r: r =
+r_b sqrt(1 + tan(alpha)^2), and its polar angle falls with inv(alpha) = tan(alpha) - alpha (ISO 21771).
 
-Each slice of the face width has a window of cells about its contact line. Cells are equal in arc length along the
+Each slice of the face width has a window of cells around its contact line. Cells are equal in arc length along the
 involute, in which the contact of two flanks is nearly that of two parabolas.
 
-Below the form circle a tooth goes on as a fillet, which comes nearer to the mate than the involute would. The rigid
-gap knows involutes alone, so contact ends at the form circle, as it does at an edge. What it leaves out is told by the
-same state with involutes that go on to the base circles: the share of the load that is beyond. In a gearbox a tip
-corner presses on the fillet there, so that the share is what the results are uncertain by.
+Below its root form diameter a tooth continues as a fillet, which comes closer to the mating gear than the involute
+would. The rigid gap is computed from involutes only, so contact is truncated at the form diameter as at an edge. The
+load neglected by this is estimated from the same state with involutes extended to the base circles: the share of the
+load beyond the form diameter. In a gearbox the tip corner contacts the fillet there, so this share measures the
+uncertainty of the results.
 """
 
 from __future__ import annotations
@@ -145,9 +146,10 @@ def rigid_gap(pair: FlankPair, roll: float, axial: float, tooth: int, rotation: 
 
 @compiled
 def circle_limit(pair: FlankPair, radius: float, axial: float, tooth: int, rotation: float) -> float:
-    """Roll angle on gear 1 at a circle of gear 2, by bisection; within gear 1's flank.
+    """Return the roll angle on gear 1 at a circle of gear 2, by bisection within the flank of gear 1.
 
-    Of the tip circle it is the least that gear 2 reaches, of the circle that ends its flank at the root the largest.
+    At the tip circle this is the smallest roll angle that gear 2 reaches, at the circle where its flank ends at the
+    root the largest.
     """
     low = pair.form_roll_1
     high = pair.tip_roll_1
@@ -305,7 +307,7 @@ _AT_FORM_CIRCLE = 0.01
 
 
 def reaches_form_circle(flanks: Flanks, cells: Cells, force: Floats) -> bool:
-    """Whether cells that carry load lie at or beyond a form circle, where the involute ends and the fillet begins."""
+    """Whether loaded cells lie at or beyond a form diameter, where the involute ends and the fillet begins."""
     touching = force > 0.0
     for flank, roll in _flanks_with_fillets(flanks, cells):
         margin = _above(flank, roll[touching])
@@ -315,12 +317,12 @@ def reaches_form_circle(flanks: Flanks, cells: Cells, force: Floats) -> bool:
 
 
 def share_beyond(flanks: Flanks, cells: Cells, force: Floats) -> float:
-    """Share of the load on cells beyond the form circles; of a cell that one of them divides, the part beyond."""
+    """Share of the load on cells beyond the form diameters; of a cell divided by one of them, the part beyond."""
     return float(_parts_beyond(flanks, cells) @ force / force.sum())
 
 
 def cut_at_form_circles(kinematics: FlankPair, flanks: Flanks) -> FlankPair:
-    """Return the kinematics of flanks on which contact ends at both form circles; it does so on gear 1 anyway."""
+    """Return the kinematics of flanks with contact truncated at both form diameters; on gear 1 it always is."""
     gear = flanks[1].gear
     if gear.has_relieved_root:
         return kinematics
@@ -328,9 +330,9 @@ def cut_at_form_circles(kinematics: FlankPair, flanks: Flanks) -> FlankPair:
 
 
 def continued_involutes(kinematics: FlankPair, flanks: Flanks) -> FlankPair:
-    """Return the kinematics of involutes that go on beyond their form circles, of gear 1 to its base circle.
+    """Return the kinematics of involutes extended beyond their form diameters, on gear 1 to its base circle.
 
-    Where a root is relieved the flank ends in an edge, and so does contact.
+    With root relief the flank, and contact with it, ends at an edge.
     """
     if flanks[0].gear.has_relieved_root:
         return kinematics
@@ -348,16 +350,16 @@ def _form_roll(flank: FlankCompliance) -> float:
 
 
 def _above(flank: FlankCompliance, roll: Floats) -> Floats:
-    """Roll angles by which places on a gear are on its flank's side of the form circle."""
+    """Roll angles by which points of a gear lie on the flank side of the form diameter."""
     if flank.gear.internal:
         return _form_roll(flank) - roll
     return roll - _form_roll(flank)
 
 
 def _parts_beyond(flanks: Flanks, cells: Cells) -> Floats:
-    """Part of each cell that lies beyond a form circle.
+    """Part of each cell beyond a form diameter.
 
-    A cell is as wide on one flank as on the other; arc lengths are r_b roll^2 / 2.
+    A cell has the same width on both flanks; arc lengths are r_b roll^2 / 2.
     """
     beyond = np.zeros(len(cells.roll))
     for flank, roll in _flanks_with_fillets(flanks, cells):

@@ -3,18 +3,19 @@
 Eight nodes, eight Gauss points. The three incompatible modes 1 - xi^2 of each element let it bend without shear.
 
 Near a load the elements cannot follow the field, and the displacement of the flank under a tent load departs from the
-true one. The departure depends on the elements within two or three of their sizes only. So it is found on a flat
-block: the bricks behind the flank, laid with their shapes on the surface of a half-space, where the truth is known.
-The block's other faces move as the half-space does (Boussinesq); what its surface then moves too far is the error.
+true one. The departure depends on the elements within two or three of their sizes only. So it is found on a flat block:
+the bricks behind the flank, laid with their shapes on the surface of a half-space, where the exact solution is known.
+The block's other faces move as the half-space does (Boussinesq); the excess displacement of its surface is the error.
 
 Frame of the block: x across the contact lines, y along them, z into the material.
 
-An end face stands on the flank of a helical tooth under an acute or obtuse angle, and layers of bricks are too thick to
-follow the field at such an edge. As in `fe_ste.elasticity.bricks` the bricks behind the flank are laid on a plane
-surface, which ends at an edge here. The truth is that of a wedge (`fe_ste.elasticity.halfspace.wedge_images`).
+An end face meets the flank of a helical tooth at an acute or obtuse angle, and layers of bricks are too thick to follow
+the field at such an edge. As in `fe_ste.elasticity.bricks` the bricks behind the flank are laid on a plane surface,
+which ends at an edge here. The exact solution is that of a wedge (`fe_ste.elasticity.halfspace.wedge_images`).
 
-Along the edge all bricks are taken as those at the middle of the profile. Then bricks and truth are solved wave number
-by wave number: one row of bricks, and the Fourier transform of 1 / distance, 2 K_0(wave number times distance).
+Along the edge all bricks are taken as those at the middle of the profile. Bricks and exact solution are then solved
+wave number by wave number: one row of bricks, and the Fourier transform of 1 / distance, 2 K_0(wave number times
+distance).
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ class Chain(NamedTuple):
 
 
 def doubled(chain: Chain, signs: Floats) -> Chain:
-    """Join a chain to one like it.
+    """Join a chain to an identical one.
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ def doubled(chain: Chain, signs: Floats) -> Chain:
 
     Examples
     --------
-    Two equal springs in series are half as stiff. Their ends move along the springs, which the turn reverses: even is
-    what stretches them, odd what moves them as a whole.
+    Two equal springs in series are half as stiff. Their ends move along the springs, which the turn reverses: the even
+    part stretches them, the odd part is their rigid motion.
 
     >>> spring = Chain(even=np.array([[2.0]]), odd=np.array([[0.0]]))
     >>> doubled(spring, np.array([-1.0])).even.tolist()

@@ -1,16 +1,15 @@
 """Compliance of a gear's flank: scikit-fem hexahedra of one tooth sector, condensed and closed to the full ring.
 
 The sector's stiffness matrix is condensed onto its two cut faces. The ring of z equal sectors is then closed exactly
-(`fe_ste.elasticity.condensation`). What is stored per gear is the normal displacement of the flank of each tooth under
-unit normal loads on the flank of one tooth. The near field of the loaded tooth depends on the mesh, so it is taken out,
-as the bricks hold it (`fe_ste.elasticity.bricks`): the contact puts the half-space solution there
-(`fe_ste.contact.compliance`).
+(`fe_ste.elasticity.condensation`). The stored result of a gear is the normal displacement of the flank of each tooth
+under unit normal loads on the flank of one tooth. The near field of the loaded tooth depends on the mesh, so the near
+field of the bricks is removed (`fe_ste.elasticity.bricks`); the contact calculation adds the half-space solution
+instead (`fe_ste.contact.compliance`).
 
-Each gear is described by itself: tooth 0 stands on the x axis, z = 0 is the middle of its face width. Loads and
-displacements of a flank are positive into the material, as a pressing load acts.
+Each gear has its own frame: tooth 0 lies on the x axis, z = 0 is the middle of its face width. Loads and displacements
+of a flank are positive into the material, as a pressing load acts.
 
-The key is a hash of all that its numbers follow from: the gear but for its name, the mesh, and the sources of the
-method.
+The key is a hash of all inputs: the gear without its name, the mesh, and the sources of the method.
 """
 
 from __future__ import annotations
@@ -60,11 +59,11 @@ class FlankCompliance(ReprMixin):
     regular: dict[tuple[int, int], Floats]
     """(tooth read, tooth loaded) -> ndarray (f l, f l), m/N. For the closed ring the key is (difference, 0)."""
     closed: bool
-    """Whether all teeth of the ring are there; else an open sector."""
+    """Whether the ring has all its teeth; else an open sector."""
     hub_torque: Floats
     """(f l,) torque of the reaction at the held surface about the axis per unit load on each flank node, m."""
     figures: dict[str, float | int | str]
-    """Unknowns, elements, least scaled Jacobian."""
+    """Number of unknowns, number of elements, minimum scaled Jacobian."""
 
     def between(self, read: int, loaded: int) -> Floats:
         """Return the compliance of tooth `read` under loads on tooth `loaded`.
@@ -205,11 +204,11 @@ def _flank_compliance(
 
 
 def regular_part(mesh: SectorMesh, displacement: Floats, near: Floats) -> Floats:
-    """Take the near field out of the loaded tooth's displacement.
+    """Remove the near field from the displacement of the loaded tooth.
 
-    What is left is smooth, and symmetric but for the discretisation (Maxwell and Betti). It is a mean over tents, which
-    along the profile is turned to values at the nodes: a tent at the tip or the form circle lies inwards of its node.
-    Along the face width the tents stay: layers of a wide gear are too few for as much.
+    The remainder is smooth, and symmetric except for the discretisation (Maxwell and Betti). It is an average over
+    tents. Along the profile it is converted to values at the nodes, because a tent at the tip or the form diameter lies
+    inwards of its node. Along the face width the averages are kept: a wide gear has too few layers for the conversion.
 
     Parameters
     ----------
@@ -272,7 +271,7 @@ def flank_images(gear: Gear, side: int) -> Floats:
 
 # Flanks computed once: both flanks of a gear from one, kept in memory and in files for the next process
 
-#: Rooms whose sources make the numbers.
+#: Packages whose sources determine the results.
 _ROOMS = ("tools", "geometry", "elimination", "elasticity")
 
 #: Of the default mesh each takes 5 MB.
@@ -289,9 +288,9 @@ def known_flanks(
 ) -> list[FlankCompliance]:
     """Return flanks as `fe_ste.elasticity.flank.flank_compliance` does, each gear computed at most once.
 
-    Files are kept in the folder ``flanks`` of exugear's user cache, those used least lately removed, or in the folder
+    Files are kept in the folder ``flanks`` of exugear's user cache, those unused for longest removed, or in the folder
     that ``EXUGEAR_FLANKS`` names; ``EXUGEAR_FLANKS=off`` neither reads nor writes any. Gears that have to be computed
-    are so two at a time.
+    are computed two at a time.
 
     Parameters
     ----------

@@ -134,7 +134,7 @@ class GearMesh(ReprMixin):
     brick_tooth: Integers
     """(m,) tooth pair of the sector each hexahedron belongs to."""
     axis_x: float
-    """Where the gear's axis stands, m."""
+    """Position of the gear's axis, m."""
     others: OtherTeeth | None = None
     """None for an open sector with free cut faces."""
 
@@ -156,7 +156,7 @@ class GearMesh(ReprMixin):
 
 @dataclass(frozen=True)
 class _Placement:
-    """Where a gear of a pair stands: which it is, loaded side, angle of tooth 0, sense of the tooth numbers, axis."""
+    """Position of a gear in a pair: which gear, loaded side, angle of tooth 0, sense of the tooth numbers, axis."""
 
     number: int
     gear: Gear

@@ -167,7 +167,7 @@ class SectorMesh(ReprMixin, line=" of {gear.name!r}: {points!n} nodes, {hexahedr
 
     @cached_property
     def scaled_jacobian(self) -> Floats:
-        """Least scaled Jacobian over the corners of each hexahedron (m,): 1 for a brick, 0 when degenerate."""
+        """Minimum scaled Jacobian over the corners of each hexahedron (m,): 1 for a brick, 0 when degenerate."""
         corners = self.points[self.hexahedra]
         neighbours = np.array([[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]])
         edges = corners[:, neighbours] - corners[:, :, None]

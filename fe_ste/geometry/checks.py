@@ -1,6 +1,6 @@
-"""What makes a gear or a gear pair impossible, told before any mesh is built.
+"""Checks that refuse an impossible gear or gear pair before any mesh is built.
 
-Every refusal is a `GeometryError` that names the gear, the key, the value and what would be right.
+Every refusal is a `GeometryError` that states the gear, the key, the value and the permitted range.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from fe_ste.geometry.pair_relations import (
 LEAST_TEETH = 5
 """Fewest teeth; below lie worms and pump rotors."""
 LEAST_TIP_THICKNESS = 0.1
-"""Least tooth thickness at the tip circle, normal section, in normal modules: below, elements there degenerate."""
+"""Minimum tooth thickness at the tip circle, normal section, in normal modules; elements there degenerate below it."""
 USUAL_TIP_THICKNESS = 0.2
 """What is usual at least; published gears have a little less."""
 LEAST_NECK_THICKNESS = 0.2
-"""Least thickness of what undercut leaves of a tooth, normal section, in normal modules."""
+"""Minimum tooth thickness left by undercut, normal section, in normal modules."""
 PRESSURE_ANGLE_RANGE = (math.radians(10.0), math.radians(35.0))
 """Normal pressure angles accepted, rad."""
 LARGEST_HELIX_ANGLE = math.radians(50.0)
@@ -100,7 +100,7 @@ def _refuse_pair(pair: UncheckedPair, key: str, value: str, remedy: str) -> Geom
 
 
 def _mm(length: float, beside: float | None = None) -> str:
-    """Length as messages show it, with as many digits more as tell it from another one that stands beside it."""
+    """Length as shown in messages, with enough digits to distinguish it from another length in the same message."""
     digits = 4
     while beside is not None and digits < 12 and f"{1e3 * length:.{digits}f}" == f"{1e3 * beside:.{digits}f}":
         digits += 1
@@ -215,12 +215,12 @@ def _check_flank(gear: GearInputs) -> None:
 
 
 def _neck_thickness(gear: GearInputs) -> float:
-    """Least thickness of an external tooth below its flank, transverse section, m."""
+    """Minimum thickness of an external tooth below its flank, transverse section, m."""
     return 2.0 * float(np.min(np.abs(root_fillet(gear, np.linspace(0.0, 1.0, 201))[:, 1])))
 
 
 def _check_form_circles(gear: GearInputs) -> None:
-    """Refuse form circles that are given beyond the flank, or that leave none."""
+    """Refuse specified form diameters that lie outside the flank or leave no flank."""
     tolerance = LENGTH_TOLERANCE * gear.normal_module
     out = gear.outward
     if (gear.tip_form_radius - gear.tip_radius) * out > tolerance:
@@ -287,7 +287,7 @@ def _check_flank_of_ring(gear: GearInputs) -> None:
 
 
 def _check_trimmed_tips(gear: GearInputs) -> None:
-    """Refuse a cutter that takes something off the tips: below its involute, or beside the line of action."""
+    """Refuse a cutter that cuts the tips: below its involute, or off the line of action."""
     cut = gear.cutter_tip_cut
     tip = gear.tip_radius
     count = gear.cutter.teeth if gear.cutter else 0
@@ -379,7 +379,7 @@ def _check_equal_rack(pair: UncheckedPair) -> None:
 
 
 def _check_hands(pair: UncheckedPair) -> None:
-    """Refuse hands that do not mate: external mates have opposite hands, internal mates the same."""
+    """Refuse mismatched hands: an external pair has opposite hands, an internal pair equal hands."""
     needed = -pair.gear.outward * pair.pinion.helix_angle
     if not math.isclose(pair.gear.helix_angle, needed, rel_tol=LENGTH_TOLERANCE, abs_tol=LENGTH_TOLERANCE):
         kind = "same hand" if pair.gear.internal else "opposite hand"
@@ -431,9 +431,9 @@ def _check_tip_clearances(pair: UncheckedPair) -> None:
 
 
 def _check_tip_interference(pair: UncheckedPair) -> None:
-    """Refuse a tip that touches its mate below the form circle, where the mate has a fillet.
+    """Refuse a tip that contacts the mating gear below its root form diameter, in the fillet.
 
-    Where undercut or a relieved root ends the mate's flank in an edge there is nothing to touch: contact ends there.
+    Where undercut or root relief ends the mating flank at an edge there is nothing to contact: contact ends there.
     """
     tolerance = LENGTH_TOLERANCE * pair.pinion.normal_module
     reach_of_gear = pair.pinion_roll_length(pair.gear.tip_form_roll_length)
@@ -461,7 +461,7 @@ def _check_contact(pair: UncheckedPair) -> None:
 
 
 def _check_fillet_clearance(pair: UncheckedPair) -> None:
-    """Refuse a tip whose corner, outside the path of contact, cuts into the root fillet of its mate."""
+    """Refuse a tip whose corner, outside the path of contact, interferes with the root fillet of the mating gear."""
     for tip, mate in ((pair.pinion, pair.gear), (pair.gear, pair.pinion)):
         gap = corner_to_fillet_gap(pair, tip, mate)
         if gap < -FILLET_TOLERANCE * tip.normal_module:

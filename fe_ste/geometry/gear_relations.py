@@ -1,6 +1,6 @@
 """Macro geometry of one cylindrical gear: its inputs, and what follows from them by the relations of ISO 21771.
 
-Nothing is refused here: the checks ask an unchecked gear for its radii and angles to tell what is wrong with it.
+Nothing is refused here: the checks read radii and angles of an unchecked gear to report what is wrong with it.
 
 External teeth get the fillet that a rack with a rounded tip generates (`fe_ste.geometry.involute`); internal teeth
 that of their cutter (`fe_ste.geometry.involute`), or, without one, an arc that touches the flank and the root circle.
@@ -422,7 +422,7 @@ def root_fillet(gear: GearInputs, parameter: Floats) -> Floats:
     Parameters
     ----------
     gear : the gear
-    parameter : (n,) 0 at the form circle, exactly on the involute, to 1 at the root circle
+    parameter : (n,) 0 at the root form diameter, exactly on the involute, to 1 at the root circle
 
     Returns
     -------

@@ -128,9 +128,9 @@ class GearPair(UncheckedPair, ReprMixin):
 
     Notes
     -----
-    Points of contact are told by ``xi``, the distance along the transverse line of action from the point
-    where it touches the pinion's base circle: ``xi = r_b1 tan(alpha_1)``. A driving pinion moves the contact
-    from `path_start` (tip of the gear) to `path_end` (tip of the pinion).
+    Points of contact are given by ``xi``, the distance along the transverse line of action from the point where it
+    touches the pinion's base circle: ``xi = r_b1 tan(alpha_1)``. A driving pinion moves the contact from `path_start`
+    (tip of the gear) to `path_end` (tip of the pinion).
 
     Examples
     --------

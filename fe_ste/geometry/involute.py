@@ -138,8 +138,9 @@ class RackTipCut:
     def undercut_parameter(self) -> float:
         """Parameter at which the curve of an undercut tooth crosses its involute.
 
-        The curve begins in the space beside the tooth and enters it there. Where it passes the base circle first,
-        too little is cut away to end the involute above it: the parameter at that circle is given.
+        The curve begins in the tooth space and enters the tooth at this parameter. If it passes the base circle first,
+        the undercut is too small to shorten the involute above that circle: the parameter at the base circle is
+        returned.
         """
         parameter = np.linspace(0.0, 1.0, SAMPLES)
         inside = np.flatnonzero(self._enters(parameter))
@@ -168,7 +169,7 @@ class RackTipCut:
 # Pinion-type cutter of an internal gear: what its rounded tip leaves at the root, and whether it spoils the tips
 
 POSITIONS = 4001
-"""Positions of the cutter at which a corner of the gear's tips is looked at."""
+"""Positions of the cutter at which a corner of the gear's tips is checked."""
 
 
 @dataclass(frozen=True)
@@ -313,7 +314,7 @@ class CutterTipCut:
         return np.where(radius <= form_radius, flank, arc)
 
     def tip_corner_gap(self, tip_radius: float, tip_half_angle: float) -> float:
-        """Least gap between the cutter's teeth and the corners of the gear's tips as they roll past each other.
+        """Minimum gap between the cutter's teeth and the corners of the gear's tips during the generating motion.
 
         Parameters
         ----------

@@ -48,7 +48,7 @@ class UncheckedPair:
 
     @property
     def backlash_free_centre_distance(self) -> float:
-        """Centre distance without backlash, m: the least of an external pair, the greatest of an internal."""
+        """Centre distance without backlash, m: the minimum of an external pair, the maximum of an internal one."""
         pinion = self.pinion
         gear = self.gear
         thickness = pinion.teeth * pinion.reference_half_angle + gear.teeth * gear.reference_half_angle
@@ -151,13 +151,13 @@ class UncheckedPair:
 
     @property
     def normal_backlash(self) -> float:
-        """Play between the back flanks along their normal, m (ISO 21771: j_bn)."""
+        """Normal backlash between the back flanks, m (ISO 21771: j_bn)."""
         across = math.cos(self.working_pressure_angle) * math.cos(self.pinion.base_helix_angle)
         return self.circumferential_backlash * across
 
     @property
     def circumferential_backlash(self) -> float:
-        """Play between the back flanks along the working circles, transverse section, m."""
+        """Circumferential backlash along the working circles, transverse section, m."""
         r_1 = self.pinion_working_radius
         r_2 = self.gear_working_radius
         thickness = 2.0 * (r_1 * self.pinion.half_angle(r_1) + r_2 * self.gear.half_angle(r_2))
@@ -171,22 +171,22 @@ FILLET_TOLERANCE = 1e-5
 
 
 def corner_to_fillet_gap(pair: UncheckedPair, tip: GearInputs, mate: GearInputs) -> float:
-    """Least gap between the way of a tip's corners and the mate's root fillet.
+    """Return the minimum gap between the path of a tip's corners and the root fillet of the mating gear.
 
-    The corner leaves the line of action at the end of the path of contact and goes deeper than there. The
-    flanks are taken in contact, as on the path of contact. A chamfer makes two corners, at the tip form circle and,
-    as far from the flank as it is high, at the tip circle.
+    The corner leaves the line of action at the end of the path of contact and goes deeper than there. The flanks are
+    assumed in contact, as on the path of contact. A chamfer has two corners, at the tip form diameter and, as far from
+    the flank as it is high, at the tip circle.
 
     Parameters
     ----------
     pair : the pair
-    tip, mate : the gear whose tip corner moves and the gear whose fillet it passes
+    tip, mate : gear whose tip corner moves, gear whose fillet it passes
 
     Returns
     -------
     float
-        Arc about the mate's axis, m; negative if the corner cuts into the fillet, infinite if it does not get
-        below the form circle.
+        Arc about the axis of the mating gear, m; negative if the corner cuts into the fillet, infinite if it does not
+        get below the root form diameter.
     """
     corners = [(tip.tip_form_radius, tip.half_angle(tip.tip_form_radius))]
     chamfer = abs(tip.tip_radius - tip.tip_form_radius)
@@ -222,10 +222,10 @@ def _corner_gap(
 # Inputs of gears that follow from their mates: profile shifts from centre distances, tips that keep clear
 
 ROOT_MARGIN = 0.1
-"""Roll length that a fitted tip keeps from its mate's form circle, in normal modules: the breadth of the contact under
-load reaches beyond the path of contact."""
+"""Roll length between an automatically shortened tip and the root form diameter of the mating gear, in normal modules:
+the width of the contact under load reaches beyond the path of contact."""
 LEAST_ROOT_MARGIN = 0.03
-"""Roll length below which contact under usual loads reaches the form circle, in normal modules."""
+"""Roll length below which contact under usual loads reaches the root form diameter, in normal modules."""
 LEAST_CLEARANCE = 0.1
 """Tip clearance that a fitted tip keeps at least, in normal modules."""
 
@@ -259,7 +259,7 @@ def shift_sum(one: GearInputs, other: GearInputs, centre_distance: float) -> flo
 
 
 def shift_beside(mate: GearInputs, gear: GearInputs, centre_distance: float) -> float | None:
-    """Profile shift of a gear that leaves no backlash beside its mate; None if there is none."""
+    """Profile shift of a gear for zero backlash with its mating gear; None if there is none."""
     total = shift_sum(gear, mate, centre_distance)
     if total is None:
         return None
@@ -271,7 +271,7 @@ def shift_beside(mate: GearInputs, gear: GearInputs, centre_distance: float) -> 
 
 
 def root_margin(pair: UncheckedPair, tip: GearInputs) -> float:
-    """Roll length, m, by which a gear's tip keeps above the form circle of its mate; infinite above a relieved root."""
+    """Roll length, m, of the tip above the form diameter of the mating root; infinite above a relieved root."""
     if (pair.pinion if tip is pair.gear else pair.gear).has_relieved_root:
         return math.inf
     if tip is pair.gear:
@@ -280,9 +280,9 @@ def root_margin(pair: UncheckedPair, tip: GearInputs) -> float:
 
 
 def clear_tip_diameter(pair: UncheckedPair, tip: GearInputs, margin: float) -> float:
-    """Tip diameter, m, at which a gear keeps above its mate's form circle by a roll length (m); its own if it does.
+    """Tip diameter, m, that keeps a roll length (m) above the form diameter of the mating root; unchanged if it does.
 
-    A chamfer keeps its height.
+    The height of a chamfer is unchanged.
     """
     lacking = margin - root_margin(pair, tip)
     if lacking <= 0.0:
@@ -293,7 +293,7 @@ def clear_tip_diameter(pair: UncheckedPair, tip: GearInputs, margin: float) -> f
 
 
 def fitted_tip_diameter(pair: UncheckedPair, tip: GearInputs) -> float:
-    """Tip diameter, m, shortened as far as the mate asks for: the clearance of the rack, and room above the fillet.
+    """Tip diameter, m, shortened for the mating gear: the clearance of the rack, and clearance above the fillet.
 
     ISO 21771 calls the shortening of the tip that keeps the clearance at profile shifts the tip alteration k m_n.
     """
@@ -339,10 +339,10 @@ def _with_gear(pair: UncheckedPair, before: GearInputs, after: GearInputs) -> Un
 
 
 def corner_clear_tip_diameter(pair: UncheckedPair, tip: GearInputs) -> float | None:
-    """Tip diameter, m, at which the corners of a gear pass the fillet of its mate.
+    """Tip diameter, m, at which the corners of a gear clear the fillet of the mating gear.
 
-    The least change of the tip does, rounded to hundredths of a millimetre on the side that clears; None where the
-    tooth would have to end at its working circle.
+    The smallest sufficient change, rounded to hundredths of a millimetre towards clearance; None where the tooth would
+    have to end at its working circle.
     """
     mate = pair.pinion if tip is pair.gear else pair.gear
 

@@ -59,8 +59,8 @@ def plot_ste_curves(datasets: Mapping[str, xr.Dataset], path: str | Path | None 
     Returns
     -------
     matplotlib.figure.Figure
-        One panel a pair, in micrometres. All panels span the same range, so that peak-to-peak values
-        compare; the means stand in the titles. Positions that have not converged are crossed out in red.
+        One panel per pair, in micrometres. All panels have the same range, so that peak-to-peak values can be compared;
+        the titles give the means. Positions that have not converged are crossed out in red.
 
     Raises
     ------
@@ -159,7 +159,7 @@ class _Cycle:
 
     @property
     def summary(self) -> str:
-        """Mean and peak-to-peak in words."""
+        """Mean and peak-to-peak value as text."""
         if not self.valid.any():
             return "no converged position"
         mean = float(self.values[self.valid].mean())
@@ -209,7 +209,7 @@ def plot_load_share(dataset: xr.Dataset, path: str | Path | None = None, title: 
     Returns
     -------
     matplotlib.figure.Figure
-        Left the shares over one mesh cycle, right the way of one tooth pair from entry to exit, which is the
+        Left the shares over one mesh cycle, right one tooth pair from the start to the end of its contact, which is the
         left panel unrolled.
 
     Raises

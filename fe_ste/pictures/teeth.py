@@ -281,7 +281,7 @@ def meshed_teeth(
 
 @dataclass(frozen=True)
 class _Side:
-    """Where a gear of a pair stands: polar angle of the middle of its tooth 0, pitch and gear's own frame."""
+    """Position of a gear in a pair: polar angle of the middle of its tooth 0, pitch and the gear's own frame."""
 
     start: float
     pitch: float
@@ -443,11 +443,11 @@ def draw_contact_stress(
 
 @dataclass(frozen=True)
 class _LoadedFlank:
-    """The flank that carries most of one gear, and how to look at it.
+    """Flank of a gear that carries the largest load, and its viewing directions.
 
-    ``points``, ``displacement`` and ``pressure`` are those of the gear's nodes, ``highest`` the node of highest
-    pressure away from the end faces, ``normal`` points out of the flank in the transverse plane, ``upward`` along it
-    to the tip.
+    ``points``, ``displacement`` and ``pressure`` belong to the gear's nodes, ``highest`` is the node of highest
+    pressure away from the end faces, ``normal`` points out of the flank in the transverse plane, ``upward`` along it to
+    the tip.
     """
 
     number: int

@@ -40,7 +40,7 @@ class TurningHub:
 
 @dataclass(frozen=True)
 class CondensedPart:
-    """Elastic material beside the bricks, condensed onto some of their nodes, in small strains."""
+    """Elastic material adjacent to the bricks, condensed onto some of their nodes, in small strains."""
 
     nodes: Integers
     """(k,) none of them on the hub."""
@@ -74,7 +74,7 @@ class ContactModel(ReprMixin):
     hub: TurningHub | None = None
     condensed: tuple[CondensedPart, ...] = ()
     clearance: Floats | None = None
-    """(s,) gap at the nodes of the first surface beside that between the meshes, m: material that is removed."""
+    """(s,) gap at the nodes of the first surface in addition to the gap between the meshes, m: removed material."""
 
     def _line(self) -> str:
         facets = f"surfaces of {len(self.first.facets)} and {len(self.second.facets)} facets"

@@ -1,9 +1,10 @@
-"""The reference analysis: full finite-element contact of a gear pair with geometric non-linearity.
+"""The reference analysis: full finite-element contact of a gear pair with geometric nonlinearity.
 
-Both gears are whole: the teeth in and beside contact are meshed afresh at each position, fine where they touch there,
-and the other teeth of each closed ring are condensed onto the ends of those (`fe_ste.elasticity.gear_mesh`). The
-pinion's hub is held; the gear's hub is rigid and turns about its axis under the torque. The static transmission
-error is that turning, from the position in which the rigid flanks would roll, as a length on the base circle.
+Both gears are complete: the teeth in contact and their neighbours are remeshed at each position, fine around the
+contact, and the other teeth of each closed ring are condensed onto the ends of this sector
+(`fe_ste.elasticity.gear_mesh`). The pinion's hub is fixed; the gear's hub is rigid and turns about its axis under the
+torque. The static transmission error is this rotation, from the position in which the rigid flanks would roll, as a
+length on the base circle.
 """
 
 from __future__ import annotations
@@ -75,7 +76,7 @@ class NonlinearSettings(ReprMixin):
 
     @property
     def bodies(self) -> str:
-        """What of the gears is modelled, in words."""
+        """Modelled part of the gears, as text."""
         bodies = "whole gears" if self.closed else "open sectors"
         if self.teeth is None:
             return bodies
@@ -83,7 +84,7 @@ class NonlinearSettings(ReprMixin):
 
     @property
     def strains(self) -> str:
-        """How the bricks deform, in words."""
+        """Kinematics of the bricks, as text."""
         return "finite deformation" if self.finite_deformation else "small strains"
 
 

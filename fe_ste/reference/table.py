@@ -1,7 +1,7 @@
-"""Tables of the reference analysis: kept position by position, apart from those of the superelement.
+"""Tables of the reference analysis: stored position by position, apart from tables of the superelement.
 
-A table is one netCDF file. It is written after each position, so that what converged is kept when the work is stopped
-or a position fails; the same input goes on from there.
+A table is one netCDF file. It is written after each position, so that converged positions are kept when the computation
+is stopped or a position fails; the same input resumes from there.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class NonlinearTable(ReprMixin):
         Raises
         ------
         TableError
-            If the file is missing, damaged, is no table of the reference analysis in this version, or belongs to
+            If the file is missing, damaged, is not a table of the reference analysis in this version, or belongs to
             another input.
         """
         path = Path(path)
@@ -205,7 +205,7 @@ class NonlinearTable(ReprMixin):
 
     @property
     def failures(self) -> list[str]:
-        """Positions that were not solved, with the reason."""
+        """Positions that have not converged, with the reason."""
         return [line for line in str(self.dataset.attrs["failures"]).splitlines() if line]
 
     def _with_position(

@@ -33,12 +33,12 @@ _MEASURED_TO_THEORETICAL = 0.8
 
 @dataclass(frozen=True)
 class MethodBStiffness(ReprMixin):
-    """Stiffness of a gear pair by ISO 6336-1 method B."""
+    """Stiffness of a gear pair according to ISO 6336-1 method B."""
 
     theoretical_single_stiffness: float
     """c'_th of one pair of spur teeth, N/m per m."""
     single_stiffness: float
-    """c': greatest stiffness of one pair of teeth, N/m per m."""
+    """c': maximum stiffness of one pair of teeth, N/m per m."""
     mesh_stiffness: float
     """c_gamma_alpha: mean of the mesh, N/m per m."""
     face_width: float
@@ -79,20 +79,20 @@ def mesh_stiffness(
     application_factor: float = 1.0,
     blank_factor: float = 1.0,
 ) -> MethodBStiffness:
-    """Stiffness of a gear pair by ISO 6336-1 method B.
+    """Return the stiffness of a gear pair according to ISO 6336-1 method B.
 
     Parameters
     ----------
     pair : the pair. An internal gear counts as a rack: infinitely many teeth, no profile shift.
     tangential_force
-        F_t at the reference circle, N. Below 100 N/mm of face width the stiffness falls with the fourth root
-        of the load; without a force that correction is left out.
+        F_t at the reference circle, N. Below 100 N/mm of face width the stiffness falls with the fourth root of the
+        load; without a force that correction is omitted.
     application_factor : K_A, applied to the force
     blank_factor : C_R of the gear blanks, 1 for solid discs
 
     Returns
     -------
-    stiffnesses and what speaks against them
+    stiffnesses, with warnings where the method does not apply
 
     Raises
     ------

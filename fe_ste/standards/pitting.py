@@ -1,4 +1,4 @@
-"""Contact stress and what withstands it by ISO 6336-2:2006, method B.
+"""Contact stress and permissible contact stress according to ISO 6336-2:2006, method B.
 
 Checked against the first worked example of ISO/TR 6336-30:2017. Case-hardened and through-hardened steels.
 """
@@ -125,15 +125,15 @@ def _constant(limit: float, soft: float, hard: float) -> float:
 # Life of gears under variable load by ISO 6336-6:2006 (Corrigendum 1:2007): S-N curves, Miner's rule, safety
 
 _MOST_FACTOR = 1e6
-"""Beyond it a safety factor says that nothing wears."""
+"""Upper limit of the safety factor; above it, fatigue damage is negligible."""
 
 
 @dataclass(frozen=True)
 class LifeCurve:
-    """Life factor over load cycles, straight between its points in logarithms.
+    """Life factor as a function of load cycles, linear between its points on logarithmic scales.
 
-    Below the first point's cycles the factor stays as it is there. Beyond the last point the last slope goes on: no
-    stress is without damage.
+    Below the cycles of the first point the factor is constant. Beyond the last point the last slope is extrapolated:
+    every stress causes damage.
 
     Examples
     --------
@@ -155,9 +155,9 @@ class LifeCurve:
         return float(np.exp(np.interp(at, x, y)))
 
     def endured(self, factors: Floats) -> Floats:
-        """Cycles that are endured where this life factor is needed; zero above the curve, infinite at zero.
+        """Cycles to failure where this life factor is required; zero above the curve, infinite at zero.
 
-        A level piece at the end endures without end what does not exceed it.
+        With a horizontal last segment, life is infinite for values that do not exceed it.
         """
         x = np.log(self.cycles)
         y = np.log(self.factors)
@@ -203,11 +203,11 @@ def miner_sum(curve: LifeCurve, stress: Floats, strength: Floats | float, cycles
 
 
 def safety_factor(curve: LifeCurve, stress: Floats, strength: Floats | float, cycles: Floats) -> float:
-    """Factor on all stresses at which Miner's sum is one; infinite where nothing wears.
+    """Return the factor on all stresses at which Miner's sum is one; infinite without fatigue damage.
 
     Examples
     --------
-    One load, at the stress that its cycles allow:
+    One load, at the permissible stress for its cycles:
 
     >>> curve = CASE_HARDENED_CONTACT
     >>> round(safety_factor(curve, np.array([0.91e9]), 1e9, np.array([1.08e9])), 3)

@@ -1,6 +1,6 @@
-"""Nominal tooth root stress by ISO 6336-3:2006 method B, for comparison with the finite elements.
+"""Nominal tooth root stress to ISO 6336-3:2006 method B, for comparison with the finite elements.
 
-Gears without protuberance and undercut, thinning of teeth left out; internal ones by Corrigendum 1 of 2007, with their
+Gears without protuberance and undercut, tooth thinning neglected; internal gears to Corrigendum 1 of 2007, with their
 pinion-type cutter. Lengths in the formulas are in normal modules of the virtual spur gear in the normal section; an
 internal gear has a negative number of teeth and negative diameters there.
 """

@@ -1,4 +1,4 @@
-"""Types of arrays, one name each: what numbers an array holds. Shapes and units stand in docstrings."""
+"""Type aliases for arrays: each names the element type. Docstrings give shapes and units."""
 
 from __future__ import annotations
 

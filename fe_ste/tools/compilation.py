@@ -1,8 +1,8 @@
-"""How numerical loops are compiled, and where their machine code is kept between processes.
+"""Compilation of numerical loops, and the cache of their machine code between processes.
 
-numba knows a kept function by its own source file only, while the machine code contains the functions that it calls,
-whichever file they are in. Here all kernels of a package are kept in one folder that is named by a digest of all
-sources with kernels: after any change they are compiled anew.
+numba identifies a cached function by its own source file only, while the machine code contains the functions that it
+calls, whichever file they are in. All kernels of a package are therefore cached in one folder, named by a digest of all
+sources with kernels: after any change they are recompiled.
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ _FOLDER = "kernels-"
 #: Folders of kernels that stay beside the one in use: of branches and versions that one goes back to.
 _FOLDERS_KEPT = 4
 
-#: What the kernels of a package do, and the processor time of all that a first verb compiles of them: the laws that its
-#: model has.
+#: What the kernels of a package do, and the processor time of all that a first command compiles of them: the laws that
+#: its model has.
 _COMPILED = {
     "fe_ste": " of tooth contact (about 8 s)",
     "exugear": " of the equations of motion (10 to 25 s per model type)",
@@ -90,15 +90,15 @@ def summing_kernel(function: Function) -> Function:
 
 
 def compile_ahead(function: Callable[..., object], *given: object) -> None:
-    """Let another process compile a kernel while this one works on what comes before its first call.
+    """Compile a kernel in another process while this one works on other tasks before its first call.
 
-    numba compiles one kernel at a time in a process. The first call waits for the other process, and compiles itself
-    if that failed. Nothing is done where the kernel is there already, where none is kept, and without a second core.
+    numba compiles one kernel at a time in a process. The first call waits for the other process, and compiles itself if
+    that failed. Nothing is done if the kernel is already cached, if nothing is cached, or without a second core.
 
     Parameters
     ----------
     function : compiled function
-        Of the top of a module.
+        Defined at the top level of a module.
     given
         Arguments of the types with which it will be called.
     """
@@ -129,14 +129,14 @@ def compile_as_asked(request: IO[bytes]) -> None:
 
 @cache
 def kernel_folder(source: Path) -> Path | None:
-    """Folder that keeps the machine code of a source file's package; made if need be.
+    """Return the cache folder for the machine code of a source file's package; create it if necessary.
 
-    Beside the sources, or in ``NUMBA_CACHE_DIR`` if that is set. Where that cannot be written: in the user's cache
-    folder, else in a folder for temporary files that no other user can fill, because what lies there is executed.
+    Next to the sources, or in ``NUMBA_CACHE_DIR`` if that is set. If that folder is not writable: in the user's cache
+    folder, else in a folder for temporary files that no other user can fill, because its content is executed.
 
     Returns
     -------
-    None if there is no source to tell the version by, or no place to write: nothing is kept then
+    None if there is no source to identify the version, or no writable folder: nothing is cached then
     """
     if source.is_file():
         return _folder_of(_package_of(source))
@@ -159,7 +159,7 @@ def _source_of(function: Callable[..., object]) -> Path:
 
 
 class _Place:
-    """Where numba looks for a function's machine code, and by what it tells that it fits the sources."""
+    """Where numba looks for a function's machine code, and how it checks that it matches the sources."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -200,7 +200,7 @@ class _KernelCache(FunctionCache):
         return kernel
 
     def holds(self, sig: Any, target_context: Any) -> bool:
-        """Tell whether there is machine code for types of arguments."""
+        """Return whether machine code exists for the given argument types."""
         key = self._index_key(sig, target_context.codegen())  # type: ignore[no-untyped-call]
         try:
             return key in cast(Any, self)._cache_file._load_index()
@@ -291,7 +291,7 @@ def _places(package: Path) -> Iterator[Path]:
 
 
 def _is_own(folder: Path) -> bool:
-    """Tell whether no other user but root can put files into a folder, or another folder into its place."""
+    """Return whether no other user but root can put files into a folder, or replace the folder by another."""
     if sys.platform == "win32":
         return True  # profiles are closed to other users
     for level in (folder, *folder.resolve().parents):
@@ -320,7 +320,7 @@ def _opened(parent: Path, name: str) -> Path:
 
 
 def _prune(parent: Path) -> None:
-    """Remove the folders of kernels used least lately; a process that still uses one makes it anew."""
+    """Remove the kernel folders unused for longest; a process that still uses one recreates it."""
 
     def last_used(folder: Path) -> float:
         try:

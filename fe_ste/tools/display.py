@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 TitledRows = tuple[str, Mapping[str, str]]
-"""Title of a table, and what is told -> its value as text, with its unit."""
+"""Title of a table, and name of each entry -> its value as text, with its unit."""
 
 
 class _Fields(Formatter):
@@ -30,15 +30,15 @@ class _Fields(Formatter):
 
 
 class ReprMixin:
-    """Shows itself as one line of text, and in a notebook as a small table.
+    """Mixin that displays an object as one line of text, and in a notebook as a small table.
 
     A class states its line, or computes it in `_line`; one with a table gives its title and rows in `_table`.
 
     Parameters
     ----------
     line : str
-        What stands behind the name of the class. Fields are attributes of the object, also dotted ones; ``!n`` is
-        the number of their entries.
+        Text after the name of the class. Fields are attributes of the object, also dotted ones; ``!n`` is the number of
+        their entries.
 
     Examples
     --------
@@ -83,8 +83,8 @@ def html_table(title: str, rows: Mapping[str, str]) -> str:
 
     Parameters
     ----------
-    title : stands above the table
-    rows : what is told -> its value as text, with its unit
+    title : caption above the table
+    rows : name of each entry -> its value as text, with its unit
 
     Returns
     -------
@@ -105,13 +105,13 @@ def _shown(text: str) -> str:
 
 
 def value_range(values: ArrayLike, unit: str, scale: float = 1.0) -> str:
-    """Return the least and the greatest of some values as text, or the one value.
+    """Return the range of some values, minimum to maximum, as text, or the single value.
 
     Parameters
     ----------
-    values : in any shape; those that are not a number are left out
+    values : in any shape; NaN is omitted
     unit : unit that is shown
-    scale : what the values are multiplied by to have that unit
+    scale : factor that converts the values to that unit
 
     Examples
     --------

@@ -1,9 +1,9 @@
-"""What all diagrams share: style, colours, figures written whole or not at all.
+"""Shared parts of all diagrams: style, colours, and picture files written completely or not at all.
 
-matplotlib is imported when a diagram is drawn and needs no display: figures are made without pyplot.
+matplotlib is imported when a diagram is drawn and needs no display: pictures are drawn without pyplot.
 
-pyvista is imported when a picture is rendered. VTK renders into memory without a display through EGL or OSMesa.
-Where neither is there it ends the process, so the first picture tries it in a process of its own.
+pyvista is imported when a picture is rendered. VTK renders into memory without a display through EGL or OSMesa. Without
+either, VTK ends the process, so rendering is first tried in a separate process.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def drawing_style() -> Iterator[None]:
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Make an empty figure with constrained layout, sizes in inches."""
+    """Return an empty `matplotlib.figure.Figure` with constrained layout, size in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
@@ -82,7 +82,7 @@ def drawable(text: str) -> str:
 
 
 def finish_figure(figure: Figure, path: str | Path | None) -> Figure:
-    """Write a figure, if a path is given, in the format of its suffix, and return it; any text in it can be drawn."""
+    """Save a diagram, if a path is given, in the format of its suffix, and return it; any text can be drawn."""
     from matplotlib.text import Text
 
     for text in figure.findobj(Text):
@@ -100,7 +100,7 @@ def finish_figure(figure: Figure, path: str | Path | None) -> Figure:
 
 
 def _print_png(figure: Figure, content: io.BytesIO) -> None:
-    """Write a figure as `savefig` does, which draws everything twice, the first time for the layout alone."""
+    """Save a diagram as `savefig` does, which draws everything twice, the first time only for the layout."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     before = figure.get_dpi()
@@ -135,12 +135,12 @@ def _probe_rendering() -> bool:
 
 
 def require_rendering() -> None:
-    """Make sure that pyvista is there and can render without a display.
+    """Check that pyvista is installed and can render without a display.
 
     Raises
     ------
     RenderingError
-        With what to install. VTK ends the process where no OpenGL can be had, hence the trial in another one.
+        With what to install. VTK ends the process where OpenGL is not available, hence the trial in another one.
     """
     if importlib.util.find_spec("pyvista") is None:
         raise RenderingError("3-D pictures need pyvista: pip install 'exugear[pictures]'")

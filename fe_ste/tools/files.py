@@ -27,15 +27,15 @@ class FileError(OSError):
 
 @contextmanager
 def replacement(path: Path, folder: Path | None = None) -> Iterator[IO[bytes]]:
-    """Open a new file that takes the place of `path` when the context ends well; on any error nothing is left of it.
+    """Open a new file that replaces `path` when the context ends without error; on any error it is removed.
 
-    It is never written through a link: a link of that name is replaced. Its mode is what the umask leaves. It is on the
-    disk before it has its name, so that a power cut leaves the old file or the new one.
+    It is never written through a link: a link of that name is replaced. Its mode follows the umask. It is flushed to
+    disk before it is renamed, so that after a power cut either the old or the new file exists.
 
     Parameters
     ----------
-    path : its directory is made if need be
-    folder : where the file grows, in the same file system; beside its place by default
+    path : its directory is created if necessary
+    folder : where the temporary file is written, in the same file system; by default the folder of `path`
     """
     folder = path.parent if folder is None else folder
     with _named_after(path):

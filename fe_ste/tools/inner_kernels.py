@@ -7,9 +7,9 @@ decides: `fe_ste.tools.compilation` makes both sorts of every function, each whe
 
 A bundle is a named tuple that kernels hand on by one address. numba takes a named tuple apart: each of its arrays
 becomes seven numbers of every function that it is handed to, written, read and sorted out again for each call. Of a
-bundle, addresses and shapes of its arrays stand in one row of memory, those of tuples within it as well; kernels name
-its fields as those of the tuple and read them there. The row never changes, which the compiler is told, so that it
-reads outside of loops.
+bundle, addresses and shapes of its arrays are stored in one row of memory, including those of nested tuples; kernels
+name its fields as those of the tuple and read them there. The row never changes and is declared constant to the
+compiler, so that it is read outside of loops.
 """
 
 from __future__ import annotations
@@ -260,7 +260,7 @@ _MOST_KEPT = 64
 
 
 class _BundleType(types.Type):
-    """Types of a bundle's fields by name, and the words of the row where they begin."""
+    """Types of a bundle's fields by name, and the index in the row where each begins."""
 
     def __init__(self, name: str, fields: dict[str, Any]) -> None:
         self.fields = fields

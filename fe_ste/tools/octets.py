@@ -58,7 +58,7 @@ def eight(array: Floats, start: int) -> Floats:
 
 
 def eight_at(array: Floats, places: Integers, start: int) -> Floats:
-    """Eight entries of a contiguous array (n,) that stand at eight places, themselves taken from a place on.
+    """Return eight entries of a contiguous array (n,) at eight indices, which are read from an array at a start index.
 
     Examples
     --------

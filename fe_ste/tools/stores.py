@@ -40,7 +40,7 @@ _SEAL = b"\nexugear sha256 "
 _SEAL_LENGTH = len(_SEAL) + 65
 _CHUNK = 1 << 20
 SETTLED = 2.0
-"""Age (s) from which a file is trusted to tell by its times that it was changed since: clocks of files are coarse."""
+"""Age (s) from which the times of a file are reliable to detect changes: file clocks are coarse."""
 _checked: dict[tuple[int, ...], str] = {}
 """Checksums of the files that this process found to fit, by what the system says of each."""
 
@@ -111,10 +111,10 @@ def _facts_of(file: IO[bytes]) -> tuple[int, ...]:
 
 @contextmanager
 def open_sealed(path: Path) -> Iterator[tuple[IO[bytes], str]]:
-    """Open a sealed file whose content fits, and give its checksum.
+    """Open a sealed file whose content matches its checksum, and return the checksum.
 
-    What is read is what was checked: files are replaced as a whole, so an open one does not change. One that this
-    process has checked, and that the system says was not touched since, is not checked again: runs are large.
+    The content read is the content checked: files are replaced as a whole, so an open one does not change. A file that
+    this process has checked, and that is unchanged since according to the system, is not checked again: runs are large.
 
     Raises
     ------
@@ -135,7 +135,7 @@ def open_sealed(path: Path) -> Iterator[tuple[IO[bytes], str]]:
 class ErrorKeeper(io.RawIOBase):
     """File for HDF5 to write into: the first error is kept, and raised by `check` instead of inside HDF5.
 
-    HDF5 cannot go on after a write that failed; told nothing, it ends in order, and the file is thrown away.
+    HDF5 cannot continue after a failed write; if it is not notified, it ends normally, and the file is discarded.
 
     Parameters
     ----------
@@ -152,15 +152,15 @@ class ErrorKeeper(io.RawIOBase):
             raise self._error
 
     def readable(self) -> bool:
-        """Tell that it can be read."""
+        """Return that it can be read."""
         return True
 
     def writable(self) -> bool:
-        """Tell that it can be written."""
+        """Return that it can be written."""
         return True
 
     def seekable(self) -> bool:
-        """Tell that it has a position."""
+        """Return that it has a position."""
         return True
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
@@ -234,13 +234,13 @@ class Layout:
     """What a netCDF file of one kind holds."""
 
     kind: str
-    """In words, for messages."""
+    """As text, for messages."""
     version: int
     """Version of the method whose numbers it holds, its attribute ``method_version``."""
     variables: Mapping[str, tuple[str, ...]]
     """Dimensions by variable; there may be more."""
     attributes: tuple[str, ...] = ()
-    """Attributes that are there; there may be more."""
+    """Required attributes; others are permitted."""
 
     def check(self, dataset: xr.Dataset, path: Path) -> None:
         """Refuse a dataset of another kind or version.
@@ -345,11 +345,11 @@ class Store:
 
         Parameters
         ----------
-        unpack : makes what is wanted of the arrays by name. What it misses, or cannot take, means a damaged file.
+        unpack : builds the value from the arrays by name. A missing or invalid array means a damaged file.
 
         Returns
         -------
-        What `unpack` gives, or None if the file is missing, of another key, or damaged, which the log tells.
+        The result of `unpack`, or None if the file is missing, of another key, or damaged, which is logged.
         """
         try:
             arrays = load_arrays(self.path)
@@ -392,7 +392,7 @@ class Store:
         self.path.unlink(missing_ok=True)
 
     def _tell_of(self, error: Exception) -> None:
-        """Log why a file that is there is not read."""
+        """Log why an existing file is not read."""
         if os.path.exists(self.path):
             reason = str(error) if isinstance(error, OSError) else f"{self.path}: is damaged ({error!r})"
             _log.warning("%s; it is computed again", reason)
@@ -407,7 +407,7 @@ Value = TypeVar("Value")
 
 
 class Cache(ReprMixin, Generic[Value]):
-    """Values by key, those used least lately removed.
+    """Cache of values by key; those unused for longest are removed.
 
     Parameters
     ----------
@@ -444,7 +444,7 @@ class Cache(ReprMixin, Generic[Value]):
         return value
 
     def keep(self, key: str, value: Value, arrays: Mapping[str, Any]) -> None:
-        """Keep a value in memory, and its arrays in a file; the log tells where that cannot be written."""
+        """Keep a value in memory, and its arrays in a file; log if the file cannot be written."""
         self._remember(key, value)
         if store := self._store(key):
             try:
@@ -472,7 +472,7 @@ class Cache(ReprMixin, Generic[Value]):
                 self._values.popitem(last=False)
 
     def _remove_oldest(self, folder: Path) -> None:
-        """Remove the files used least lately beyond the bound; another process may do so, too."""
+        """Remove the files unused for longest above the size limit; another process may do so, too."""
         files = []
         for entry in os.scandir(folder):
             if entry.name.startswith(f"{self._name}-") and entry.name.endswith(".npz"):

@@ -1,10 +1,10 @@
-"""Threads: one for the dense linear algebra, whose many small factorisations do not profit from more; two side by side.
+"""Threads: one for dense linear algebra, whose many small factorisations gain nothing from more; two in parallel.
 
 OpenBLAS keeps its threads spinning between calls. On a machine whose cores others use too, or that runs several
-computations side by side, that costs 10 to 80 times what a second thread could gain on matrices of a few hundred rows.
-Whole computations side by side gain what threads of their parts cannot.
+computations in parallel, that costs 10 to 80 times what a second thread could gain on matrices of a few hundred rows.
+Complete computations in parallel gain more than threads within each of them.
 
-This module loads no library: a worker watches over that process before it loads what it works with.
+This module loads no library: a worker monitors that process before it loads its own libraries.
 """
 
 from __future__ import annotations
@@ -150,9 +150,9 @@ class AtOnce(Executor):
 
 
 def second_thread() -> Executor:
-    """Return a thread beside this one, or none where it would take from others what it gains.
+    """Return a second thread, or none where it would slow down this process or others.
 
-    That is where there is one core only, and in a worker process, which shares the cores with others.
+    None is returned on a single core, and in a worker process, which shares the cores with others.
 
     Examples
     --------
@@ -166,7 +166,7 @@ def second_thread() -> Executor:
 
 
 def second_core_is_free() -> bool:
-    """Whether a core is likely to be free beside this process's own: there is one, and this is no worker process."""
+    """Whether a core is likely to be free for a second thread: more than one core, and this is no worker process."""
     return available_cores() > 1 and multiprocessing.parent_process() is None
 
 

@@ -123,8 +123,8 @@ class PairCompliance(ReprMixin):
 def _teeth_in_contact(pair: GearPair, flanks: tuple[FlankCompliance, FlankCompliance]) -> tuple[int, int]:
     """Largest difference of tooth pairs in contact at once, and outermost tooth pair that may touch.
 
-    In a closed ring every tooth is there, and contact needs one tooth pair more on either side than the contact ratio;
-    an open sector has its own teeth and no others.
+    A closed ring has all its teeth, and contact needs one more tooth pair on either side than the contact ratio; an
+    open sector has only its own teeth.
     """
     reach = min([math.ceil(pair.total_contact_ratio)] + [flank.tooth_reach for flank in flanks if flank.closed])
     open_reach = [flank.tooth_reach for flank in flanks if not flank.closed]

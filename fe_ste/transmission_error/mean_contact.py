@@ -1,10 +1,10 @@
-"""Contact of a pair about the state that it stands in: means over the mesh cycle, and their slopes by misalignment.
+"""Contact of a pair linearised about its operating state: means over the mesh cycle, and slopes by misalignment.
 
-A table over load, centre distance and misalignment takes thousands of states. What shafts and bearings need to know
-about teeth at rest, laws about their changes over the mesh cycle, takes forty-five: some positions of the cycle
-under two misalignments on either side of the real one, and at a centre distance beside it. Between these all is
-linear. They stand on a lattice whose steps are small against what teeth yield, so that all states nearby share one
-contact: those of equal planets, of a later step of the same search, of a gearbox that varies a little.
+A table over load, centre distance and misalignment takes thousands of states. The static equilibrium of shafts and
+bearings, and mesh models of the variation over the mesh cycle, need forty-five: some positions of the cycle at two
+misalignments on either side of the actual one, and at a neighbouring centre distance. Between these everything is
+linear. They lie on a lattice whose steps are small compared with tooth deflections, so that all states nearby share one
+contact: equal planets, later steps of the same iteration, and slightly changed gearboxes.
 
 The key is a hash of its whole input and of the versions of the method.
 """
@@ -85,9 +85,9 @@ def face_load_factor(states: xr.Dataset) -> xr.DataArray:
 POSITIONS = 5
 """Positions of the mesh cycle for means: twice as many move the misalignment of a gearbox in balance by 0.4 %."""
 FINER = 4
-"""How many times as many positions what changes over the cycle is taken at.
+"""Factor on the number of positions for the variation over the mesh cycle.
 
-With twice as many the third harmonic of gears that stand a millirad askew is a fifth too high, the fourth 1.4 to 2
+With a factor of two the third harmonic of gears misaligned by a millirad is a fifth too high, the fourth 1.4 to 2
 times.
 """
 FORCE_STEP = 0.02
@@ -289,13 +289,13 @@ _told: ContextVar[Callable[[int, int], None] | None] = ContextVar("_told", defau
 
 @contextmanager
 def contacts_told(progress: Callable[[int, int], None]) -> Iterator[None]:
-    """Let somebody hear of contacts that are solved inside the context, however deep they are asked for.
+    """Report the contacts that are solved inside the context, at any depth of calls.
 
     Parameters
     ----------
     progress
-        Called with the number of contacts that are there, and of all that have to be solved. What it raises, such as
-        Ctrl-C, ends the work.
+        Called with the number of finished contacts, and of all that have to be solved. An exception that it raises,
+        such as Ctrl-C, ends the work.
     """
     token = _told.set(progress)
     try:
@@ -307,12 +307,12 @@ def contacts_told(progress: Callable[[int, int], None]) -> Iterator[None]:
 def known_contacts(wanted: Sequence[TableInput]) -> list[MeanContact | ContactError]:
     """Return contacts as `fe_ste.transmission_error.mean_contact.mean_contact` does, each solved at most once.
 
-    Files are kept where `fe_ste.elasticity.flank.known_flanks` keeps its own; each is written when it is solved,
-    so that what is stopped goes on from there.
+    Files are kept where `fe_ste.elasticity.flank.known_flanks` keeps its own; each is written when it is solved, so
+    that a stopped computation resumes from there.
 
     Returns
     -------
-    in the order asked for; why one could not be solved stands in its place
+    in the order requested; for a contact that could not be solved, the reason
     """
     keys = [_key(one) for one in wanted]
     asked = dict(zip(keys, wanted, strict=True))

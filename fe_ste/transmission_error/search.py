@@ -1,8 +1,8 @@
-"""One position in the mesh cycle (pmc) under one load: the window that contact fills, and the state in it.
+"""Contact at one position in the mesh cycle (pmc) under one load: search window and solution.
 
-Where contact will be is not known before it is solved. So cells are laid in a window about each contact line, those
-too far apart to touch are left out, and the problem is solved; if contact then fills the window, or cells left out
-would touch, the start is mended and the search goes on. Frame and signs as in `fe_ste.contact.kinematics`.
+The contact area is not known in advance. So cells are placed in a window around each contact line, cells too far apart
+to touch are omitted, and the problem is solved; if contact then fills the window, or omitted cells would touch, the
+start is corrected and the search continues. Frame and signs as in `fe_ste.contact.kinematics`.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def hertz_half_width(pair: GearPair, line_load: float) -> float:
 
 @lru_cache(maxsize=64)
 def least_contact_length(pair: GearPair, samples: int = 100) -> float:
-    """Least total length of the contact lines over the mesh cycle, m."""
+    """Minimum total length of the contact lines over the mesh cycle, m."""
     axial = np.linspace(-0.5, 0.5, 401) * pair.face_width
     pitch = pair.transverse_base_pitch
     # A helix shifts the contact along the path by tan(beta_b) times the axial position; a tooth more by a base pitch.
@@ -119,11 +119,11 @@ def contact_states(
 
     Returns
     -------
-    for each misalignment the state, or why there is none
+    for each misalignment the state, or the reason of the failure
 
     Notes
     -----
-    Contact that reaches a form circle is solved again, cut off there, and once more on involutes that go on: see
+    Contact that reaches a form diameter is solved again, truncated there, and once more on extended involutes: see
     `fe_ste.contact.kinematics`.
     """
     pair = compliance.pair
@@ -149,7 +149,7 @@ def contact_states(
 def _counted(
     compliance: PairCompliance, cut: ContactState | ContactError, whole: ContactState | ContactError
 ) -> ContactState | ContactError:
-    """State cut off at the form circles, with the share of the load that is beyond them on involutes that go on."""
+    """State truncated at the form diameters, with the share of the load beyond them on extended involutes."""
     for state in (cut, whole):
         if isinstance(state, ContactError):
             return ContactError(f"contact extends beyond the form diameter, where the involute ends: {state}")
@@ -394,7 +394,7 @@ def new_start(compliance: PairCompliance, torque: float) -> SearchStart:
 
 
 def _ends(cells: Cells, looked: Booleans) -> tuple[Booleans, Booleans]:
-    """Cells next to which contact could go on unseen: at the end of the window, and beside one not `looked` at."""
+    """Cells next to which contact could continue undetected: at the window's end, or next to one not in `looked`."""
     group = cells.tooth * (cells.layer.max() + 1) + cells.layer
     first = np.diff(group, prepend=group[0] - 1) != 0
     last = np.append(first[1:], True)
@@ -404,7 +404,7 @@ def _ends(cells: Cells, looked: Booleans) -> tuple[Booleans, Booleans]:
 
 
 def _around_least(cells: Cells, gap: Floats) -> Booleans:
-    """In each slice the cell of the least gap, where contact begins under any misalignment, and its neighbours."""
+    """In each slice the cell of the smallest gap, where contact begins under any misalignment, and its neighbours."""
     group = cells.tooth * (cells.layer.max() + 1) + cells.layer
     starts = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
     least = np.repeat(np.minimum.reduceat(gap, starts), np.diff(starts, append=len(gap))) == gap
@@ -433,7 +433,7 @@ def normal_load(pair: GearPair, torque: float) -> float:
 
 
 def pitch_point_pressure(pair: GearPair, torque: float) -> float:
-    """Greatest pressure at the pitch point, the load spread evenly over the least length of the contact lines, Pa.
+    """Return the maximum pressure at the pitch point with even load over the shortest contact lines, Pa.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ class ContactState(ReprMixin):
     pressure: Floats
     """(n,) Pa."""
     truncated_load: float = 0.0
-    """Share of the load that would be beyond the form circles, where contact is cut off: see
+    """Share of the load that would lie beyond the form diameters, where contact is truncated: see
     `fe_ste.contact.kinematics`."""
 
     def _line(self) -> str:
@@ -125,7 +125,7 @@ class StateAxes(ReprMixin):
         return "axes of a grid of states", self.ranges()
 
     def ranges(self) -> dict[str, str]:
-        """Return the values along each axis as text for people, with units."""
+        """Return the values along each axis as text with units."""
         return {
             "position in the mesh cycle": f"{self.positions} positions",
             "torque": value_range(self.torque, "N m"),
@@ -135,7 +135,7 @@ class StateAxes(ReprMixin):
 
 
 CUT_OFF = "truncated_load"
-"""Variable of what contact leaves out at form circles: see `fe_ste.contact.kinematics`."""
+"""Variable of the load neglected beyond the form diameters: see `fe_ste.contact.kinematics`."""
 
 _UNITS = {
     "pmc": ("1", "position in the mesh cycle"),
@@ -216,7 +216,7 @@ class StateResults(ReprMixin):
 
     @classmethod
     def empty(cls, compliance: PairCompliance, shape: tuple[int, int, int, int]) -> StateResults:
-        """Results of `shape` of which none is there yet."""
+        """Empty results of `shape`."""
         teeth = compliance.teeth
         axial = compliance.axial
         return cls(

@@ -1,13 +1,14 @@
 """Static transmission error between the nodes of a table: one smooth surface over load, position and gear position.
 
 The surface is a cubic in each axis, so that it and its slopes are continuous, and goes through every node. Position is
-periodic. The load axis is the root of the line-of-action force: a flank that touches with a line yields in proportion
-to the force, one that touches in a point faster, and both are smooth in the root. Slopes along it are the table's own
-tangent stiffness, limited where needed so that more load never means less deflection (Fritsch and Carlson, SIAM J.
-Numer. Anal. 17 (1980) 238-246); along misalignment they are the axial position of a little more load, which is exactly
-what s changes by; the other axes take their slopes from parabolas through three nodes.
+periodic. The load axis is the root of the line-of-action force: a flank in line contact deflects in proportion to the
+force, one in point contact more than that at small force, and both are smooth in the root. Slopes along it are the
+table's own tangent stiffness, limited where needed so that more load never means less deflection (Fritsch and Carlson,
+SIAM J. Numer. Anal. 17 (1980) 238-246); along misalignment they are the axial position of an increment of load, which
+is exactly the derivative of s; the other axes take their slopes from parabolas through three nodes.
 
-What stands in is a guess, and whoever uses it says so: a table keeps its gaps, and an interpolation is marked there.
+Interpolated states are estimates, and results that use them report this: a table keeps its gaps, and an interpolation
+is marked there.
 """
 
 from __future__ import annotations
@@ -29,16 +30,16 @@ if TYPE_CHECKING:
 MOST_MISSING = 0.1
 """Part of the positions of a mesh cycle, or of the states of a table, that may be missing."""
 DOUBTFUL_CUT_OFF = 0.01
-"""Share of the load cut off at a form circle that raises a doubt: ten times less moves the transmission error by
-a few millionths, but what a tip does in a fillet is not in the model."""
+"""Truncated share of the load at a form diameter that causes a warning: a tenth of it changes the transmission error by
+a few millionths, but contact of a tip in a fillet is not modelled."""
 
 
 class GapError(ValueError):
-    """More states are missing than others can stand in for; the message says how many."""
+    """Too many states are missing to be interpolated from their neighbours; the message gives their number."""
 
 
 def complete_cycle(state: xr.Dataset) -> xr.Dataset:
-    """Fill the positions of a mesh cycle that are not solved, by cubics between their neighbours without overshoot.
+    """Interpolate the positions of a mesh cycle that have not converged, by cubics without overshoot.
 
     Parameters
     ----------
@@ -73,10 +74,10 @@ def complete_cycle(state: xr.Dataset) -> xr.Dataset:
 def complete_loads(
     root: Floats, nodes: Floats, tangent: Floats, centre: Floats, solved: Booleans
 ) -> tuple[Floats, Floats, Floats]:
-    """Fill the states of a grid that are not solved; more load always means more deflection.
+    """Interpolate the states of a grid that have not converged; more load always means more deflection.
 
-    Between solved loads a cubic without overshoot, beyond the last a straight line along its tangent; where no load is
-    solved, the growth of the nearest place at which one is.
+    Between converged loads a cubic without overshoot, beyond the last one extrapolated linearly along its tangent;
+    where no load has converged, the growth at the nearest converged place.
 
     Parameters
     ----------
@@ -260,16 +261,16 @@ class SteSurface(ReprMixin):
     to 1 (m), and the integral of s over the force from zero to the start of the piece (J). Along misalignment the
     same of the slope follows each node, unless there is one node only."""
     guessed: Booleans | None = None
-    """(p, c, a, l) nodes that are not solved, where a guess stands in; none if there are none."""
+    """(p, c, a, l) nodes that have not converged and are interpolated; none if there are none."""
 
     @classmethod
     def from_table(cls, dataset: xr.Dataset) -> SteSurface:
-        """Lay the surface through a table (see `fe_ste.static_transmission_error`).
+        """Fit the surface to a table (see `fe_ste.static_transmission_error`).
 
         Raises
         ------
         InterpolationError
-            If too many states are not solved for others to stand in, or more load gives less deflection.
+            If too many states have not converged to be interpolated, or more load gives less deflection.
         """
         axes = ("pmc", "centre_distance", "misalignment", "torque")
         table = dataset.transpose(*axes, ...)
@@ -299,7 +300,7 @@ class SteSurface(ReprMixin):
         unloaded_centre: ArrayLike = 0.0,
         solved: ArrayLike = True,
     ) -> SteSurface:
-        """Lay the surface through values at the nodes.
+        """Fit the surface to values at the nodes.
 
         Parameters
         ----------
@@ -310,12 +311,12 @@ class SteSurface(ReprMixin):
         unloaded, unloaded_centre : (p, c, a) arrays or floats
             Transmission error at no load, and its derivative by misalignment, m.
         solved : (p, c, a, l) array or True
-            States that are solved; others stand in for the rest (`fe_ste.transmission_error.surface`).
+            Converged states; the rest is interpolated (`fe_ste.transmission_error.surface`).
 
         Raises
         ------
         InterpolationError
-            If too many states are not solved, or more load gives less deflection.
+            If too many states have not converged, or more load gives less deflection.
 
         Examples
         --------
@@ -369,7 +370,7 @@ class SteSurface(ReprMixin):
         return SteSurface(self.centre_distance, self.misalignment, self.root_force, mean, guessed)
 
     def near_guesses(self) -> Booleans:
-        """Tell between which nodes a guess acts: intervals of pmc, centre distance, misalignment, pieces of load.
+        """Return where interpolated nodes act: intervals of pmc, centre distance, misalignment, segments of load.
 
         Returns
         -------
@@ -391,11 +392,11 @@ class SteSurface(ReprMixin):
         return np.concatenate([near[..., 1:], near[..., -1:]], axis=-1)
 
     def acting_guesses(self) -> Booleans:
-        """Tell on which intervals, and at which nodes between them, a guess acts.
+        """Return the intervals, and the nodes between them, at which interpolated nodes have an effect.
 
         Nodes and intervals alternate along each axis: 2 n + 1 entries for the n intervals of `near_guesses`, node i at
-        2 i, the interval behind it at 2 i + 1. Values and slopes are continuous at a node, so a guess that acts on one
-        side of it only has no weight there.
+        2 i, the interval behind it at 2 i + 1. Values and slopes are continuous at a node, so an interpolated node that
+        acts on only one side of it has no weight there.
 
         Returns
         -------

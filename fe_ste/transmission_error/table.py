@@ -119,7 +119,7 @@ class MeshTable(ReprMixin):
     """Static transmission error of a pair over its axes."""
 
     dataset: xr.Dataset
-    """See `fe_ste.static_transmission_error`; with the input, its hash and the solver's figures as attributes."""
+    """See `fe_ste.static_transmission_error`; with the input, its hash and the solver's settings as attributes."""
 
     @classmethod
     def compute(
@@ -136,9 +136,9 @@ class MeshTable(ReprMixin):
         ----------
         progress : called with the number of finished states and of all states
         executor
-            What the states are sent to, see `fe_ste.transmission_error.grid`; without it two processes share a grid
-            of more than a thousand states, and this process solves fewer.
-        partial : file in which finished positions are kept; a computation that was stopped goes on from there
+            Executor of the states, see `fe_ste.transmission_error.grid`; without it two processes share a grid of more
+            than a thousand states, and this process solves fewer.
+        partial : file in which finished positions are kept; a stopped computation resumes from there
 
         Raises
         ------
@@ -172,7 +172,7 @@ class MeshTable(ReprMixin):
         Raises
         ------
         TableError
-            If the file is missing, damaged, is no table of this version, or belongs to another input.
+            If the file is missing, damaged, is not a table of this version, or belongs to another input.
         """
         path = Path(path)
         try:
@@ -220,7 +220,7 @@ class MeshTable(ReprMixin):
 
     @property
     def failures(self) -> list[str]:
-        """Positions that were not solved, with the reason."""
+        """Positions that have not converged, with the reason."""
         return [line for line in str(self.dataset.attrs["failures"]).splitlines() if line]
 
     def _line(self) -> str:
@@ -242,12 +242,12 @@ class MeshTable(ReprMixin):
 
 
 def _with_cut_off(dataset: xr.Dataset, path: Path) -> xr.Dataset:
-    """Add what a table lacks that was computed when contact could not end at a form circle: nothing was cut off.
+    """Add missing variables of a table computed before contact was truncated at form diameters: nothing was truncated.
 
     Raises
     ------
     TableError
-        It has states that are unsolved for that reason.
+        It has states that have not converged for that reason.
     """
     if CUT_OFF in dataset:
         return dataset

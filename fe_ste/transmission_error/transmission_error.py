@@ -51,7 +51,7 @@ def static_transmission_error(
     positions : equally spaced positions of the mesh cycle
     centre_distance : operating centre distances, m; the pair's own unless given
     misalignment
-        Relative rotation of the axes in the plane of action, rad, positive where it opens the gap at the +z end.
+        Relative rotation of the axes in the plane of action, rad, positive for a gap at the +z end.
     mesh, contact : discretisation, if `pair` is a `GearPair`
     progress : called with the number of finished positions and of all positions
 
@@ -62,8 +62,8 @@ def static_transmission_error(
         line_of_action_force (N), load_centroid and tangent_load_centroid (m), load_share and tangent_load_share by
         ``tooth``, line_load (N/m of contact line) by ``tooth`` and ``axial_position``, max_pressure and edge_pressure
         (Pa; inside the flank, and in cells at a tip edge, where it depends on the cells), iterations, converged.
-        What is tangent belongs to a little more load, and is the derivative of ste by misalignment or by a gap of one
-        tooth pair under constant load. Positions that failed are not a number; ``failures`` says why.
+        Tangent quantities refer to an increment of load, and are the derivative of ste by misalignment or by a gap of
+        one tooth pair under constant load. Positions that failed are NaN; ``failures`` gives the reason.
 
     Raises
     ------
