@@ -350,7 +350,7 @@ def parse_study(content: dict[str, Any], source: str) -> StudyFile:
 
     Examples
     --------
-    >>> parse_study({"name": "a", "case": "b.toml", "parameters": {}, "quantity": {}}, "s.toml")
+    >>> parse_study({"name": "a", "case": "b.toml", "parameters": {}, "output": {}}, "s.toml")
     Traceback (most recent call last):
     ...
     exugear.studies.sections.StudyError: s.toml: parameters: must have at least 1 entry

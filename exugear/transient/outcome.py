@@ -89,7 +89,7 @@ class Run(ReprMixin):
     Examples
     --------
     >>> Run(Path("rigid/run.nc"), complete=True, end=0.5, wall=1.25)
-    <Run rigid/run.nc: complete, 0.5 s simulated in 1.2 s, trusted>
+    <Run rigid/run.nc: complete, 0.5 s simulated in 1.2 s, valid>
     """
 
     path: Path
