@@ -1,6 +1,6 @@
-"""Campbell diagram of a mean system: eigenfrequencies and damping over speed, each mode named, and read from a file.
+"""Campbell diagram of the averaged system: eigenfrequencies and damping over speed, each mode labelled.
 
-Two modes at neighbouring speeds are compared by left and right shapes::
+The diagram is also read from a file. Two modes at neighbouring speeds are compared by left and right shapes::
 
     MAC_ij = |(left_i . right_j) (left_j . right_i)|,   left_i . right_i = 1 at each speed
 
@@ -13,10 +13,11 @@ gradually. Two modes that changed places within a step crossed if MAC_ij is zero
 as two modes are that veer, and stay close over 2 c / (D_1 + D_2) of the step: if that is wide enough to be seen, the
 step is halved, too.
 
-Equal planets, equally spaced, have three types of modes (Lin and Parker 1999, J. Vib. Acoust. 121, 316): rotational,
-in which all planets move alike and central bodies turn (and move along the axis); translational, in which planets move
-as a cosine and a sine around the carrier and central bodies move across; planet modes, of higher waves, in which no
-central body moves. Coordinates are waves already, so that the kinetic energy tells.
+Equal planets, equally spaced, have three types of modes (Lin and Parker 1999, J. Vib. Acoust. 121, 316): rotational, in
+which all planets move alike and central bodies rotate (and move axially); translational, in which planets move as a
+cosine and a sine around the carrier and central bodies move radially; planet modes, of higher multi-blade components,
+in which no central body moves. The coordinates are multi-blade components already, so the kinetic energy identifies the
+type.
 """
 
 from __future__ import annotations
@@ -133,7 +134,7 @@ def _matches(one: Found, other: Found) -> tuple[Integers, Integers, Floats]:
 
 
 def _clarity(one: Found, other: Found, narrowest: float) -> float:
-    """Minimum MAC of modes that are one across a step, or less than `CLEAR` where a veering may hide in it."""
+    """Minimum MAC for modes to be matched across a step, or less than `CLEAR` where a veering may be hidden in it."""
     rows, columns, values = _matches(one, other)
     before, after = (own[0][places].imag for own, places in ((one, rows), (other, columns)))
     far = np.triu(np.subtract.outer(before, before), 1)
@@ -174,31 +175,31 @@ def _joined(speeds: Floats, found: list[Found]) -> ModeTracks:
 KINDS = ("rotational", "translational", "planet")
 """Types of modes of a planetary set."""
 MIXED = "mixed"
-"""Neither: bearings that are not isotropic, or gears beside the set, couple its waves."""
+"""Neither: anisotropic bearings, or gears outside the set, couple its multi-blade components."""
 OF_SET, OF_PLANETS, OF_KIND = 0.5, 0.1, 0.8
-"""Least shares of the kinetic energy: of a set for a mode to be one of its own, of the planets for it to be named by
-type, and of one type within the set."""
+"""Minimum shares of the kinetic energy: of a set for a mode to be one of its own, of the planets for the mode to be
+named by type, and of one type within the set."""
 LATERAL = 0.01
-"""Least share of the kinetic energy that turning bodies' lateral and tilting motions have for a whirl to be told."""
+"""Minimum share of the kinetic energy in lateral and tilting motion of rotating bodies for whirl to be reported."""
 TURNING = tuple(BODY_MOTIONS.index(name) for name in ("spin", "axial", "twist", "stretch"))
 """Motions of a central body in rotational modes; all others are those of translational ones."""
 
 
 @dataclass(frozen=True)
 class NamedMode:
-    """A mode in words."""
+    """Description of a mode as text."""
 
     kind: str
     """Of `KINDS`, `MIXED`, or empty where no planet set carries the mode; with the carrier where there are several."""
     name: str
-    """What moves and what is strained."""
+    """Kinetic energy by body and strain energy by element."""
     whirl: float
-    """1 for a circle in the sense in which the body turns, -1 against it, 0 for a line and where hardly any turning
-    body moves across."""
+    """1 for a circular orbit in the sense of rotation of the body, -1 against it, 0 for a straight orbit and where
+    radial motion of rotating bodies is negligible."""
 
 
 class ModeNamer:
-    """Names modes of a mean system; its elements are linearised once, about the static state at one speed.
+    """Names the modes of the averaged system; its elements are linearised once, about the static state at one speed.
 
     Parameters
     ----------
@@ -213,7 +214,7 @@ class ModeNamer:
         self._senses = {name: float(np.sign(own * speed)) for name, own in frame.speeds.items()}
 
     def named(self, shape: Complexes) -> NamedMode:
-        """Name a mode shape (size,) of the averaged system."""
+        """Name a shape (size,) of the averaged system."""
         kinetic = self._kinetic(shape)
         return NamedMode(self._kind(shape, kinetic), self._words(shape, kinetic), self.whirl(shape))
 
@@ -282,7 +283,7 @@ class ModeNamer:
         return of_planets, shares
 
     def _wave_energy(self, slot: str, shape: Complexes) -> float:
-        """Kinetic energy of the wave that stands in the coordinates of a planet."""
+        """Kinetic energy of the multi-blade component in the coordinates of a planet."""
         index = [i for i in self.assembly.coordinates[slot] if i >= 0]
         own = shape[index]
         return float((own.conj() @ self.system.mass[np.ix_(index, index)] @ own).real)
@@ -372,7 +373,7 @@ def modes_over_speed(system: MeanSystem, low: float, high: float, highest: float
 
 
 def campbell_of(system: MeanSystem, tracks: ModeTracks) -> Campbell:
-    """Campbell diagram of the modes of an averaged system, tracked over speed."""
+    """Campbell diagram of the modes of an averaged system, followed over speed."""
     low = tracks.speeds[0]
     high = tracks.speeds[-1]
     namer = ModeNamer(system, high if abs(high) > abs(low) else low)

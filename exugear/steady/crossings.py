@@ -1,11 +1,12 @@
-"""Where lines cross modes of the mean system: speeds at which a response has to be looked at, and how strong it is.
+"""Crossings of orders with modes of the averaged system: speeds to evaluate, and the strength of the response there.
 
-With half a per mille of damping a peak is as wide as a per mille of its speed: even steps miss it. Modes are those of
-the Campbell diagram, followed over speed by their shapes; where a line passes a mode, the linear response of that mode
-tells whether it matters. One speed there and its neighbours then tell where the top is.
+With a damping ratio of half a per mille a peak is as wide as a per mille of its speed: equal steps miss it. Modes are
+taken from the Campbell diagram, followed over speed by their shapes; where an order crosses a mode, the linear response
+of that mode shows whether it is relevant. One speed there and its neighbours then locate the maximum.
 
-At the level `linear` a line of the overall transmission error is a sum over meshes, and over modes of the mean system.
-Shares are the parts of each along the sum, so that they add up to one; parts that work against the sum are negative.
+With the method `linear` an order of the overall transmission error is a sum over meshes, and over modes of the averaged
+system. Shares are the components of each along the sum, so that they add up to one; components opposed to the sum are
+negative.
 """
 
 from __future__ import annotations
@@ -39,17 +40,17 @@ MOST = 240
 LOUDEST = 100
 """Peaks of each quantity whose tops are looked for, of all speeds and of the range of operation."""
 LEAST_STAND = 1e-4
-"""Share by which a peak stands out at the known speeds to be looked at: more of it may show."""
+"""Relative prominence of a peak at the known speeds from which it is refined: its maximum may be higher."""
 GAIN = 1e-3
-"""Share by which a top is higher than its peak at the known speeds, from which it is looked at."""
+"""Relative excess of a maximum over its peak at the known speeds from which it is evaluated."""
 APART = 0.25
-"""Share of the distance of a peak's neighbours within which two tops are looked at once; what is left shows then."""
+"""Share of the distance between a peak's neighbours within which two maxima are evaluated together."""
 ROUNDS = 4
 """Iterations to a mode at the speed where a line meets it; their error is squared each time."""
 COINCIDE = 1e-6
 """Share of the speed within which two speeds are one."""
 SAME = 0.5
-"""Least MAC with the followed mode for what they end in to be that mode."""
+"""Minimum MAC with the followed mode for the final mode to be the same mode."""
 
 
 @dataclass(frozen=True)
@@ -143,17 +144,17 @@ def missed_tops(
     operation: tuple[float, float] | None,
     known: KnownTops | None = None,
 ) -> Floats:
-    """Speeds at which the loudest peaks are higher than at any known speed, by curves through five neighbours.
+    """Return speeds at which the highest peaks exceed every known speed, by curves through five neighbours.
 
     Parameters
     ----------
     speeds : (n,) ascending, rad/s
     amplitude : (n, lines, signals) of all signals, the mean as the first line
-    smooth : (n,) where the response is smooth over speed: not where teeth part
-    quantities : whose peaks count
-    operation : speeds between which the loudest count by themselves, rad/s without sign
+    smooth : (n,) where the response is smooth over speed: not with contact loss
+    quantities : quantities whose peaks are evaluated
+    operation : operating speed range, whose highest peaks are ranked separately, rad/s without sign
     known : dict, optional
-        Tops that were found between the same speeds before, to which those found now are added.
+        Maxima found between the same speeds before; newly found ones are added.
     """
     if len(speeds) < NEIGHBOURS:
         return np.zeros(0)
@@ -190,7 +191,7 @@ def missed_tops(
 
 
 def _looked_at(gearset: HarmonicBalanceModel) -> list[int]:
-    """Lines of a single mesh frequency, and those beside it."""
+    """Orders of a single mesh frequency, and their sidebands."""
     index = gearset.lines.index[:, : len(gearset.waves.base_orders)]
     return [int(line) for line in np.flatnonzero(np.count_nonzero(index, axis=1) == 1)]
 
@@ -269,12 +270,12 @@ def improved(mode: Mode, mass: Floats, damping: Floats, stiffness: Floats) -> Mo
 # What makes a peak: which mesh's error excites it, which mode carries it, and what would lower it, in percent
 
 LEAST_MODE = 0.01
-"""Share of a mode below which it is not told."""
+"""Minimum share of a mode to be reported."""
 
 
 @dataclass(frozen=True)
 class Contributions:
-    """What a line of the overall transmission error is made of at one speed."""
+    """Contributions to an order of the overall transmission error at one speed."""
 
     speed: float
     """Of the input, rad/s."""
@@ -317,10 +318,10 @@ def contributions(gearset: HarmonicBalanceModel, speed: float, line: int) -> Con
 
 
 def loudest_near(gearset: HarmonicBalanceModel, speed: float, width: float, line: int) -> float:
-    """Speed (rad/s) within a share `width` of another at which a line is loudest at the level `linear`.
+    """Return the speed (rad/s) of the largest `linear` amplitude of an order, within a share `width` of another speed.
 
-    There the height of a peak changes with a parameter as the amplitude does at that speed: its place then counts
-    for nothing.
+    At the maximum, the height of a peak changes with a parameter as the amplitude at that fixed speed does: the shift
+    of the peak has no first-order effect.
     """
     import scipy.optimize  # a quarter of a second that others need not wait
 
@@ -351,7 +352,7 @@ def _share(part: complex, total: complex) -> float:
 def _modes(
     gearset: HarmonicBalanceModel, speed: float, frequency: float, loads: Complexes, row: Floats, total: complex
 ) -> tuple[tuple[float, float], ...]:
-    """Shares of the modes of the averaged system, those of negative frequency counted with their partners."""
+    """Shares of the modes of the averaged system, those of negative frequency counted with their conjugates."""
     values, right, left = mean_modes(gearset.system, speed)
     size = gearset.system.size
     pushed = np.linalg.solve(gearset.system.mass, loads)

@@ -58,16 +58,16 @@ from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
 
 SAMPLES_PER_HARMONIC = 16
-"""Samples over a mesh period at least where teeth part, over the harmonics: kinks want more than products of lines."""
+"""Minimum samples per mesh period over the harmonics, with contact loss: kinks need more than products of orders."""
 MOST_LINES = 500
 """Combinations up to which lines are looked for: those up to the eighth of three mesh frequencies, the 21st of two."""
 
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """The meshes of a gearbox as they meet its mean system at one speed; m waves, r readings, f forces, n lines.
+    """Meshes of a gearbox in the averaged system at one speed; m components, r outputs (readings), f forces, n orders.
 
-    Waves of non-linear bearings follow those of the meshes.
+    Components of nonlinear bearings follow those of the meshes.
     """
 
     speed: float
@@ -85,7 +85,7 @@ class Interface:
     torque_per_force: Floats
     """(m, f) torque of the drive per steady force, N m/N."""
     bearings: BearingMean | None
-    """Non-linear bearings in the averaged system."""
+    """Nonlinear bearings in the averaged system."""
 
     @cached_property
     def deflection(self) -> Complexes:
@@ -187,12 +187,12 @@ class HarmonicBalanceModel:
 
     @property
     def wander(self) -> bool:
-        """Whether the load of any mesh with a law along a row moves along the face."""
+        """Whether the load of any mesh with a model along a row shuttles."""
         return self.waves.wander and not self.parting
 
     @property
     def bent(self) -> bool:
-        """Whether forces are no parabolas of what the laws read: teeth or rolling elements may part."""
+        """Whether forces are not parabolas of the inputs of the models: teeth or rolling elements may lose contact."""
         return self.parting or self.bearings is not None
 
     @cached_property
@@ -287,7 +287,7 @@ class HarmonicBalanceModel:
         return other
 
     def of(self, which: Booleans) -> HarmonicBalanceModel:
-        """Copy with some of its lines, told by a flag for each (n,)."""
+        """Copy with some of its orders, selected by a mask (n,)."""
         other = self._copied()
         other.lines = self.lines.part(which)
         return other
@@ -326,10 +326,10 @@ class HarmonicBalanceModel:
         return other
 
     def passing(self, strong: Booleans) -> HarmonicBalanceModel | None:
-        """Copy with one more multiple of the passing of planets beside strong lines, told by a flag for each (n,).
+        """Return a copy with one more multiple of the planet passing as sidebands of strong orders, chosen by a mask (n,).
 
-        Planets tilt unequally under load, and tables tell that: each that passes then puts lines beside all others.
-        None where planets are not looked at one by one.
+        Planets tilt unequally under load, and table models include this: each passing planet then modulates all orders,
+        which adds sidebands. None if planets are not modelled individually.
         """
         waves = self.waves
         usual = self._usual
@@ -365,12 +365,12 @@ class HarmonicBalanceModel:
 
     @property
     def base_names(self) -> tuple[str, ...]:
-        """Names of all bases: meshes, and carriers whose turns put lines beside those of their planets."""
+        """Names of all bases: meshes, and carriers whose rotation causes sidebands of the orders of their planets."""
         return (*self.waves.base_names, *(name for name, _ in self.waves.carriers))
 
     @property
     def system(self) -> MeanSystem:
-        """The averaged (time-invariant) system."""
+        """The averaged system."""
         return self.waves.system
 
     @cached_property
@@ -398,7 +398,7 @@ class HarmonicBalanceModel:
 
     @cached_property
     def cycle_ways(self) -> Complexes:
-        """Fourier coefficients (m, harmonics + 1) of the way of the load along the face, m."""
+        """Fourier coefficients (m, harmonics + 1) of the axial shift of the load, m."""
         return self.waves.cycle_coefficients("way", harmonics=self.harmonics)
 
     @cached_property
@@ -420,10 +420,10 @@ class HarmonicBalanceModel:
 
     @cached_property
     def cycle_tangents(self) -> dict[tuple[int, int], Complexes]:
-        """Slopes (m, harmonics + 1) of the static law of each force by each reading, as those of stiffness over cycles.
+        """Derivatives (m, harmonics + 1) of the static model of each force by each reading, like those of stiffness.
 
-        Of the force by the deflection; where loads wander along the face, of force and moment by it and the
-        misalignment.
+        Derivative over the mesh cycle of the force by the deflection; where loads shuttle, of force and moment by
+        deflection and misalignment.
         """
         found = {(DEFLECTION, DEFLECTION): self.cycle_coefficients}
         if self.wander:
@@ -472,7 +472,7 @@ class HarmonicBalanceModel:
         return found
 
     def forward(self, speed: float) -> Booleans:
-        """Return which waves' meshes (m,) run through their cycles forward at a speed of the input."""
+        """Return which components' meshes (m,) run forward through their cycles at a speed of the input."""
         return np.array([wave.sense for wave in self.waves.waves]) * math.copysign(1.0, speed) > 0.0
 
     def ports_at(self, speed: float) -> MeshInterface:
@@ -517,7 +517,7 @@ class HarmonicBalanceModel:
         )
 
     def _bearings_at(self, speed: float) -> BearingMean:
-        """Bearings in the averaged system at an input speed, rad/s."""
+        """Bearings in the averaged system at a speed of the input, rad/s."""
         return BearingMean(*(self.system.at(np.array(own), speed) for own in zip(*self._bearing_means, strict=True)))
 
     def row_of_overall(self, speed: float) -> Floats:
@@ -532,7 +532,7 @@ def _stacked(ports: list[MeshInterface]) -> dict[str, Floats]:
 
 
 def _lines_within(waves: MeshWaves, reach: HarmonicTruncation) -> LineSet:
-    """Lines that reach so far; those that planets make that mesh out of phase stand beside them."""
+    """Orders up to a limit, with the sidebands caused by planets that mesh out of phase."""
     lines = line_set(waves.base_orders.tolist(), reach.harmonics, reach.combinations)
     modulators = [own for _, own in waves.carriers]
     if waves.passing:

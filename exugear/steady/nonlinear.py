@@ -1,11 +1,11 @@
-"""Steady response by mesh forces evaluated in time: the position moves with the vibration, and teeth may part.
+"""Steady-state response by mesh forces evaluated in time: position varies with the vibration, with contact loss.
 
-Lines become samples on a lattice of the bases' angles, the laws are evaluated there, and their forces become lines
-again. Newton's method solves the balance, each step by GMRES on the tangents along the lattice.
+Orders are converted to samples on a lattice of the bases' angles, the models are evaluated there, and their forces are
+converted back to orders. Newton's method solves the balance, each step by GMRES on the tangents along the lattice.
 
-A balance of lines says nothing of its stability. Two ways tell the largest growth: a first-order estimate for all pairs
-of modes at once, which finds the speeds where two modes and a harmonic of a mesh work together (Hsu 1963), and Floquet
-exponents of the whole system at one speed, one base at a time, the meshes of others at their mean.
+Harmonic balance does not show stability. The largest growth rate follows from two methods: a first-order estimate for
+all pairs of modes at once, which finds the speeds of combination instability of two modes and a mesh harmonic (Hsu
+1963), and Floquet exponents of the whole system at one speed, one base at a time, the meshes of others at their mean.
 """
 
 from __future__ import annotations
@@ -101,11 +101,11 @@ class HarmonicResidual:
         return bool(self.gearset.waves.loads.any())
 
     def _stiffness(self, places: MeshPlaces) -> Floats:
-        """Stiffness in places, N/m, and two derivatives per cycle, (3 q, s, u); none for laws that have tables.
+        """Return stiffness in places, N/m, and two derivatives per cycle, (3 q, s, u); none for models with tables.
 
-        Then follow the curves' exponents less one; of tangents the forces that these have less, N. Where loads wander
-        along the face, their way follows, or what `sample_wandering_line` asks for. No harmonics stand in it but those
-        of the level `parametric`: others would alias.
+        Then follow the curves' exponents minus one; for tangents the forces to be subtracted, N. Where loads shuttle,
+        their axial shift follows, or the arrays required by `sample_wandering_line`. It contains only the harmonics of
+        the method `parametric`: others would alias.
         """
         if self.gearset.parting:
             return np.zeros((0, 0, 0))
@@ -201,9 +201,9 @@ class HarmonicResidual:
         return values, self.lattice.values(rates_of(self.gearset, self.interface, readings))
 
     def forces(self, readings: Complexes) -> tuple[Complexes, Tangent, Floats]:
-        """Find the forces (n, m, f) beyond the averaged system, and how they follow small changes of the readings.
+        """Return the forces (n, m, f) in addition to the averaged system, and their linearisation by the readings.
 
-        The last result is the whole forces (s, u, f) in time, in all places.
+        The last result is the total forces (s, u, f) in time, in all places.
         """
         if not self._last or self._last[0][0] is not readings:
             there = self.places.there
@@ -217,9 +217,9 @@ class HarmonicResidual:
 
     @cached_property
     def _last(self) -> list[tuple[Complexes, Complexes, LawSamples]]:
-        """The last readings and the forces that they gave: a search ends where others go on.
+        """Return the last readings and the forces that they gave: start values of the next search.
 
-        No tangent is kept: it refers to the balance, and the memory of both would not fall free at once.
+        No tangent is kept: it refers to the balance, and the memory of both could not be freed at once.
         """
         return []
 
@@ -255,7 +255,7 @@ class HarmonicResidual:
         return np.asarray(unit + self.interface.readings.reshape(n, m * r, -1) @ forces)
 
     def _less_mean(self, slopes: Floats, by_rates: bool) -> None:
-        """Take from slopes (..., m, f, m, r) those that the mean system has."""
+        """Subtract the slopes of the averaged system from slopes (..., m, f, m, r)."""
         waves = self.gearset.waves
         at = np.arange(self.meshes)
         if by_rates:
@@ -268,7 +268,7 @@ class HarmonicResidual:
             slopes[..., self.meshes :, :COMPONENTS, self.meshes :, :COMPONENTS] -= self.interface.bearings.slope
 
     def tangents_along(self, readings: Complexes, base: int, samples: int) -> Floats:
-        """Slopes of the forces beyond the mean system along the angle of one base, the meshes of others at their mean.
+        """Return slopes of the forces beyond the averaged system over the angle of one base, other meshes at their mean.
 
         Parameters
         ----------
@@ -306,7 +306,7 @@ class HarmonicResidual:
         return np.concatenate(parts, axis=2)
 
     def _varies(self, wave: int, base: int) -> bool:
-        """Return whether the law of a wave varies with a base: bearings do with all of them."""
+        """Return whether the model of a component varies with a base: bearings vary with all of them."""
         return wave >= self.meshes or self.gearset.waves.waves[wave].base == base
 
     def _mean_slopes(self, change: Complexes) -> Complexes:
@@ -325,7 +325,7 @@ class HarmonicResidual:
         return found
 
     def _mean_part(self, readings: Complexes) -> Complexes:
-        """Find the forces (n, m, f) of the averaged system under readings (n, m, r)."""
+        """Return the forces (n, m, f) of the averaged system under readings (n, m, r)."""
         slopes = self._mean_slopes(readings - self.static)
         slopes[0] += self.mean_force
         return slopes
@@ -486,7 +486,7 @@ def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:
 # Stability of steady states: what varying meshes do to a disturbance
 
 SMOOTH_KICKS, PARTING_KICKS = 400, 1000
-"""Kicks per period at least, and where teeth part, so that the instants at which they do are met."""
+"""Minimum kicks per period, and with contact loss, so that the instants of contact loss are resolved."""
 ROLLING = 2
 """Multipliers of free rolling, which are one: angle and speed."""
 CHECKED = 3
@@ -547,14 +547,14 @@ def _couple_modes(felt: Complexes, tangents: Mapping[tuple[int, int], Complexes]
 
 
 def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: int = SMOOTH_KICKS) -> float:
-    """Fastest growth of a disturbance of a steady state, 1/s, by Floquet exponents over one period of a base.
+    """Return the largest growth rate, 1/s, of a disturbance of a steady state, by Floquet exponents over one base.
 
     Parameters
     ----------
     balance : at the speed
-    readings : (n, m, r) what the laws read in the steady state
+    readings : (n, m, r) inputs of the models in the steady state
     base : base that varies
-    least : kicks per period at least
+    least : minimum number of kicks per period
     """
     gearset = balance.gearset
     interface = balance.interface
@@ -600,10 +600,10 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
 
 
 def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool) -> float:
-    """Fastest growth of a disturbance of a steady state over the bases, 1/s.
+    """Return the largest growth rate of a disturbance of a steady state over the bases, 1/s.
 
-    Parameters as of `growth_at`; `parted` tells whether its teeth part. NaN where planets mesh out of phase: the
-    carrier's angle is then a cause beside the mesh cycle.
+    Parameters as of `growth_at`; `parted` is True with contact loss. NaN where planets mesh out of phase: the carrier's
+    angle is then an excitation in addition to the mesh cycle.
     """
     if balance.gearset.waves.carriers:
         return math.nan
@@ -612,7 +612,7 @@ def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool
 
 
 def mean_growth(gearset: HarmonicBalanceModel) -> float:
-    """Fastest growth of the averaged system over its speeds, 1/s; free rolling left out."""
+    """Largest growth rate of the averaged system over its speeds, 1/s; free rotation excluded."""
     rates = []
     for speed in gearset.system.speeds:
         values = gearset.system.eigenvalues(float(speed))

@@ -1,4 +1,4 @@
-"""Peaks of a stored steady response: which line is loud where, what stands beside it, and what a run-up shows of it."""
+"""Peaks of a stored steady-state response: dominant orders by speed, their sidebands, and their height in a run-up."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ LEAST_SPEEDS = 3
 SAME_SPEED = 0.02
 """Share of the speed within which a peak belongs to the crossing of its line with a mode."""
 DRAWN, MANY_TURNS = 4096, 2e4
-"""Angles of the input that teeth are looked at, and from which range they are drawn, rad."""
+"""Number of angles of the input at which contact loss is checked, and the range from which they are drawn, rad."""
 HEARD = 1e-4
 """Share of the static force below which a line plays no part in whether teeth pull."""
 STRAINED = 0.3
-"""Dynamic over static load of a bearing from which a straight line about the static load is told to be none of it."""
+"""Dynamic over static load of a bearing from which it is reported to be outside the linear range."""
 BESIDE = 0.03
 """Share of the speed within which a run-up's peak is looked for: sweeps shift it."""
 
 
 @dataclass(frozen=True)
 class Peak:
-    """A line of a signal at the speed of its largest amplitude."""
+    """An order of a signal at its maximum."""
 
     line: str
     """Such as ``2 x intermediate``."""
     order: float
-    """Periods per turn of the input."""
+    """Periods per revolution of the input."""
     speed: float
     """Of the input, rad/s."""
     frequency: float
@@ -68,12 +68,12 @@ def line_name(index: tuple[int, ...], bases: tuple[str, ...]) -> str:
 
 
 def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) -> tuple[Peak, ...]:
-    """Local maxima over speed of all lines of a signal that stand out on both sides, the loudest first.
+    """Return local maxima over speed of all orders of a signal that are prominent on both sides, highest first.
 
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
-    least : share of the loudest below which a peak is left out
+    least : share of the highest peak below which a peak is omitted
 
     Raises
     ------
@@ -105,7 +105,7 @@ def peaks(data: xr.Dataset, signal: str = "overall_dte", least: float = 0.01) ->
 
 @dataclass(frozen=True)
 class Sideband:
-    """Sideband of a peak, at the speed of the peak."""
+    """A sideband of a peak, at the speed of the peak."""
 
     line: str
     """Its name, as of `Peak`; of a planet's sidebands the signal."""
@@ -114,7 +114,7 @@ class Sideband:
     amplitude: float
     """In the signal's unit."""
     share: float
-    """Amplitude over that of the line that it stands beside: of the peak, or of the largest wave of the signal."""
+    """Amplitude relative to the carrier order of the sideband: of the peak, or of the signal's largest component."""
     cause: str
     """What modulates the line of the peak."""
 
@@ -127,13 +127,13 @@ def _tops(values: Floats) -> Integers:
 
 
 def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: float = 0.01) -> tuple[Sideband, ...]:
-    """Lines that differ from a peak's by whole multiples of the other mesh frequencies, the loudest first.
+    """Return orders that differ from a peak's by integer multiples of the other mesh frequencies, largest first.
 
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
     peak : of it
-    least : share of the peak below which a line is left out
+    least : share of the peak below which an order is omitted
     """
     point, own = _place(data, peak)
     index = data["index"].to_numpy()
@@ -163,18 +163,18 @@ def sidebands(data: xr.Dataset, peak: Peak, signal: str = "overall_dte", least: 
 def planet_sidebands(
     data: xr.Dataset, peak: Peak, carriers: Mapping[str, tuple[str, float]], least: float = 0.01
 ) -> tuple[Sideband, ...]:
-    """Lines beside a peak in the force of one planet's meshes, which pass the cosine and the sine wave.
+    """Return the sidebands of a peak in the force of one planet's meshes, from the cosine and sine components.
 
-    With waves F_c cos theta + F_s sin theta and a carrier at the angular speed W, a planet feels (F_c -+ i F_s) / 2 at
-    the frequency of the line plus and minus W, as its place turns.
+    With components F_c cos theta + F_s sin theta and a carrier at the angular speed W, the force on a planet is (F_c -+
+    i F_s) / 2 at the frequency of the order plus and minus W, as its position rotates.
 
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
     peak : of it
     carriers : mapping of family of meshes to (str, float)
-        Carrier of the planets and its turns per turn of the input.
-    least : share of the force that all planets share, or of the largest line, below which a line is left out
+        Carrier of the planets and its revolutions per revolution of the input.
+    least : share of the common force of all planets, or of the largest order, below which an order is omitted
     """
     point, line = _place(data, peak)
     names = [str(name) for name in data["signal"].to_numpy()]
@@ -217,7 +217,7 @@ def _signed(words: str) -> str:
 
 @dataclass(frozen=True)
 class TensileMesh:
-    """A mesh whose teeth would have to pull: they part, which a law without contact loss does not know."""
+    """A mesh with tensile force: in reality the teeth lose contact, which a bilateral model neglects."""
 
     mesh: str
     """Name; of planets the family."""
@@ -230,10 +230,10 @@ class TensileMesh:
 
 
 def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
-    """Find the meshes whose force changes its sign about its mean, the static force, that longest pulling first.
+    """Return the meshes whose force changes its sign relative to the static force, longest tensile time first.
 
-    The lines of a speed are summed up at angles of the input drawn at random (`DRAWN`, the same each time). Of planets
-    it is the one that the waves around the carrier unload most.
+    The orders of a speed are added at angles of the input drawn at random (`DRAWN`, the same each time). For planets it
+    is the planet with the largest unloading by the multi-blade components.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
 
 
 def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
-    """Share of time at each speed in which a mesh pulls, from its waves: all planets alike, then the others."""
+    """Fraction of time at each speed with tensile mesh force, from its components: common part of the planets first."""
     own = data[["amplitude", "phase"]].isel(signal=places)
     force = own["amplitude"].to_numpy() * np.exp(1j * own["phase"].to_numpy().astype(np.float64))
     static = force[:, 0, 0].real
@@ -272,22 +272,22 @@ def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
 
 @dataclass(frozen=True)
 class BearingLoadExcursion:
-    """A linear bearing whose load swings so far about the static one that its rows are no straight line there."""
+    """A linear bearing with so large load amplitudes about the static load that it is outside the linear range."""
 
     bearing: str
     count: int
     """At how many of the speeds."""
     speed: float
-    """Of the input where it swings most, rad/s."""
+    """Speed of the input at the largest amplitude, rad/s."""
     share: float
-    """Of the static load that the vibration takes away at most there; from 1 on the bearing comes free."""
+    """Maximum reduction of the static load by the vibration; from 1 on the bearing is unloaded."""
 
 
 def bearing_swings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
-    """Find linear bearings whose vibration takes `STRAINED` of the static load or more, the worst first.
+    """Return linear bearings whose vibration reaches `STRAINED` of the static load or more, the largest ratio first.
 
-    The lines of a speed are added up as if they met, along the static load. Planets' bearings, whose load turns in
-    fixed axes, are not looked at.
+    The orders of a speed are added as if in phase, along the static load. Planet bearings, whose load rotates in fixed
+    axes, are not checked.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ def _swinging(data: xr.Dataset, places: list[int], static: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class ComparedPeak:
-    """A peak of a steady response beside what a run-up shows of it."""
+    """A peak of a steady-state response and its amplitude in a run-up."""
 
     peak: Peak
     damping: float | None
@@ -326,7 +326,7 @@ class ComparedPeak:
     severity: float | None
     """Of the sweep, as `exugear.results.spectra.resonances.sweep_severity` has it."""
     run_rank: int
-    """Rank among the peaks by the run-up's amplitude, 1 for the largest."""
+    """Rank among the peaks by the run-up's amplitude, 1 for the highest."""
 
 
 def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -> OrderCut:
@@ -373,14 +373,14 @@ def damping_at(data: xr.Dataset, peak: Peak) -> float | None:
 def compared_peaks(
     data: xr.Dataset, cut: Callable[[OrderLine], OrderCut], rate: float, most: int = 20, signal: str = "overall_dte"
 ) -> tuple[ComparedPeak, ...]:
-    """Loudest peaks of single mesh frequencies beside what a run-up shows of them, the loudest first.
+    """Return the highest peaks of single mesh frequencies with their amplitudes in a run-up, highest first.
 
     Parameters
     ----------
-    data : steady response of the same variant
+    data : steady-state response of the same variant
     cut : from an order to its cut out of the run-up, as `exugear.results.spectra.resonances.run_up_cut` makes it
     rate : at which order one sweeps, Hz/s
-    most : how many
+    most : maximum number of peaks
     """
     index = data["index"].to_numpy()
     orders = data["order"].to_numpy()

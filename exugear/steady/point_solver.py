@@ -1,9 +1,10 @@
-"""Steady states one speed after the other, at any level.
+"""Steady-state solutions, one speed after the other, by any method.
 
-Where teeth may part, a state that Newton's method finds is refined by more harmonics until they change nothing, and its
-stability looked at. Where none is found near the last one, or it is unstable, the gearbox runs in time from there: it
-settles to the state that it jumps to, or to none, which is said in words. Last the planets are looked at one by one:
-where they bear unequally, each one that passes puts lines beside all others, and these act back.
+With contact loss, a solution of Newton's method is refined by more harmonics until they have no effect, and its
+stability is checked. If no solution is found near the last one, or it is unstable, a time simulation starts from there:
+it settles to another steady state, or to none, which is reported as text. Finally the planets are modelled
+individually: with unequal load sharing each passing planet causes sidebands of all orders, and these act back on the
+vibration.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Complexes, Floats
 
 LEFT_OUT = 2e-4
-"""What lines that are left out may have together, over the vibration."""
+"""Maximum norm of all neglected orders, relative to the vibration."""
 ALIASED = 2e-4
 """The same of the residual on other samples, up to which those of the balance do where something parts."""
 DROP_LINE_TOL = 2e-5
@@ -46,15 +47,15 @@ DROP_LINE_TOL = 2e-5
 ROUGH = 1e-5
 """Residual of the balance over the size of the deflections up to which it is solved before lines are added."""
 UNEQUAL = 5e-4
-"""What passing planets put beside all lines, over the vibration, from which they are looked at one by one."""
+"""Share of the vibration in sidebands of passing planets from which the planets are modelled individually."""
 SIDEBAND_TOL = 1e-4
-"""What a line has, over the vibration, from which others are looked for beside it; what those left out may have."""
+"""Minimum share of the vibration in an order for sidebands to be sought; maximum share in neglected ones."""
 SIDEBAND_RESIDUAL = 1e-4
-"""Residual over the vibration up to which lines beside others count as found that passing planets make."""
+"""Residual relative to the vibration up to which sidebands of passing planets count as converged."""
 MOST_SIDEBANDS = 3
-"""Multiples of the passing of planets whose lines are looked at, at most."""
+"""Maximum number of multiples of the planet passing frequency whose orders are included."""
 SIDEBAND_WARNING = 0.05
-"""Share of the overall transmission error in lines beside others from which it is remarked on."""
+"""Share of the overall transmission error in sidebands from which a note is given."""
 MOST_REFINED = 5
 """Times that lines are added at most."""
 MOST_DENSER = 2
@@ -72,9 +73,9 @@ PERTURBATION = 1.02
 def gearset_of(
     assembly: Assembly, speeds: Floats, harmonics: int | None = None, combinations: int = 3
 ) -> HarmonicBalanceModel:
-    """Build the model of an assembly for speeds of the input (rad/s), lines as in `SteadySettings`; linear bearings.
+    """Build the model of an assembly for input speeds (rad/s), orders as in `SteadySettings`; linear bearings.
 
-    Where teeth may part, each state takes the lines that it needs: then it begins with few.
+    With contact loss, each state takes as many orders as it needs, starting with few.
     """
     waves = mesh_waves(mean_system(assembly, speeds))
     usual = FEWEST if LAWS[assembly.mesh_model].loses_contact else waves.needed_harmonics()
@@ -83,7 +84,7 @@ def gearset_of(
 
 @dataclass(frozen=True, eq=False)
 class ContactLossState:
-    """Steady state of a gearbox with possible tooth contact loss."""
+    """A steady state of a gearbox, contact loss included."""
 
     gearset: HarmonicBalanceModel
     """With the lines that it took."""
@@ -95,7 +96,7 @@ class ContactLossState:
     remark: str = ""
     """What is to be said of it, empty if nothing."""
     averaged: ContactLossState | None = None
-    """The state with planets at their mean over a turn of the carrier, where this one has lines beside those of it."""
+    """The state with planets averaged over a revolution of the carrier, where this one has sidebands of it."""
 
     def on(self, gearset: HarmonicBalanceModel, interface: Interface | None = None) -> ContactLossState:
         """Return the state in the lines of another gearset, which are some of its own."""
@@ -170,13 +171,13 @@ class PointSolver:
 
     @property
     def branch_gearset(self) -> HarmonicBalanceModel:
-        """HarmonicBalanceModel whose lines a branch has: twice the harmonics where teeth may part."""
+        """HarmonicBalanceModel with the orders of a continuation: twice the harmonics with contact loss."""
         if self.gearset.bent:
             return self.gearset.finer
         return self.gearset
 
     def readings(self, speed: float) -> Complexes:
-        """Find what the mesh laws read (n, m, r) at a speed of the input (rad/s), in the lines of a branch."""
+        """Return the inputs of the mesh models (n, m, r) at an input speed (rad/s), in the orders of a continuation."""
         if self.gearset.bent:
             state = self._parting(speed)
             return readings_in(state.gearset, state.readings, self.branch_gearset)
@@ -185,7 +186,7 @@ class PointSolver:
         return self._last
 
     def response_to(self, readings: Complexes, speed: float) -> Response:
-        """Response at a speed of the input (rad/s) where what the mesh laws read (n, m, r) is known, on a branch."""
+        """Response at an input speed (rad/s) for known inputs of the mesh models (n, m, r), on a continuation."""
         gearset = self.branch_gearset
         interface = self.gearset.at(speed)
         own = gearset.at(speed) if gearset is not self.gearset else interface
@@ -220,10 +221,10 @@ class PointSolver:
         return found
 
     def _from_rest(self, speed: float) -> ContactLossState | None:
-        """Find the state near the static one where the last one is of no help although all touched in it.
+        """Find the state near the static one if the last one does not help although nothing lost contact in it.
 
-        Bearings bend their forces so that a state of a far speed is a bad start. Where something parts, a run in time
-        has to tell which state the gearbox goes to.
+        Bearing forces are so nonlinear that a state at a distant speed is a bad start. With contact loss, a time
+        simulation has to show which state the gearbox reaches.
         """
         last = self.state
         if self.gearset.bearings is None or last is None or _parted(last.response):
@@ -267,13 +268,13 @@ class PointSolver:
         return replace(unstable, remark=f"{grows}; {verdict}")
 
     def _grows(self, state: ContactLossState) -> bool:
-        """Return whether a disturbance of a state grows within a run in time."""
+        """Return whether a disturbance of a state grows within a time simulation."""
         slowest = abs(state.response.interface.speed) * float(self.gearset.waves.base_orders.min())
         return state.growth * 2.0 * np.pi / slowest > GROWING
 
 
 def _with_passing(state: ContactLossState) -> ContactLossState:
-    """Look at planets one by one: a state with the lines that their passing puts beside others, where they count."""
+    """Model planets individually: return a state with the sidebands of their passing, where these are relevant."""
     found = state
     speed = state.response.interface.speed
     size = float(np.linalg.norm(state.readings[1:, :, DEFLECTION]))
@@ -402,7 +403,7 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
 
 
 def _thinned(state: ContactLossState, usual: HarmonicBalanceModel) -> tuple[HarmonicBalanceModel, Complexes]:
-    """Lines of a state, without those beyond the usual ones that it hardly has, and its readings in them."""
+    """Orders of a state, without negligible ones beyond the usual orders, and its readings in them."""
     sizes = np.linalg.norm(state.readings[..., DEFLECTION], axis=1)
     needed = np.isin(np.arange(len(sizes)), usual.places_in(state.gearset)[0])
     sizes[needed] = 0.0

@@ -1,12 +1,12 @@
-"""Steady response of a gearbox at one speed, by mesh forces that are linear in the deflections.
+"""Steady-state response of a gearbox at one speed, by mesh forces that are linear in the deflections.
 
-With what the mesh laws read y, and the forces F that the meshes have beyond those of their mean stiffness
+With the inputs y of the mesh models, and the forces F of the meshes in addition to those of their mean stiffness
 
     y_k = y_static [k = 0] - G(w_k) F_k
 
-for every line k. Level `linear`: F is what the static transmission error excites under the mean force. Level
-`parametric`: F = (k(pmc) - k_mean) d, all mesh frequencies at once; the equations are linear and GMRES solves them.
-A curve of load over deflection is taken by its tangent k(pmc) at the static load F_0, with the exponent m(pmc):
+for every order k. Method `linear`: F is the excitation by the static transmission error under the mean force. Method
+`parametric`: F = (k(pmc) - k_mean) d, all mesh frequencies at once; the equations are linear and GMRES solves them. A
+curve of load over deflection is replaced by its tangent k(pmc) at the static load F_0, with the exponent m(pmc):
 
     force k d - (m - 1) F_0 = k (d - e),  e = s - F_0 / k,  s the static transmission error.
 """
@@ -32,16 +32,16 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Steady state at one speed; n lines, m mesh waves, f forces of each.
+    """Steady state at one speed; n orders, m mesh components, f forces of each.
 
-    Arrays of lines hold coefficients; `exugear.steady.harmonics.lines.LineSet` says how they make a signal.
+    Arrays of lines hold coefficients; `exugear.steady.harmonics.lines.LineSet` defines the signal.
     """
 
     interface: Interface
     deflection: Complexes
     """(n, m) deflections that the laws read, m."""
     excess: Complexes
-    """(n, m, f) forces beyond those of the averaged system, in the law's coordinates, N and N m."""
+    """(n, m, f) forces in addition to the averaged system, in the model's coordinates, N and N m."""
     force: Complexes
     """(n, m) forces of the meshes on the line of action, N."""
     products: int
@@ -65,10 +65,10 @@ class Response:
 
 
 def linear_response(gearset: HarmonicBalanceModel, interface: Interface) -> Response:
-    """Response to the static transmission errors as given displacements, of first order in the variation of stiffness.
+    """Compute the response to static transmission errors as given displacements, first order in stiffness variation.
 
     F = -k_mean e with e = s - mean of s, the transmission error under the static force F_0; of a curve k_mean is the
-    mean of the tangent. Where the load moves along the face by w, s has w (g - g0) in it, and F_0 w is a moment.
+    mean of the tangent. Where the load shuttles by w, s contains w (g - g0), and F_0 w is a moment.
     """
     static = interface.ports.static[:, DEFLECTION]
     excess = transmission_errors(gearset, interface.ports, interface.speed)
@@ -163,7 +163,7 @@ def _group_values(values: Floats, group: Group) -> Floats:
 
 
 def given_forces(gearset: HarmonicBalanceModel, interface: Interface) -> Complexes:
-    """Find the forces (n, m, f) of tangents without deflection beyond those of the mean system: of curves alone."""
+    """Return the forces (n, m, f) of tangents at zero deflection in addition to the averaged system: of curves only."""
     waves = gearset.waves
     ports = interface.ports
     shape = len(gearset.lines.index), *ports.forces.shape[:2]
@@ -221,7 +221,7 @@ def signals(gearset: HarmonicBalanceModel, response: Response) -> Complexes:
 
 
 def dissipated_and_given(gearset: HarmonicBalanceModel, response: Response) -> tuple[float, float]:
-    """Mean power that damping takes from the vibration, and that varying meshes give to it, W.
+    """Return mean power dissipated by damping, and mean power supplied by the varying meshes, W.
 
     Both are equal in a steady state.
     """

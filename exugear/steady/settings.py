@@ -1,4 +1,4 @@
-"""What a steady response is asked for: speeds, method, lines."""
+"""Settings of a steady-state response: speeds, method, orders."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ USUAL_COUNT = 400
 MOST_COUNT = 20000
 MOST_HARMONICS = 100
 SLOWEST = 1e-6
-"""Share of the fastest speed below which the input stands, and nothing is excited in time."""
+"""Share of the maximum speed below which the input is at standstill, without excitation in time."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +84,12 @@ class SpeedRange:
 
 
 def usual_speeds(gearbox: Gearbox) -> SpeedRange:
-    """Speeds that the first load case passes, from standstill on, and those of operation.
+    """Return the speeds of the first load case, from standstill on, and the operating speeds.
 
     Raises
     ------
     SteadyError
-        No load case turns the train, and the file names no speed of operation.
+        No load case rotates the gear train, and the file gives no operating speed.
 
     Examples
     --------
@@ -113,12 +113,12 @@ def usual_speeds(gearbox: Gearbox) -> SpeedRange:
 
 
 def check_speeds(gearbox: Gearbox, speeds: SpeedRange) -> None:
-    """Refuse speeds that no gearbox reaches.
+    """Refuse implausibly high speeds.
 
     Raises
     ------
     SteadyError
-        A rim runs faster than wheels of steel bear.
+        A tip speed exceeds the limit for steel gears.
     """
     fastest = max(abs(speeds.first), abs(speeds.last))
     turns = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
@@ -132,12 +132,13 @@ def check_speeds(gearbox: Gearbox, speeds: SpeedRange) -> None:
 
 
 def check_law(name: str, method: Method) -> None:
-    """Refuse a mesh law that a method cannot take.
+    """Refuse a mesh model that a method does not support.
 
     Raises
     ------
     SteadyError
-        The gears only roll, or the teeth part and the method is linear in the deflections.
+        The mesh model is a kinematic constraint, or it includes contact loss and the method is linear in the
+        deflections.
     """
     law = LAWS[name]
     if not law.has_force:

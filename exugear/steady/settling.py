@@ -47,7 +47,7 @@ def frame_coordinates(frame: RotatingFrame, q: Floats, psi: Floats) -> Floats:
 
 
 def _turn_back(u: Floats, q: Floats, planets: PlanetSet, own: Integers, psi: Floats, bend: Floats) -> None:
-    """Turn displacements and tilts of planets from the axes that stand to radius and tangent, in place."""
+    """Transform displacements and tilts of planets from fixed axes to radius and tangent, in place."""
     turned = planets.ratio * psi
     for angle, places in zip(planets.angles, own, strict=True):
         along = places[:2]
@@ -98,7 +98,7 @@ class SettlingSegment:
 
     @property
     def verdict(self) -> str:
-        """What the motion is, in words."""
+        """Kind of motion, as text."""
         if self.outside < REPEATING:
             return "the time-domain motion is periodic"
         if self.doubled < 0.3 * self.outside:

@@ -67,7 +67,7 @@ _LAYOUT = Layout(
 
 
 def steady_path(folder: str | Path, choice: Choice, settings: SteadySettings) -> Path:
-    """Place of the steady response of a choice that names its inertia set: beside its modes."""
+    """Path of the steady-state response of a choice that names its inertia set: next to its modes."""
     return modes_path(folder, choice).with_name(f"steady-{'branch' if settings.branches else settings.method}.nc")
 
 
@@ -126,7 +126,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
 
 
 def _attributes(response: SteadyResponse) -> dict[str, Any]:
-    """Tell what holds for a response as a whole."""
+    """Return the attributes of a response as a whole."""
     assembly = response.assembly
     return {
         "gearbox": assembly.gearbox.name,
@@ -210,15 +210,15 @@ def steady_response(
     bodies: Mapping[str, ElasticBody] | None = None,
     settings: SteadySettings | None = None,
 ) -> xr.Dataset:
-    """Steady response of a gearbox variant under its static load, over speeds of the overall input.
+    """Compute the steady-state response of a gearbox variant under its static load, over speeds of the overall input.
 
     Parameters
     ----------
-    choice : variant, mesh law and inertia set
+    choice : variant, mesh model and inertia set
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness F_bt / STE over the cycle, N/m.
-    bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
-    settings : speeds and level; those that the first load case passes, and `parametric`, by default
+    bodies : by body name, reduced flexible bodies, required by the variant `flexible`
+    settings : speeds and method; by default the speeds of the first load case, and `parametric`
 
     Returns
     -------
@@ -227,7 +227,7 @@ def steady_response(
     Raises
     ------
     SteadyError
-        What cannot be treated, and why.
+        The case cannot be treated; the message gives the reason.
     BalanceError
         The static load has no equilibrium.
 
@@ -257,9 +257,9 @@ def stored_or_computed(
     settings: SteadySettings,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
-    """Read the response of an assembly at `path` if it is there and fits; else compute and write it.
+    """Read the response of an assembly at `path` if it exists and matches; else compute and write it.
 
-    Points that a stopped computation left are taken up; what is stopped again leaves its points.
+    Points of a stopped computation are reused; a computation stopped again keeps its points.
     """
     store = Store(path, settings.hash_with(assembly))
     points = Store(partial_path(path), store.key)

@@ -52,9 +52,9 @@ class SteadyBranch(ReprMixin):
     speed: Floats
     """(n,) of the overall input, rad/s."""
     readings: Complexes
-    """(n, lines, m, r) what the mesh laws read."""
+    """(n, lines, m, r) inputs of the mesh models."""
     growth: Floats
-    """(n,) fastest growth of a disturbance, 1/s, over the bases looked at one at a time."""
+    """(n,) largest growth rate of a disturbance, 1/s, over the bases evaluated one at a time."""
     folds: tuple[float, ...]
     """Speeds at which the branch turns back, rad/s."""
     ended: str = ""
@@ -160,16 +160,16 @@ class SolvedPoints:
     drive_torque: Floats
     """(points,) N m."""
     energy_error: Floats
-    """(points,) power that damping takes less that given by the meshes, over the larger of both."""
+    """(points,) power dissipated by damping minus power supplied by the meshes, over the larger of both."""
     products: Floats
     """(points,) products with the operator of the balance."""
     apart: Floats
-    """(points, waves) share of time in which the teeth of each mesh wave are apart."""
+    """(points, waves) fraction of time without contact of each mesh component."""
     free: Floats
     """(points, bearings) share of time in which no rolling element of a non-linear bearing touches, of planets the
     mean."""
     growth: Floats
-    """(points,) fastest growth of a disturbance, 1/s, along a branch and where teeth may part; NaN elsewhere."""
+    """(points,) largest growth rate of a disturbance, 1/s, on a continuation and with contact loss; NaN elsewhere."""
     remark: Texts
     """(points,) what is to be said of a point, or why there is none: its numbers are NaN then."""
 
@@ -196,7 +196,7 @@ class SteadyResponse(ReprMixin):
     lines: LineSet
     base_names: tuple[str, ...]
     wave_names: tuple[str, ...]
-    """Meshes of each base, and mesh waves."""
+    """Meshes of each base, and mesh components."""
     signals: tuple[SignalName, ...]
     bearing_names: tuple[str, ...]
     """Bearings whose law was evaluated in time; all others are linear about the static state."""
@@ -213,8 +213,8 @@ class SteadyResponse(ReprMixin):
     branch_ended: str
     """Why a branch ends before the last speed, and where; empty if it does not."""
     growth_rate: float
-    """Fastest growth of any disturbance over the speeds, 1/s: of the mean system, where two modes and a mesh
-    frequency work together, and of the points where teeth may part."""
+    """Largest growth rate of any disturbance over the speeds, 1/s: of the averaged system at combination resonances of
+    two modes and a mesh frequency, and of the points with contact loss."""
     planet_spread: float
     """Largest change of planet bearings' stiffness that made the planets equal, over that stiffness."""
     stiffness_variation: float
@@ -224,10 +224,10 @@ class SteadyResponse(ReprMixin):
     left_out: Floats
     """(waves,) share of the variation of each mesh's compliance that is above them."""
     change_with_more: float
-    """Largest relative change of the ten loudest peaks by half as many harmonics again; NaN where each state has the
-    lines that it needs."""
+    """Largest relative change of the ten highest peaks with 1.5 times as many harmonics; NaN where each state has as
+    many orders as it needs."""
     campbell: Campbell
-    """Modes over the speeds, as far up as the lines that `crossings` looks at."""
+    """Modes over the speeds, up to the highest orders that `crossings` evaluates."""
 
     def _line(self) -> str:
         assembly = self.assembly
@@ -265,7 +265,7 @@ class SteadyResponse(ReprMixin):
 
 
 CHECKED, MORE = 10, 1.5
-"""Loudest peaks that are computed again, and with how many times the harmonics."""
+"""Number of highest peaks that are recomputed, and the factor on the number of harmonics."""
 EXPLAINED = 20
 """Crossings whose peaks are taken apart."""
 ROUNDS = 5
@@ -363,7 +363,7 @@ def _tracks(gearset: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
 
 @dataclass(frozen=True)
 class _Work:
-    """What goes beside the solution of points: what is known of them, who is told, and who keeps them."""
+    """Context of the solution of points: known points, progress callback, and storage."""
 
     known: SolvedPoints | None
     progress: Callable[[int, int], None]
@@ -383,9 +383,9 @@ def _solve(
 
 
 def _with_tops(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints, work: _Work) -> SolvedPoints:
-    """Solve where neighbours tell that peaks are higher than at any speed yet, until none is.
+    """Solve at speeds where neighbours indicate peaks higher than at any known speed, until none remain.
 
-    Each such state begins anew: it hangs on no other, so that what is stopped goes on to the same numbers.
+    Each such state starts independently of others, so that a resumed computation gives the same results.
     """
     quantities = quantities_of([signal_name.name for signal_name in solver.gearset.signal_names])
     operation = operating_range(solver.gearset.waves.assembly.gearbox)
@@ -408,7 +408,7 @@ def _with_tops(solver: PointSolver, settings: SteadySettings, solved: SolvedPoin
 def _missed(
     solved: SolvedPoints, quantities: tuple[Quantity, ...], operation: tuple[float, float] | None, tops: KnownTops
 ) -> Floats:
-    """Speeds of tops between those of solved points, which stand in any order."""
+    """Speeds of maxima between solved points, which may be in any order."""
     there = np.flatnonzero(np.isfinite(solved.drive_torque))
     known = solved.part(there[np.argsort(solved.speed[there], kind="stable")])
     smooth = np.asarray(~(known.apart.any(axis=1) | known.free.any(axis=1)))
@@ -416,7 +416,7 @@ def _missed(
 
 
 def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints) -> float:
-    """Find the largest relative change of the loudest peaks of the transmission error by more harmonics."""
+    """Return the largest relative change of the highest peaks of the transmission error with more harmonics."""
     gearset = solver.gearset
     if gearset.bent or settings.branches:
         return math.nan
@@ -436,7 +436,7 @@ def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: Sol
 
 
 def _tops_of(values: Floats) -> Integers:
-    """Places of the peaks among values over speed; of a line without one, where it is loudest."""
+    """Return indices of the peaks among values over speed; without a peak, the index of the maximum of the order."""
     peaks = standing_peaks(values)
     if peaks.size:
         return peaks
@@ -487,7 +487,7 @@ def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
 
 
 def _contributions(gearset: HarmonicBalanceModel, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
-    """Find what makes the lines at the strongest crossings, each where it is loudest."""
+    """Find the contributions to the orders at the strongest crossings, each at its maximum."""
     explained = []
     for crossing in found[:EXPLAINED]:
         speed = loudest_near(gearset, crossing.speed, 2.0 * crossing.damping, crossing.line)
@@ -542,7 +542,7 @@ def _fill(out: SolvedPoints, n: int, gearset: HarmonicBalanceModel, response: Re
 
 
 def _count_in_contact(known: SolvedPoints, count: int) -> int:
-    """Count the known points up to the last at which all touches: states hang on those before, from there anew."""
+    """Count the known points up to the last with full contact: later states depend on earlier ones, so they are redone."""
     parted = known.apart[:count].any(axis=1) | known.free[:count].any(axis=1)
     touching = np.isfinite(known.drive_torque[:count]) & ~parted
     if touching.any():

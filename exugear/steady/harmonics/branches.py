@@ -1,6 +1,6 @@
-"""Branches of solutions over a parameter, through their folds: their stability, and peaks of curves.
+"""Continuation of solutions over a parameter, through turning points: their stability, and peaks of curves.
 
-Coefficients of lines y and the parameter p are unknown together; the length along the branch is what advances (Keller
+Coefficients of orders y and the parameter p are unknown together; the arc length along the branch is advanced (Keller
 1977). A secant predicts, and Newton's method corrects on the plane across it, with two linear solutions each step.
 
     x' = A x - sum_j b_j s_j(t) c_j x,  the varying parts of low rank
@@ -8,8 +8,8 @@ Coefficients of lines y and the parameter p are unknown together; the length alo
 Between instants the constant part acts exactly, by its exponential; the varying part acts in kicks at the instants
 (Strang's splitting, an error of second order in the step).
 
-Near a resonance every signal is a ratio of polynomials of the frequency. One of second degree through five
-neighbouring values has two poles, as many as a resonance and its neighbour need, and tells the top between them.
+Near a resonance every signal is a ratio of polynomials of the frequency. A ratio of second degree through five
+neighbouring values has two poles, enough for a resonance and its neighbour, and locates the maximum between them.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Branch:
     lines: Complexes
     """(n, ...)"""
     whole: bool = True
-    """Whether it goes on to where it was to end; else it has as many points as were allowed."""
+    """Whether the branch reached its end value; else it stopped at the maximum number of points."""
 
     @property
     def folds(self) -> tuple[tuple[int, float], ...]:
@@ -95,12 +95,12 @@ def trace(
     Parameters
     ----------
     residual : callable
-    start : lines near a solution at `first`
+    start : orders near a solution at `first`
     first, last : of the parameter
     step, longest : first and longest step along the branch, in scales
-    most : points at most
+    most : maximum number of points
     solve : callable, optional
-        Solution of the linear equations; GMRES as it stands by default.
+        Solution of the linear equations; GMRES by default.
     progress : called with the parameter of each point
 
     Raises
@@ -267,21 +267,21 @@ def _apply_kicks(state: Floats, advance: Floats, pushes: Floats, reads: Floats, 
 # Peaks of complex curves over a parameter that is known at few places: where they stand, and how high they are
 
 STANDS = 0.01
-"""Share of a peak's height by which it stands above the lowest values on both sides, up to the next that is higher."""
+"""Prominence, as a share of a peak's height, above the lowest values on both sides up to the next higher peak."""
 NEIGHBOURS = 5
 """Values that a curve of two poles goes through."""
 SUPPORT, OTHERS = [0, 2, 4], [1, 3]
 """Which of them carry the curve, and which the weights follow from."""
 LOOKED_AT, CLOSER = 64, 3
-"""Places at which a curve is looked at between its neighbours, and how often closer around the highest of them."""
+"""Number of points at which a curve is evaluated between its neighbours, and of refinements around the highest one."""
 BESIDE = 1e-12
 """Share of the neighbours' distance from a place that carries the curve, where its form is 0 / 0."""
 
 
 def standing_peaks(values: Floats, stands: float = STANDS) -> Integers:
-    """Places at which values (n,) have a local maximum that stands above both sides, in ascending order.
+    """Return indices of local maxima of values (n,) that are prominent on both sides, in ascending order.
 
-    The ends are none: what rises up to them has its top elsewhere.
+    End points are excluded: the maximum of a curve that rises up to an end lies elsewhere.
 
     Examples
     --------

@@ -3,8 +3,8 @@
 Bodies touch each other at few coordinates, so that most entries of a dynamic stiffness are zero, the same ones at all
 frequencies. Which entries an elimination fills, and in what order it fills the fewest, is found once; then eight lines
 at a time pass through it in the registers of the processor. Entries on the diagonal are not exchanged for larger ones:
-what is left over tells whether that was harmless, and a line that it was not harmless for is solved with exchanges.
-Machine code is kept by `fe_ste.tools.compilation`.
+the residual shows whether this was accurate, and orders for which it was not are solved with pivoting. Machine code is
+kept by `fe_ste.tools.compilation`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MOST_PRODUCTS = 400
 
 
 ROOM = 40
-"""Products for which there is room from the beginning; more of it is made where they are not enough."""
+"""Number of products for which memory is allocated initially; it grows where this is not enough."""
 
 
 class HarmonicBalanceError(RuntimeError):

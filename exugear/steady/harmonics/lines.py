@@ -1,18 +1,18 @@
-"""Sets of lines: the frequencies at which something driven by several periodic causes vibrates.
+"""Sets of orders: the frequencies of the vibration of a system driven by several periodic excitations.
 
-Each cause is a base with a frequency of its own. What all of them do together is a sum of lines, at integer
-combinations k . base of these frequencies. Real signals need one line of each pair k, -k.
+Each excitation is a base with its own frequency. The joint response is a sum of orders (lines), at integer combinations
+k . base of these frequencies. Real signals need one line of each pair k, -k.
 
-Bases in a ratio of small integers (a shaft whose wheel has twice the teeth of its pinion) have lines in common. What
-two bases do at one frequency is one line: bases are then multiples of fewer independent frequencies, and lines are told
-apart by these.
+Bases in a ratio of small integers (a shaft whose wheel has twice the teeth of its pinion) have lines in common. The
+response of two bases at one frequency is one line: bases are then multiples of fewer independent frequencies, and lines
+are told apart by these.
 
 Sample j of M has the angles theta = 2 pi z j / M with an integer z for each base. Line k falls into slot k . z mod M of
 one discrete Fourier transform of M samples, however many bases there are (Kammerer, Potts and Volkmer 2015). With z
 such that all lines of a larger set fall into slots of their own, products of lines do not disturb them.
 
-Signals fall into groups that couple among themselves alone. The functions of a group are a matrix for each of its
-harmonics; one compiled pass over all lines and terms then makes all products.
+Signals form groups that couple only within themselves. The functions of a group are a matrix for each of its harmonics;
+one compiled pass over all lines and terms then makes all products.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class LineSet(ReprMixin, line=": {index!n} lines of {index.shape[1]} bases"):
         return keys[order], order
 
     def part(self, which: Booleans) -> LineSet:
-        """Take some of the lines, told by a flag for each (n,); the mean is always among them.
+        """Select some of the lines by a mask (n,); the mean is always among them.
 
         Examples
         --------
@@ -108,7 +108,7 @@ class LineSet(ReprMixin, line=": {index!n} lines of {index.shape[1]} bases"):
         return LineSet(self.index[alone, :bases], self.bases[:bases], self.units[:bases, : self.units.shape[1] - slow])
 
     def find(self, multiples: Integers) -> tuple[Integers, Booleans]:
-        """Place of lines (..., bases) in the set, -1 for none, and whether it is the conjugate that stands there."""
+        """Index of lines (..., bases) in the set, -1 for none, and whether the set contains the conjugate."""
         keys, order = self._sorted_keys
         wanted = multiples @ self.units @ self._radix
 
@@ -136,7 +136,7 @@ class LineSet(ReprMixin, line=": {index!n} lines of {index.shape[1]} bases"):
 
 @dataclass(frozen=True)
 class Modulator:
-    """A slow turn of several equal things that puts lines beside those of some bases."""
+    """Slow rotation of several equal parts that causes sidebands of the lines of some bases."""
 
     order: float
     """Its frequency over that of the reference."""
@@ -149,7 +149,7 @@ class Modulator:
     side; None where they follow no rule."""
 
     def turns(self, line: Integers) -> tuple[int, ...]:
-        """Multiples of the turn beside a line (bases,): by the rule, and of a base alone all of them.
+        """Multiples of the rotation as sidebands of a line (bases,): by the rule; for a single base all of them.
 
         Examples
         --------
@@ -198,7 +198,7 @@ def line_set(orders: Sequence[float], harmonics: int, combinations: int = 0) -> 
 
 
 def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
-    """Lines with those beside them that slow turns make, whose bases come after the others.
+    """Return lines with the sidebands caused by slow rotations, whose bases come after the others.
 
     Examples
     --------
@@ -216,12 +216,12 @@ def modulated(lines: LineSet, modulators: Sequence[Modulator]) -> LineSet:
 
 
 def beside(lines: LineSet, slow: Sequence[Modulator], most: int) -> LineSet:
-    """Lines with those that the passing of equal things puts beside each, the mean among them; slow bases come last.
+    """Return lines with the sidebands caused by passing equal parts, including those of the mean; slow bases come last.
 
     Parameters
     ----------
-    slow : what turns, one at a time: after a turn over their `count` the things stand in each other's places
-    most : passings beside a line at most
+    slow : rotating sets of equal parts, one at a time: after 1 / `count` of a revolution the parts coincide again
+    most : maximum number of sidebands on either side of a line, in passings
 
     Examples
     --------
@@ -259,7 +259,7 @@ def count_of_lines(bases: int, sum_of_multiples: int) -> int:
 
 
 def largest(sizes: Floats, rest: float) -> Booleans:
-    """Tell which of many contributions (n,) are the largest, so that the norm of all others is at most `rest`.
+    """Return which of many contributions (n,) are the largest, so that the norm of all others is at most `rest`.
 
     Examples
     --------
@@ -288,7 +288,7 @@ def _lines_of_rows(rows: Integers, bases: Floats, units: Integers) -> LineSet:
 
 
 def _independent(bases: Floats) -> Integers:
-    """Multiples (bases, independent) of independent frequencies that bases are: their greatest common divisors."""
+    """Multiples (bases, independent) of independent frequencies that give the bases: greatest common divisors."""
     groups: list[list[tuple[int, Fraction]]] = []
     for n, base in enumerate(bases):
         for group in groups:
@@ -384,15 +384,15 @@ def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = Fals
     ----------
     lines : lines of the signals
     larger : lines of the same bases; twice the harmonics and combinations keep products of two lines apart
-    least : samples at least
+    least : minimum number of samples
     shared
-        Whether lines that are in the larger set alone may share slots with each other: a third fewer samples, on which
-        what lies beyond the larger set meets those of the lines more often.
+        Whether lines only in the larger set may share slots with each other: a third fewer samples, but lines outside
+        the larger set alias more often with the slots of the lines.
 
     Raises
     ------
     LatticeError
-        None was found, which only a set without end could bring about.
+        None was found, which is possible only for an infinite set.
 
     Examples
     --------
@@ -465,7 +465,7 @@ class Terms(NamedTuple):
     size: Integers
     """(g,) first signal and number of signals of each group."""
     room: Integers
-    """(g,) number of signals filled up to whole octets, as coefficients and products stand in memory."""
+    """(g,) number of signals padded to whole octets, as coefficients and products are stored in memory."""
     first: Integers
     """(g, n + 1) first term of each line in the arrays that follow."""
     place: Integers
@@ -506,7 +506,7 @@ class Coupling:
         return Terms(begin, size, room, np.array(first), places, conjugates, at_blocks)
 
     def memory(self) -> tuple[Floats, Floats]:
-        """Make memory (lines times the room of all groups,) for products, real and imaginary parts."""
+        """Allocate memory (lines times the size of all groups,) for products, real and imaginary parts."""
         size = len(self.lines.index) * int(self.terms.room.sum())
         return np.empty(size), np.empty(size)
 
@@ -554,7 +554,7 @@ def flat(functions: Sequence[Complexes]) -> tuple[Floats, Floats]:
 def take_in(
     terms: Terms, real: Floats, imaginary: Floats, values: Complexes, out_real: Floats, out_imaginary: Floats
 ) -> None:
-    """Fill products (n times all rooms,) of signals (n, k) and functions as `flat` has them."""
+    """Fill products (n times all group sizes,) of signals (n, k) and functions as `flat` has them."""
     room = 0
     for group in range(terms.room.size):
         room += terms.room[group]
@@ -597,9 +597,9 @@ def add_answered(
     memory: Floats,
     out: Complexes,
 ) -> None:
-    """Fill signals (n, k) plus what lines answer by themselves to the products of these.
+    """Fill signals (n, k) plus the response of the lines themselves to the products of these.
 
-    `answers` are those of each line (n, k, k) as `flat` has them, `taken` and `memory` (16,) room.
+    `answers` are those of each line (n, k, k) as `flat` has them, `taken` and `memory` (16,) work arrays.
     """
     take_in(terms, real, imaginary, values, taken_real, taken_imaginary)
     lines, size = values.shape

@@ -1,1 +1,1 @@
-"""A gearbox seen from its turning carriers: mean system with constant matrices, waves of its meshes, signals."""
+"""Averaged (time-invariant) system of a gearbox in carrier frames: constant matrices, mesh components, signals."""

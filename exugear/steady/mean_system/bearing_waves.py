@@ -1,9 +1,9 @@
-"""Bearings with rows of rolling elements in the rotating frame: what their law reads, and what it pushes along.
+"""Bearings with rows of rolling elements in the rotating frame: inputs of their model, and its force directions.
 
-A bearing's law reads five numbers, the displacement and tilts of the second body's seat against that of the first in
-the first one's axes, ahead by the time of the damping; five forces go with them. Bearings of equal planets are waves
-around the carrier, as their meshes are, each along the radius and the tangent of its planet: in these the law is the
-same for all of them, wherever the carrier stands.
+A bearing model has five inputs (readings), the displacement and tilts of the second body's seat against that of the
+first in the first one's axes, ahead by the time of the damping; five forces go with them. Bearings of equal planets are
+written as multi-blade components, like their meshes, each along the radius and the tangent of its planet: in these
+directions the model is the same for all of them, at every angle of the carrier.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class BearingWave:
 
 
 class BearingMean(NamedTuple):
-    """Bearings in the averaged system at one speed; b waves."""
+    """Bearings in the averaged system at one speed; b components."""
 
     readings: Floats
     rates: Floats
@@ -67,13 +67,13 @@ class BearingMean(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BearingWaves:
-    """All waves of the non-linear bearings of an averaged system."""
+    """All multi-blade components of the nonlinear bearings of an averaged system."""
 
     system: MeanSystem
     waves: tuple[BearingWave, ...]
     """Those of a family one after the other."""
     carriers: tuple[str, ...]
-    """Carriers whose angle is a base: their planets are looked at one by one."""
+    """Carriers whose angle is a base: their planets are modelled individually."""
 
     @property
     def assembly(self) -> Assembly:
@@ -110,7 +110,7 @@ class BearingWaves:
         return np.array([0.5 * bearing_rows(supports[wave.connectors[0]])[0].pitch_diameter for wave in self.waves])
 
     def at(self, speed: float) -> BearingMean:
-        """Find how the bearings stand in the mean system at a speed of the input, rad/s."""
+        """Find the static state of the bearings in the averaged system at a speed of the input, rad/s."""
         frame = self.system.frame
         numbers = self._numbers
         q, v, _ = frame.state(0.0, speed, self.system.static_at(speed))
@@ -181,9 +181,9 @@ class BearingWaves:
         return np.concatenate(found)
 
     def _mean_slope(self, static: Floats) -> Floats:
-        """Find the derivatives (b, 5, b, 5) of the forces of waves by readings, at those of the static state (b, 5).
+        """Return derivatives (b, 5, b, 5) of the forces of components by readings, at the static state (b, 5).
 
-        As the mean system has them: the mean over the same places of the carrier.
+        As in the averaged system: the mean over the same positions of the carrier.
         """
         out = np.zeros((len(self.waves), COMPONENTS) * 2)
         for n in self.firsts:

@@ -1,10 +1,10 @@
-"""The mean system: equations of motion in the rotating frame, linearised about the static state at speed.
+"""The averaged system: equations of motion in the rotating frame, linearised about the static state at speed.
 
     M u'' + C(W) u' + K(W) u = forces,   C and K quadratic in the speed W of the overall input
 
-averaged over the carrier's places: static tilts that differ from planet to planet leave 5e-5 of variation in the GRC.
-Gyroscopic, Coriolis and centrifugal terms are in C and K. They come from the assembly's own forces by central
-differences, since these know every element; the parabolas through three speeds are exact.
+averaged over the positions of the carrier: static tilts that differ from planet to planet cause 5e-5 of variation in
+the GRC. Gyroscopic, Coriolis and centrifugal terms are in C and K. They come from the assembly's own forces by central
+differences, since these include every element; the parabolas through three speeds are exact.
 """
 
 from __future__ import annotations
@@ -31,22 +31,23 @@ from fe_ste.tools.display import ReprMixin
 PLACE_STEP, RATE_STEP = 1e-6, 1e-3
 """Steps of central differences by u and u'; forces are all but linear in the latter."""
 ROWS_STEP = 1e-8
-"""Step by u where rolling elements bend the forces: those that hardly touch stiffen within a tenth of a micrometre.
+"""Step in u where rolling elements make forces nonlinear: barely loaded ones stiffen within a tenth of a micrometre.
 
-A step ten times as long takes 3e-5 of a frequency in the GRC, which is 2e-3 of the response beside a light mode."""
+A step ten times as long changes a frequency in the GRC by 3e-5, which is 2e-3 of the response near a lightly damped
+mode."""
 MOST_STEPS = 20
 """Steps of Newton's method to the static state."""
 BALANCED = 1e-8
-"""Residual over the largest load that counts as balanced; the search goes on as far as it falls."""
+"""Residual over the largest load at which a state is balanced; the search continues as long as the residual falls."""
 VARIATION = 2e-4
 """Largest change of stiffness over the carrier's angle that counts as none, over the stiffness.
 
 Static tilts that are not the same for all planets bend the geometry by 5e-5 in the GRC; unequal planets bring 1e-3."""
 ROWS_VARIATION = 2e-2
-"""The same on non-linear bearings and curved teeth: planets share the load unequally, the more loaded is the stiffer.
+"""The same with nonlinear bearings and curved teeth: planets share the load unequally, more loaded ones are stiffer.
 
-Shares go around with the carrier's angle. In the GRC, whose sun is pushed aside, it is 8e-3, at three times the
-carrier's frequency: lines stay as they are to 1e-3, and what stands beside them is left out."""
+Shares rotate with the carrier's angle. In the GRC, whose sun is displaced radially, the variation is 8e-3, at three
+times the carrier's frequency: orders change by less than 1e-3, and their sidebands are neglected."""
 PLACES = 4
 """Places of the carrier between one planet's and the next, over which matrices are averaged.
 
@@ -57,12 +58,12 @@ ELASTIC_RING = (
     "treat; set flexibility = 'none' for the ring's body"
 )
 LEAST_ENERGY = 1e-6
-"""Share of the kinetic energy from which what a line does in the mean is looked at."""
+"""Minimum share of the kinetic energy of an order for its mean torque to be evaluated."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeanSystem(ReprMixin):
-    """Averaged (time-invariant) system of an assembly over speed."""
+    """Averaged system of an assembly over speed."""
 
     frame: RotatingFrame
     speeds: Floats
@@ -161,7 +162,7 @@ class MeanSystem(ReprMixin):
         return np.asarray(columns[:, None] * solved)
 
     def eigenvalues(self, speed: float) -> Complexes:
-        """Eigenvalues of the averaged system at an input speed, 1/s; free rolling among them."""
+        """Eigenvalues of the averaged system at a speed of the input, 1/s; free rotation among them."""
         n = self.size
         lower = np.linalg.solve(self.mass, np.hstack([-self.stiffness_at(speed), -self.damping_at(speed)]))
         return np.asarray(scipy.linalg.eigvals(np.vstack([np.eye(n, 2 * n, n), lower])))
@@ -211,9 +212,9 @@ def mean_system(assembly: Assembly, speeds: Floats) -> MeanSystem:
 
 
 def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Assembly, float]:
-    """Assembly whose planets stand on equal bearings, and the largest change of stiffness that this took, over it.
+    """Assembly with equal planet bearings, and the largest relative change of stiffness that this required.
 
-    Those from a catalogue are equal already: what is left are matrices of the file that are not the same all around.
+    Catalogue bearings are equal already: the change concerns anisotropic matrices of the file.
     """
     supports = [
         planet_support
@@ -225,10 +226,11 @@ def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tupl
 
 
 def torque_of_vibration(system: MeanSystem, speed: float, frequencies: Floats, motion: Complexes) -> float:
-    """Torque of the drive, N m, that a vibration takes in the mean beside that of the mean system.
+    """Return the mean torque of the drive, N m, caused by a vibration in addition to that of the averaged system.
 
-    It is of second order in the vibration: bearing moments on bodies that tilt push along the rolling. A run in time
-    without it gains or loses speed, 4e-5 a second at a light resonance of the GRC, which turns phases there by 1e-2.
+    It is of second order in the vibration: bearing moments on tilting bodies do work along the kinematic rotation. A
+    time simulation without it gains or loses speed, 4e-5 per second at a lightly damped resonance of the GRC, which
+    shifts phases there by 1e-2.
 
     Parameters
     ----------
@@ -238,8 +240,8 @@ def torque_of_vibration(system: MeanSystem, speed: float, frequencies: Floats, m
 
     Notes
     -----
-    The power that all forces together have along the rolling has to vanish in the mean. Meshes have none: rolling does
-    not deflect them. What two lines do together has no mean, so that each line is looked at alone, as far as it counts.
+    The mean power of all forces along the kinematic rotation has to vanish. Meshes contribute none: the rotation does
+    not deflect them. Products of two different orders have zero mean, so each relevant order is evaluated alone.
     """
     frame = system.frame
     assembly = system.frame.assembly
@@ -265,11 +267,11 @@ def torque_of_vibration(system: MeanSystem, speed: float, frequencies: Floats, m
 
 
 def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:
-    """Say why an assembly has no steady response that this room can compute; empty if nothing speaks against it.
+    """Return why this package cannot compute the steady-state response of an assembly; empty if it can.
 
     Parameters
     ----------
-    elastic : bodies that another variant takes as elastic, which this one does not
+    elastic : bodies that are flexible in another variant, but not in this one
     """
     try:
         _check(assembly)
@@ -333,9 +335,9 @@ def _check_rows(assembly: Assembly) -> None:
 
 
 def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:
-    """Generalized force of a unit of the drive's torque, and those of the static load.
+    """Return the generalized force of a unit of the drive's torque, and those of the static load.
 
-    What the file locks is what keeps the speed: its torque is whatever balances the others.
+    The degree of freedom locked in the file holds the speed: its torque balances the others.
     """
     load = assembly.gearbox.case.static_load
     overall = assembly.gearbox.case.overall
@@ -345,7 +347,7 @@ def _drive_and_load(assembly: Assembly) -> tuple[Floats, Floats]:
 
 
 def _first_guess(assembly: Assembly, frame: RotatingFrame, drive: Floats) -> Floats:
-    """Find the static state at rest, rolled back until the input stands at zero, in the coordinates of the frame."""
+    """Find the static state at standstill, rotated back to zero angle of the input, in the coordinates of the frame."""
     q = static_state(assembly).q
     rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
     pinned = assembly.spin[assembly.gearbox.case.overall.input]

@@ -1,23 +1,22 @@
-"""Where the laws of meshes are evaluated: places around carriers, at samples of the bases' angles.
+"""Evaluation points of mesh models: positions around carriers, at samples of the bases' angles.
 
-A single mesh is one place. Meshes of planets in phase are looked at in places spread evenly over the turn of the
-carrier, in which the waves add up as they do for a planet there: the mean over its turn counts. Of planets out of
-phase each is a place, whose angle turns with the base of its carrier.
+A single mesh is one place. Meshes of planets in phase are evaluated in places spread evenly over the revolution of the
+carrier, in which the multi-blade components add up as they do for a planet there: the mean over the revolution counts.
+Each planet out of phase is a place, whose angle rotates with the base of its carrier.
 
-A law along a row reads its deflection and the position in the mesh cycle, and has one force; what it resists
-misalignment with is in the mean system. Where its load moves along the face it reads the misalignment, too, and has a
-moment along that. The law `table` reads the
-approach of both flanks, the centre distance, the misalignment of both flanks and the position, and pushes along all
-but the last (`exugear.system.tooth_mesh.laws.table`). Kernels of `fe_ste.tools.compilation` read the numbers of its
-rows.
+A model along a row has the inputs (readings) deflection and position in the mesh cycle, and one force; its tilting
+stiffness is in the averaged system. Where its load shuttles, the misalignment is an input, too, with a moment along it.
+The model `table` has the inputs approach of both flanks, centre distance, misalignment of both flanks and position, and
+a force along all but the last (`exugear.system.tooth_mesh.laws.table`). Kernels of `fe_ste.tools.compilation` read the
+numbers of its rows.
 
-A function f of the mesh cycle multiplies what each mesh reads. Seen in waves around the carrier that is
+A function f of the mesh cycle multiplies the input of each mesh. In multi-blade components this is
 
     sum over places of   back (waves, places)  f(position)  there (places, waves),
 
 as `exugear.steady.mean_system.mesh_places` has both. The position follows the angle of the base; of planets out of
-phase, shapes turn with the angle of the carrier. Both make harmonics: those of the cycle are known, those of a turn
-follow from few samples of it.
+phase, shapes rotate with the angle of the carrier. Both generate harmonics: those of the cycle are known, those of a
+revolution follow from few samples of it.
 """
 
 from __future__ import annotations
@@ -111,14 +110,14 @@ def wave_shapes(planets: PlanetSet | None, speed: float, turned: Floats | None) 
 # What mesh laws read of the motion and what they push along: rows by the frame's coordinates, as waves
 
 DEFLECTION, MISALIGNMENT, POSITION = 0, 1, -1
-"""Places among what a law along a row reads: the first, the second where its load moves along the face, the last."""
+"""Indices of the inputs of a model along a row: the first, the second where its load shuttles, the last."""
 FRONT, BACK, CENTRE, TILT, BACK_TILT = range(5)
 """Places among what the law `table` reads and pushes along."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshInterface:
-    """Rows of all mesh waves at one speed; m waves, r readings, f forces."""
+    """Rows of all mesh components at one speed; m components, r readings, f forces."""
 
     readings: Floats
     """(m, r, size) rows of what the law reads; the last is the position in the mesh cycle, in cycles."""
@@ -129,14 +128,14 @@ class MeshInterface:
     positions: Floats
     """(meshes,) position in the mesh cycle at zero angle of the input, of the waves of meshes alone."""
     levers: Floats
-    """(m, size + 1) rows by which the deflection at mid-face is more than what a law reads of it that bears beside
-    the middle, of the waves of meshes alone; in the last column that in the static state."""
+    """(m, size + 1) rows of the difference between the deflection at mid-face and the input of a model whose load is
+    off the middle, for components of meshes only; in the last column the difference in the static state."""
     rates: Floats | None = None
     """(m, r, size) rows of what the law reads by the rates of the coordinates; non-linear bearings have some."""
 
 
 def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshInterface:
-    """Rows of all mesh waves at a speed of the input (rad/s); `parting` for the law `table`."""
+    """Rows of all mesh components at a speed of the input (rad/s); `parting` for the model `table`."""
     meshes = waves.assembly.meshes
     rows, offsets = _table_rows(meshes) if parting else _row_rows(meshes, waves.wander)
     means = np.array([wave.wave == 0 for wave in waves.waves])
@@ -159,10 +158,10 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshInterface:
 
 
 def _row_rows(meshes: MeshArrays, wander: bool) -> tuple[list[Floats], list[Floats]]:
-    """Rows that a law along a row reads (`system.tooth_mesh.contact_state`), and their values at zero coordinates.
+    """Return the input rows of a model along a row (`system.tooth_mesh.contact_state`), and values at zero coordinates.
 
-    They are its deflection with the mean lever of the load and, where loads wander along the face, the misalignment
-    against that of the contact's state; zeros of a mesh whose load stays.
+    These are its deflection with the mean lever arm of the load and, where loads shuttle, the misalignment relative to
+    that of the contact's state; zeros for a mesh without shuttling.
     """
     lever = meshes.tilt[:, TILT_LEVER]
     nominal = meshes.table.nominal
@@ -177,7 +176,7 @@ def _row_rows(meshes: MeshArrays, wander: bool) -> tuple[list[Floats], list[Floa
 
 
 def _table_rows(meshes: MeshArrays) -> tuple[list[Floats], list[Floats]]:
-    """Rows of both flanks and of where the gears stand, and their values at zero coordinates."""
+    """Rows of both flanks and of the gear positions, and their values at zero coordinates."""
     table = meshes.table
     nominal = table.nominal.T
     front = nominal[NOMINAL_DEFLECTION]
@@ -223,7 +222,7 @@ class Family:
 
 
 def families(waves: MeshWaves) -> tuple[Family, ...]:
-    """Families of all mesh waves, in their order."""
+    """Families of all mesh components, in their order."""
     carriers = [name for name, _ in waves.carriers]
     found = []
     for first, wave in enumerate(waves.waves):

@@ -1,14 +1,14 @@
-"""Gear meshes in the rotating frame: the scalar signals through which everything that varies acts.
+"""Gear meshes in the rotating frame: scalar signals through which all variations act.
 
-The meshes of N planets are written as waves around the carrier, as the planets are: with the gradient g_n of the
-deflection of mesh n by the frame's coordinates u
+The meshes of N planets are written as multi-blade components around the carrier, as the planets are: with the gradient
+g_n of the deflection of mesh n by the frame's coordinates u
 
     d_n = d_0 + d_c cos theta_n + d_s sin theta_n,   rows g_0 = mean g_n, g_c = 2/N sum g_n cos theta_n, g_s likewise,
 
-and a force F_n in each mesh is a generalized force -(N g_0 F_0 + N/2 g_c F_c + N/2 g_s F_s). Planets that mesh in
-phase have one position in the mesh cycle, so that their stiffness k multiplies each wave by itself. Planets out of
-phase have all N waves, and the carrier's angle is a cause of its own: harmonic h of the stiffness carries a wave to
-another, and its line to one beside it, by a whole number of the carrier's turns.
+and a force F_n in each mesh is a generalized force -(N g_0 F_0 + N/2 g_c F_c + N/2 g_s F_s). Planets that mesh in phase
+have one position in the mesh cycle, so that their stiffness k multiplies each component by itself. Planets out of phase
+have all N components, and the carrier's angle is a base of its own: harmonic h of the stiffness couples a component to
+another, and its order to a sideband, by a whole number of the carrier's revolutions.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from fe_ste.tools.arrays import Complexes, Floats
 SAMPLES = 64
 """Samples of each cubic piece of a stiffness for its Fourier coefficients: aliases are below 1e-7 of it."""
 FEWEST, MOST_HARMONICS = 10, 1000
-"""Harmonics of a mesh frequency that are looked at in any case, and more than anyone asks for."""
+"""Minimum number of harmonics of a mesh frequency, and the largest number permitted."""
 LEFT_OUT = 2e-2
-"""Share of the variation of a mesh's compliance that harmonics may leave out.
+"""Share of the variation of a mesh's compliance that truncation of harmonics may neglect.
 
-With it the ten loudest peaks of the GRC and of a spur planetary gearbox keep within 1e-2 of those by half as many
-harmonics again."""
+With it the ten highest peaks of the GRC and of a spur planetary gearbox agree within 1e-2 with results for 1.5 times as
+many harmonics."""
 CONSTANT = 1e-9
 """Variation of a compliance over its mean below which there is none."""
 IN_PHASE = 1e-6
@@ -85,14 +85,14 @@ class MeshWave:
     sense: float
     """Mesh cycles per cycle of the base when the input turns about +z: 1 or -1."""
     carrier: float
-    """Turns of the waves per turn of the input."""
+    """Rotations of the components per revolution of the input."""
     ahead: tuple[float, ...] = ()
-    """Cycles by which each planet's mesh is ahead of the first's, empty where the mean over a turn stands for all."""
+    """Cycles by which each planet's mesh leads the first; empty where the mean over a revolution represents all."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshWaves:
-    """All mesh waves of a mean system; m waves."""
+    """All mesh components of an averaged system; m components."""
 
     system: MeanSystem
     waves: tuple[MeshWave, ...]
@@ -101,9 +101,9 @@ class MeshWaves:
     base_names: tuple[str, ...]
     """Meshes of each base."""
     passing: int = 0
-    """Multiples of the passing of planets (thrice a turn of the carrier where there are three) whose lines are
-    looked at: planets in phase are then taken one by one as they turn, as those out of phase are, and not at their
-    mean."""
+    """Multiples of the planet passing frequency (three times per revolution of the carrier for three planets) whose
+    orders are included: planets in phase are then modelled individually as they rotate, like planets out of phase, and
+    not by their mean."""
 
     @property
     def assembly(self) -> Assembly:
@@ -117,7 +117,7 @@ class MeshWaves:
 
     @cached_property
     def carriers(self) -> tuple[tuple[str, Modulator], ...]:
-        """Carriers whose planets are looked at one by one, and the lines that turns put beside those of the meshes."""
+        """Carriers whose planets are modelled individually, and the sidebands of mesh orders due to their rotation."""
         found: dict[str, tuple[PlanetSet, set[int], set[int | None]]] = {}
         for wave in self.waves:
             planets = self.planets(wave)
@@ -167,9 +167,9 @@ class MeshWaves:
 
     @cached_property
     def partners(self) -> Floats:
-        """What a mesh that travels through the waves sees besides their own rates, (m, m).
+        """Return the inputs of a mesh that travels through the components, in addition to their own rates, (m, m).
 
-        The rate of wave a is d_a' + W p_ab d_b at the speed W of the input.
+        The rate of component a is d_a' + W p_ab d_b at the speed W of the input.
         """
         rates = np.zeros((len(self.waves),) * 2)
         for n, wave in enumerate(self.waves):
@@ -210,7 +210,7 @@ class MeshWaves:
 
     @property
     def wander(self) -> bool:
-        """Whether the load of any mesh moves along the face over its cycle."""
+        """Whether the load of any mesh shuttles over its cycle."""
         return bool(self.assembly.meshes.way_pieces.any())
 
     def cycle_coefficients(self, *quantities: CycleQuantity, harmonics: int) -> Complexes:
@@ -299,7 +299,7 @@ class MeshWaves:
 
 
 def mesh_waves(system: MeanSystem, passing: int = 0) -> MeshWaves:
-    """Mesh waves of a mean system; `passing` as `MeshWaves` says."""
+    """Mesh components of an averaged system; `passing` as in `MeshWaves`."""
     assembly = system.frame.assembly
     gearbox = assembly.gearbox
     frequencies = gearbox.train.mesh_frequencies(2.0 * math.pi)
@@ -385,7 +385,7 @@ def _turns_per_cycle(wave: MeshWave, planets: PlanetSet) -> int | None:
 
 
 def _one_of(steps: set[int | None]) -> tuple[int | None]:
-    """Tell the step that all meshes of a carrier have, None where they differ."""
+    """Return the common step of all meshes of a carrier, None where they differ."""
     if len(steps) == 1:
         return (next(iter(steps)),)
     return (None,)

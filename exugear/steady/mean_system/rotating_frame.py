@@ -1,12 +1,12 @@
 """Coordinates in which a gearbox with planets has constant matrices: multi-blade (Coleman) coordinates.
 
-A planet's displacements and tilts are written along the radius and the tangent of its place on the turning carrier,
-and then as waves around the carrier: with N planets at angles theta_n = psi + phi_n,
+A planet's displacements and tilts are written along the radius and the tangent of its place on the turning carrier, and
+then as components around the carrier: with N planets at angles theta_n = psi + phi_n,
 
     z_n = z_0 + sum_m (z_cm cos m theta_n + z_sm sin m theta_n) [+ z_a (-1)^n for even N].
 
-The waves do not turn with the carrier: a central body on bearings that are not isotropic feels constant stiffness
-(Coleman and Feingold 1958, NACA report 1351). Bodies on fixed axes keep their coordinates.
+The components do not rotate with the carrier: a central body on anisotropic bearings has constant stiffness (Coleman
+and Feingold 1958, NACA report 1351). Bodies on fixed axes keep their coordinates.
 """
 
 from __future__ import annotations
@@ -135,10 +135,10 @@ class RotatingFrame:
 
     @cached_property
     def mean_meshes(self) -> MeshArrays:
-        """Meshes of the mean system: linear, their stiffness that of the mean over the mesh cycle.
+        """Return the meshes of the averaged system: linear, with the mean stiffness over the mesh cycle.
 
-        Tables become their stiffness at the static load, curves their tangents there: as they are, stiffness would
-        change with each planet's misalignment and load.
+        Tables are replaced by their stiffness at the static load, curves by their tangents there: otherwise stiffness
+        would depend on each planet's misalignment and load.
         """
         if not LAWS[self.assembly.mesh_model].loses_contact:
             return self.assembly.tangent_meshes
@@ -164,7 +164,7 @@ class RotatingFrame:
 
     @cached_property
     def _kept(self) -> dict[float, tuple[Jet, Jet]]:
-        """Matrices and rolling at the last angle: differences ask for one angle many times."""
+        """Matrices and kinematic velocities at the last angle: differences use one angle many times."""
         return {}
 
     def _rotation_at(self, psi: float) -> tuple[Jet, Jet]:

@@ -1,7 +1,7 @@
-"""Mesh laws on many samples at once: forces and their slopes by what the laws read, in compiled loops.
+"""Mesh models on many samples at once: forces and their derivatives by the inputs, in compiled loops.
 
-A law along a row reads deflection and position, and the misalignment between them where its load moves along the face,
-with a moment along that (`exugear.system.tooth_mesh.contact_state`); the law `table` both flanks, the centre distance,
+A model along a row has the inputs deflection and position, and the misalignment between them where its load shuttles,
+with a moment along it (`exugear.system.tooth_mesh.contact_state`); the model `table` both flanks, the centre distance,
 both misalignments and the position (`exugear.steady.mean_system.mesh_places`). Loops are compiled by
 `fe_ste.tools.compilation`.
 """
@@ -84,16 +84,16 @@ def widened(samples: LawSamples, forces: int, readings: int) -> LawSamples:
 
 
 def sample_line(stiffness: Floats, readings: Floats) -> LawSamples:
-    """Sample a straight law along a row without its damper, which is in the mean system.
+    """Sample a linear model along a row without its damper, which is in the averaged system.
 
     Parameters
     ----------
     stiffness : (6, s)
-        Stiffness where the mean speed alone has brought the mesh, N/m, and its two derivatives per cycle; the same of
-        the force that it has less, N.
+        Stiffness at the mesh position of the mean speed, N/m, and its two derivatives per cycle; the same of the force
+        to be subtracted, N.
     readings : (s, 2)
-        Deflection, m, and how far the vibration has moved the position, cycles. It is a thousandth of a cycle or less,
-        so that a parabola serves.
+        Deflection, m, and shift of the position by the vibration, cycles. It is a thousandth of a cycle or less, so
+        that a parabola is sufficient.
     """
     deflection, moved = readings.T
     value, by_position = _moved(stiffness[:3], moved)
@@ -124,15 +124,15 @@ def sample_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
 
 
 def sample_wandering_line(tangents: Floats, readings: Floats) -> LawSamples:
-    """Sample a straight law whose load moves along the face, as `sample_line`.
+    """Sample a linear model whose load shuttles, as `sample_line`.
 
     Parameters
     ----------
     tangents : (18, s)
-        Stiffness k (N/m), force that it has less p (N), with the way w of the load k w, p w and k w^2, and the moment
-        beyond it (N m); each with two derivatives per cycle.
+        Stiffness k (N/m), force to be subtracted p (N), with the axial shift w of the load k w, p w and k w^2, and the
+        additional moment (N m); each with two derivatives per cycle.
     readings : (s, 3)
-        Deflection (m), misalignment against that of the contact's state (rad), and position as `sample_line` has it.
+        Deflection (m), misalignment relative to that of the contact's state (rad), and position as in `sample_line`.
     """
     deflection, tilt, moved = readings.T
     (k, k_slope), (p, p_slope), (kw, kw_slope), (pw, pw_slope), (kww, kww_slope), (beyond, beyond_slope) = (
@@ -147,9 +147,9 @@ def sample_wandering_line(tangents: Floats, readings: Floats) -> LawSamples:
 
 
 def sample_wandering_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
-    """Sample a curve whose load moves along the face, as `sample_curve`.
+    """Sample a curve whose load shuttles, as `sample_curve`.
 
-    Its way and the moment beyond it (6, s) follow the curve's numbers. Readings (s, 3) are those of
+    The axial shift and the additional moment (6, s) follow the curve's parameters. Readings (s, 3) are those of
     `sample_wandering_line`.
     """
     deflection, tilt, moved = readings.T
@@ -166,7 +166,7 @@ def sample_wandering_curve(curve: Floats, readings: Floats, load: float) -> LawS
 
 
 def _moved(values: Floats, moved: Floats) -> tuple[Floats, Floats]:
-    """Value and slope of a function (3, s) with two derivatives, beside its place by `moved` (s,)."""
+    """Value and slope of a function (3, s) with two derivatives, at an offset `moved` (s,)."""
     return values[0] + moved * (values[1] + 0.5 * moved * values[2]), values[1] + moved * values[2]
 
 

@@ -1,9 +1,9 @@
-"""What a steady response is told in: transmission errors, forces of meshes and bearings, accelerations of seats.
+"""Signals of a steady-state response: transmission errors, forces of meshes and bearings, accelerations of seats.
 
-Bearings of planets have waves around the carrier, along radius and tangent, as the planets themselves.
+Bearings of planets have multi-blade components, along radius and tangent, as the planets themselves.
 
-The force of a bearing has three parts, and those of planets three waves around the carrier as well: of each line it is
-the root of the mean square over the planets, along all axes. Of several bearings the one that has most counts.
+The force of a bearing has three parts, and for planets three multi-blade components as well: for each order it is the
+rms value over the planets, along all axes. Of several bearings the largest counts.
 """
 
 from __future__ import annotations
@@ -104,9 +104,10 @@ def _slopes(function: Callable[[Floats], Floats], size: int, step: float) -> Flo
 
 
 def carried_seats(assembly: Assembly) -> dict[str, bool]:
-    """Tell of each bearing, planets' by their family, whether its seat's acceleration is that of what carries it.
+    """Return for each bearing, planets' by family, whether its seat's acceleration is that of the supporting body.
 
-    It is where that is elastic, as a housing may be; else it is that of the shaft.
+    This applies where the supporting body is flexible, such as a housing; otherwise it is the acceleration of the
+    shaft.
     """
     return {support.family: carried for support, carried in zip(assembly.supports, _carried(assembly), strict=True)}
 
@@ -169,10 +170,11 @@ def _support_waves(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tuple[Flo
     return turn, labels
 
 
-# The three quantities by which a steady response is told: transmission error, bearing force, acceleration at bearings
+# The three quantities that describe a steady-state response: transmission error, bearing force, acceleration at
+# bearings
 
 MEAN_OF_OTHERS = 0.5
-"""What the square of a wave around the carrier has in the mean over the planets, but for that which all share."""
+"""Mean square over the planets of each multi-blade component, except for the common one."""
 ALTERNATING = "alternating"
 """The wave that changes its sign from planet to planet: its square is the same at all."""
 
