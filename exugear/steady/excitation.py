@@ -326,7 +326,7 @@ class HarmonicBalanceModel:
         return other
 
     def passing(self, strong: Booleans) -> HarmonicBalanceModel | None:
-        """Return a copy with one more multiple of the planet passing as sidebands of strong orders, chosen by a mask (n,).
+        """Return a copy with one more multiple of the planet passing as sidebands of strong orders, by a mask (n,).
 
         Planets tilt unequally under load, and table models include this: each passing planet then modulates all orders,
         which adds sidebands. None if planets are not modelled individually.

@@ -268,7 +268,7 @@ class HarmonicResidual:
             slopes[..., self.meshes :, :COMPONENTS, self.meshes :, :COMPONENTS] -= self.interface.bearings.slope
 
     def tangents_along(self, readings: Complexes, base: int, samples: int) -> Floats:
-        """Return slopes of the forces beyond the averaged system over the angle of one base, other meshes at their mean.
+        """Return slopes of forces beyond the averaged system over the angle of one base, other meshes at their mean.
 
         Parameters
         ----------

@@ -114,7 +114,7 @@ class Sideband:
     amplitude: float
     """In the signal's unit."""
     share: float
-    """Amplitude relative to the carrier order of the sideband: of the peak, or of the signal's largest component."""
+    """Amplitude relative to the modulated order: of the peak, or of the signal's largest component."""
     cause: str
     """What modulates the line of the peak."""
 

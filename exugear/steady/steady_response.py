@@ -542,7 +542,7 @@ def _fill(out: SolvedPoints, n: int, gearset: HarmonicBalanceModel, response: Re
 
 
 def _count_in_contact(known: SolvedPoints, count: int) -> int:
-    """Count the known points up to the last with full contact: later states depend on earlier ones, so they are redone."""
+    """Count the known points up to the last with full contact: later states depend on earlier ones."""
     parted = known.apart[:count].any(axis=1) | known.free[:count].any(axis=1)
     touching = np.isfinite(known.drive_torque[:count]) & ~parted
     if touching.any():

@@ -41,29 +41,29 @@ def assemble(
     contact: Mapping[str, ContactState] | None = None,
     before_balance: Callable[[Assembly], None] | None = None,
 ) -> Assembly:
-    """Put the equations of motion of a gearbox together.
+    """Assemble the equations of motion of a gearbox.
 
     Parameters
     ----------
-    choice : variant, mesh law and inertia set
+    choice : variant, mesh model and inertia set
     stiffness : mapping of pair name to (n,) array, or to the table's surface
         Mesh stiffness over the cycle, N/m: see `exugear.system.tooth_mesh.element.mesh_elements`.
     bodies : by body name
-        Reduced elastic bodies, which the variant `flexible` needs; `reduced_bodies` of
+        Reduced flexible bodies, required by the variant `flexible`; `reduced_bodies` of
         `exugear.system.bodies.of_gearbox` gives them.
     flanks, angles, contact
         As in `exugear.system.tooth_mesh.element.mesh_elements`.
     before_balance
-        Called with the assembly before the static load is looked for that bearings take their stiffness from.
+        Called with the assembly before the static equilibrium that determines the bearing stiffness is solved.
 
     Raises
     ------
     VariantError
-        Unknown variant, or supports or elastic bodies missing for it.
+        Unknown variant, or supports or flexible bodies missing for it.
     BalanceError
-        The static load, which catalogue bearings take their stiffness from, cannot be held.
+        The static load, which determines the stiffness of catalogue bearings, has no equilibrium.
     MeshError
-        Unknown law, or no stiffness for a pair at work.
+        Unknown mesh model, or no stiffness for an active pair.
 
     Examples
     --------

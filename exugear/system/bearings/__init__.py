@@ -1,1 +1,1 @@
-"""Bearings and other supports: what holds the bodies of a gearbox, and how."""
+"""Bearings and other supports: how the bodies of a gearbox are supported."""

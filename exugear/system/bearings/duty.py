@@ -1,4 +1,4 @@
-"""What bearings bear: load, stiffness, misalignment, contact pressure and life of each at its operating point."""
+"""Operating results of bearings: load, stiffness, misalignment, contact pressure and life at the operating point."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class OperatingPoint(ReprMixin):
     stiffness: Floats
     """(6, 6) derivative of that load, mean over positions of the cage."""
     is_unloaded: bool
-    """Whether it carries so little that its stiffness is that at the least load."""
+    """Whether its load is so small that the stiffness is taken at the minimum load."""
     first_roller_angle: float = 0.0
     """Polar angle of the first rolling element at which the displacement holds the load, rad."""
     load_stands_still: bool = True
@@ -154,11 +154,11 @@ class Ratings:
     dynamic: float
     static: float
     estimated: bool
-    """Whether they follow from the inside of the bearing, by ISO 281 and ISO 76."""
+    """Whether they follow from the internal geometry of the bearing, according to ISO 281 and ISO 76."""
     makers: tuple[str, ...] = ()
-    """Whose catalogues they are the least of; empty if they are not."""
+    """Manufacturers whose catalogues the ratings are the minimum of; empty if they are not from catalogues."""
     two_designs: str = ""
-    """Which of two designs of the designation is taken, where makers print both; empty elsewhere."""
+    """Which of two designs of the designation is used, where manufacturers list both; empty elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ class Sensitivity:
 
 @dataclass(frozen=True)
 class BearingLoadState:
-    """What a catalogue bearing bears."""
+    """Operating results of a catalogue bearing."""
 
     name: str
     family: str
@@ -202,17 +202,17 @@ class BearingLoadState:
     ratings: Ratings
     basic_life: float
     reference_life: float
-    """L10 by ISO 281 and L10r by ISO/TS 16281 (basic: lubricant and cleanliness left out), million revolutions;
+    """L10 to ISO 281 and L10r to ISO/TS 16281 (basic: lubricant and cleanliness neglected), million revolutions;
     infinite without load."""
     remarks: tuple[str, ...]
     """What a reader should know before trusting the row."""
 
 
 def ratings_of(section: CatalogueSection) -> Ratings:
-    """Load ratings of catalogue bearings: of the file, or the least that makers print for the designation, or by ISO.
+    """Load ratings of catalogue bearings: from the file, the minimum of manufacturers' catalogues, or to ISO.
 
-    Those of ISO 281 and ISO 76 rest on the inside of the bearing. Where that is estimated, they are divided by how far
-    estimates may lie above catalogues: a bearing is never rated better than it may be.
+    Ratings to ISO 281 and ISO 76 follow from the internal geometry of the bearing. Where that is estimated, they are
+    divided by the factor by which estimates may exceed catalogue values, so that the rating is conservative.
     """
     rows = catalogue_rows(section)
     given = (section.dynamic_rating_kN, section.static_rating_kN)
@@ -234,7 +234,7 @@ def ratings_of(section: CatalogueSection) -> Ratings:
 
 
 def _two_designs(section: CatalogueSection, taken: KnownRating) -> str:
-    """Say that makers print a reinforced design, too, and which is taken; empty where there is one design."""
+    """Return a note if manufacturers list a reinforced design, too, and which is used; empty where there is one design."""
     other = other_design(section)
     if other is None:
         return ""
@@ -339,9 +339,9 @@ def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -
 
 
 def estimate_effects(point: OperatingPoint) -> tuple[Sensitivity, ...]:
-    """Radial stiffness at both ends of each dimension that the file leaves open, under the load of an operating point.
+    """Return the radial stiffness at both limits of each dimension missing in the file, at the load of an operating point.
 
-    What changes is taken in one position of the cage.
+    The change is evaluated at one position of the cage.
     """
     section = point.bearing.catalogue
     assert section is not None

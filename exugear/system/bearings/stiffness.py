@@ -74,12 +74,12 @@ def rotate_stiffness(stiffness: Floats, angle: float) -> Floats:
 
 
 def regularised(stiffness: Floats, floor: ArrayLike) -> Floats:
-    """Give directions without stiffness the one that is stated.
+    """Set a stated stiffness in directions without stiffness.
 
     Parameters
     ----------
     stiffness : (6, 6) symmetric stiffness
-    floor : (6,) least diagonal entries, N/m and N m/rad; zero leaves a direction free
+    floor : (6,) minimum diagonal entries, N/m and N m/rad; zero leaves a direction free
 
     Returns
     -------
@@ -127,7 +127,7 @@ NOMINAL_LOAD = 0.1
 LEAST_LOAD = 0.01
 """Load over the basic dynamic rating below which a linear bearing counts as loaded by this: none has no stiffness."""
 HOLDING_LOAD = 1.25
-"""Axial load over the least that one row with a contact angle needs beside a radial one, where neither is known."""
+"""Axial load over the minimum that a row with a contact angle needs under a radial load, where neither is known."""
 QUARTER_PITCH = 0.25
 """Place of a cage that stands still, in pitches past the load: the stiffness has its mean over the pitch there, to
 the second harmonic."""
@@ -141,13 +141,13 @@ class SupportLaw:
     damping: Floats
     """(6, 6) linear part, N/m .. N m/rad, and times s."""
     rows: tuple[RollingRow, ...] = ()
-    """Rows of rolling elements that act beside it; none for a linear support."""
+    """Rows of rolling elements that act in addition; none for a linear support."""
     scale: float = 1.0
     """Displacement of the inner ring against the outer one over that of the body against what it sits on."""
     damping_time: float = 0.0
     """Damping over the stiffness of the rows, s."""
     cage_ratio: float = 0.0
-    """Turns of the cage per turn of the body against what it sits on; 0 for a cage that stands still."""
+    """Revolutions of the cage per revolution of the body relative to its support; 0 for a cage at standstill."""
     phase: float = 0.0
     """Polar angle of the first rolling element, rad."""
     point_strain: Floats = field(default_factory=lambda: np.zeros(6))
@@ -156,9 +156,9 @@ class SupportLaw:
 
 
 def load_stands_still(bearing: Bearing, bodies: Mapping[str, Body]) -> bool:
-    """Tell whether a bearing's load keeps its direction in the axes of what it sits on, of bodies by their names.
+    """Return whether a bearing's load keeps its direction in the axes of the supporting body, given bodies by name.
 
-    So it does on the ground, and where planets sit on their carrier.
+    This holds on the ground, and for planets on their carrier.
     """
     return bearing.on not in bodies or bodies[bearing.on].fixed or bodies[bearing.body].carrier == bearing.on
 
@@ -183,7 +183,7 @@ def law_in_words(bearing: Bearing, stands_still: bool = True) -> str:
 
 
 def is_catalogued(bearing: Bearing) -> bool:
-    """Tell whether rows of rolling elements give a bearing's stiffness at the load that the statics find."""
+    """Return whether rows of rolling elements determine a bearing's stiffness at the load from statics."""
     return bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None
 
 
@@ -221,14 +221,15 @@ def misplaced_factor(bearing: Bearing) -> str:
 
 
 def linear_law(bearing: Bearing, damping_time: float, of_rows: Floats | None = None) -> SupportLaw:
-    """Linear law of a support, housing factor included.
+    """Return the linear model of a support, housing factor included.
 
     Parameters
     ----------
     damping_time : damping over stiffness where the file gives no damping, s
     of_rows : (6, 6)
         Stiffness of its rows of rolling elements; by default that at the load which the file states, or at
-        `NOMINAL_LOAD`. Directions below the stiffness that the file gives beside a catalogue are raised to it.
+        `NOMINAL_LOAD`. Directions below the stiffness that the file gives in addition to a catalogue bearing are raised
+        to it.
 
     Raises
     ------
@@ -285,7 +286,7 @@ def law_through_point(law: SupportLaw, strain: Floats, load: Floats, stands_stil
 
 
 def cage_ratio(row: RollingRow, outer_ring_turns: bool) -> float:
-    """Find the turns of a cage per turn of one ring while the other one stands still, without slip.
+    """Return the revolutions of a cage per revolution of one ring with the other ring fixed, without slip.
 
     Examples
     --------
@@ -332,7 +333,7 @@ def catalogue_stiffness(section: CatalogueSection) -> Floats:
 
 
 def holds_one_way(rows: Sequence[RollingRow]) -> bool:
-    """Tell whether rows hold the inner ring in one direction along the axis only."""
+    """Return whether rows locate the inner ring in one axial direction only."""
     angles = [row.contact_angle for row in rows]
     return min(angles) > 0.0 or max(angles) < 0.0
 
@@ -364,7 +365,7 @@ def planet_families(bodies: Iterable[Body]) -> list[list[Body]]:
 
 
 def equally_spaced(planets: Sequence[Body]) -> bool:
-    """Tell whether planets of a set stand at equal distances around their carrier, three of them or more."""
+    """Return whether three or more planets of a set are at equal distances around their carrier."""
     spacing = 2.0 * math.pi / len(planets)
     turned = np.array([planet.orbit_angle - planets[0].orbit_angle for planet in planets]) % (2.0 * math.pi)
     return len(planets) >= FEWEST and bool(np.abs(turned - spacing * np.arange(len(planets))).max() <= SPACING)

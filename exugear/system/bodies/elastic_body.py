@@ -47,7 +47,7 @@ class FloatingBody(ReprMixin, line=" {name}: {seats!n} seats, {stiffness!n} mode
     centrifugal_tension: Floats
     """(k, k) what times the square of the spin speed is the stiffness of centrifugal tension."""
     turning: Floats
-    """(k, k) antisymmetric S: a turn by psi takes modes into each other by exp(psi S)."""
+    """(k, k) antisymmetric S: a rotation by psi transforms the modes by exp(psi S)."""
 
     @property
     def frequencies(self) -> Floats:
@@ -173,7 +173,7 @@ class FloatingMotion:
 
 
 class FloatingCoordinates:
-    """From the 7 + k coordinates of a body's floating frame to the n = 6 + k of the reduced body, and back.
+    """Return the maps from the 7 + k coordinates of a floating frame to the n = 6 + k of the reduced body, and back.
 
     A floating frame's coordinates are the displacement of its centre, the change of its Euler parameters from
     (1, 0, 0, 0), and the modal coordinates.
@@ -181,7 +181,7 @@ class FloatingCoordinates:
     Raises
     ------
     ReductionError
-        The body is none of revolution.
+        The body is not a body of revolution.
     """
 
     def __init__(self, body: FloatingBody) -> None:

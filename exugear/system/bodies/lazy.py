@@ -15,9 +15,9 @@ class _AtFirstUse(ModuleType):
 
 
 def at_first_use(name: str) -> Any:
-    """Return what stands for a library and loads it when it is used.
+    """Return a proxy of a library that loads it at first use.
 
-    For type checkers the library is imported beside it, under ``TYPE_CHECKING``.
+    For type checkers the library is also imported under ``TYPE_CHECKING``.
 
     Parameters
     ----------

@@ -127,9 +127,9 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
 
 
 def shared_seats(gearbox: Gearbox, name: str) -> dict[str, str]:
-    """Seats of a body's shaft that another one stands for, which has their place and width, by their names.
+    """Seats of a body's shaft that are represented by another one of equal position and width, by their names.
 
-    Two of one place and width would move alike: nothing could tell what each carries.
+    Two seats of equal position and width would have the same motion: their loads could not be separated.
     """
     body = gearbox.body(name)
     shape = _shape_of(gearbox, body)
@@ -186,7 +186,7 @@ def _section_of(section: ShaftSectionSection) -> ShaftSection:
 
 
 def _seats(gearbox: Gearbox, body: Body, shape: ShapeSection) -> Iterator[SeatBand]:
-    """Each seat as the file has it, from the beginning of the shaft."""
+    """Each seat as given in the file, from the beginning of the shaft."""
     start = shape.start_z_mm * MM
     for gear, z in body.wheels.items():
         yield SeatBand(gear, z - start, gearbox.gears[gear].face_width)
@@ -249,13 +249,13 @@ class SolidBody:
 
 
 def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
-    """Everything that the gearbox file says of a body's solid; its file is there and may be read, but is not yet.
+    """Return the data of a body's solid from the gearbox file; its solid file exists and is permitted, but not yet read.
 
     Raises
     ------
     GearboxFileError
-        The body has no solid, its file is not there, in no format that is read, or lies where it may not, or a seat of
-        something on it is missing or not known well enough.
+        The body has no solid, its file does not exist, has no supported format or lies outside the permitted folder, or
+        a seat of an item on it is missing or incompletely specified.
     """
     body = gearbox.body(name)
     section = gearbox.case.bodies[body.family]
@@ -379,7 +379,7 @@ def _solid_seats(
 
 
 def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, section: SolidSeatSection) -> SolidSeat:
-    """One seat, from what the file says of it and what is known of the item on it."""
+    """One seat, from its entry in the file and the known data of the item on it."""
     diameter, width = (None, None) if item is None else (item.diameter, item.width)
     if section.diameter_mm is not None:
         diameter = MM * section.diameter_mm
@@ -411,7 +411,7 @@ def _parts(seat: SolidSeat, count: int) -> list[SolidSeat]:
 
 
 def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list[str]) -> dict[str, Blank]:
-    """Blanks by seat; one given for a bearing of all planets goes on each of its seats."""
+    """Blanks by seat; a blank of a bearing of all planets is added at each of its seats."""
     families = {name: item.family for name, item in _items(gearbox, body).items()}
     blanks: dict[str, Blank] = {}
     for name, section in solid.blanks.items():
@@ -423,7 +423,7 @@ def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list
 
 
 def solids_of(gearbox: Gearbox) -> Iterator[tuple[str, SolidModel]]:
-    """Key and model of each solid that the variant `flexible` takes; files are there, but none is read or run yet.
+    """Return key and model of each solid that the variant `flexible` uses; files exist, but none is read or run yet.
 
     Raises
     ------
@@ -437,16 +437,16 @@ def solids_of(gearbox: Gearbox) -> Iterator[tuple[str, SolidModel]]:
 
 
 def check_solids(gearbox: Gearbox, folder: Path) -> None:
-    """Refuse solids that cannot be taken, and scripts that would have to run and may not, before any work.
+    """Refuse solids that cannot be used, and scripts that would have to run without permission, before any work.
 
     Parameters
     ----------
-    folder : where reductions are stored: a script whose reduction is there need not run
+    folder : where reductions are stored: a script with a stored reduction need not run
 
     Raises
     ------
     GearboxFileError
-        A script that may not run, or as `solid_body`.
+        A script is not permitted to run, or as `solid_body`.
     """
     for key, model in solids_of(gearbox):
         file: SolidFile = model.mesh

@@ -1,24 +1,24 @@
-"""Reduction of elastic bodies: six coordinates at each seat, and a few modal coordinates inside.
+"""Reduction of flexible bodies: six coordinates at each seat, and a few internal modal coordinates.
 
 A seat is where a gear or a bearing sits. Its six coordinates are the rigid motion nearest to that of its surface, so
-that a seat looks to a mesh or a bearing like a rigid body. A body's displacement is a sum of component modes:
+that meshes and bearings treat a seat as a rigid body. A body's displacement is a sum of component modes:
 
 constraint modes
-    One per seat coordinate: the shape of least strain energy with this coordinate at 1 and the others at 0.
+    One per seat coordinate: the shape of minimum strain energy with this coordinate at 1 and the others at 0.
 inertia-relief modes
-    What rigid accelerations do to the body between seats that do not move. With them every static deflection is exact,
-    that of a body which accelerates included.
+    Deformation of the body between fixed seats under rigid accelerations. With them every static deflection is exact,
+    including that of an accelerating body.
 free-interface normal modes
-    Elastic vibrations of the free body up to a frequency, less the constraint modes that move the seats alike; they
-    are exact then.
+    Elastic vibrations of the free body up to a frequency, minus the constraint modes with the same motion of the seats;
+    they are then exact.
 
 The form with physical coordinates at the seats is that of Craig and Bampton (AIAA Journal 6, 1968), who take
 fixed-interface normal modes; with inertia-relief and free-interface modes it is that of Hintz (AIAA Journal 13, 1975)
 and Herting (Finite Elements in Analysis and Design 1, 1985).
 
-A shaft that turns is described in a frame that does not (`frame` "nonrotating"): as it is axially symmetric, its
-matrices are constant there, M q'' + Omega G q' + K q = f. No coordinate is needed for its spin: the common part of
-the seats' turning about z is the spin, with Omega = r' M q' / (r' M r) for the rigid spin r.
+A rotating shaft is described in a non-rotating frame (`frame` "nonrotating"): as it is axially symmetric, its matrices
+are constant there, M q'' + Omega G q' + K q = f. No coordinate is needed for its spin: the common part of the seats'
+turning about z is the spin, with Omega = r' M q' / (r' M r) for the rigid spin r.
 """
 
 from __future__ import annotations

@@ -140,14 +140,14 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand, start: float = 0.0)
 
 
 def narrowed(sections: Sequence[ShaftSection], seat: SeatBand) -> SeatBand:
-    """Return a seat that reaches a little across a shoulder, or beyond the shaft, as one that ends there.
+    """Return a seat that slightly crosses a shoulder, or the shaft end, as one that ends there.
 
-    It stays about its middle, where what sits on it acts, so that the other side ends as far from there. One that
-    reaches further stays as it is; `locate` refuses it.
+    It stays centred about its middle, where the load of the mounted part acts, so that the other side is shortened
+    equally. A seat that extends further is unchanged; `locate` refuses it.
 
     Examples
     --------
-    A bearing of 20 mm whose shoulder stands 19 mm from its far side:
+    A bearing of 20 mm whose shoulder is 19 mm from its far side:
 
     >>> sections = (ShaftSection(0.019, 0.040), ShaftSection(0.100, 0.050))
     >>> round(narrowed(sections, SeatBand("bearing", 0.010, 0.020)).width, 6)

@@ -1,7 +1,7 @@
 """Solids from files: shapes meshed with tetrahedra by gmsh, meshes read by meshio.
 
-Files may come from a stranger. Scripts of gmsh run only where they are permitted to; shapes are read without what
-lies beside them, meshes in formats that refer to no other file.
+Files may be untrusted. Scripts of gmsh run only where permitted; shapes are read without neighbouring files, meshes in
+formats that refer to no other file.
 
 gmsh (under the GPL) and meshio are loaded only where used.
 """
@@ -201,10 +201,10 @@ MESH_HEAD = b"$MeshFormat"
 
 
 def _rewritten_by_gmsh(path: Path, meshio: Any) -> Any:
-    """Content of a mesh that meshio stumbles on, by way of gmsh; None where that cannot read it either.
+    """Read the content of a mesh that meshio fails to read, via gmsh; None where gmsh cannot read it either.
 
-    With `Mesh.SaveAll` a file holds elements with and without a physical group, which meshio does not take in format
-    4; written anew in format 2.2 it does.
+    With `Mesh.SaveAll` a file holds elements with and without a physical group, which meshio does not accept in format
+    4; it does after conversion to format 2.2.
     """
     with path.open("rb") as file:
         if path.suffix.lower() != ".msh" or file.read(len(MESH_HEAD)) != MESH_HEAD:
@@ -231,7 +231,7 @@ def _rewritten_by_gmsh(path: Path, meshio: Any) -> Any:
 
 
 def _includes(path: Path) -> bool:
-    """Tell whether a file of Abaqus takes in another one; keywords as meshio understands them."""
+    """Return whether an Abaqus file includes another one; keywords as meshio interprets them."""
     with path.open(encoding="utf-8", errors="replace") as lines:
         return any(line.partition(",")[0].strip().replace("*", "").upper() == "INCLUDE" for line in lines)
 
@@ -252,17 +252,17 @@ class SolidFile:
 
     @property
     def is_geometry(self) -> bool:
-        """Tell whether gmsh has to mesh it."""
+        """Return whether gmsh has to mesh it."""
         return self.path.suffix.lower() in GEOMETRY
 
     @property
     def is_mesh(self) -> bool:
-        """Tell whether it holds a mesh in a format that is read."""
+        """Return whether it contains a mesh in a supported format."""
         return self.path.suffix.lower() in MESHES
 
     @property
     def is_script(self) -> bool:
-        """Tell whether it can run commands of the system."""
+        """Return whether it can run commands of the system."""
         return self.path.suffix.lower() == SCRIPT
 
     @cached_property
@@ -288,7 +288,7 @@ class SolidFile:
 
 
 def _library(name: str) -> Any:
-    """Import an optional library, or tell what to install."""
+    """Import an optional library, or raise an error that states what to install."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError:

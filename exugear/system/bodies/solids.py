@@ -1,25 +1,25 @@
-"""Elastic bodies of any shape: solid finite elements, reduced to seats and a few modal coordinates.
+"""Flexible bodies of any shape: solid finite elements, reduced to seats and a few modal coordinates.
 
-A body is reduced free of all supports; what holds a housing are supports on its seats. The frame its coordinates are
-seen from decides on the gyroscopic matrix:
+A body is reduced free of all supports; a housing is held by supports on its seats. The reference frame of its
+coordinates determines the gyroscopic matrix:
 
 nonrotating
-    A body of revolution that turns inside a frame that does not: G = C' - C'^T with C' = int rho N (x d_y - y d_x) N,
-    as for turned shafts (`exugear.system.bodies.turned_section`).
+    A body of revolution that rotates in a non-rotating frame: G = C' - C'^T with C' = int rho N (x d_y - y d_x) N, as
+    for turned shafts (`exugear.system.bodies.turned_section`).
 carrier
-    A body seen from its own turning frame: the constant Coriolis matrix, 2 int rho phi_i . (e_z x phi_j). Centrifugal
-    stiffness and softening are left out together; at the speed of a planet carrier both are far below its stiffness.
+    A body in its own rotating frame: the constant Coriolis matrix, 2 int rho phi_i . (e_z x phi_j). Centrifugal
+    stiffening and softening are both neglected; at the speed of a planet carrier both are far below its stiffness.
 ground
-    A body that does not turn: none.
+    A body that does not rotate: none.
 
 All elastic normal modes of a reduced solid (`exugear.system.bodies.solids`) are modes, so that static deflections are
-those of the reduced body; mass scaling brings those above the limit down to it. A floating frame knows the body by int
-rho f_a g_b of its place and its modes f, g; rigid rings on seats (blanks) add theirs.
+those of the reduced body; mass scaling brings those above the limit down to it. A floating frame describes the body by
+int rho f_a g_b of its position and its modes f, g; rigid rings on seats (blanks) are added.
 
-For a body of revolution a turn by psi takes the modes into each other, exp(psi S), with eigenvalues of S at whole
-numbers: 0 for torsion and stretching, 1 for bending.
+For a body of revolution a rotation by psi transforms the modes by exp(psi S), with eigenvalues of S at whole numbers: 0
+for torsion and stretching, 1 for bending.
 
-Nothing here knows a solver; Exudyn's floating frame is in `exugear.transient.exudyn_model.floating`.
+This module is independent of the solver; Exudyn's floating frame is in `exugear.transient.exudyn_model.floating`.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ else:
 
 
 ASYMMETRY_TOLERANCE = 5e-3
-"""Relative change of the seats' mass or stiffness by a quarter turn above which a body is none of revolution."""
+"""Relative change of the seats' mass or stiffness by a quarter turn above which a body is not a body of revolution."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ def reduce_solid(model: SolidModel, backend: Backend | None = None) -> ReducedBo
     SolidError
         A seat without faces, or two that share some.
     ReductionError
-        A blank without its seat, too few seats, or a body in the frame "nonrotating" that is none of revolution.
+        A blank without its seat, too few seats, or a body in the frame "nonrotating" that is not a body of revolution.
     """
     return reduced_body(model, reduce_matrices(model, backend))
 
@@ -221,7 +221,7 @@ def reduction_file(model: SolidModel, folder: Path) -> Path:
 
 
 def load_or_reduce_solid(model: SolidModel, folder: Path) -> ReducedBody:
-    """Reduced solid from a folder if it is there for exactly these inputs, else reduced and stored there."""
+    """Return the reduced solid from a folder if stored for exactly these inputs; otherwise reduce and store it."""
     return load_or_reduce(reduction_file(model, folder), model.key, lambda: reduce_solid(model))
 
 
@@ -375,7 +375,7 @@ def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> Fl
 def with_inertia(body: FloatingBody, wanted: RigidInertia) -> FloatingBody:
     """Give a body the rigid inertia of another model of it; as `system.bodies.reduction.with_rigid_inertia` does.
 
-    What is added or missing moves with the frame, that is with the rigid part of the motion.
+    The added or missing inertia moves with the frame, that is with the rigid part of the motion.
     """
     offset = np.array(wanted.centre) - body.centre
     square = np.diag([wanted.axial / 2, wanted.axial / 2, wanted.transverse - wanted.axial / 2])
@@ -387,9 +387,9 @@ def with_inertia(body: FloatingBody, wanted: RigidInertia) -> FloatingBody:
 
 
 def load_or_reduce_floating(model: SolidModel, folder: Path | None) -> tuple[ReducedBody, FloatingBody]:
-    """Both descriptions of a solid of revolution, from a folder if they are there for exactly these inputs.
+    """Return both descriptions of a solid of revolution, from a folder if stored for exactly these inputs.
 
-    What is not there is reduced and stored.
+    Missing ones are reduced and stored.
 
     Raises
     ------

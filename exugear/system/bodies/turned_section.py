@@ -228,7 +228,7 @@ class Shaft:
         return self.sections[self._locate(seat)[0]]
 
     def _solid(self, r: Floats, z: Floats) -> Booleans:
-        """Tell which points of the half-section are steel."""
+        """Return which points of the half-section are steel."""
         number = np.clip(np.searchsorted(self._ends, z) - 1, 0, len(self.sections) - 1)
         return np.asarray((r < self.tapers.outer[number]) & (r > self.tapers.inner[number]))
 

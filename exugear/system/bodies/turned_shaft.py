@@ -124,7 +124,7 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
 
 
 def load_or_reduce_shaft(model: ShaftModel, folder: Path) -> ReducedBody:
-    """Reduced shaft from a folder if it is there for exactly these inputs, else reduced and stored there."""
+    """Return the reduced shaft from a folder if stored for exactly these inputs; otherwise reduce and store it."""
     return load_or_reduce(folder / f"{model.name}-{model.key[:16]}.npz", model.key, lambda: reduce_shaft(model))
 
 
@@ -155,7 +155,7 @@ def _gyroscopic(model: ShaftModel, bending: Harmonic, component: ReducedComponen
 
 
 class _Layout:
-    """Where the coordinates of each harmonic stand among those of the body."""
+    """Indices of the coordinates of each harmonic among those of the body."""
 
     def __init__(self, seats: int, sizes: Mapping[HarmonicName, int]) -> None:
         seat_starts = 6 * np.arange(seats)

@@ -1,4 +1,4 @@
-"""Compiled laws on arrays of coordinates; they know nothing of what stands above.
+"""Compiled force models on arrays of coordinates, independent of all higher layers.
 
-What a coordinate is and how a body's six are arranged stands in `exugear.system.kernels.coordinates`.
+Coordinates and the order of a body's six are defined in `exugear.system.kernels.coordinates`.
 """

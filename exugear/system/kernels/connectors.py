@@ -173,7 +173,7 @@ def _forces(x: Floats, ends: _Ends, load: Floats) -> Floats:
 
 
 def _places(connectors: ConnectorArrays, size: int) -> Integers:
-    """Coordinates (c, 2, 6) of both ends; those of the ground stand behind the others."""
+    """Coordinates (c, 2, 6) of both ends; those of the ground follow the others."""
     first = np.where(connectors.bodies < 0, size, connectors.bodies)
     return np.asarray(first[..., None] + np.arange(BODY_SIZE))
 

@@ -1,4 +1,4 @@
-"""Coordinates of bodies as all compiled laws read them, inertia of rigid bodies, torsional springs.
+"""Coordinates of bodies as used by all compiled models, inertia of rigid bodies, torsional springs.
 
 Coordinates are those of Exudyn's ``NodeRigidBodyRxyz``: translations x, y, z of the body's node (m), tilts a and b
 (rad) about x and about the tilted y, and the unwrapped spin about the body's own z axis (rad), so that its axes
@@ -6,10 +6,10 @@ are turned by Rx(a) Ry(b) Rz(spin). All are zero in the reference state. Rates a
 coordinates. Generalized forces are conjugate to them: N for translations, N m for angles.
 
 A body has all six one after the other, or its spin alone; the ground has none. So has each seat of an elastic body,
-which a mesh or a bearing takes for a rigid body. Laws that allow for missing coordinates give them the index -1; in
+which a mesh or a bearing treats as a rigid body. Models that allow for missing coordinates give them the index -1; in
 the arrays of the compiled solver they point to a coordinate that stays zero.
 
-Numbers here become part of machine code: `fe_ste.tools.compilation` compiles anew when this file changes.
+Numbers here become part of machine code: `fe_ste.tools.compilation` recompiles when this file changes.
 
 Coordinates are those of `exugear.system.kernels.coordinates`.
 """

@@ -159,7 +159,7 @@ def row_product(matrix: Floats, begin: int | np.uint64, given: Floats, count: in
 def gather_deformation(b: int, q: Floats, v: Floats, time: float, elastic: ElasticMotion, out: Floats) -> None:
     """Fill q + time v of block b without the common turning, as `deformation`.
 
-    What is behind is of no account: rows and columns of the matrices are zero there.
+    Entries after the block are irrelevant: rows and columns of the matrices are zero there.
     """
     first = elastic.first[b]
     common = q[elastic.coordinate[first]] * elastic.spin[first]

@@ -1,4 +1,4 @@
-r"""Compiled geometry of gear meshes on arrays of coordinates: what deflects, at what rate, and where the gears stand.
+r"""Compiled geometry of gear meshes on arrays of coordinates: deflection, its rate, and positions of the gears.
 
 Each mesh lives in a frame that carries its line of centres: ground, or a carrier of spin psi. With R the
 rotation by psi, p a gear's place relative to the frame's axis and S = z x,
@@ -8,19 +8,19 @@ rotation by psi, p a gear's place relative to the frame's axis and S = z x,
     pmc   = phase + (spin_1 - psi) cycles                                  position in the mesh cycle
     f     = -F dg/dq,  g = sum_b V_b . z_b                                 generalized force of a scalar force F
 
-A law along a row that resists misalignment gamma has the deflection and the moment of
-`exugear.system.tooth_mesh.contact_state` instead: e = delta - (zt + w) (gamma - g0) for delta, and + M d gamma/dq
-beside it.
+A model along a row that resists misalignment gamma has the deflection and the moment of
+`exugear.system.tooth_mesh.contact_state` instead: e = delta - (zt + w) (gamma - g0) for delta, and + M d gamma/dq in
+addition.
 
-The row g does not change when everything turns with psi: the carrier's share of the force balances moments exactly.
-Which force F a deflection raises is the matter of the mesh laws (`exugear.system.tooth_mesh.laws`). Errors of pitch and
-run-out, given over a revolution of each gear, are subtracted from the deflection of any law.
+The row g does not change when everything rotates with psi: the carrier's share of the force balances moments exactly.
+The mesh models (`exugear.system.tooth_mesh.laws`) give the force F at a deflection. Errors of pitch and run-out, given
+over a revolution of each gear, are subtracted from the deflection of any model.
 
 Coordinates are those of `exugear.system.kernels.coordinates`.
 
-The formulas are those of `exugear.system.kernels.meshes`, which the tests hold them against. What differs:
-sines of the frames' angles are taken once per evaluation and handed in, missing coordinates point to one that stays
-zero, so that the loops need no exceptions, and nothing is allocated.
+The formulas are those of `exugear.system.kernels.meshes`, which the tests hold them against. What differs: sines of the
+frames' angles are computed once per evaluation and passed in, missing coordinates point to one that stays zero, so that
+the loops need no exceptions, and nothing is allocated.
 """
 
 from __future__ import annotations
@@ -332,9 +332,9 @@ ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
 LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE, LAST_ENERGY, LAST_DAMPED, LAST_CYCLE, LAST_OTHER = range(8)
 LAST_CENTRE, LAST_MISALIGNMENT, LAST_CENTRE_RATE = range(8, 11)
 """Columns of `MeshMemory.states`: deflection (m), rate (m/s), 1 outside a table, scalar force (N; of a table F_bt), and
-what an account of energy takes of the mesh: elastic energy (J); power damped, of the stiffness that changes with pmc,
-and of a force that is not conjugate to its deflection (W); of a table change of centre distance (m),
-misalignment (rad) and rate of the centre distance (m/s)."""
+the terms of the mesh in the energy balance: elastic energy (J); power damped, of the stiffness that changes with pmc,
+and of a force that is not conjugate to its deflection (W); of a table change of centre distance (m), misalignment (rad)
+and rate of the centre distance (m/s)."""
 STATES_SIZE = 11
 DEFLECTION_ROW, FORCE_ROW = range(2)
 """Rows of `Meshes.rows`."""
@@ -347,7 +347,7 @@ misalignment at zero tilts against that of the contact's state (rad); tilt stiff
 PADDED_FRAME = 2 * PADDED
 """Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
-"""Columns of an account of energy, as runs take it (`exugear.transient.compiled.sampling`).
+"""Columns of the energy balance, as recorded by runs (`exugear.transient.compiled.sampling`).
 
 Kinetic and elastic energy (J); powers (W): of the loads, damped, of the stiffness that changes with pmc, of mesh forces
 that are not conjugate to their deflection, of bearings whose rate is not the derivative of their displacement.
@@ -360,7 +360,7 @@ class Meshes(NamedTuple):
     coordinates: Integers
     """(m, 13)"""
     slot: Integers
-    """(m,) where the cosine and sine of the frame's angle stand among those of all angles that turn anything."""
+    """(m,) index of the cosine and sine of the frame's angle among those of all frame angles."""
     axis: Floats
     """(m, 2, 2) zero for gears without translations."""
     form: Integers

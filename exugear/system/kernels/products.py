@@ -64,7 +64,7 @@ def add_symmetric(tiles: Floats, begin: int, size: int, x: Floats, y: Floats) ->
     """Add the product of a symmetric matrix, of tiles from `begin` on, with x to y; `size` is filled up."""
     for i in range(0, size, SIZE):
         own = eight(x, i)
-        # Spread once for a row of tiles: what is put into y might be x, as far as the processor is told.
+        # Spread once for a row of tiles: the compiler must assume that y may alias x.
         x0, x1, x2, x3 = all_eight(x[i]), all_eight(x[i + 1]), all_eight(x[i + 2]), all_eight(x[i + 3])
         x4, x5, x6, x7 = all_eight(x[i + 4]), all_eight(x[i + 5]), all_eight(x[i + 6]), all_eight(x[i + 7])
         a, b = eight(tiles, begin) * own, eight(tiles, begin + 8) * own

@@ -34,9 +34,9 @@ LAYOUT_SIZE = 7
 COSINE, SINE, LEVER, GAP, TILTING, RADIUS, AXIAL, CONSTANT = range(8)
 """First columns of `RollingArrays.geometry`; `CONSTANT` is that of a ball, or of one slice of a roller."""
 CENTRE_RADIAL, CENTRE_AXIAL, SPAN = range(8, 11)
-"""What a row of balls has behind them."""
+"""Parameters of a row of balls that follow them."""
 PER_TILT, MOST_TILT, PER_ROOT, MOST_DEPTH, SLICE_LENGTH = range(8, 13)
-"""What a row of rollers has behind them."""
+"""Parameters of a row of rollers that follow them."""
 GEOMETRY_SIZE = 13
 STRIP_TILT, STRIP_PER = 4, 5
 """In each strip of tilts behind the four coefficients of D: its first tilt, and 1 over its width."""
@@ -180,9 +180,9 @@ def contact_law(
 ) -> tuple[float, float, float, float, float, float]:
     """Potential of an element at the approach d (m) and the tilt w (rad), as `slices_law`, after `first_contact`.
 
-    With the depth s = d - D(w) behind first contact and x = sqrt(s) the table of a roller has V(x, w) = U / s^2, even
-    in w. It hardly varies, so that cubics serve from first touch to the limit of the raceways. Beyond it slices are
-    summed.
+    With the depth s = d - D(w) after first contact and x = sqrt(s) the table of a roller has V(x, w) = U / s^2, even in
+    w. It varies little, so that cubics are sufficient from first contact to the limit of the raceways. Beyond it slices
+    are summed.
     """
     geometry = rolling.geometry[r]
     layout = rolling.layout[r]

@@ -1,13 +1,13 @@
-"""Rows of rolling elements from a catalogue section, and estimates of what it leaves open.
+"""Rows of rolling elements from a catalogue section, with estimates of missing dimensions.
 
-A catalogue prints the boundary dimensions. What the file leaves open of the inside follows from the usual
-proportions of the type (`exugear.system.bearings.rolling.dimensions`), and is told as an estimate with its range.
+A catalogue lists the boundary dimensions. Internal dimensions missing in the file follow from the usual proportions of
+the type (`exugear.system.bearings.rolling.dimensions`), and are reported as estimates with their range.
 
-`makers.csv` has the least of what the catalogues of SKF, NKE and NSK print for open bearings of today's design with
+`makers.csv` contains the minimum of the catalogue values of SKF, NKE and NSK for open bearings of current design with
 these boundary dimensions (text of the catalogues in the public repository ArtemFilin1990/Mar, commit 7b871a5):
-cylindrical roller bearings with E of that design, without E the older ones where they are printed; angular contact ball
-bearings of 40 degrees (B). Where two makers agree within a tenth and the third does not within a fifth, it was read
-wrong and is left out.
+cylindrical roller bearings with E of that design, without E the older ones where they are listed; angular contact ball
+bearings of 40 degrees (B). If two manufacturers agree within a tenth and the third deviates by more than a fifth, the
+third value was misread and is omitted.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Estimate:
     value: float
     low: float
     high: float
-    """What is taken, and the range that is usual."""
+    """Value used, and its usual range."""
     unit: str
     """Unit of the three, as the key has it; empty for numbers."""
 
@@ -57,7 +57,7 @@ def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:
 
     Parameters
     ----------
-    section : what the file says of the bearing
+    section : bearing section of the gearbox file
 
     Returns
     -------
@@ -71,8 +71,8 @@ def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:
     Notes
     -----
     A four-point ball bearing is two rows of the same balls about one centre, with contact angles of both signs: each
-    diagonal of a ball is a line of contact by itself. That leaves out that the diagonals share the ball's
-    equilibrium when their angles differ under load, and the gap between the halves of the groove under radial load.
+    diagonal of a ball is a line of contact by itself. This neglects that the diagonals share the ball's equilibrium
+    when their angles differ under load, and the gap between the halves of the groove under radial load.
 
     Examples
     --------
@@ -86,10 +86,10 @@ def catalogue_rows(section: CatalogueSection) -> tuple[RollingRow, ...]:
 
 
 def estimates(section: CatalogueSection) -> tuple[Estimate, ...]:
-    """Tell what `catalogue_rows` takes for the keys that a section leaves open.
+    """Return the values that `catalogue_rows` uses for the missing keys of a section.
 
-    An estimate rests on what the section gives and on the estimates before it: the number of rollers, say, on
-    their diameter.
+    An estimate follows from the section and from preceding estimates: for example, the number of rollers from their
+    diameter.
 
     Examples
     --------
@@ -336,7 +336,7 @@ def _ball_row(section: CatalogueSection) -> BallRow:
 
 
 def _placed(section: CatalogueSection, row: RollerRow | BallRow) -> tuple[RollingRow, ...]:
-    """Put the rows of a bearing or a pair side by side, with their contact angles."""
+    """Place the rows of a bearing or a pair next to each other, with their contact angles."""
     angle = math.radians(section.contact_angle_deg or 0.0)
     signed = angle if section.locates_towards == "+z" else -angle
     if section.type == "four_point_ball":
@@ -396,7 +396,7 @@ _SEALED = re.compile(r"2?RS|LL|DDU|VV|UU")
 
 @dataclass(frozen=True)
 class KnownRating:
-    """Dynamic and static rating of one bearing, N, and whose catalogues they are the least of."""
+    """Dynamic and static rating of one bearing, N, and the manufacturers whose catalogues they are the minimum of."""
 
     dynamic: float
     static: float
@@ -458,9 +458,9 @@ def margins(section: CatalogueSection) -> tuple[float, float]:
 
 
 def _listed_as(section: CatalogueSection) -> tuple[str, ...]:
-    """Designations of the table that may be meant; none for other designs, and for seals that leave less room inside.
+    """Matching designations of the table; none for other designs, and for seals that reduce the internal space.
 
-    A cylindrical roller bearing without E is of the older design where a maker still prints that one.
+    A cylindrical roller bearing without E has the older design if a manufacturer still lists it.
     """
     match = _LISTED.match((section.designation or "").strip().upper())
     if match is None:
@@ -485,7 +485,7 @@ def _listed_as(section: CatalogueSection) -> tuple[str, ...]:
 
 @cache
 def _listed() -> dict[tuple[str, str], tuple[float, float, float, float, float, tuple[str, ...]]]:
-    """Bore, outer diameter and width (mm), dynamic and static rating (N) and makers, by type and designation."""
+    """Bore, outer diameter and width (mm), dynamic and static rating (N) and manufacturers, by type and designation."""
     found = {}
     with (Path(__file__).parent / "makers.csv").open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):

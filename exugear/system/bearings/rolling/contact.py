@@ -1,4 +1,4 @@
-"""Contact of rolling elements with their raceways by ISO/TS 16281: loads, the inner ring in balance, its tangent.
+"""Contact of rolling elements with their raceways to ISO/TS 16281: loads, equilibrium of the inner ring, tangent.
 
 Rows of rollers and of balls between two rigid rings. Each roller is cut into laminae; a lamina between both
 raceways carries ``c_L / n * delta^(10/9)`` with ``c_L = 35948 L_we^(8/9)`` (N, mm), its approach ``delta`` following
@@ -7,7 +7,7 @@ from the six displacements of the inner ring relative to the outer one. Balls ar
 convex function of the displacements; so the load of the bearing is the gradient of a convex function, the equilibrium
 under a given force unique and the tangent symmetric.
 
-Rings are rigid, ribs, cage, friction, centrifugal forces and the housing are left out. The frame is that of
+Rings are rigid; ribs, cage, friction, centrifugal forces and the housing are neglected. The frame is that of
 `exugear.system.bearings.rolling.rows`.
 """
 
@@ -51,7 +51,7 @@ HIDDEN_FALL = 1e-9
 MOST_TRAVEL = 1.0
 """Displacement (m) at which a ring is taken for one that nothing holds."""
 LEAST_SHOULDER = 1e-6
-"""Least sine of the contact angle that a ball of a row with a contact angle may come down to."""
+"""Minimum sine of the contact angle of a ball in a row with a contact angle."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def row_contacts(rows: Sequence[RollingRow], first_roller_angle: float = 0.0) ->
 
 @lru_cache(maxsize=128)
 def _placed(rows: tuple[RollingRow, ...], first_roller_angle: float) -> RowContacts:
-    """Place all rolling elements; kept, because a search for balance or a sensitivity asks for the same ones anew."""
+    """Place all rolling elements; cached, because an equilibrium search or a sensitivity requests the same ones repeatedly."""
     first = (0, *np.cumsum([row.element_count for row in rows]).tolist())
     rollers = [(row, start) for row, start in zip(rows, first, strict=False) if isinstance(row, RollerRow)]
     balls = [(row, start) for row, start in zip(rows, first, strict=False) if isinstance(row, BallRow)]
@@ -172,7 +172,7 @@ def _placed(rows: tuple[RollingRow, ...], first_roller_angle: float) -> RowConta
 
 
 def is_preloaded(rows: Sequence[RollingRow]) -> bool:
-    """Tell whether rolling elements carry before anything loads the bearing; ribs that touch do not count."""
+    """Return whether rolling elements carry load before the bearing is loaded; ribs in contact do not count."""
     return elastic_energy(row_contacts(on_raceways(rows)), np.zeros(6)) > 0.0
 
 
@@ -226,10 +226,11 @@ def element_loads(contacts: RowContacts, displacement: Floats) -> Floats:
 
 
 def element_pressures(contacts: RowContacts, displacement: Floats) -> Floats:
-    """Greatest pressure of each rolling element on a raceway by Hertz, row by row, Pa, shape (elements,).
+    """Return the maximum Hertzian pressure of each rolling element on a raceway, row by row, Pa, shape (elements,).
 
-    Of rollers that of the lamina that carries most, on the inner raceway, which is the narrower one; pressures at
-    the very end of a roller, higher than Hertz's, are left out. Of balls that on the raceway that fits them less.
+    For rollers it is the pressure of the most loaded lamina, on the inner raceway, which is the more curved one;
+    pressures at the very end of a roller, higher than Hertzian, are neglected. For balls it is the pressure on the
+    raceway of lower conformity.
     """
     pressure = np.zeros(contacts.first[-1])
     if contacts.laminae is not None:
@@ -267,7 +268,7 @@ class BearingState(ReprMixin):
     element_load: Floats
     """(elements,) load of each roller or ball, row by row, N."""
     element_pressure: Floats
-    """(elements,) greatest pressure of each on a raceway, Pa."""
+    """(elements,) maximum pressure of each on a raceway, Pa."""
     lamina_load: tuple[Floats | None, ...]
     """(elements, laminae) for each row of rollers the load of each lamina, N; None for a row of balls."""
     energy: float
@@ -352,7 +353,7 @@ def equilibrium(
 
 
 def _holds(row: RollingRow, axial_force: float) -> bool:
-    """Tell whether a row can hold an axial force on the inner ring: balls in grooves without contact angle, both."""
+    """Return whether a row can carry an axial force on the inner ring: balls in grooves without contact angle, both."""
     if row.contact_angle == 0.0:
         return isinstance(row, BallRow) and not row.aligning
     return (row.contact_angle > 0.0) == (axial_force > 0.0)

@@ -1,4 +1,4 @@
-"""Dimensions of rolling bearings: boundary dimensions by designation, usual proportions of what catalogues leave open.
+"""Dimensions of rolling bearings: boundary dimensions by designation, usual proportions of missing dimensions.
 
 Diameters, numbers and lengths were set so that the static ratings that follow from them (ISO 76) are those of SKF's
 General Catalogue (2008), its edition of 2017 for needle roller bearings. For each type: how many bearings, and
@@ -16,17 +16,18 @@ self-aligning ball    72 1.00 0.71-1.21
 four-point ball       51 1.01 0.93-1.13
 ==================== === ==== =========
 
-The range of each single proportion is that of bearings whose inside is published (Harris and Kotzalas, Rolling
-Bearing Analysis; data sets of faulty bearings), widened where the ratings ask for it.
+The range of each single proportion covers bearings with published internal geometry (Harris and Kotzalas, Rolling
+Bearing Analysis; data sets of faulty bearings), widened where the ratings require it.
 
 Sizes of radial bearings are those of ISO 15, of tapered roller bearings those of ISO 355; the basic numbers of
-designations are those of DIN 623-1: type, dimension series, bore. What stands behind the number (seals, cages,
-clearance) does not change them.
+designations are those of DIN 623-1: type, dimension series, bore. Suffixes (seals, cages, clearance) do not change
+them.
 
-All series were compared with what makers print: of 737 designations that the tables give, 728 stand with the same three
-numbers in catalogues of FAG/INA, FBJ, IBB or KRW (their text in the public repository ArtemFilin1990/Mar, commit
-7b871a5), and the series 2 besides in BOLTS (DIN 625-1 and 5412-1); none stands there with others. The nine that are not
-listed, N303, N1005, N1030 to N1040 and NU1004, differ from listed ones in their ribs alone, as all NUP bearings do.
+All series were compared with manufacturers' catalogues: of 737 designations in the tables, 728 are listed with the same
+three dimensions in catalogues of FAG/INA, FBJ, IBB or KRW (their text in the public repository ArtemFilin1990/Mar,
+commit 7b871a5), and the series 2 also in BOLTS (DIN 625-1 and 5412-1); none is listed with other dimensions. The nine
+that are not listed, N303, N1005, N1030 to N1040 and NU1004, differ from listed ones only in their ribs, as all NUP
+bearings do.
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ ALIGNING_ROW_DISTANCE: Mapping[str, Proportion] = {
 }
 """Distance of the rows over the width of the bearing, where both rows point to its middle."""
 PAIR_DISTANCE = Proportion(1.0, 0.95, 1.05)
-"""Distance of the middles of the rows over the width of one bearing, of two that stand side by side."""
+"""Distance between the middles of the rows over the width of one bearing, for two bearings next to each other."""
 TAPERED_PAIR_DISTANCE: Mapping[str, Proportion] = {
     "X": Proportion(1.16, 1.11, 1.24),
     "O": Proportion(0.84, 0.76, 0.89),
@@ -126,7 +127,7 @@ CLEARANCE_UM: Mapping[str, tuple[float, float]] = {
     "self_aligning_ball": (15.0, 0.33),
     "four_point_ball": (60.0, 0.45),
 }
-"""Greatest radial clearance (micrometres) before mounting, normal group of ISO 5753: a part, and a part for each mm of
+"""Maximum radial clearance (micrometres) before mounting, normal group of ISO 5753: a constant, and a part per mm of
 bore. A fit within 15 % to the tables, which go by steps; of four-point bearings from the axial one."""
 AXIAL_SETTING_UM_PER_MM = 0.5
 """Range of the axial setting of a pair, either way, for each mm of bore: assumed, it is set at mounting."""
@@ -291,7 +292,7 @@ _LEAST_BORE = {
     "cylindrical_roller": {"10": 20, "02": 15, "03": 17, "04": 30},
     "spherical_roller": {"22": 25, "23": 40},
 }
-"""Bores below which no maker lists a type in a dimension series, where the table of its widths goes further."""
+"""Bores below which no manufacturer lists a type in a dimension series, where the table of its widths continues."""
 
 _BORES = {"00": 10, "01": 12, "02": 15, "03": 17}
 

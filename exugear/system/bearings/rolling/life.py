@@ -75,12 +75,12 @@ def reference_life(
     ----------
     rows : rows of the bearing
     loads
-        For each row of rollers the lamina loads, shape (elements, laminae); for each row of balls the loads,
-        shape (elements,); N. Several positions of the cage may stand one under another: (positions * elements, ...).
+        For each row of rollers the lamina loads, shape (elements, laminae); for each row of balls the loads, shape
+        (elements,); N. Several positions of the cage may be stacked: (positions * elements, ...).
     bearing_type : type of the bearing
     dynamic_rating : C_r of the whole bearing, N, where the manufacturer states it; by default `basic_dynamic_rating`
     inner_ring_turns_against_load
-        Whether the load stands still against the outer ring, as usual, or against the inner ring, as in planets.
+        Whether the load is stationary relative to the inner ring, as in planets, instead of the outer ring, as usual.
 
     Returns
     -------
@@ -284,12 +284,12 @@ def life_factor(ratio: float, cleanliness_load: float, bearing_type: BearingType
 
     Parameters
     ----------
-    ratio : kappa; below 0.1 a_ISO is that of 0.1, the least that the standard has
+    ratio : kappa; below 0.1 a_ISO is evaluated at 0.1, the minimum of the standard
     cleanliness_load : ``e_C C_u / P``
 
     Examples
     --------
-    Dirt takes nine tenths of any life:
+    Severe contamination reduces any life by nine tenths:
 
     >>> round(life_factor(2.0, 0.0, "cylindrical_roller"), 6)
     0.1

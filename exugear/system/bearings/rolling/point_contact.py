@@ -118,7 +118,7 @@ class EllipticContact:
 
     @property
     def pressure(self) -> float:
-        """Greatest pressure over the load to the power of 1/3, Pa/N^(1/3)."""
+        """Maximum pressure over the load to the power of 1/3, Pa/N^(1/3)."""
         _, second = elliptic_integrals(1.0 - 1.0 / self.ratio**2)
         long = math.pow(2.0 * self.ratio**2 * second / math.pi, 1.0 / 3.0) * _size_of_unit_load(self.curvature_sum)
         return 1.5 * self.ratio / (math.pi * long**2)
@@ -141,10 +141,10 @@ def elliptic_contact(curvature_sum: float, curvature_difference: float) -> Ellip
 
     Notes
     -----
-    The ratio chi of the half axes follows from ``1 - 2 / (chi^2 - 1) (K / E - 1) = F(rho)``, whose left side grows
-    from 0 to 1. With ``E' = E / (1 - nu^2)`` of both bodies and the reduced values ``a* = (2 chi^2 E(m) / pi)^(1/3)``
-    and ``delta* = 2 K(m) / pi (pi / (2 chi^2 E(m)))^(1/3)``, ``m = 1 - 1 / chi^2``, the approach is
-    ``delta* (3 Q / (E' S))^(2/3) S / 2`` and the greatest pressure ``3 Q / (2 pi a b)``.
+    The ratio chi of the half axes follows from ``1 - 2 / (chi^2 - 1) (K / E - 1) = F(rho)``, whose left side grows from
+    0 to 1. With ``E' = E / (1 - nu^2)`` of both bodies and the reduced values ``a* = (2 chi^2 E(m) / pi)^(1/3)`` and
+    ``delta* = 2 K(m) / pi (pi / (2 chi^2 E(m)))^(1/3)``, ``m = 1 - 1 / chi^2``, the approach is ``delta* (3 Q / (E'
+    S))^(2/3) S / 2`` and the maximum pressure ``3 Q / (2 pi a b)``.
 
     References
     ----------
@@ -204,7 +204,7 @@ def ball_constant(row: BallRow) -> float:
 
 
 def ball_pressure(row: BallRow) -> float:
-    """Greatest pressure of a ball on either ring over its load to the power of 1/3, Pa/N^(1/3)."""
+    """Maximum pressure of a ball on either ring over its load to the power of 1/3, Pa/N^(1/3)."""
     return max(contact.pressure for contact in groove_contacts(row))
 
 
@@ -223,7 +223,7 @@ class BallArrays:
     constant: Floats
     """(n,) N/m^(3/2)."""
     pressure: Floats
-    """(n,) greatest pressure over the load to the power of 1/3, Pa/N^(1/3)."""
+    """(n,) maximum pressure over the load to the power of 1/3, Pa/N^(1/3)."""
     element: Integers
     """(n,) number of each ball, counted through all rows of the bearing."""
 
@@ -347,7 +347,7 @@ STEPS, MORE_STEPS = (32, 24), (48, 32)
 """Steps of a table along the root of the depth and along the tilt; more where first contact is no smooth function of
 the tilt, as of straight rollers."""
 MOST_TILT_OF_TABLE = 5e-3
-"""Tilt (rad) up to which a table goes: more than any bearing stands. Beyond it slices are summed."""
+"""Tilt (rad) up to which a table extends: more than any bearing permits. Beyond it slices are summed."""
 MOST_PRESSURE = 4e9
 """Contact pressure (Pa) that a table goes to: that of the static rating of roller bearings (ISO 76)."""
 ROUNDING = 2e-4
@@ -411,7 +411,7 @@ def _patches(nodes: Floats, width: Floats) -> Floats:
 
 
 def _is_crowned(row: RollerRow) -> bool:
-    """Tell whether the roller curves away from its middle on, so that first contact moves steadily with the tilt."""
+    """Return whether the profile drops from the middle on, so that first contact moves continuously with the tilt."""
     return row.profile_table is None and (row.profile_factor > 0.0 or row.crown_curvature > 0.0)
 
 
@@ -422,10 +422,10 @@ def _slice_positions(row: RollerRow) -> Floats:
 
 
 def _first_contact(row: RollerRow, tilts: Floats, rounding: float) -> tuple[Floats, Floats]:
-    """Bound (m) below the approach at which a roller first touches, and its derivative, at each tilt.
+    """Return a bound (m) below the approach at first contact of a roller, and its derivative, at each tilt.
 
-    The least of gap and tilt times place over the roller's length. A slight crown, and its height taken off again,
-    keeps it smooth where the roller has none of its own, so that forces have no jump at zero tilt.
+    Minimum of gap and tilt times position over the roller's length. A slight crown, whose height is subtracted again,
+    keeps it smooth for rollers without a crown, so that forces are continuous at zero tilt.
     """
     height = 0.0 if _is_crowned(row) else rounding
     share = np.linspace(-1.0, 1.0, 8001)[1:-1]

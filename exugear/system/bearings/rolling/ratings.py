@@ -1,17 +1,17 @@
-"""Load ratings and equivalent loads of rolling bearings from their rows, by ISO 281 and ISO 76.
+"""Load ratings and equivalent loads of rolling bearings from their rows, according to ISO 281 and ISO 76.
 
 The dynamic factor f_c and the static factor f_0 are computed, not read from the tables of the standards: f_c by
 the formulas of ISO/TR 1281-1 behind ISO 281:2007, f_0 from the Hertzian contact behind ISO 76:2006 (ISO/TR 10657).
 The standards' tables are the tests. The formulas hold in N and mm; arguments and results are SI.
 
-A bearing has `i` rows that are alike. Its ratings are radial forces: contact angles above 45 degrees make a
-thrust bearing and are refused. A manufacturer's own ratings may be higher or lower; where they are known, take them.
+A bearing has `i` rows that are alike. Its ratings are radial forces: contact angles above 45 degrees make a thrust
+bearing and are refused. A manufacturer's own ratings may be higher or lower; where they are known, use them.
 
-The equivalent load is the radial load that would wear the bearing out, or press its rolling elements in, as the
-radial and axial load together do. Both standards give it as the larger of two sums ``X F_r + Y F_a``; the limit
-``e`` of ISO 281 is the ratio ``F_a / F_r`` at which the two are equal. Opposite contact angles make a double row
-bearing (or a pair in X or O), equal ones a single row bearing or a pair in tandem. Moments are not in it: rows
-that carry a moment are for the reference rating life (`exugear.system.bearings.rolling.life`).
+The equivalent load is the radial load with the same fatigue damage (dynamic), or the same permanent indentation
+(static), as the radial and axial load together. Both standards give it as the larger of two sums ``X F_r + Y F_a``; the
+limit ``e`` of ISO 281 is the ratio ``F_a / F_r`` at which the two are equal. Opposite contact angles make a double row
+bearing (or a pair in X or O), equal ones a single row bearing or a pair in tandem. Moments are neglected: rows that
+carry a moment require the reference rating life (`exugear.system.bearings.rolling.life`).
 """
 
 from __future__ import annotations
@@ -184,8 +184,8 @@ def equivalent_load(
     rows : rows of the bearing
     bearing_type : decides on the factors. Four-point bearings take those of double rows.
     radial, axial
-        Loads of the bearing, N. The sign of the axial load, positive where it pushes the inner ring towards +z,
-        only tells which rows carry it.
+        Loads of the bearing, N. The sign of the axial load, positive where it pushes the inner ring towards +z, only
+        determines which rows carry it.
     static_rating : C_0r of the bearing, N: the contact angle of ball bearings grows with the axial load over it
 
     Returns
@@ -443,5 +443,5 @@ def _tabulated(table: tuple[tuple[float, ...], ...], angle: float, load: float) 
 
 
 def _interpolate_angle(values: Sequence[float], angle: float) -> float:
-    """Value between the tabulated contact angles, linear as the standard says, constant beyond them."""
+    """Value between the tabulated contact angles, interpolated linearly according to the standard, constant beyond them."""
     return float(np.interp(math.degrees(angle), CONTACT_ANGLES, values))

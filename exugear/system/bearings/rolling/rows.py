@@ -1,9 +1,9 @@
-"""Rows of rollers and of balls: the elements that all rolling bearings are made of.
+"""Rows of rollers and of balls, from which all rolling bearings are composed.
 
 Frame: origin at the middle of the bearing, z along its axis; coordinates
 ``(u_x, u_y, u_z, theta_x, theta_y, theta_z)`` of the inner ring relative to the outer ring, SI units.
 
-What a catalogue does not print is estimated from the boundary dimensions by the usual proportions of the design.
+Dimensions missing in a catalogue are estimated from the boundary dimensions by the usual proportions of the design.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class BearingError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class RollingRow:
-    """What a row of rollers and one of balls have in common."""
+    """Common base of rows of rollers and of balls."""
 
     element_diameter: float
     pitch_diameter: float
@@ -60,7 +60,7 @@ class RollingRow:
     """Whether the outer raceway is a sphere, in which no element tilts: tilting rings about its centre loads
     nothing."""
     sphere_centre: float = 0.0
-    """Where that centre stands on the axis, m: in the middle of radial bearings, beside thrust bearings."""
+    """Axial position of that centre, m: in the middle of radial bearings, outside thrust bearings."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be built."""
@@ -215,12 +215,12 @@ def rib_row(row: RollerRow, towards: int, contact_length: float) -> RollerRow:
 
 
 def is_rib(row: RollingRow) -> bool:
-    """Tell whether a row stands for ribs."""
+    """Return whether a row represents ribs."""
     return isinstance(row, RollerRow) and row.rib
 
 
 def on_raceways(rows: Sequence[RollingRow]) -> tuple[RollingRow, ...]:
-    """Rows without those that stand for ribs: what is rated, and what wears out by rolling."""
+    """Rows without those that represent ribs: the rows with a rating and with rolling contact fatigue."""
     return tuple(row for row in rows if not is_rib(row))
 
 
@@ -290,10 +290,9 @@ def _approached(row: Row, approach: float) -> Row:
 class CylindricalRollerBearing:
     """Single-row cylindrical roller bearing from its boundary dimensions.
 
-    What the catalogue does not print is estimated from the boundary dimensions: roller diameter
-    ``0.27 (D - d)``, effective length ``0.64 B``, and as many rollers as fit on the pitch circle at a
-    pitch of 1.15 roller diameters (with a cage) or 1.01 (full complement); see
-    `exugear.system.bearings.rolling.dimensions`.
+    Dimensions missing in the catalogue are estimated from the boundary dimensions: roller diameter ``0.27 (D - d)``,
+    effective length ``0.64 B``, and as many rollers as fit on the pitch circle at a pitch of 1.15 roller diameters
+    (with a cage) or 1.01 (full complement); see `exugear.system.bearings.rolling.dimensions`.
 
     Parameters
     ----------
@@ -382,7 +381,7 @@ class TaperedRollerBearing:
 
 @dataclass(frozen=True, kw_only=True)
 class BearingPair:
-    """Two equal bearings side by side on one shaft and in one housing, as one bearing.
+    """Two equal bearings next to each other on one shaft and in one housing, as one bearing.
 
     Examples
     --------
