@@ -234,7 +234,7 @@ def ratings_of(section: CatalogueSection) -> Ratings:
 
 
 def _two_designs(section: CatalogueSection, taken: KnownRating) -> str:
-    """Return a note if manufacturers list a reinforced design, too, and which is used; empty where there is one design."""
+    """Return a note if manufacturers list a reinforced design, too, and which is used; empty otherwise."""
     other = other_design(section)
     if other is None:
         return ""
@@ -339,7 +339,7 @@ def _remarks(point: OperatingPoint, ratings: Ratings, reaction: Floats | None) -
 
 
 def estimate_effects(point: OperatingPoint) -> tuple[Sensitivity, ...]:
-    """Return the radial stiffness at both limits of each dimension missing in the file, at the load of an operating point.
+    """Return the radial stiffness at both limits of each dimension missing in the file, at an operating point.
 
     The change is evaluated at one position of the cage.
     """

@@ -249,7 +249,7 @@ class SolidBody:
 
 
 def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
-    """Return the data of a body's solid from the gearbox file; its solid file exists and is permitted, but not yet read.
+    """Return the data of a body's solid from the gearbox file; its file exists and is permitted, but is not yet read.
 
     Raises
     ------

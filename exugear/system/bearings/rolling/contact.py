@@ -159,7 +159,7 @@ def row_contacts(rows: Sequence[RollingRow], first_roller_angle: float = 0.0) ->
 
 @lru_cache(maxsize=128)
 def _placed(rows: tuple[RollingRow, ...], first_roller_angle: float) -> RowContacts:
-    """Place all rolling elements; cached, because an equilibrium search or a sensitivity requests the same ones repeatedly."""
+    """Place all rolling elements; cached, because an equilibrium search requests the same ones repeatedly."""
     first = (0, *np.cumsum([row.element_count for row in rows]).tolist())
     rollers = [(row, start) for row, start in zip(rows, first, strict=False) if isinstance(row, RollerRow)]
     balls = [(row, start) for row, start in zip(rows, first, strict=False) if isinstance(row, BallRow)]

@@ -443,5 +443,5 @@ def _tabulated(table: tuple[tuple[float, ...], ...], angle: float, load: float) 
 
 
 def _interpolate_angle(values: Sequence[float], angle: float) -> float:
-    """Value between the tabulated contact angles, interpolated linearly according to the standard, constant beyond them."""
+    """Interpolate linearly between the tabulated contact angles, as the standard says; constant beyond them."""
     return float(np.interp(math.degrees(angle), CONTACT_ANGLES, values))
