@@ -458,7 +458,7 @@ def margins(section: CatalogueSection) -> tuple[float, float]:
 
 
 def _listed_as(section: CatalogueSection) -> tuple[str, ...]:
-    """Return the matching designations of the table; none for other designs, and for seals that reduce the internal space.
+    """Return the matching designations of the table; none for other designs, nor for seals that reduce the inner space.
 
     A cylindrical roller bearing without E has the older design if a manufacturer still lists it.
     """
