@@ -38,7 +38,7 @@ class Loading:
 
     @property
     def is_constant(self) -> bool:
-        """Tell whether the generalized forces never change."""
+        """Return whether the generalized forces are constant."""
         return self.drive is None and not self.varying
 
     def generalized(self, assembly: Assembly, t: float, q: Floats, v: Floats) -> Floats:

@@ -1,8 +1,8 @@
-"""Eigenmodes of a gearbox variant: frequencies, damping, where the energy sits, and what moves in words.
+"""Eigenmodes of a gearbox variant: frequencies, damping, distribution of energy, and mode shapes as text.
 
-Linearised about the static equilibrium under the file's static load, PMC frozen and mesh stiffness averaged
-over the cycle. The tangent of the law at that load is used: k'(PMC) times the deflection would give the free
-rotation a false stiffness.
+Linearised about the static equilibrium under the file's static load, PMC frozen and mesh stiffness averaged over the
+cycle. The tangent of the mesh model at that load is used: a stiffness k'(PMC) times the deflection would give the free
+rotation a spurious stiffness.
 """
 
 from __future__ import annotations
@@ -69,10 +69,11 @@ def kinetic_shares(assembly: Assembly, shapes: Floats, q: Floats) -> Floats:
 
 
 def _elastic_energies(body: ReducedBody, shapes: Floats) -> Floats:
-    """Twice the kinetic energy (n, motions) of an elastic body: of its rigid part, and of each deformation.
+    """Return twice the kinetic energy (n, motions) of a flexible body: of its rigid part, and of each deformation.
 
-    The rigid part is what the momentum of the whole tells; the rest is orthogonal to it. Turns about all three axes
-    share their energy in the proportion that each has alone: a housing's products of inertia couple them.
+    The rigid part follows from the total momentum; the remainder is orthogonal to it. The energy of rotations about the
+    three axes is divided in proportion to the energy of each alone, because a housing's products of inertia couple
+    them.
     """
     rigid = body.rigid_motions(body.rigid_inertia.centre)
     inertia = rigid.T @ body.mass @ rigid
@@ -100,12 +101,12 @@ def _elastic_energies(body: ReducedBody, shapes: Floats) -> Floats:
 
 
 def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Floats, strain: Floats) -> str:
-    """Describe a mode: who moves how, until 80 % of the kinetic energy is told, and what is strained most.
+    """Describe a mode: motions by body up to 80 % of the kinetic energy, and the elements with most strain energy.
 
     Parameters
     ----------
     kinetic : (bodies, motions) share by body and motion
-    strain : (elements,) share by mesh, bearing, coupling and elastic body
+    strain : (elements,) share by mesh, bearing, coupling and flexible body
     """
     moving: dict[str, float] = {}
     for body, shares in zip(assembly.bodies, kinetic, strict=True):
@@ -164,7 +165,7 @@ class Modes(ReprMixin):
     amplification: Floats
     """(n, meshes) overall DTE at resonance per amplitude of STE in one mesh, m/m."""
     names: tuple[str, ...]
-    """What moves, in words."""
+    """Kinetic energy by body, as text."""
     growth_rate: float
     """Fastest growth of any disturbance, 1/s; above 0 only where the law `tangential` makes a mode flutter."""
 
@@ -186,7 +187,7 @@ class Modes(ReprMixin):
 
     @property
     def label(self) -> str:
-        """What the modes belong to: variant, mesh law, inertia set and housing factor."""
+        """Model of the modes: variant, mesh model, inertia set and housing factor."""
         assembly = self.assembly
         model = f"mesh model {assembly.mesh_model}, inertia set {assembly.inertias}"
         return f"{assembly.variant}, {model}, housing stiffness factor {assembly.housing_factor:g}"
@@ -323,16 +324,16 @@ def eigenmodes(
     *,
     angles: Angles = "reference",
 ) -> Modes:
-    """Eigenmodes of a gearbox variant at its static load.
+    """Compute the eigenmodes of a gearbox variant at its static load.
 
     Parameters
     ----------
-    choice : variant, mesh law and inertia set
+    choice : variant, mesh model and inertia set
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness F_bt / STE over the cycle, N/m, for example from the STE tables.
-    bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
+    bodies : by body name, reduced flexible bodies, required by the variant `flexible`
     angles : {"reference", "operating"}
-        Angles of the law `tangential`.
+        Angles of the mesh model `tangential`.
 
     Examples
     --------

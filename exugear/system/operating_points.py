@@ -1,12 +1,12 @@
-"""Catalogue bearings at the loads that they really carry: the static state with the full law of their rows.
+"""Catalogue bearings at their operating loads: the static state with the nonlinear model of their rows.
 
 A bearing's stiffness depends on its load, and the load on the stiffness of all bearings. The static state is solved
-with the non-linear law of every row, so that both belong to each other to round-off. The problem is convex, and starts
-from the bearings' stiffness at a nominal load. A linear bearing then passes the point that its rows are in, and has
-their tangent there: its own static state is that of the rows.
+with the nonlinear model of every row, so that load and stiffness are consistent to round-off. The problem is convex,
+and starts from the bearings' stiffness at a nominal load. A linear bearing then passes through the state of its rows,
+with their tangent there: its static state is the same as with the rows.
 
-What lasts in motion is the mean over the turn of each carrier, which equal planets tell at one of its angles: bearings
-of planets get the mean of their set. Unequal ones, by their pins or their spacing, are looked at over the whole turn.
+In motion the mean over the revolution of each carrier is relevant, which equal planets give at a single angle: bearings
+of planets get the mean of their set. Planets with unequal pins or spacing are evaluated over the whole revolution.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def linearise_at_static_load(assembly: Assembly) -> Assembly:
 
 
 def _with_contacts(assembly: Assembly) -> tuple[Assembly, Floats | None]:
-    """Let teeth bear as finite elements have it where gears stand at rest; with the last state of the search."""
+    """Set the load distribution of teeth by finite-element contact at static gear positions; return the last state."""
     near = None
     even = assembly
     for _ in range(CONTACT_STEPS if contact_places(assembly, np.zeros(assembly.size)) else 0):
@@ -346,7 +346,7 @@ def bearing_duties(assembly: Assembly) -> tuple[BearingLoadState, ...]:
 
 
 def is_stated(bearing: Bearing) -> bool:
-    """Tell whether the file states a bearing's load."""
+    """Return whether the file states a bearing's load."""
     return bearing.catalogue is not None and bearing.catalogue.radial_load_kN is not None
 
 
@@ -358,9 +358,9 @@ def reaction_loads(assembly: Assembly) -> dict[str, Floats]:
 
 
 def mesh_duties(assembly: Assembly) -> tuple[MeshLoadState, ...]:
-    """Find how the gears of all meshes stand under the static load, and how evenly their teeth bear there.
+    """Return the positions of the gears of all meshes under the static load, and the load distribution of their teeth.
 
-    Each mesh has its own contact here, over more of the mesh cycle than its law needs.
+    Each mesh has its own contact here, at more positions of the mesh cycle than its mesh model needs.
 
     Raises
     ------

@@ -1,8 +1,9 @@
-"""What is possible and hardly meant: masses, bores, places and centre distances beside what the gears' dimensions say.
+"""Plausibility checks: possible but implausible masses, bores, positions and centre distances for the gear dimensions.
 
-Limits are wide: a unit mistaken is a factor of ten or more, and no gearbox that is meant so is to raise an alarm.
+Limits are wide: a wrong unit is a factor of ten or more, and an intended design must not cause a warning.
 
-From macro geometry and the static load alone, so that it costs nothing before the finite elements do.
+Only macro geometry and the static load are used, so that the checks run at negligible cost before any finite-element
+work.
 """
 
 from __future__ import annotations
@@ -22,16 +23,16 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.transmission_error.search import pitch_point_pressure
 
 LEAST_CLASH, CLASHING_SHARE = 1e-3, 0.15
-"""Height (m), and part of the width of a row, by which a gear and a bearing stand in each other before it is told.
+"""Overlap of a gear and a bearing from which a warning is given: height (m), and part of the width of a row.
 
-Rings of tapered bearings are narrower than the bearing, and faces in files wider than teeth with chamfers.
+Rings of tapered bearings are narrower than the bearing, and face widths in files include chamfers.
 """
 STEEL = 7850.0
 """Density that masses are compared by, kg/m3."""
 MOST_MASS, LEAST_MASS = 50.0, 0.02
 """Mass of a body over that of the steel cylinder around its gears and bearings."""
 MOST_GYRATION, LEAST_GYRATION = 8.0, 0.02
-"""Radius of gyration of a body over the reach of its gears and bearings: one disc beside small gears may be large."""
+"""Maximum radius of gyration of a body over the reach of its gears and bearings: a disc next to gears may be large."""
 LEAST_OVERLAP = 0.9
 """Part of the face of a pair on which both gears have teeth."""
 MOST_BACKLASH = 3.0
@@ -39,8 +40,8 @@ MOST_BACKLASH = 3.0
 LEAST_BORE, MOST_RIM = 0.02, 2.0
 """Bore of a gear, and outside of a ring's rim, over the root diameter."""
 WHEEL, LEAST_SEAT, LEAST_OVER_SHAFT = 1.5, 0.98, 0.9
-"""Roots over the shaft beside them from which a gear is a wheel on a shaft, not one piece with it; and least bore of a
-wheel over the bores of the bearings on both sides of it, and over the shaft that the file draws under it."""
+"""Root diameter over the adjacent shaft from which a gear is taken as mounted, not integral with the shaft; and minimum
+bore of a mounted gear over the bores of the bearings on both sides, and over the shaft under it in the file."""
 OTHER_SIZE, MOST_WALL = 0.01, 4.0
 """Difference of a diameter from that of the designation, and outer diameter of a bearing over its bore."""
 TILTING = ("deep_groove_ball", "self_aligning_ball", "angular_contact_ball", "four_point_ball", "spherical_roller")
@@ -104,7 +105,7 @@ def _doubts_about_mass(body: Body, radius: float, length: float) -> Iterator[str
 
 
 def _bores(gearbox: Gearbox) -> Iterator[str]:
-    """Tell bores and rims that no gear has, and bores that the shaft does not pass."""
+    """Yield implausible bores and rim diameters of gears, and bores smaller than the shaft."""
     for name, gear in gearbox.gears.items():
         key = f"gears.{name}.held_diameter_mm"
         held = gear.held_diameter
@@ -122,7 +123,7 @@ def _bores(gearbox: Gearbox) -> Iterator[str]:
 
 
 def _seats(gearbox: Gearbox) -> Iterator[str]:
-    """Tell bores of wheels that are narrower than the shaft on either side of them, or than the shaft under them."""
+    """Yield bores of mounted gears narrower than the shaft on either side of them, or than the shaft under them."""
     told = set()
     for body in gearbox.bodies():
         for name, wheel in body.wheels.items():
@@ -162,7 +163,7 @@ def _bores_beside(gearbox: Gearbox, body: Body, place: float) -> tuple[float, fl
 
 
 def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> float | None:
-    """Least diameter (m) of the shape of a body under a gear; None without one."""
+    """Minimum diameter (m) of the shape of a body under a gear; None without one."""
     section = gearbox.case.bodies.get(body.family)
     if section is None or section.shape is None:
         return None
@@ -177,7 +178,7 @@ def _shaft_under(gearbox: Gearbox, body: Body, gear: Gear, place: float) -> floa
 
 
 def _bearings(gearbox: Gearbox) -> Iterator[str]:
-    """Tell bearings of other diameters than their designation says, or than any bearing has."""
+    """Yield bearings with diameters other than their designation states, or than any bearing has."""
     for name, section in gearbox.case.bearings.items():
         catalogue = section.catalogue
         if catalogue is None:
@@ -199,7 +200,7 @@ def _bearings(gearbox: Gearbox) -> Iterator[str]:
 
 
 def _faces(gearbox: Gearbox) -> Iterator[str]:
-    """Tell gears in mesh that miss each other along the axis by a part of their face."""
+    """Yield gears in mesh with an axial offset of a part of their face width."""
     bodies = gearbox.named_bodies
     told = set()
     for mesh in gearbox.meshes:
@@ -225,7 +226,7 @@ def _faces(gearbox: Gearbox) -> Iterator[str]:
 
 
 def usual_backlash(pair: GearPair) -> float:
-    """Least normal backlash that ISO/TR 10064-2 recommends for gears of usual accuracy in usual housings, m.
+    """Return the minimum normal backlash of ISO/TR 10064-2 for gears and housings of usual accuracy, m.
 
     Examples
     --------
@@ -239,7 +240,7 @@ def usual_backlash(pair: GearPair) -> float:
 
 
 def _backlashes(gearbox: Gearbox) -> Iterator[str]:
-    """Tell pairs with far more backlash than drawings ask for: shifts and centre distance do not belong together."""
+    """Yield pairs with far more backlash than usual: shifts and centre distance do not match."""
     for name in dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes):
         pair = gearbox.gear_pairs[name]
         usual = usual_backlash(pair)
@@ -253,7 +254,7 @@ def _backlashes(gearbox: Gearbox) -> Iterator[str]:
 
 
 def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
-    """Tell shafts with gears that only one bearing of a type holds which gives way to tilting."""
+    """Yield shafts with gears that are supported by only one bearing, of a type that is compliant in tilting."""
     told = set()
     for body in gearbox.bodies():
         bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
@@ -269,7 +270,7 @@ def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
 
 
 def _faces_in_bearings(gearbox: Gearbox) -> Iterator[str]:
-    """Tell gears that run into a bearing of their own body."""
+    """Yield gears that overlap a bearing of their own body."""
     told = set()
     for body in gearbox.bodies():
         bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
@@ -286,7 +287,7 @@ def _faces_in_bearings(gearbox: Gearbox) -> Iterator[str]:
 
 
 def _clash(gear: Gear, place: float, bearing: Bearing) -> float:
-    """Length along the axis (m) over which a gear's body and a bearing's rings share space; zero if hardly any."""
+    """Axial length (m) over which a gear's body and a bearing's rings overlap; zero if negligible."""
     catalogue = bearing.catalogue
     if catalogue is None:
         return 0.0
@@ -306,10 +307,10 @@ def _width(catalogue: CatalogueSection) -> float:
 # How near gear pairs are to what tables cut off or what wears out: form circles, tips, pressure at the pitch point
 
 LEAST_FORM_MARGIN = 0.02
-"""Part of a flank that should be left between the mate's tip and the form circle.
+"""Minimum part of a flank between the mating gear's tip and the root form diameter.
 
-Elastic teeth meet a little before and after the path of contact; tables cut off what is beyond the form circle, and
-count it (`fe_ste.contact.kinematics`).
+Loaded teeth are in contact slightly beyond the path of contact; tables truncate contact at the form diameter, and
+record the truncated load (`fe_ste.contact.kinematics`).
 """
 LARGEST_PRESSURE = 3e9
 """Pressure at the pitch point that is doubted, Pa: case-hardened flanks bear 1.5 GPa for ever, 2.4 GPa once."""
@@ -322,8 +323,8 @@ class PairMargins:
     """Margins of a gear pair."""
 
     form: tuple[float, float]
-    """Of gear 1 and gear 2: roll length from the form circle to where the mate's tip touches, over the roll length
-    of the flank; NaN where the root is relieved on purpose, so that contact may end there."""
+    """Of gear 1 and gear 2: roll length from the root form diameter to the contact of the mating tip, over the roll
+    length of the flank; NaN where the root is relieved on purpose, so that contact may end there."""
     tip_thickness: tuple[float, float]
     """Of both tips in the normal section, in normal modules."""
     pitch_point_pressure: float
@@ -395,7 +396,7 @@ def _span_doubt(gear: Gear, count: int) -> str:
 
 
 def backlash_range(gearbox: Gearbox, pair: GearPair) -> tuple[float, float, float]:
-    """Least, computed and greatest backlash of a pair on its working circles, m: of the thickest and thinnest teeth.
+    """Return minimum, nominal and maximum backlash of a pair on its working circles, m: of thickest and thinnest teeth.
 
     Examples
     --------
@@ -431,7 +432,7 @@ def _margin(gear: Gear, roll_length: float) -> float:
 
 
 def doubts_about_pairs(gearbox: Gearbox) -> Iterator[str]:
-    """Say which margins of pairs at work are small: key, value, and what would be right."""
+    """Yield the small margins of active pairs: key, value, and the recommended value."""
     at_work = {mesh.pair.name for mesh in gearbox.meshes}
     for name, spec in gearbox.pairs.items():
         if name not in at_work:

@@ -1,6 +1,6 @@
-"""All parts of a gearbox built once, as far as that is quick: what a later step refuses is told before it begins.
+"""Quick construction of all parts of a gearbox: errors of later steps are reported before these start.
 
-Small motions of rigid bodies about the reference state. Every support holds the directions in which its stiffness
+Small motions of rigid bodies about the reference state. Every support constrains the directions in which its stiffness
 acts, every mesh its line of action, every coupling a difference of spins; how stiff they are does not matter here.
 """
 
@@ -30,11 +30,11 @@ from fe_ste.tools.arrays import Floats
 TILT_LENGTH = 0.1
 """Length (m) that turns a tilt into a displacement, so that both are compared."""
 HOLDING_SHARE = 1e-10
-"""Least stiffness of a support in a direction over its largest that counts as holding."""
+"""Minimum stiffness of a support in a direction, over its largest, that constrains the direction."""
 FREE_STRETCH = 1e-8
 """Largest stretch of all springs, per unit of motion, that counts as none."""
 ROLLING_TOLERANCE = 1e-3
-"""Share of a free motion beside rolling up to which it counts as rolling."""
+"""Share of a free motion other than kinematic rotation up to which it counts as rotation."""
 _SCALE = np.array([1.0, 1.0, 1.0, 1.0 / TILT_LENGTH, 1.0 / TILT_LENGTH, 1.0 / TILT_LENGTH])
 """Rows are over displacements and over rotations times `TILT_LENGTH`."""
 DIRECTIONS = ("move along x", "move along y", "move along z", "tilt about x", "tilt about y", "turn about z")
@@ -138,7 +138,7 @@ def _rolling_motions(gearbox: Gearbox, moving: list[Body], starts: Mapping[str, 
     return np.asarray(np.linalg.qr(motions.T)[0].T)
 
 
-# All parts of a gearbox built once, as far as that is quick: what a later step refuses is told before it begins
+# Quick construction of all parts of a gearbox: errors of later steps are reported before these start
 
 MOST_STATES = 200_000
 """Most states of one table: at 50 ms each, three hours."""
@@ -171,7 +171,7 @@ def check_parts(gearbox: Gearbox) -> None:
 
 
 def faults_of_bearings(content: Mapping[str, Any], source: str) -> Iterator[str]:
-    """Tell rolling bearings whose data do not fit, in content that may have other faults."""
+    """Return rolling bearings with inconsistent data, in content that may have other errors."""
     for name, section in readable(content).bearings.items():
         if section.catalogue is not None:
             try:
@@ -197,7 +197,7 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
 
 
 def _misfits(gearbox: Gearbox, variant: Variant) -> str:
-    """Say which elastic body cannot be, or has a seat beside it: the first fault that `check_parts` tells of them."""
+    """Return the first error of `check_parts` about flexible bodies: an impossible body, or a seat off the body."""
     for name in elastic_names(gearbox) if variant.is_elastic else ():
         try:
             _build_elastic_body(gearbox, name)
@@ -215,7 +215,7 @@ def _misplaced_factors(gearbox: Gearbox, variant: Variant) -> str:
 
 
 def remarks(gearbox: Gearbox) -> tuple[str, ...]:
-    """Tell what is possible and unusual, and how it is taken; a line each. Every verb tells the same."""
+    """Return implausible inputs, and how they are interpreted; one line each, the same for every command."""
     lines = list(gearbox.warnings)
     lines += (
         f"pairs.{name}: no torque in [static_load], so no table is computed: mesh stiffness to ISO 6336-1, no "

@@ -63,7 +63,7 @@ class ParameterVariation(ReprMixin):
         return f" {self.parameter.label}: {values} values, {modes} modes"
 
     def near(self, window: tuple[float, float], least_share: float) -> ParameterVariation:
-        """Keep modes that somewhere lie in a window (Hz) while they have a least share."""
+        """Return only modes that lie in a window (Hz) at some value, with a minimum share."""
         inside = (self.frequency >= window[0]) & (self.frequency <= window[1]) & (self.share >= least_share)
         kept = inside.any(axis=0)
         return replace(
@@ -75,7 +75,7 @@ class ParameterVariation(ReprMixin):
         )
 
     def crossings(self, frequency: float, least_share: float) -> tuple[float, ...]:
-        """Parameter values at which a mode of a least share passes a frequency (Hz), interpolated between values."""
+        """Return parameter values at which a mode of a minimum share passes a frequency (Hz), by interpolation."""
         scale = np.log(self.parameter.values) if self.parameter.logarithmic else np.array(self.parameter.values)
         crossings = []
         for mode in range(self.frequency.shape[1]):
@@ -146,21 +146,21 @@ def assumed_parameters(
     stiffness: Mapping[str, MeshData],
     bodies_of: Callable[[Gearbox], Mapping[str, ElasticBody]] | None = None,
 ) -> tuple[Parameter, ...]:
-    """Parameters of a gearbox that were assumed: those that the variant has.
+    """Return the assumed parameters of a gearbox that the variant has.
 
     Parameters
     ----------
     choice : the model that is varied
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness over the cycle, N/m.
-    bodies_of : reduced elastic bodies of a varied gearbox, which the variant `flexible` needs
+    bodies_of : reduced flexible bodies of a varied gearbox, required by the variant `flexible`
 
     Returns
     -------
     tuple of Parameter
-        Housing factor where it is at work, stiffness of the planets' bearings where there are bearings; axial inertia
-        of the overall output body; damping time of the meshes. Where they move the gears, teeth touch each other as
-        they do by default: 0.2 % in the GRC's frequencies from housing factor 0.2 to 1.
+        Housing factor where it is active, stiffness of the planets' bearings where there are bearings; axial inertia of
+        the overall output body; damping time of the meshes. Where they move the gears, tooth contact is kept at its
+        default state: 0.2 % in the GRC's frequencies from housing factor 0.2 to 1.
 
     Examples
     --------
@@ -278,11 +278,11 @@ class FrequencyMatch(ReprMixin, line=" {parameter.label} = {value:.3g}: {frequen
 def frequency_matches(
     variations: Iterable[ParameterVariation], frequency: float, least_share: float
 ) -> Iterator[FrequencyMatch]:
-    """Yield the assumptions under which a mode of a least share lies at a frequency.
+    """Yield the assumptions under which a mode of a minimum share lies at a frequency.
 
     Parameters
     ----------
-    variations : where they cross the frequency, the modes are computed anew
+    variations : where they cross the frequency, the modes are recomputed
     frequency : Hz
     least_share : of the overall transmission error's mobility, 0 to 1
     """

@@ -1,10 +1,10 @@
-"""What a run records: one table of signals, and where each stands among the columns of a sample.
+"""Signals of a run: one table of all signals, and the column of each in a sample.
 
-`SIGNALS` has a row for each signal, under the name that it has in the file of a run. Whoever fills, judges, writes or
-reads signals goes by these names: `SignalLayout` says which columns of a sample belong to one.
+`SIGNALS` has a row for each signal, under the name that it has in the file of a run. All code that fills, checks,
+writes or reads signals uses these names: `SignalLayout` gives the columns of a sample for each.
 
-A joint's load is that of the meshes of its body and, of planets on their orbits, what keeps them there. Both follow
-from what a run stores, so that runs of the variant `rigid` need not hold moments.
+The load of a joint is the load of the meshes of its body and, for orbiting planets, the force that keeps them on their
+orbit. Both follow from stored signals, so that runs of the variant `rigid` need not store moments.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Variable:
     long_name: str = ""
     """What it is, where the name does not say it."""
     sign_convention: str = ""
-    """What a positive value means, where it can have either sign."""
+    """Meaning of a positive value, for signals of either sign."""
     kind: str = "f8"
     """Type in the file, as NumPy writes it."""
 
@@ -55,8 +55,8 @@ class Variable:
 class Signal(Variable):
     """A row of `SIGNALS`.
 
-    The first dimension says what kind of signal it is: ``time``, a value of each stored sample; ``mesh``, a time that
-    is added up for each mesh; ``balance_time``, a term of the account of energy.
+    The first dimension gives the kind of signal: ``time``, a value of each stored sample; ``mesh``, a time accumulated
+    for each mesh; ``balance_time``, a term of the energy balance.
     """
 
     filled_by: tuple[str, ...] = ()
@@ -66,13 +66,13 @@ class Signal(Variable):
     """Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
     that is added up: in which samples it passes."""
     laws: Literal["all", "table", "bilateral"] = "all"
-    """Mesh laws that have it: all, the law `table`, or all others. A time that a law has not got is zero."""
+    """Mesh models with this signal: all, the model `table`, or all others. A time missing in a model is zero."""
     on_bearings: bool = False
     """Whether only variants on bearings have it; of ideal joints `exugear.system.signals` derives it."""
     stored: bool = True
-    """Whether it stands in the file; other signals are for the formulas alone."""
+    """Whether the signal is stored in the file; other signals are used only in the formulas."""
     is_power: bool = False
-    """Of the account of energy: whether the observer gives its power (W), which the run integrates."""
+    """For a term of the energy balance: whether the observer gives its power (W), which the run integrates."""
 
     @property
     def is_sampled(self) -> bool:
@@ -86,7 +86,7 @@ class Signal(Variable):
 
     @property
     def is_balance_term(self) -> bool:
-        """Whether it is a term of the account of energy."""
+        """Whether it is a term of the energy balance."""
         return self.dimensions == ("balance_time",) and bool(self.filled_by)
 
 
@@ -287,15 +287,14 @@ SIGNALS = (
 )
 """All signals, in the order of the file.
 
-The account of energy: the loads' work = change of kinetic and elastic energy + the other four. The last two of these
-are what the law `tangential` does because its force has parts that its deflection does not see, and what the bearings
-do because their rate is not the derivative of their displacement (see
-`exugear.system.kernels.connectors`).
+The energy balance: the loads' work = change of kinetic and elastic energy + the other four. The last two of these are
+the work of the model `tangential`, whose force has components not conjugate to its deflection, and the work of bearings
+whose rate is not the derivative of their displacement (see `exugear.system.kernels.connectors`).
 """
 MESH_TIMES = tuple(signal.name for signal in SIGNALS if signal.is_mesh_time)
 """Times (s) that a run adds up for each mesh."""
 BALANCE_TERMS = tuple(signal.name for signal in SIGNALS if signal.is_balance_term)
-"""Terms of the account of energy."""
+"""Terms of the energy balance."""
 POWERS = tuple(signal.name for signal in SIGNALS if signal.is_power)
 """Terms of the account whose power is observed."""
 ENERGIES = tuple(name for name in BALANCE_TERMS if name not in POWERS)
@@ -355,7 +354,7 @@ class SignalLayout:
         return int(max(columns.stop for columns in self._slices.values()))
 
     def __contains__(self, name: str) -> bool:
-        """Tell whether a signal has columns."""
+        """Return whether a signal has columns."""
         return name in self._slices
 
     def __getitem__(self, name: str) -> slice:
@@ -419,9 +418,9 @@ def signal_layout(assembly: Assembly) -> SignalLayout:
 
 
 def bodies_of_forces(assembly: Assembly) -> dict[str, str]:
-    """Bodies between which meshes and supports act, in words, as attributes of a file.
+    """Bodies connected by meshes and supports, as text, for attributes of a file.
 
-    Of a mesh those of gear 1 and gear 2; of a support its body and what this sits on.
+    For a mesh the bodies of gear 1 and gear 2; for a support its body and the supporting body.
     """
     meshes = [f"{element.mesh.name}: {element.mesh.pinion}, {element.mesh.gear}" for element in assembly.elements]
     joints = assembly.gearbox.joints if assembly.variant.spins_only else ()
@@ -455,7 +454,7 @@ NEEDED = ("time", "input_speed", "mesh_force", "support_force")
 
 
 class LoadsUnknownError(ValueError):
-    """Loads of supports that what is stored does not tell."""
+    """Loads of supports that do not follow from the stored signals."""
 
 
 def support_loads(assembly: Assembly, run: Mapping[str, Floats]) -> Floats:

@@ -154,11 +154,11 @@ LARGEST_RESIDUAL = 1e-9
 ROUNDINGS = 10.0
 """Times that places near 1 m are rounded on their way to a force."""
 EASING_SHARES = (0.1, 1e-3, 0.0)
-"""Shares of the stiffness of non-linear bearings that act beside their rows, one search after the other."""
+"""Shares of the stiffness of nonlinear bearings added to their rows, one search after the other."""
 HOLDING_SHARES = (1e-6, 1e-4, 1e-2)
 """The same in Newton's matrix alone, each where the one before fails: it holds bearings that carry nothing."""
 CLOSING_SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-5, 0.0)
-"""Shares of the stiffness of linear teeth that act beside tables where teeth that are apart hold nothing."""
+"""Shares of the stiffness of linear teeth added to tables, where separated teeth have no stiffness."""
 SHORTEST_STEP = 1e-4
 """Share of a step of Newton's method to which it is halved while it does not lower the residual."""
 LONGEST_TURN = 0.02
@@ -171,7 +171,7 @@ class BalanceError(RuntimeError):
 
 @dataclass(frozen=True, eq=False)
 class _Beside:
-    """Linear teeth that act beside those of a law, by a share of their stiffness."""
+    """Linear teeth in parallel with a mesh model, scaled by a share of their stiffness."""
 
     share: float
     meshes: MeshArrays
@@ -184,7 +184,7 @@ class _Beside:
 
 
 class _Solve(Protocol):
-    """Search for a balance of an assembly, with other meshes than its own or with linear ones beside them."""
+    """Equilibrium search of an assembly, with other meshes than its own or with linear ones in parallel."""
 
     def __call__(
         self, assembly: Assembly, start: Floats, meshes: MeshArrays | None, beside: _Beside | None = None
@@ -277,19 +277,19 @@ def locked_equilibrium(
     other_loads: Floats | None = None,
     near: Floats | None = None,
 ) -> Floats:
-    """Coordinates at rest under torques (N m) with some spins held at zero.
+    """Solve for the static coordinates under torques (N m) with some spins held at zero.
 
     Parameters
     ----------
     torques : mapping of body name to torque about +z, N m
-    locked : names of the bodies whose spins are held; where they leave the train free to roll and the torques are in
-        balance, it stays where it is
+    locked : names of the bodies whose spins are held; where they leave the gear train free to rotate and the torques
+        are in balance, it keeps its position
     meshes : mesh arrays to use instead of the assembly's, such as its `mean_meshes`
-    about : (size,) coordinates of the train rolled to another position, at which spins are held instead of zero
-    other_loads : (size,) generalized forces beside the torques, N and N m
+    about : (size,) coordinates of the gear train rotated to another position, at which spins are held instead of zero
+    other_loads : (size,) generalized forces in addition to the torques, N and N m
     near : (size,)
         Coordinates from which the search begins, such as those under a similar load; by default it begins with linear
-        bearings and teeth, as it does where these lead nowhere.
+        bearings and teeth, also if the search from these coordinates fails.
 
     Raises
     ------
@@ -410,7 +410,7 @@ def static_state(assembly: Assembly) -> StaticState:
 
 
 def meshes_near_unconverged(assembly: Assembly) -> tuple[str, ...]:
-    """Meshes that, at the static load, read their table beside states that are not solved; see `SteSurface.guessed`."""
+    """Meshes whose table is read next to states that have not converged, at static load; see `SteSurface.guessed`."""
     if not any(
         element.table is not None and element.table.surface.guessed is not None for element in assembly.elements
     ):
@@ -451,11 +451,11 @@ def _from_linear(
     solve: _Solve,
     meshes: MeshArrays | None,
 ) -> Floats:
-    """Solve for linear bearings and teeth, then let their own laws take over.
+    """Solve for linear bearings and teeth, then change to their own models step by step.
 
-    Rows of rolling elements that are apart hold nothing, nor do table flanks: the search begins where they touch. Under
-    a small load linear teeth do not close what tables have between their flanks: then they act beside these, less and
-    less, so that flanks touch long before they are gone.
+    Separated rows of rolling elements have no stiffness, nor have table flanks: the search begins with contact. Under a
+    small load linear teeth do not close the gap between table flanks: then they act in parallel with decreasing
+    stiffness, so that the flanks are in contact before the linear teeth are removed.
     """
     linear = assembly.with_linear_supports()
     x, teeth = _touching(linear, start, to_coordinates, solve)

@@ -113,12 +113,12 @@ class Assembly(ReprMixin):
 
     @property
     def variant(self) -> Variant:
-        """How bodies are held."""
+        """Variant: how bodies are supported."""
         return self.choice.variant
 
     @property
     def mesh_model(self) -> str:
-        """Mesh law."""
+        """Mesh model."""
         return self.choice.mesh_model
 
     @property
@@ -127,7 +127,7 @@ class Assembly(ReprMixin):
         return self.choice.inertia_set(self.gearbox)
 
     def has_six(self, body: Body) -> bool:
-        """Tell whether a body is rigid with all six coordinates."""
+        """Return whether a body is rigid with all six coordinates."""
         return self.coordinates[body.name][0] >= 0 and body.name not in self.elastic_bodies
 
     @cached_property
@@ -208,7 +208,7 @@ class Assembly(ReprMixin):
         return replace(self, connectors=linear)
 
     def with_added_stiffness(self, share: float) -> Assembly:
-        """Let a share of the stiffness of non-linear bearings act beside their rows."""
+        """Add a share of the stiffness of nonlinear bearings to their rows."""
         stiffness = self.connectors.stiffness + share * self._row_stiffness
         if self.has_rows:
             return replace(self, connectors=self.connectors._replace(stiffness=stiffness))
@@ -422,7 +422,7 @@ class Assembly(ReprMixin):
         return m
 
     def rolling_velocity(self, q: Floats, speeds: Mapping[str, float]) -> Floats:
-        """Velocities when the train rolls at the given spins and the planets orbit with their carriers."""
+        """Velocities of the gear train at the given spins, with planets orbiting with their carriers."""
         v = np.zeros(self.size)
         for name, elastic_slice in self.elastic_slices.items():
             v[elastic_slice] = speeds.get(name, 0.0) * self.elastic_bodies[name].reduced.spin

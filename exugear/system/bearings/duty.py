@@ -156,7 +156,7 @@ class Ratings:
     estimated: bool
     """Whether they follow from the internal geometry of the bearing, according to ISO 281 and ISO 76."""
     makers: tuple[str, ...] = ()
-    """Manufacturers whose catalogues the ratings are the minimum of; empty if they are not from catalogues."""
+    """Manufacturers whose catalogues were compared for the minimum; empty if the rating is from another source."""
     two_designs: str = ""
     """Which of two designs of the designation is used, where manufacturers list both; empty elsewhere."""
 

@@ -222,7 +222,7 @@ def _rewritten_by_gmsh(path: Path, meshio: Any) -> Any:
             copy = Path(folder) / "mesh.msh"
             gmsh.write(str(copy))
             return meshio.gmsh.read(str(copy))
-    except Exception:  # gmsh raises nothing narrower; the first error is told
+    except Exception:  # gmsh raises nothing narrower; the first error is reported
         return None
     finally:
         gmsh.finalize()

@@ -34,7 +34,7 @@ class TurningBody:
 
     @cached_property
     def seat_offsets(self) -> Floats:
-        """Return positions of the seats from the axis, (seats, 2), m, from their displacement in the rigid spin."""
+        """Positions of the seats from the axis, (seats, 2), m, from their displacement in the rigid spin."""
         moved = self.reduced.spin[: 6 * self.seat_count].reshape(-1, 6)
         return np.stack([moved[:, UY], -moved[:, UX]], axis=1)
 

@@ -34,9 +34,9 @@ LAYOUT_SIZE = 7
 COSINE, SINE, LEVER, GAP, TILTING, RADIUS, AXIAL, CONSTANT = range(8)
 """First columns of `RollingArrays.geometry`; `CONSTANT` is that of a ball, or of one slice of a roller."""
 CENTRE_RADIAL, CENTRE_AXIAL, SPAN = range(8, 11)
-"""Parameters of a row of balls that follow them."""
+"""Next columns of a row of balls."""
 PER_TILT, MOST_TILT, PER_ROOT, MOST_DEPTH, SLICE_LENGTH = range(8, 13)
-"""Parameters of a row of rollers that follow them."""
+"""Next columns of a row of rollers."""
 GEOMETRY_SIZE = 13
 STRIP_TILT, STRIP_PER = 4, 5
 """In each strip of tilts behind the four coefficients of D: its first tilt, and 1 over its width."""

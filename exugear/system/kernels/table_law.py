@@ -1,15 +1,15 @@
-r"""Compiled law of a mesh that follows its table: force from deflection, position and where the gears stand.
+r"""Compiled model of a mesh from its table: force from deflection, position and relative position of the gears.
 
 On a surface s(pmc, a, gamma, F) of static transmission error over the mesh cycle, centre distance, misalignment and
 line-of-action force (`fe_ste.transmission_error.surface`), the force at a deflection delta is the F with s = delta;
-below s at no load the flanks are apart. With the complementary energy U*(F) = int_0^F s dF
+below s at no load the flanks are separated. With the complementary energy U*(F) = int_0^F s dF
 
     U = F delta - U*,   dU/d delta = F,   dU/da = -dU*/da,   dU/d gamma = -dU*/d gamma,   dF/d delta = 1 / (ds/dF)
 
-so that one potential gives the force, the push between the axes and the moment that misalignment raises. A
-flank of the other side has the same surface seen from the other end of the gear: gamma changes its sign.
+so that one potential gives the mesh force, the force between the axes and the moment caused by misalignment. The
+opposite flank has the same surface seen from the other end of the gear: gamma changes its sign.
 
-Nothing is allocated here but the memory handed in.
+All memory is passed in; nothing is allocated here.
 """
 
 from __future__ import annotations
@@ -42,16 +42,16 @@ AXIS_PMC, AXIS_DISTANCE, AXIS_MISALIGNMENT = range(3)
 NOMINAL_DEFLECTION, NOMINAL_DISTANCE, NOMINAL_MISALIGNMENT = range(3)
 """Columns of `TableArrays.nominal`."""
 CUBIC_SIZE, NODE_SIZE = 5, 8
-"""Numbers of a load piece, and the room that they have: filled up with zeros for the processor's vectors."""
+"""Number of values of a load piece, and the space reserved for them: padded with zeros for SIMD vectors."""
 ENERGY_BELOW = 4
 """Behind the four coefficients of s over a load piece: the integral of s over the force up to the piece's start."""
 LAW_FORCE, LAW_STIFFNESS, LAW_POTENTIAL, LAW_BY_DISTANCE, LAW_BY_MISALIGNMENT, LAW_BY_PMC, LAW_OUTSIDE = range(7)
 """Entries of `Scratch.law`."""
 LAW_SIZE = 7
 LEFT_TABLE, GUESSED = 1.0, 2.0
-"""What the law may have at `LAW_OUTSIDE` beside zero: it left an axis, or interpolated over a state not solved."""
+"""Possible values at `LAW_OUTSIDE` other than zero: an axis was left, or states that have not converged were used."""
 NODE_WIDTH = 1e-6
-"""Share of an interval beside a node that counts as the node. What acts on the other side of the node alone has a
+"""Share of an interval next to a node that counts as the node. States acting only on the other side of the node have a
 weight of less than 3e-12 in the value there, and 6e-6 in the slope over the interval."""
 BY_DISTANCE, BY_MISALIGNMENT, OF_DISTANCE, OF_BOTH, OF_MISALIGNMENT = range(5)
 """Entries of what `surface_damping` fills."""
@@ -94,7 +94,7 @@ class TableArrays(NamedTuple):
     sense: Floats
     """(m,) the loaded flank of gear 1, 1 or -1: the table is that of 1, or of -1 turned about the line of centres."""
     has_guesses: Integers
-    """(m,) 1 where states that were not solved have others standing in for them."""
+    """(m,) 1 for states that have not converged and are interpolated from neighbours."""
     acting_guesses: Booleans
     """(m, k) where one of these acts (`SteSurface.acting_guesses`, flat)."""
 
@@ -109,8 +109,8 @@ class Scratch(NamedTuple):
     cubic: Floats
     """(9, 8) the surface's derivatives in the order of `ORDERS`, over one load piece, filled up."""
     law: Floats
-    """(7,) force (N), tangent stiffness (N/m), potential (J), its derivatives by centre distance (N), by:
-    misalignment (N m) and by pmc (J), `LEFT_TABLE` where an axis was left, `GUESSED` near unsolved states."""
+    """(7,) force (N), tangent stiffness (N/m), potential (J), its derivatives by centre distance (N), by: misalignment
+    (N m) and by pmc (J), `LEFT_TABLE` where an axis was left, `GUESSED` near states that have not converged."""
 
 
 @compiled
@@ -347,7 +347,7 @@ def node_or_interval(interval: int, t: float) -> int:
 def guess_acts(
     pmc: float, centre: float, misalignment: float, piece: int, t: float, m: int, tables: TableArrays, node: Integers
 ) -> bool:
-    """Whether a state that is not solved has weight at a place of the axes and the share t of a load piece."""
+    """Whether a state that has not converged has weight at a position of the axes and the share t of a load piece."""
     shape = tables.shape[m]
     # Four positions act between the second and the third of them; a mean over the cycle has one.
     place = 1
@@ -453,7 +453,7 @@ def surface_law(
 
 @kernel
 def extrapolate_beyond_last(delta: float, start: float, step: float, count: int, memory: Scratch) -> None:
-    """Fill `memory.law` beyond the last load: the deflection goes on in proportion to the force."""
+    """Fill `memory.law` beyond the last load: the deflection grows in proportion to the force."""
     law, cubic = memory.law, memory.cubic
     c = cubic[0]
     # Slope ds/dF at the end of the last piece: (ds/dt) / (dF/dt).
@@ -521,11 +521,11 @@ def surface_tangent(t: float, piece: int, m: int, tables: TableArrays, memory: S
 
 @kernel
 def surface_damping(t: float, piece: int, m: int, tables: TableArrays, memory: Scratch, out: Floats) -> None:
-    """Directions and sizes of the damping, in proportion to the tangent, after `surface_law` with its derivatives.
+    """Compute directions and sizes of the damping, proportional to the tangent, after `surface_law` with derivatives.
 
-    At a frozen position the tangent of the potential in x = (delta, a, gamma) is that of the force on
-    e = delta - s_a a - s_gamma gamma at a constant load, and beside it what the load keeps: -U*_xx. Where teeth would
-    bend the wrong way, its diagonal is cut off at zero, and what stands beside the diagonal at what a damper may have.
+    At a frozen position the tangent of the potential in x = (delta, a, gamma) is that of the force on e = delta - s_a a
+    - s_gamma gamma at a constant load, plus the part at constant load: -U*_xx. Where the tangent would be negative, its
+    diagonal is limited to zero, and its off-diagonal entries to the range of a positive semidefinite damper.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Elastic bodies described in their own turning frame, such as a planet carrier: laws on arrays of coordinates.
+"""Flexible bodies in their own rotating frame, such as a planet carrier: forces on arrays of coordinates.
 
 Coordinates in the state are those of `exugear.system.kernels.coordinates` at each seat: the displacement of its centre
-from the place p that it has at zero angles, tilts about axes that do not turn, and the unwrapped spin. Modal
-coordinates of the inside follow. So a seat at p from the axis that turns by psi is displaced by x = R(psi) (p + u) - p.
-Stiffness and mass are constant in a frame that turns with the mean psi of the spins of the seats off the axis (of all
-seats if none is), Omega = d psi / dt:
+from the place p that it has at zero angles, tilts about non-rotating axes, and the unwrapped spin. Internal modal
+coordinates follow. So a seat at p from the axis that turns by psi is displaced by x = R(psi) (p + u) - p. Stiffness and
+mass are constant in a frame that turns with the mean psi of the spins of the seats off the axis (of all seats if none
+is), Omega = d psi / dt:
 
 - displacements in it, q: u = R' (p + x) - p, tilts R' (a, b), spins less psi, amplitudes as they are;
 - velocities along its axes, w: R' x', R' (a', b'), spins', amplitudes'. With S, which turns the vectors of the seats
@@ -19,20 +19,21 @@ which carry the reaction on the frame's angle, m = (S q) . K (q + time q') - w .
 2 Omega C q' and the centrifugal force -Omega^2 C r of the undeformed body; a disc on the axis tilts as a gyroscope.
 All forces but damping balance: their power w . (-K q + Omega h) + Omega m is -q' . K q, whatever h is.
 
-Of what else is quadratic in Omega, centrifugal stiffening and softening of the deformation are left out together, and
-tilts count as on the axis; the part of Omega' C q that M S does not hold is left out, too. At the speed of a planet
-carrier (3 rad/s) this is a millionth of the elastic forces.
+Of the other terms quadratic in Omega, centrifugal stiffening and softening of the deformation are both neglected, and
+tilts are treated as on the axis; the part of Omega' C q that M S does not contain is neglected, too. At the speed of a
+planet carrier (3 rad/s) this is a millionth of the elastic forces.
 
-The toothed ring of an elastic body has seats on equal sectors, each the rigid motion nearest to that of its sector.
+The toothed ring of a flexible body has seats on equal sectors, each the rigid motion nearest to that of its sector.
 Seen from the direction of its sector (radial, tangential, axial), that motion is a sample of a function around the
 ring. The motion under a mesh at the angle theta is the trigonometric polynomial through an odd number s of samples,
 
     x(theta) = sum_k w(theta - theta_k) R(theta - theta_k) x_k,   w(d) = (1 + 2 sum_(n=1)^((s-1)/2) cos n d) / s,
 
-with R the turn about z. It reproduces rigid motions, and it is smooth: a load that passes from sector to sector makes
-no noise of its own. Waves around the ring up to n = (s-1)/2 are seen, their radial part less by the smearing over a
-sector: nine sectors see 94 % of an oval (n = 2) and 85 % of three waves. Forces go back to the sectors by the
-transposed law, and what the slope of x(theta) does goes to the angle of the frame: no energy is made or lost.
+with R the rotation about z. It reproduces rigid motions, and it is smooth: a load that passes from sector to sector
+causes no numerical excitation. Circumferential harmonics of the ring up to n = (s-1)/2 are represented, with a radial
+part reduced by averaging over a sector: nine sectors represent 94 % of an oval (n = 2) and 85 % of n = 3. Forces are
+distributed to the sectors by the transposed map, and the work of the slope of x(theta) is assigned to the angle of the
+frame: energy is conserved.
 
 Each travelling seat has six coordinates of its own behind those of the system, which follow from these; they are those
 of `exugear.system.kernels.coordinates`.
@@ -351,7 +352,7 @@ def sum_sectors(t: int, q: Floats, v: Floats, seats: TravellingArrays, memory: F
 
 @kernel
 def turned_sum(memory: Floats, row: int, i: int) -> float:
-    """Entry i of a motion from its sums by weight, along and across, which stand in three rows."""
+    """Entry i of a motion from its sums by weight, along and across, which are stored in three rows."""
     if i % TILT == AXIAL:
         return float(memory[row, i])
     if i % TILT == 0:

@@ -1,1 +1,1 @@
-"""Gear meshes: tables, stiffness, where teeth stand, the mesh element."""
+"""Gear meshes: tables, stiffness, tooth positions, the mesh element."""

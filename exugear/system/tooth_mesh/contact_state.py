@@ -1,23 +1,23 @@
-"""Contact of a mesh about its static state: what it deflects by, where it bears, and how both follow load and tilt.
+"""Contact of a mesh about its static state: deflection, load centroid, and their dependence on load and tilt.
 
-With the deflection d at mid-face and the misalignment g, both of the loaded flank, a law along a row reads
+With the deflection d at mid-face and the misalignment g, both of the loaded flank, a model along a row uses
 
     e = d - (zt + w) (g - g0),   force F(e),   moment M = F0 zc + zt (F - F0) + w F - kg (g - g0),
 
-which has a potential, U = U(e) + (zt - zc) F0 (g - g0) + kg (g - g0)^2 / 2: the generalized force of the mesh is
--F dd/dq + M dg/dq. Teeth yield otherwise where the axes stand apart, by sa (a - a0) for a centre distance a: the row of
-d has that in it, so that the load pushes between the axes as well. The load centre zc and that of a load more, zt, are
-means over the mesh cycle, in the transverse plane of action from the middle of the common face towards +z.
+which has a potential, U = U(e) + (zt - zc) F0 (g - g0) + kg (g - g0)^2 / 2: the generalized force of the mesh is -F
+dd/dq + M dg/dq. The deflection changes with the centre distance a by sa (a - a0): the row of d includes this, so that
+the load also acts between the axes. The load centroid zc and the centroid zt of an increment of load are means over the
+mesh cycle, in the transverse plane of action from the middle of the common face towards +z.
 
-Over the mesh cycle the load moves along the face, most of helical teeth, and what a little more deflection adds to it
-moves otherwise: c(pmc) and w(pmc) are load centre and tangent load centre against their means. By w the deflection
-under a constant load follows the misalignment, and the load its moment: F w + F0 (c - w), which at F0 is that of the
-contact. The latter part is given by the cycle alone, in the potential -F0 (c - w) (g - g0). While both change, teeth
-take or give the power (F w' + F0 (c' - w')) (g - g0) dpmc/dt, as they do while the stiffness changes. Dampers act along
-the mean lever zt.
+Over the mesh cycle the load shuttles, most with helical teeth, and the increment of load shuttles differently: c(pmc)
+and w(pmc) are load centroid and tangent load centroid relative to their means. Through w the deflection under a
+constant load depends on the misalignment, and the moment on the load: F w + F0 (c - w), which at F0 equals the moment
+of the contact. The latter part depends only on the cycle, in the potential -F0 (c - w) (g - g0). While both change,
+teeth absorb or supply the power (F w' + F0 (c' - w')) (g - g0) dpmc/dt, as they do while the stiffness changes. Dampers
+act along the mean lever arm zt.
 
-Meshes of equal planets share one contact, that at their mean: as the carrier turns each of them passes all places, and
-left apart they would be an asymmetry that turns with the carrier.
+Meshes of equal planets share one contact, at their mean: as the carrier rotates each of them passes all positions, and
+separate contacts would be an asymmetry that rotates with the carrier.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class ContactState:
     deflection_by_distance: float = 0.0
     """a0 (m), and sa: change of the deflection with the centre distance under constant load."""
     cycle: ContactCycle | None = None
-    """What of it changes over the mesh cycle, if that is known."""
+    """Variation over the mesh cycle, if known."""
 
     def seen_by(self, flank: int) -> ContactState:
         """Take the state from the axes of a table to those of a mesh with this flank, or back.
@@ -137,13 +137,13 @@ def changed_over_cycle(known: Floats, samples: Samples) -> Floats:
 
 
 def even_contact(pair: GearPair, force: float, stiffness: float, tangent_stiffness: float) -> ContactState:
-    """Contact of teeth that are equally stiff all along the common face and bear evenly, so that kg = k b^2 / 12.
+    """Return the contact of teeth of uniform stiffness and even load along the common face, so that kg = k b^2 / 12.
 
     Parameters
     ----------
     force : N
     stiffness, tangent_stiffness
-        Load over deflection, and the slope of the load: that is what a tilt at constant load works against, N/m.
+        Load over deflection, and the slope of the load, which resists a tilt at constant load, N/m.
     """
     tilt_stiffness = tangent_stiffness * pair.face_width**2 / 12.0
     return ContactState(force, force / stiffness, tangent_stiffness, 0.0, 0.0, 0.0, tilt_stiffness)
@@ -154,7 +154,7 @@ def even_contact(pair: GearPair, force: float, stiffness: float, tangent_stiffne
 
 @dataclass(frozen=True)
 class MeshPlace:
-    """How the gears of a mesh stand at rest, in the axes of its pair's table."""
+    """Static position of the gears of a mesh, in the axes of its pair's table."""
 
     table: TableInput
     """What the pair's table was computed from."""
@@ -178,7 +178,7 @@ class StaticContacts:
 
     @property
     def states(self) -> dict[str, ContactState]:
-        """What a mesh law takes of them, by mesh, in the axes of the pairs' tables."""
+        """Values for the mesh model, by mesh, in the axes of the pairs' tables."""
         return {name: contact_state(contact) for name, contact in self.contacts.items()}
 
     @property
@@ -202,7 +202,7 @@ class StaticContacts:
 
 
 def static_contacts(places: Mapping[str, MeshPlace], positions: int = POSITIONS) -> StaticContacts:
-    """Solve the contact of meshes where they stand.
+    """Solve the contact of meshes at the positions of their gears.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def static_contacts(places: Mapping[str, MeshPlace], positions: int = POSITIONS)
 
 
 def contact_state(contact: MeanContact) -> ContactState:
-    """Take from a contact what a mesh law needs: the middle of its two misalignments, so that all nearby agree."""
+    """Return the values of a contact for a mesh model: at the middle of its misalignments, equal for nearby states."""
     middle = float(contact.misalignment.mean())
     deflection, stiffness, centre, tangent_centre = (
         float(contact.at(values, middle))
@@ -292,11 +292,11 @@ class MeshLoadState(ReprMixin):
 
 
 def with_contact(duty: MeshLoadState, place: MeshPlace | None, flank: int) -> MeshLoadState:
-    """Add what finite-element contact tells of a mesh.
+    """Add the results of finite-element contact to a mesh.
 
     Parameters
     ----------
-    place : where its gears stand, if contact can be solved
+    place : position of its gears, if contact can be solved
     flank : loaded flank of gear 1: the table's frame is that of +1
     """
     if place is None:

@@ -18,10 +18,9 @@ Frames and signs, in this one place
 - PMC grows with s theta_1, seen from the frame of the line of centres; PMC = 0 when the loaded flanks touch
   in the pitch point at the middle of the common face.
 
-Where the gears stand: the centre distance is along the line of centres at mid-face; misalignment is the turning of
-gear 1's axis against gear 2's in the loaded flank's plane of action, positive where it opens the gap at the +z end.
-What deflection and force are to a law, and what else it knows of the teeth, stands in its file
-(`exugear.system.tooth_mesh.laws`).
+Position of the gears: the centre distance is along the line of centres at mid-face; misalignment is the rotation of
+gear 1's axis relative to gear 2's in the loaded flank's plane of action, positive for a gap at the +z end. The file of
+each mesh model defines its deflection, force and other inputs (`exugear.system.tooth_mesh.laws`).
 """
 
 from __future__ import annotations
@@ -92,7 +91,7 @@ class MeshCurve:
 
 
 MeshData = ArrayLike | MeshCurve | SteSurface
-"""What a law knows of a pair: stiffness over the mesh cycle (N/m), load over deflection, or the table's surface."""
+"""Input of a mesh model for a pair: stiffness over the mesh cycle (N/m), load over deflection, or table surface."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +112,7 @@ class TableFlanks:
 
 
 class Law:
-    """A mesh law with a force; what it does not say otherwise is as along the line of action."""
+    """Mesh model with a force; defaults apply to a force along the line of action."""
 
     form: ClassVar[int]
     """Number of the law's compiled form in `exugear.system.tooth_mesh.laws.mesh_forces`."""
@@ -122,16 +121,16 @@ class Law:
     that does not has no moment, or one of its own."""
 
     def read(self, gearbox: Gearbox, pair: str, directory: Path) -> Floats | MeshCurve | SteSurface:
-        """Read or compute what the law knows of a pair.
+        """Read or compute the inputs of the model for a pair.
 
         Parameters
         ----------
-        directory : results folder with ``tables/<pair>.nc``, for laws that need tables
+        directory : results folder with ``tables/<pair>.nc``, for models that need tables
 
         Raises
         ------
         MeshError
-            A table is missing, holds unsolved positions, or was computed from another input.
+            A table is missing, has positions that have not converged, or was computed from another input.
         """
         raise NotImplementedError
 
@@ -213,16 +212,16 @@ class MeshElement:
     computed_from: TableInput | None = None
     """Input of the pair's table where contact is still to be solved at the static misalignment."""
     load_ways: Floats = field(default_factory=lambda: np.zeros((2, 0)))
-    """(2, n) way of the load along the face over the mesh cycle, and of what a little more deflection adds to: it,
-    each about its mean, in the axes of the mesh, m; empty where they stay or nothing is known of them."""
+    """(2, n) axial shift of the load over the mesh cycle, and of an increment of load, each about its mean, in the axes
+    of the mesh, m; empty if constant or unknown."""
 
     def with_contact(self, contact: ContactState) -> MeshElement:
-        """Return the mesh, whose teeth bear evenly so far, with a contact that was solved, in the axes of its table.
+        """Return the mesh, so far with even load, with the results of a solved contact, in the axes of its table.
 
-        The mean of a curved law's stiffness is then that of the contact. So are its changes over the mesh cycle and the
-        load's ways along the face, as far as the positions of the contact tell; finer ones stay the table's. Where
-        gears stand so askew that flanks touch long before or after their middles would, the deflection at mid-face is
-        mostly that gap, and no measure of how teeth yield: the curve then begins at the gap.
+        The mean stiffness of a curved model is then that of the contact, and so are its variation over the mesh cycle
+        and the axial shifts of the load, as far as the positions of the contact resolve them; finer details are from
+        the table. Where misalignment is so large that flanks touch long before or after mid-face contact, the
+        deflection at mid-face is mostly that gap, and no measure of tooth deflection: the curve then begins at the gap.
         """
         secant = self.stiffness
         tangent = self.tangent
@@ -253,7 +252,7 @@ class MeshElement:
         )
 
     def _samples_over_cycle(self, contact: ContactState, yielding: float) -> tuple[Floats, Floats, Floats]:
-        """Secant and tangent stiffness (n,), N/m, and ways of the load (2, n), m, where the gears stand."""
+        """Secant and tangent stiffness (n,), N/m, and axial shifts of the load (2, n), m, at the gear positions."""
         cycle = contact.cycle
         if cycle is None:
             return self.stiffness, self.tangent, self.load_ways
@@ -278,7 +277,7 @@ class MeshElement:
 
     @property
     def bears_beside(self) -> bool:
-        """Whether the load bears beside the middle of the face where the gears stand straight."""
+        """Whether the load centroid of aligned gears is off the middle of the face."""
         contact = self.contact
         return contact is not None and any((contact.misalignment, contact.load_centroid, contact.tangent_load_centroid))
 
@@ -299,29 +298,29 @@ def mesh_elements(
     nodes: Mapping[str, Floats] | None = None,
     contact: Mapping[str, ContactState] | None = None,
 ) -> tuple[MeshElement, ...]:
-    """Elements of all meshes.
+    """Return the elements of all meshes.
 
     Parameters
     ----------
     stiffness : mapping of pair name to (n,) array, to a curve, or to the table's surface
-        F_bt / STE at pmc = 0, 1/n, ..., N/m; a single value for a constant. The law `table` needs surfaces.
-    law : `exugear.system.tooth_mesh.laws.registry.law_of` knows it by its name
-    inertias : inertia set: it decides where the bodies' nodes (centres of mass) are
+        F_bt / STE at pmc = 0, 1/n, ..., N/m; a single value for a constant. The model `table` needs surfaces.
+    law : name of the mesh model, see `exugear.system.tooth_mesh.laws.registry.law_of`
+    inertias : inertia set: it determines the positions of the bodies' nodes (centres of mass)
     flanks : loaded flank of each mesh; from the static load by default
     angles : {"reference", "operating"}
-        Angles of the law `tangential`.
-    displaced : place of bodies at zero coordinates against their nominal one, x and y seen from the mesh's frame, m
+        Angles of the model `tangential`.
+    displaced : offset of bodies at zero coordinates from their nominal position, x and y in the mesh's frame, m
     nodes : position (3,) of the node that carries a gear, by `seat_key` of body and gear; the body's own otherwise
     contact : by mesh name
-        Contact at the static misalignment, in the axes of the pair's table (of the flank +1). A law that is curved has
-        its stiffness from there, and how that and the place of the load change over the mesh cycle
-        (`MeshElement.with_contact`). Meshes without one, or loaded on the other flank, bear evenly along the common
-        face (`even_contact`).
+        Contact at the static misalignment, in the axes of the pair's table (of the flank +1). A curved model takes its
+        stiffness from it, with its variation and the shift of the load over the mesh cycle
+        (`MeshElement.with_contact`). Meshes without one, or loaded on the other flank, carry the load evenly along the
+        common face (`even_contact`).
 
     Raises
     ------
     MeshError
-        No stiffness for a pair at work, or none that the law can do with.
+        No stiffness for an active pair, or none suitable for the model.
     """
     usual = loaded_flanks(gearbox)
     flanks = usual if flanks is None else flanks

@@ -1,9 +1,9 @@
-"""Where teeth in mesh stand: directions, phases, orientation; frames as in `exugear.system.tooth_mesh.element`.
+"""Tooth positions in mesh: directions, phases, orientation; frames as in `exugear.system.tooth_mesh.element`.
 
-Each wheel's error in a mesh is a function of its own angle seen from the mesh's frame, a length on the transverse line
-of action by which its loaded flank stands back. A tooth's pitch deviation acts with the part of the contact lines that
-this tooth has, which is the first order of what a table of the same teeth would show; run-out acts along the line of
-action. Both repeat with the wheel, not with the mesh, and so give sidebands at its shaft's order.
+The error of each gear in a mesh is a function of its own angle seen from the mesh's frame, a length on the transverse
+line of action by which its loaded flank is set back. A tooth's pitch deviation acts with its share of the contact
+lines, which is the first-order effect in a table of the same teeth; run-out acts along the line of action. Both repeat
+with the gear, not with the mesh, and cause sidebands at its shaft order.
 """
 
 from __future__ import annotations
@@ -68,12 +68,11 @@ class MeshGeometry:
 
 @dataclass(frozen=True)
 class ToothContact:
-    """How PMC and the orientation of one wheel's teeth hang together in a mesh.
+    """Relate PMC and the orientation of a gear's teeth in a mesh.
 
-    The orientation is the polar angle of a tooth's middle at zero body angle, in the wheel's own middle
-    plane. With eta the tooth's half angle at the working radius, the loaded flank is at +s eta from it, on
-    an internal wheel at
-    -s eta; in the pitch point it stands at u (gear 1, internal gear 2) or opposite (external gear 2).
+    The orientation is the polar angle of a tooth's middle at zero body angle, in the gear's own middle plane. With eta
+    the tooth's half angle at the working radius, the loaded flank is at +s eta from it, on an internal gear at -s eta;
+    in the pitch point it lies at u (gear 1, internal gear 2) or opposite (external gear 2).
     """
 
     mesh: Mesh
@@ -121,9 +120,9 @@ class ToothContact:
 
 
 def loaded_flanks(gearbox: Gearbox, torques: Mapping[str, float] | None = None) -> dict[str, int]:
-    """Tell the loaded flank s of each mesh under the static load, or other torques at the same locks.
+    """Return the loaded flank s of each mesh under the static load, or under other torques with the same locks.
 
-    Of a mesh that they leave without force, the one by which what it drives is dragged along.
+    For a mesh without force, return the flank that drags the driven side along.
     """
     forces = gearbox.train.static_mesh_forces(torques)
     if not all(forces.values()):
@@ -284,7 +283,7 @@ def _wheel_error(
     orientation: Mapping[tuple[str, str], float],
     phase: float,
 ) -> Floats:
-    """Error of one wheel over its revolution; empty for none."""
+    """Error of one gear over its revolution; empty for none."""
     deviation = gearbox.deviations.get(wheel)
     if deviation is None:
         return np.zeros(0)

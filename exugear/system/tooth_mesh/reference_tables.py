@@ -1,4 +1,4 @@
-"""Tables of a gearbox's pairs by the reference analysis, beside those that its dynamics use."""
+"""Tables of a gearbox's pairs by the reference analysis, in addition to the tables used for dynamics."""
 
 from __future__ import annotations
 
@@ -90,9 +90,9 @@ def doubts_of_references(summaries: Iterable[dict[str, Any]]) -> list[str]:
 
 
 def summarise_reference(request: ReferenceRequest, table: NonlinearTable) -> dict[str, Any]:
-    """Return the figures of a table that a person asks for first; the unit is part of the key.
+    """Return the main results of a table; the unit is part of the key.
 
-    What no converged position gives is None.
+    Results without a converged position are None.
     """
     data = table.dataset
 

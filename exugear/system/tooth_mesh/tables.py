@@ -1,8 +1,8 @@
-"""The transmission error tables of a gearbox: which are wanted, which are there, and what they say in figures.
+"""Transmission error tables of a gearbox: required and existing tables, and their main results.
 
-An axis reaches three times as far as the static state, for loads that grow and gears that swing, and at least 20 um:
-over the common face for the misalignment, for the centre distance where the backlash leaves it. Ends are round numbers,
-so that a gearbox that varies a little keeps its tables.
+An axis extends to three times the static state, for larger loads and oscillating gears, and at least to 20 um: over the
+common face for the misalignment, for the centre distance where the backlash permits it. Limits are round numbers, so
+that the tables remain valid for a slightly changed gearbox.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 REACH = 3.0
 """Times the static state that an axis reaches."""
 NEEDED = 0.5
-"""Part of its reach that an axis of a table must have that is there already."""
+"""Part of the required range that an axis of an existing table must cover."""
 LEAST = 20e-6
-"""Least end of an axis, m."""
+"""Minimum limit of an axis, m."""
 STEP = 40e-6
 """Longest step of openings, m: half of it is interpolated within half a per cent of what usual teeth yield."""
 MOST_STEPS = 4
@@ -67,7 +67,7 @@ def reaches(table: MeshTable, wanted: TableInput) -> bool:
 
 
 def axes_reaching(pair: GearPair, opening: float = 20e-6, change: float = 33e-6) -> GridAxes:
-    """Lay axes for a pair whose gears stand `opening` (m over the face) askew at rest, and `change` (m) from nominal.
+    """Return axes for a pair with static misalignment `opening` (m over the face), and offset `change` (m) from nominal.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def _axis_to_end(end: float, steps: int) -> tuple[float, ...]:
 
 
 def _possible(pair: GearPair, sense: float, most: float) -> float:
-    """Greatest change of the centre distance to one side, m, up to `most`, at which the gears run; 0 if none."""
+    """Maximum change of the centre distance to one side, m, up to `most`, at which the gears run; 0 if none."""
     change = most
     while change > 0.05 * LEAST:
         try:
@@ -140,7 +140,7 @@ class TableRequest:
     stored: MeshTable | None
     """The table in the file, if it was computed from exactly this input."""
     replaces: str = ""
-    """Why a file that is there does not serve; empty if there is none or it serves."""
+    """Reason why an existing file is not usable; empty if there is none or it is usable."""
 
     @property
     def states(self) -> int:
@@ -175,16 +175,16 @@ def requested_tables(
     grid: bool = False,
     axes: Mapping[str, GridAxes] | None = None,
 ) -> list[TableRequest]:
-    """List the tables of a gearbox and find those that are there; computes and writes nothing.
+    """List the tables of a gearbox and find existing ones; computes and writes nothing.
 
     Parameters
     ----------
-    gearbox : the case
+    gearbox : the gearbox
     out : results folder; the tables lie in its folder ``tables``
-    names : pairs to list; without any, those that the file wants a table of
-    positions : positions of the mesh cycle; without it what the file says
+    names : pairs to list; without any, the pairs with tables required by the file
+    positions : positions of the mesh cycle; by default from the gearbox file
     grid : ask for the axes of the file even if its section ``ste`` does not
-    axes : by pair name, axes where the file names none; usual ones by default
+    axes : by pair name, axes where the file gives none; usual ones by default
 
     Raises
     ------
@@ -308,7 +308,7 @@ def fitting_table(
 
 
 def _opened(path: Path) -> MeshTable:
-    """Read a table, or give the one that was read of the same file before: a verb looks at each several times."""
+    """Read a table, or return the one read from the same file before: a command reads each several times."""
     try:
         status = path.stat()
     except OSError:
@@ -353,13 +353,13 @@ def _values(table: MeshTable, axis: str) -> tuple[float, ...]:
 def missing_tables(
     gearbox: Gearbox, out: Path, grid: bool = False, axes: Mapping[str, GridAxes] | None = None
 ) -> list[TableRequest]:
-    """List the tables that dynamics need and that are not there, or belong to another input.
+    """List the tables required for dynamics that are missing or belong to another input.
 
     Parameters
     ----------
     out : results folder
-    grid : whether the mesh law interpolates over load, centre distance and misalignment
-    axes : by pair name, what axes must reach that the file does not name
+    grid : whether the mesh model interpolates over load, centre distance and misalignment
+    axes : by pair name, the required range of axes not given in the file
     """
     work = tables_at_work(gearbox, out, grid, axes)
     requests = []
@@ -372,7 +372,7 @@ def missing_tables(
 def tables_at_work(
     gearbox: Gearbox, out: Path, grid: bool = False, axes: Mapping[str, GridAxes] | None = None
 ) -> dict[str, MeshTable]:
-    """Tables of the pairs at work that are there and fit; parameters as of `missing_tables`."""
+    """Existing valid tables of the active pairs; parameters as of `missing_tables`."""
     found = {}
     for name in _with_tables(gearbox, grid):
         with suppress(TableError):
@@ -381,7 +381,7 @@ def tables_at_work(
 
 
 def _with_tables(gearbox: Gearbox, grid: bool) -> list[str]:
-    """Pairs at work whose tables dynamics read; of those with a stated stiffness only a law with axes does."""
+    """Active pairs whose tables dynamics read; of pairs with a stated stiffness only for a model with axes."""
     names = dict.fromkeys(mesh.pair.name for mesh in gearbox.meshes)
     return [name for name in names if grid or name not in gearbox.stated_stiffness]
 
@@ -402,9 +402,9 @@ def _request(
 
 
 def summarise(request: TableRequest, table: MeshTable) -> dict[str, Any]:
-    """Return the figures of a table that a person asks for first; the unit is part of the key.
+    """Return the main results of a table; the unit is part of the key.
 
-    Of the static state, but for the numbers of states. What no converged position gives is None.
+    Results refer to the static state, except for the numbers of states. Results without a converged position are None.
     """
     data = table.static_state
 
@@ -462,7 +462,7 @@ def remarks_about_table(name: str, table: MeshTable) -> Iterator[str]:
 
 
 def doubts_about_table(name: str, table: MeshTable) -> Iterator[str]:
-    """Say why the table of a pair is not to be trusted; a line each, none if it is."""
+    """Return why the table of a pair is invalid; one line each, none if valid."""
     missing, states = _missing(table)
     if missing > MOST_MISSING * states:
         yield f"{name}: {missing} of {states} states not converged, more than {_percent(MOST_MISSING)}"
@@ -488,7 +488,7 @@ def static_cut_off(table: MeshTable) -> float:
 
 
 def _missing(table: MeshTable) -> tuple[int, int]:
-    """Numbers of states that are not solved, and of all."""
+    """Count the states that have not converged, and all states."""
     solved = table.dataset["converged"].to_numpy().astype(bool)
     return int(np.count_nonzero(~solved)), solved.size
 
@@ -505,7 +505,7 @@ LEAST_PUSH = 1e-6
 
 @dataclass(frozen=True)
 class Shuttling:
-    """Way of the load along the face, in its first harmonic.
+    """Shuttling amplitude of the load along the face, first harmonic.
 
     Examples
     --------
@@ -530,7 +530,7 @@ class Shuttling:
 
 
 def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[Shuttling, ...]:
-    """Way of the load of each pair that has a table, at the static load, that which counts most first.
+    """Return the shuttling of each pair with a table, at the static load, largest effect first.
 
     Parameters
     ----------

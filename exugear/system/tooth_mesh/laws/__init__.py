@@ -1,1 +1,1 @@
-"""Mesh laws: how teeth in mesh push each other. One file a law, and one table of all of them, `registry`."""
+"""Mesh models: force between teeth in mesh. One file per model, and one table of all of them, `registry`."""

@@ -1,4 +1,4 @@
-"""Mesh law `constant`: as `line_of_action` with the mean of the table's stiffness."""
+"""Mesh model `constant`: as `line_of_action` with the mean of the table's stiffness."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mesh law `iso6336`: as `constant` with the mean mesh stiffness of ISO 6336-1 method B; needs no tables."""
+"""Mesh model `iso6336`: as `constant` with the mean mesh stiffness of ISO 6336-1 method B; needs no tables."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Iso6336(Constant):
 
 
 def iso6336_stiffness(spec: PairSpec) -> float:
-    """Mean mesh stiffness of a pair by ISO 6336-1 method B at its static load, N/m."""
+    """Mean mesh stiffness of a pair according to ISO 6336-1 method B at its static load, N/m."""
     force = spec.static_torque / spec.pair.pinion.reference_radius
     return iso_stiffness(spec.pair, tangential_force=force or None).stiffness
 

@@ -1,13 +1,13 @@
-"""Mesh law `line_of_action`: a curve of load over deflection along the line of action, which changes over the cycle.
+"""Mesh model `line_of_action`: load over deflection along the line of action, varying over the mesh cycle.
 
-A table of one load F0 knows the deflection s(pmc) and the tangent stiffness. The curve through both that passes the
+A table of one load F0 contains the deflection s(pmc) and the tangent stiffness. The curve through both that passes the
 origin is a power of the deflection d::
 
     F = F0 sgn(d) x^m,  x = |d| / s,  m = tangent stiffness / (F0 / s),  tangent m F / d,  U = |F d| / (m + 1).
 
-Teeth of a stated stiffness k have m = 1, a straight line. While s and m change with pmc the teeth take or give the
-power dU/dpmc dpmc/dt, which comes from the rolling train. Below x = `LINEAR_BELOW` the curve is extrapolated linearly,
-because it has no tangent at the origin. How a mesh resists misalignment is described in
+Teeth of a stated stiffness k have m = 1, a straight line. While s and m change with pmc the teeth absorb or supply the
+power dU/dpmc dpmc/dt, which is taken from the rotation of the gear train. Below x = `LINEAR_BELOW` the curve is
+extrapolated linearly, because it has no tangent at the origin. The tilting stiffness of a mesh is described in
 `exugear.system.tooth_mesh.contact_state`.
 """
 

@@ -1,12 +1,12 @@
-"""Forces of all meshes in one pass, each by the form that its law has: plain, and in loops over time.
+"""Forces of all meshes in one pass, each in the form of its model: plain, and in loops over time.
 
-Forms are numbered (`MeshArrays.form`). All but that of the law `table` depend on the deflection along a row and stand
-in `exugear.system.tooth_mesh.laws.mesh_forces`; a table depends on where the gears stand as well.
+Forms are numbered (`MeshArrays.form`). All except the model `table` depend on the deflection along a row and are in
+`exugear.system.tooth_mesh.laws.mesh_forces`; a table also depends on the positions of the gears.
 
-The law itself stands here once, `row_law`: one with a force of its own is a branch there. Around it is what all of them
-share: damping, misalignment that teeth resist, the load that moves along the face. `row_force` with `add_row_tangent`
-is the plain form, on coordinates as they are; `add_row_mesh` is that of loops over time, on the geometry that is
-arranged for speed (`exugear.system.kernels.meshes`). Tests hold them together.
+The model itself is implemented once, in `row_law`: a model with its own force is a branch there. The other functions
+implement common parts: damping, resistance of teeth to misalignment, shuttling of the load. `row_force` with
+`add_row_tangent` is the plain form, on coordinates as they are; `add_row_mesh` is the form of loops over time, on the
+geometry that is arranged for speed (`exugear.system.kernels.meshes`). Tests check that they agree.
 """
 
 from __future__ import annotations
@@ -109,9 +109,9 @@ def row_law(
 
 @kernel
 def tilted(q: Floats, m: int, meshes: MeshArrays, memory: Floats) -> float:
-    """Misalignment of mesh m against that of its contact's state, rad; its gradient stays in `memory`.
+    """Misalignment of mesh m relative to that of its contact's state, rad; its gradient stays in `memory`.
 
-    Rows of the deflection that stand there become those of e (`exugear.system.tooth_mesh.contact_state`).
+    Rows of the deflection stored there are replaced by those of e (`exugear.system.tooth_mesh.contact_state`).
     """
     gradient = memory[GRADIENT]
     turning = memory[TURNING]
@@ -234,10 +234,10 @@ def add_row_tangent(q: Floats, v: Floats, m: int, meshes: MeshArrays, memory: Fl
 
 @kernel
 def add_way_tangent(across: float, way: float, moment: float, by_spin: float, memory: Floats, jq: Floats) -> None:
-    """Add the derivatives of the moment of a load that moves along the face to the negative force, (13, 13).
+    """Add the derivatives of the moment of a shuttling load to the negative force, (13, 13).
 
-    What the misalignment takes of the force's slope goes to `memory`; `across` is the stiffness times the way (N),
-    `by_spin` the slope of the moment (N m) by the spin of gear 1.
+    The contribution of misalignment to the force's slope is stored in `memory`; `across` is the stiffness times the
+    shift (N), `by_spin` the slope of the moment (N m) by the spin of gear 1.
     """
     gradient = memory[GRADIENT]
     tilting = memory[TILTING]
@@ -453,10 +453,10 @@ def pass_meshes(
     memory: Floats,
     law_memory: Scratch | None,
 ) -> None:
-    """Do for all meshes what the functions below say, where there is room for it.
+    """Apply the functions below to all meshes, with the memory provided.
 
-    One function does all, so that the laws are compiled once. `table` is that of `acting_table`, and the memory
-    of its law is there with it; `memory` is (`MEMORY`, 13).
+    One function does all, so that the models are compiled once. `table` is that of `acting_table`, including the memory
+    of its model; `memory` is (`MEMORY`, 13).
     """
     state = memory[STATE]
     acting = memory[ACTING]

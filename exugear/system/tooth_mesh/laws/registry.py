@@ -1,8 +1,8 @@
-"""All mesh laws in one table: their names, what they are in a line, and what the rest of the program must know.
+"""Registry of all mesh models: names, one-line descriptions, and properties used by the rest of the program.
 
-To add a law: a file of its name in this folder, with a `LAW`, and a row here. Only a law whose force is no stiffness
-over the mesh cycle times the deflection needs more, a branch in `exugear.system.tooth_mesh.laws.mesh_forces`. Nothing
-heavy is imported here, because the command line reads its choices from this table.
+To add a model: a file of its name in this folder, with a `LAW`, and a row here. Only a model whose force is not a
+stiffness over the mesh cycle times the deflection also needs a branch in `exugear.system.tooth_mesh.laws.mesh_forces`.
+No large library is imported here, because the command line reads its choices from this table.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ class LawProperties:
     description: str
     """One line for the command line and the page of choices."""
     has_force: bool = True
-    """False where gears only roll and no mesh has a force."""
+    """False for a kinematic constraint, without mesh forces."""
     needs_tables: bool = True
     """Whether it reads tables of the static transmission error."""
     needs_axes: bool = False
     """Whether these are to be tables over load, centre distance and misalignment."""
     loses_contact: bool = False
-    """Whether teeth part and touch on the other flank."""
+    """Whether teeth can lose contact and touch on the other flank."""
     signals_positions: bool = False
-    """Whether a run records where the gears of each mesh stand."""
+    """Whether a run records the positions of the gears of each mesh."""
     moves_load: bool = False
-    """Whether the load moves along the face over the mesh cycle as the table has it."""
+    """Whether the load shuttles over the mesh cycle as in the table."""
 
     @property
     def of_one_load(self) -> bool:

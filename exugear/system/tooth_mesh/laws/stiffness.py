@@ -1,4 +1,4 @@
-"""What a mesh law knows of each pair of a gearbox: its stiffness over the mesh cycle, or more of its table."""
+"""Inputs of a mesh model for each pair of a gearbox: stiffness over the mesh cycle, or more of its table."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ from fe_ste.transmission_error.surface import SteSurface
 def mesh_stiffness(
     gearbox: Gearbox, law: str, directory: str | Path | None = None
 ) -> dict[str, Floats | MeshCurve | SteSurface]:
-    """Stiffness F_bt / STE (N/m) at pmc = 0, 1/n, ... of each pair at work, as its law knows it.
+    """Return the stiffness F_bt / STE (N/m) at pmc = 0, 1/n, ... of each active pair, as its mesh model uses it.
 
-    The law ``line_of_action`` knows the curve of load over deflection where there is a table, ``table`` its surface.
+    The model ``line_of_action`` uses the curve of load over deflection where a table exists, ``table`` its surface.
 
     Parameters
     ----------
-    law : one of `exugear.system.tooth_mesh.laws.registry.MESH_MODELS`; it says whether it needs tables
+    law : one of `exugear.system.tooth_mesh.laws.registry.MESH_MODELS`, which states whether it needs tables
     directory : results directory with ``tables/<pair>.nc``
 
     Raises
     ------
     MeshError
-        Unknown law; or a table is missing, holds unsolved positions, or was computed from another input.
+        Unknown model; or a table is missing, has positions that have not converged, or was computed from another input.
 
     Examples
     --------

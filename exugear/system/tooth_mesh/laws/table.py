@@ -1,15 +1,16 @@
-"""Mesh law `table`: the potential of a pair's table over deflection, centre distance and misalignment.
+"""Mesh model `table`: the potential of a pair's table over deflection, centre distance and misalignment.
 
 The potential (`exugear.system.kernels.table_law`) depends on the deflection delta, on the centre distance a
 and on the misalignment gamma, each a row of the same coordinates. The generalized force is
 
     f = -(F d delta/dq + U_a da/dq + U_gamma d gamma/dq).
 
-Damping is a time times the tangent of the potential at a frozen position, along the same rows: where the tangent has a
-negative part, that does not damp (`exugear.system.kernels.table_law.surface_damping`). It fades as the teeth
-part. Teeth are apart in the backlash; beyond it the other flank touches. A table is that of the flank s = +1; the flank
-s = -1 is it turned by pi about the line of centres: the same table with misalignment reversed. Two forms of the force
-stand here, `table_force` with its tangent, and `fast_table_force` for the compiled solver, which tests hold together.
+Damping is a time times the tangent of the potential at a frozen position, along the same rows: a negative part of the
+tangent causes no damping (`exugear.system.kernels.table_law.surface_damping`). It vanishes as the teeth lose contact.
+Teeth are separated within the backlash; beyond it the other flank touches. A table applies to the flank s = +1; the
+flank s = -1 is the same rotated by pi about the line of centres: the same table with misalignment reversed. The force
+has two forms, `table_force` with its tangent, and `fast_table_force` for the compiled solver; tests check that they
+agree.
 """
 
 from __future__ import annotations
@@ -376,10 +377,10 @@ def fast_flank_force(
     law_memory: Scratch,
     memory: MeshMemory,
 ) -> None:
-    """Add what one flank (1, -1) of a mesh with a table does to `memory.states`, to `memory.gradient` its force.
+    """Add what one flank (1, -1) of a mesh with a table contributes to `memory.states`, and its force to `memory.gradient`.
 
-    That is the negative generalized force. The change of centre distance stands in the states already; the loaded flank
-    leaves deflection, rate and misalignment there. c and s are those of the frame's angle.
+    The latter is the negative generalized force. The states already contain the change of centre distance; the loaded
+    flank stores deflection, rate and misalignment there. c and s are cosine and sine of the frame's angle.
     """
     index, axis, state = meshes.coordinates[m], meshes.axis[m], memory.states[m]
     gradient, total = memory.gradient[ALONG_DEFLECTION], memory.gradient[TABLE_FORCE]
@@ -394,7 +395,7 @@ def fast_flank_force(
     less, slower = subtract_errors(q, v, m, float(side), meshes, gradient, BODY_SIZE, SPIN, FRAME)
     delta, rate = delta + offset + less, rate + slower
     misalignment = table.nominal[m, NOMINAL_MISALIGNMENT]
-    # Gears with their spin alone neither move apart nor tilt; of the other flank one is told only where it touches.
+    # Gears with spin only neither move apart nor tilt; the other flank is evaluated only in contact.
     spinning = meshes.spinning[m] == 1
     tilt_rate = 0.0
     if not spinning and (side > 0 or delta > table.lowest[m]):

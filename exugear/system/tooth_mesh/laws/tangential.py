@@ -1,7 +1,7 @@
-"""Mesh law `tangential`: the published tangential law, deflection along the pitch circle.
+"""Mesh model `tangential`: the published tangential model, deflection along the pitch circle.
 
 The deflection is tangential, at the pitch point; the force on gear 1 is T = (1, tan phi_n / cos beta, -tan beta) times
-k delta, with radial and axial parts that the deflection does not see. So it is not conservative.
+k delta, with radial and axial components not conjugate to the deflection. So it is not conservative.
 """
 
 from __future__ import annotations
