@@ -1,15 +1,15 @@
-"""Filters of stored signals: low-pass and decimation while a run goes on, and what is put right of it.
+"""Filters of stored signals: low-pass and decimation during a run, and correction of predicted values.
 
 A multistep method evaluates at the state that it predicts, and signals come from that evaluation. The correction of the
 state changes each of them in a known way: `exugear.transient.compiled.integrator.ahead_of_correction`. So the low pass
-before decimation takes the change off, at no cost in the loop:
+before decimation subtracts the change, at no cost in the loop:
 
-- deflections and other positions by what the method says of a position,
-- forces of bearings by what it says of a position and its rate together, as damping goes with stiffness,
+- deflections and other positions by the method's correction of a position,
+- forces of bearings by its correction of a position and its rate together, as damping is proportional to stiffness,
 - forces of meshes, whose stiffness changes, by the change of their deflection times mean stiffness and damping.
 
-What hangs on corrected states alone (`exugear.transient.compiled.solver.Observer.complete`) stays as it is, and so
-do meshes of gears that only spin: the loop corrects these itself.
+Signals that depend only on corrected states (`exugear.transient.compiled.solver.Observer.complete`) are unchanged, and
+so are meshes of gears with spin only: the loop corrects these itself.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def filter_one(rows: Floats, first: int, taps: Floats, source: int, target: int,
 
 @kernel
 def filter_four(rows: Floats, first: int, factor: int, taps: Floats, source: int, target: int, out: Floats) -> None:
-    """Do the same for four results side by side, because each addition waits for the one before."""
+    """Do the same for four results in parallel, because each addition waits for the one before."""
     a = eight(out[0], target)
     b = eight(out[1], target)
     c = eight(out[2], target)
@@ -115,9 +115,9 @@ class Filter(NamedTuple):
     """A filter over rows: taps of each column on itself, and of some columns on others."""
 
     own: Floats
-    """(2 half + 1, columns) what each column takes of itself."""
+    """(2 half + 1, columns) weights of each column in itself."""
     other: Floats
-    """(2 half + 1, columns) what each column takes of the one that stands so many columns before it."""
+    """(2 half + 1, columns) weights in each column of the column so many positions before it."""
     before: int
     """That number of columns."""
 
@@ -331,9 +331,9 @@ def _fitted(remedy: Complexes, by: Complexes, error: Complexes, half: int) -> Fl
 
 
 def _cascade(low_pass: Floats, remedy: Floats) -> Floats:
-    """Taps of a low pass and a remedy one after the other, as many as the low pass has: what is cut off is 1e-6.
+    """Return taps of a low pass and a remedy in series, as many as the low pass has: truncation error 1e-6.
 
-    Their sum is zero: a mean load may be ten thousand times the fluctuation beside it, and is right as it is.
+    Their sum is zero: a mean load may be ten thousand times its fluctuation, and needs no correction.
     """
     both = np.convolve(low_pass, remedy, mode="same")
     both[len(both) // 2] -= both.sum()

@@ -1,9 +1,10 @@
-"""What a run gives, and how it can fail.
+"""Outcome of a run: results, failures and validity checks.
 
-A run can end without an error and still be wrong: a torque of the wrong sign drives the train to speeds that no
-wheel survives, a parametric instability lets teeth close by more than their height, a bilateral law pulls where teeth
-would have parted. Each limit is physical, far outside of what good runs do, and comes with its reason. Beyond those
-that end in ``stopped`` a run is stopped; beyond the others it goes on and is marked as not to be trusted.
+A run can end without an error and still be wrong: a torque of the wrong sign accelerates the gear train to speeds that
+no gear survives, a parametric instability causes approaches larger than the tooth height, a bilateral model has tensile
+force where teeth would have lost contact. Each limit is physical, far outside the range of valid runs, and is reported
+with its reason. A run is stopped beyond limits that end in ``stopped``; beyond the others it continues and is marked as
+invalid.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ class Progress:
 
 
 class ProgressMeter:
-    """Teller of how far a run is.
+    """Progress reporter of a run.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ class ProgressMeter:
         return time.perf_counter() - self._wall_start
 
     def reach(self, now: float) -> None:
-        """Tell that the run has reached a simulated time, s."""
+        """Report that the run has reached a simulated time, s."""
         if self._tell is None:
             return
         wall = self.wall
@@ -98,9 +99,9 @@ class Run(ReprMixin):
     wall: float
     """Simulated and wall time, s."""
     reasons: tuple[str, ...] = ()
-    """Why it is not to be trusted (`exugear.transient.outcome`), none if it is."""
+    """Why it is invalid (`exugear.transient.outcome`), none if it is valid."""
     halted: bool = False
-    """Whether it was stopped beyond a limit, and cannot go on."""
+    """Whether it was stopped beyond a limit, and cannot be resumed."""
 
     @property
     def trusted(self) -> bool:
@@ -139,7 +140,7 @@ LARGEST, SINCE, WHERE = range(3)
 AT_START, SCALE = range(2)
 """Columns of the row `ACCOUNT`: energy that the account began with, and the largest so far, J."""
 FIGURES = (5, 3)
-"""Shape of the running figures."""
+"""Shape of the monitored values."""
 WORK_OF_LOADS, KINETIC, ELASTIC = map(BALANCE_TERMS.index, ("work_of_loads", "kinetic_energy", "elastic_energy"))
 """Terms of the account that say how much energy there is; what varying stiffness pumps in shows up in them."""
 EXPLAINING = [number for number, term in enumerate(BALANCE_TERMS) if term != "work_of_loads"]
@@ -147,9 +148,9 @@ EXPLAINING = [number for number, term in enumerate(BALANCE_TERMS) if term != "wo
 PULLING = MESH_TIMES.index("tensile_time")
 """Row of the times of meshes in which they pull."""
 UNSOLVED = MESH_TIMES.index("interpolation_time")
-"""Row of those in which they read a table beside states that are not solved."""
+"""Row of the times in which they read a table next to states that have not converged."""
 WHOLLY = 0.9
-"""Part of a run in which a mesh pulls that is not swaying about no load, but load on the other flank."""
+"""Part of a run with tensile mesh force from which it is load on the other flank, not oscillation about zero load."""
 LEAST_ENERGY = 1e-9
 """Energy that counts as none, J: a train at rest has nothing but round-off to account for."""
 
@@ -165,20 +166,21 @@ class Limits:
     hundredth, amplitudes are no longer known to the per cent that a level in dB is read by; a tenth from nowhere
     means that the step does not solve the equations."""
     rim_speed_stopped: float = BURSTING_RIM_SPEED
-    """Rim of a gear, m/s: see `exugear.gearbox.load_cases.BURSTING_RIM_SPEED`."""
+    """Tip speed of a gear, m/s: see `exugear.gearbox.load_cases.BURSTING_RIM_SPEED`."""
     overspeed_stopped: float = 2.0
     swaying: float = 10.0
-    """Multiple of the fastest speed that the loads give the rolling train, and what a rim may have beyond it, m/s.
-    Elastic motions sway about the rolling one: 10 m/s at 1 kHz are 1.6 mm on the rim, a hundred times the deflection
-    of loaded teeth."""
+    """Multiple of the maximum speed of the kinematic gear train under the loads, and permitted excess of the tip speed,
+    m/s. Elastic motions oscillate about the kinematic one: 10 m/s at 1 kHz are 1.6 mm at the tip circle, a hundred
+    times the deflection of loaded teeth."""
     deflection_marked: float = 0.05
     deflection_stopped: float = 0.25
-    """Deflection of a mesh as part of the height of its teeth. Teeth of steel break at their root, at some 2 GPa,
-    when they give way by a sixtieth of their height: at three times this they are gone. At a quarter of the height
-    the gears no longer stand where the stiffness was computed, and bilateral laws know of no gap."""
+    """Deflection of a mesh as part of the height of its teeth. Teeth of steel break at their root, at about 2 GPa, when
+    they deflect by a sixtieth of their height: at three times this they have failed. At a quarter of the height the
+    gear positions differ from those of the stiffness, and bilateral models include no gap."""
     pulling_marked: float = 0.5
-    """Part of the run in which a mesh of a bilateral law pulls. At resonances it may do so now and then, as teeth do
-    that part. A mesh that pulls for half of the run or more is not loaded on the flank that it is the law of."""
+    """Part of the run with tensile force in a mesh of a bilateral model. At resonances this may occur temporarily,
+    where teeth would lose contact. A mesh with tensile force for half of the run or more is not loaded on the flank of
+    its model."""
 
     def to_json(self) -> str:
         """Limits as text, for the file of a run."""
@@ -213,7 +215,7 @@ def energy_left_over(lines: Floats, start: float, scale: float) -> tuple[Floats,
 
 
 class ValidityMonitor:
-    """What a run has reached so far, against the limits.
+    """Monitored values of a run so far, compared with the limits.
 
     Parameters
     ----------
@@ -222,7 +224,7 @@ class ValidityMonitor:
     Attributes
     ----------
     figures : array of the shape `FIGURES`
-        All that the judge remembers: a run that goes on takes it over.
+        The complete state of the monitor: a resumed run takes it over.
     """
 
     def __init__(self, assembly: Assembly, loads: LoadSummary, limits: Limits = LIMITS) -> None:
@@ -243,7 +245,7 @@ class ValidityMonitor:
         self._gaps = np.array([0.0 if e.table is None else e.table.backlash for e in assembly.elements])
 
     def see(self, times: Floats, deflections: Floats, v: Floats, account_times: Floats, account: Floats) -> None:
-        """Take what a run has done since the last time.
+        """Add the results of a run since the last call.
 
         Parameters
         ----------
@@ -251,7 +253,7 @@ class ValidityMonitor:
         deflections : (n, meshes) m
         v : (n, size) velocities
         account_times, account : (k,) (k, terms)
-            Lines of the account of energy, J, as in `exugear.system.signals.BALANCE_TERMS`.
+            Rows of the energy balance, J, as in `exugear.system.signals.BALANCE_TERMS`.
         """
         # A run that diverges passes through numbers whose sums overflow: infinite or not a number, they are too large.
         with np.errstate(over="ignore", invalid="ignore"):
@@ -295,13 +297,13 @@ class ValidityMonitor:
 
     @property
     def stop(self) -> bool:
-        """Whether the run must not go on."""
+        """Whether the run must be stopped."""
         limits = self.limits
         most = (limits.energy_stopped, limits.rim_speed_stopped, 1.0, limits.deflection_stopped)
         return bool(np.any(self.figures[:ACCOUNT, LARGEST] > most))
 
     def reasons(self, mesh_times: Floats, simulated: float) -> tuple[str, ...]:
-        """Reasons why the run is not to be trusted, none if it is.
+        """Return the reasons why the run is invalid, none if it is valid.
 
         Parameters
         ----------

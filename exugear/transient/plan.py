@@ -1,4 +1,4 @@
-"""What a run is to do: its steps, and what it was run with, as the file keeps it."""
+"""Plan of a run: its steps, and its settings as stored in the file."""
 
 from __future__ import annotations
 
@@ -100,11 +100,11 @@ def check_disk(
 
 
 def sample_bytes(meshes: int, supports: int, tabled: bool, jointed: bool = False) -> int:
-    """Size of one sample on disk, of a run with so many meshes and supports.
+    """Return the size of one sample on disk, of a run with so many meshes and supports.
 
     Parameters
     ----------
-    tabled : whether its mesh law is `table`, which has further signals
+    tabled : whether its mesh model is `table`, which has further signals
     jointed : whether supports are ideal joints, which have fewer
 
     Examples
@@ -182,7 +182,7 @@ class RunPlan:
     band: float
     """Highest frequency whose amplitude is kept, Hz."""
     integration: Integration
-    """How the compiled solver integrates; of Exudyn's own methods it tells the step."""
+    """Integration settings of the compiled solver; of Exudyn's own methods only the step."""
     solver: str
     """``compiled`` or ``exudyn``."""
     mesh_route: MeshRoute = "element"

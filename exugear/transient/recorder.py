@@ -30,7 +30,7 @@ OBSERVED = [BALANCE_TERMS.index(term) for term in ENERGIES]
 
 
 class EnergyAccount:
-    """Terms of `exugear.system.signals.BALANCE_TERMS` as a run goes on.
+    """Terms of `exugear.system.signals.BALANCE_TERMS` accumulated during a run.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ class StateBuffer:
         return self._rows_between(self.filled, min(self.filled + most, len(self._times)))
 
     def take(self, times: Floats) -> None:
-        """Count states that were filled into the room, at times (n,), s."""
+        """Count states that were filled into the buffer, at times (n,), s."""
         end = self.filled + len(times)
         self._times[self.filled : end] = times
         self.filled = end
@@ -152,7 +152,7 @@ class StateBuffer:
 
 
 class Recorder:
-    """Keeper of a run in progress; as a context manager it waits for what is being written.
+    """Writer of a run in progress; as a context manager it waits for pending writes.
 
     Parameters
     ----------
@@ -166,9 +166,9 @@ class Recorder:
     last_time : float
         Time of the last state that counts, s.
     fault : str
-        What ended the run, empty if nothing did.
+        The error that ended the run, empty if none.
     past : (n, size) array
-        Accelerations that a solver with a memory goes on from after the last state, the latest last.
+        Accelerations from which a multistep solver continues after the last state, the latest last.
     """
 
     def __init__(
@@ -232,7 +232,7 @@ class Recorder:
         self._take(np.array([time]))
 
     def take_observed(self, times: Floats) -> None:
-        """Take the states that a solver left in the room of the buffer, with their signals, at times (n,), s."""
+        """Accept the states that a solver stored in the buffer, with their signals, at times (n,), s."""
         self.buffer.observed += len(times)
         self._take(times)
 
@@ -259,7 +259,7 @@ class Recorder:
         self._await_writing()
 
     def _hand_over(self) -> None:
-        """Have the buffer written and go on with the other, unless what was written before ends the run there."""
+        """Start writing the buffer and continue with the other, unless the previous write ends the run there."""
         self._await_writing()
         if self._stopped:
             self.buffer.clear()
@@ -281,7 +281,7 @@ class Recorder:
             self._progress(written)
 
     def _write(self, buffer: StateBuffer, past: Floats, against: tuple[str, ...]) -> float:
-        """Turn the states of a buffer into signals, write them and the state to go on from; return its time (s)."""
+        """Convert the states of a buffer into signals, write them and the restart state; return its time (s)."""
         with np.errstate(over="ignore", invalid="ignore"):  # a run that diverges ends in numbers too large to add up
             self._observe_rest(buffer)
             times, rows = buffer.states()
@@ -308,7 +308,7 @@ class Recorder:
         return np.unique(np.append(np.arange(0, count, stride), count - 1))
 
     def _checkpoint(self, time: float, rows: RowBuffer, past: Floats) -> Checkpoint:
-        """State to go on from: the last of these rows, at a time (s)."""
+        """Restart state: the last of these rows, at a time (s)."""
         return Checkpoint(
             step=round(time / self._plan.step),
             q=rows.q[-1],
@@ -324,7 +324,7 @@ class Recorder:
         )
 
     def reasons(self) -> tuple[str, ...]:
-        """Reasons why the run is not to be trusted so far."""
+        """Return the reasons why the run is invalid so far."""
         return self._reasons(self.last_time)
 
     def _reasons(self, time: float) -> tuple[str, ...]:

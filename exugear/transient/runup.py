@@ -190,23 +190,23 @@ def simulate(
 
     Parameters
     ----------
-    choice : variant, mesh law, inertia set and load case
+    choice : variant, mesh model, inertia set and load case
     stiffness : mapping of pair name to (n,) array
         Mesh stiffness over the cycle, see `exugear.system.tooth_mesh.laws.stiffness.mesh_stiffness`.
     out : results directory
-    bodies : by body name, reduced elastic bodies, which the variant `flexible` needs
-    duration : simulated time, s; the load case's by default, that of the stopped run where one is gone on with
+    bodies : by body name, reduced flexible bodies, required by the variant `flexible`
+    duration : simulated time, s; the load case's by default, that of the stopped run where one is resumed
     step : integration step, s; chosen from `band` and the fastest eigenfrequency by default
     band, sample_rate : highest frequency whose amplitude is kept, and stored rate, Hz; the rate must divide the steps
     solver : {"compiled", "exudyn"}, optional
         The compiled one where it applies by default; a body in a floating frame needs Exudyn.
     integrator : {"adams", "rk4"}, optional
-        Kind of method of the compiled solver; whichever takes fewer evaluations by default. ``rk4`` is the reference.
+        Kind of method of the compiled solver; by default the one with fewer evaluations. ``rk4`` is the reference.
     angles : {"reference", "operating"}
-        Angles of the law `tangential`.
+        Angles of the model `tangential`.
     mesh_route : {"element", "loads"}
         See `exugear.transient.exudyn_model.system`; "loads" is Exudyn's alone.
-    resume : go on with a run that was stopped
+    resume : resume a stopped run
     progress : called about every quarter of a simulated second
 
     Returns
@@ -218,13 +218,13 @@ def simulate(
     Raises
     ------
     GearboxFileError
-        A load case or a duration that cannot be run: too short, too long for the disk, or with a motion so fast that
-        it asks for an absurd step.
+        A load case or a duration that cannot be run: too short, too long for the disk, or with a motion so fast that it
+        requires an extremely small step.
     RunError
-        The compiled solver does not take the variant or the step, a state that is not finite, a step that Exudyn
-        cut, or nothing to resume.
+        The compiled solver does not support the variant or the step, a state is not finite, Exudyn reduced a step, or
+        there is nothing to resume.
     FileError
-        Another process is at work on this run.
+        Another process is writing this run.
     OSError
         The results cannot be written; what was written before is kept.
     LimitError
@@ -273,7 +273,7 @@ def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], No
 
 
 def _integrate(plan: RunPlan, start: RunStart, file: RunFile, meter: ProgressMeter) -> Run:
-    """Integrate and tell how it ended; a fault, or a limit that was passed, is raised."""
+    """Integrate and return the run; an error, or a limit that was passed, is raised."""
     with Recorder(plan, start, file, meter.reach) as recorder, interruptible() as interruption:
         integrate(plan, start, recorder, interruption)
         recorder.finish()

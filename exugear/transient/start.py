@@ -1,4 +1,4 @@
-"""Where a run starts from and what acts on it, anew or from the last piece of a run that was stopped."""
+"""Start of a run: initial state and loads, for a new run or from the last piece of a stopped one."""
 
 from __future__ import annotations
 
@@ -48,26 +48,26 @@ LOCK_NAME = "run.partial.lock"
 
 @contextmanager
 def held(directory: Path) -> Iterator[None]:
-    """Keep a run to this process; the lock ends with the process, however that ends.
+    """Reserve a run for this process; the lock ends with the process, in any case.
 
     Raises
     ------
     FileError
-        Another process is at work on the run.
+        Another process is writing the run.
     """
     with exclusive(directory / LOCK_NAME, f"the run {directory}"):
         yield
 
 
 def refuse_if_busy(directory: Path) -> None:
-    """Raise what `simulate` would raise if another process is at work on a run; change nothing."""
+    """Raise what `simulate` would raise if another process is writing a run; change nothing."""
     if (directory / LOCK_NAME).exists():
         with held(directory):
             pass
 
 
 def refuse_to_resume(directory: Path) -> str:
-    """Why a run cannot be gone on with; empty if it can."""
+    """Why a run cannot be resumed; empty if it can."""
     if has_pieces(directory / PARTIAL_NAME):
         return ""
     if (directory / EARLIER_PARTIAL_NAME).exists():

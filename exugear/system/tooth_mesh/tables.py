@@ -67,7 +67,7 @@ def reaches(table: MeshTable, wanted: TableInput) -> bool:
 
 
 def axes_reaching(pair: GearPair, opening: float = 20e-6, change: float = 33e-6) -> GridAxes:
-    """Return axes for a pair with static misalignment `opening` (m over the face), and offset `change` (m) from nominal.
+    """Return axes for a pair with static misalignment `opening` (m over the face), and `change` (m) from nominal.
 
     Examples
     --------

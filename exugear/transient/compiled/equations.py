@@ -366,7 +366,7 @@ def add_rolling(
 
 @kernel
 def hand_to_body(frame: Floats, turned: bool, sign: float, sums: Floats, moment: int, load: Floats) -> None:
-    """Add a force and the moment that stands at an entry of sums, in a body's axes, to a load in global axes."""
+    """Add a force, and the moment at an entry of sums, both in a body's axes, to a load in global axes."""
     x = sign * sums[0]
     y = sign * sums[1]
     z = sign * sums[2]
@@ -396,8 +396,8 @@ def hand_to_body(frame: Floats, turned: bool, sign: float, sums: Floats, moment:
 def add_connectors(q: Floats, bodies: Bodies, connectors: Connectors, pairs: Pairs, work: Work) -> None:
     """Add the forces of all connectors to `work.loads`, pair of bodies by pair; fill `work.supports`.
 
-    What both bodies do is turned into the first one's axes once for all connectors between them, and what they push
-    turned back once.
+    The motion of both bodies is transformed into the first one's axes once for all connectors between them, and their
+    forces are transformed back once.
     """
     ground = bodies.start.size - 1
     sums = work.sums
@@ -518,8 +518,8 @@ def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
 def evaluate(t: float, q: Floats, v: Floats, with_power: bool, equations: Equations, work: Work) -> None:
     """Fill `work.rate` with the accelerations at time t (s) and state q, v (e,).
 
-    What bodies, meshes and connectors do there is left in `work.frames`, `work.mesh.states` and `work.supports`; what
-    elastic bodies damp in `work.damped` if asked for with the power.
+    States of bodies, meshes and connectors are stored in `work.frames`, `work.mesh.states` and `work.supports`; power
+    dissipated by flexible bodies in `work.damped` if the power is requested.
     """
     bodies = equations.bodies
     places = equations.places

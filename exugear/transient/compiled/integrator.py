@@ -1,4 +1,4 @@
-"""The integrator: methods of integration in time, and the step that is stable and accurate for what vibrates.
+"""The integrator: time integration methods, and a step that is stable and accurate for the vibrations.
 
 Two kinds. The classical Runge-Kutta method of order 4 evaluates the accelerations four times a step. The multistep
 method of order k evaluates them once: velocities are predicted by Adams and Bashforth, positions by the same polynomial
@@ -6,9 +6,9 @@ through the last k accelerations integrated twice (Stoermer, Cowell); the accele
 corrects both by its difference from the extrapolated one (predict, evaluate, correct; Hairer, Norsett and Wanner,
 Solving Ordinary Differential Equations I, section III.1 and III.10).
 
-The steps themselves, which move coordinates and velocities on, are in `exugear.transient.compiled.solver`.
+The steps themselves, which advance coordinates and velocities, are in `exugear.transient.compiled.solver`.
 
-Numbers here become part of machine code: `fe_ste.tools.compilation` compiles anew when this file changes.
+Numbers here become part of machine code: `fe_ste.tools.compilation` recompiles when this file changes.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ PREDICT_VELOCITY, PREDICT_POSITION, EXTRAPOLATE = range(3)
 CORRECT_VELOCITY, CORRECT_POSITION = range(2)
 """Entries of `Method.correction`."""
 ORDERS = (4, 5, 6)
-"""Orders of the multistep method to choose from: 3 makes negative damping, 7 and more are hardly ever stable."""
+"""Orders of the multistep method to choose from: 3 has negative damping, 7 and more are rarely stable."""
 _FREE_SHARES = np.array(
     [
         [0.78877, -0.32168, -0.37097, 0.34632],
@@ -107,7 +107,7 @@ class Method(NamedTuple):
 
     @property
     def is_multistep(self) -> bool:
-        """Whether it goes on from several accelerations of the past."""
+        """Whether it uses several past accelerations."""
         return self.points > 0
 
     @property
@@ -151,13 +151,13 @@ def adams(order: int) -> Method:
 
 
 def stabilised() -> Method:
-    """Multistep method of order 4 from eight accelerations, stable and exact at longer steps than those of Adams.
+    """Return the multistep method of order 4 from eight accelerations, stable and exact at longer steps than Adams'.
 
     Four accelerations more than order 4 needs leave multiples of four fourth differences free in each sum; with both
-    corrections that makes fourteen numbers. They are those of the least error of free motions with damping ratios of 0
-    to 4 % up to w h = 0.50, among all that are stable up to w h = 0.86 with damping ratios of 2 to 3.5 %, as elastic
-    bodies have at their highest frequencies (Adams' method of order 4: 0.72). The free motion's eigenvalue errs by
-    1.3e-5 of its magnitude up to there; by Adams' method of order 4 at the same step it does by 8e-4.
+    corrections that makes fourteen numbers. They minimise the error of free motions with damping ratios of 0 to 4 % up
+    to w h = 0.50, among all that are stable up to w h = 0.86 with damping ratios of 2 to 3.5 %, as flexible bodies have
+    at their highest frequencies (Adams' method of order 4: 0.72). The relative error of the free motion's eigenvalue is
+    up to 1.3e-5 in this range; for Adams' method of order 4 at the same step it is 8e-4.
 
     Examples
     --------
@@ -401,7 +401,7 @@ def highest_rate(assembly: Assembly) -> float:
 
 
 def fastest_motion(assembly: Assembly) -> str:
-    """Say in words what the largest ``|eigenvalue|`` belongs to: the body that moves, and what holds or damps it.
+    """Describe as text the motion of the largest ``|eigenvalue|``: the moving body, and the element that acts on it.
 
     Examples
     --------
@@ -429,7 +429,7 @@ def fastest_motion(assembly: Assembly) -> str:
 
 
 def _stable(method: Method, values: Complexes, step: float, factor: float) -> bool:
-    """Tell whether no free motion grows, all being faster by a factor."""
+    """Return whether no free motion grows, all being faster by a factor."""
     moving = factor * values[np.abs(values) * step > SLOWEST]
     if not moving.size:
         return True
@@ -460,7 +460,7 @@ class _Motions:
         self.values = self.values[self.values.imag >= 0.0]
 
     def with_step(self, method: Method, step: float) -> Integration:
-        """Figures of a method with a step (s)."""
+        """Return the properties of a method with a step (s)."""
         return Integration(
             method,
             step,
@@ -507,23 +507,23 @@ def choose_integration(
     step: float | None = None,
     integrator: str | None = None,
 ) -> Integration:
-    """Find the method and the step that take the fewest evaluations.
+    """Choose the method and the step with the fewest evaluations.
 
     The step divides the sampling interval, is stable by `MARGIN` for all eigenvalues of the system at rest, meshes at
     their stiffest, keeps amplitudes up to `band` within `FORCED_ERROR` and resonances excited up to there within
-    `RESONANCE_ERROR`, those of elastic bodies too: teeth excite them wherever mesh frequencies pass. Heavy damping
-    shortens the steps of multistep methods: the Runge-Kutta method takes over then.
+    `RESONANCE_ERROR`, including those of flexible bodies: teeth excite them wherever mesh frequencies cross. Heavy
+    damping shortens the steps of multistep methods: then the Runge-Kutta method is used.
 
     Parameters
     ----------
     sample_rate, band : Hz
-    step : take this step, s, whatever its accuracy; the method is then the stable one of least error
+    step : use this step, s, whatever its accuracy; the method is then the stable one of minimum error
     integrator : {"adams", "rk4"}, optional
-        Kind of method; whichever is cheaper by default.
+        Kind of method; the cheaper one by default.
 
     Returns
     -------
-    its margin is below 1 if the step asked for is not stable
+    its margin is below 1 if the specified step is not stable
 
     Examples
     --------
@@ -546,7 +546,7 @@ def choose_integration(
 
 
 def _best(choices: Iterable[Integration]) -> Integration:
-    """Return the cheapest that is stable with the margin and accurate; else the stable one of least error."""
+    """Return the cheapest that is stable with the margin and accurate; else the stable one of minimum error."""
     ranked = sorted(choices, key=lambda choice: (choice.margin < 1.0, choice.error))
     good = [choice for choice in ranked if choice.margin >= MARGIN and choice.is_accurate]
     if good:

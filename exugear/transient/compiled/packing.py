@@ -1,6 +1,6 @@
 """An assembly and its loads as the arrays of the compiled solver.
 
-Names of columns become part of machine code: `fe_ste.tools.compilation` compiles anew when this file changes.
+Names of columns become part of machine code: `fe_ste.tools.compilation` recompiles when this file changes.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class Bodies(NamedTuple):
     spin_inertia: Floats
     """(s,) coordinate and kg m2 of bodies with their spin alone."""
     inverse: Floats
-    """(s, s) inverse mass matrix of these spins where gears only roll, else (0, 0)."""
+    """(s, s) inverse mass matrix of these spins for a kinematic gear train, else (0, 0)."""
     turning: Integers
     """(k,) coordinates whose sine is needed; the first is one that stays zero."""
 
@@ -115,7 +115,7 @@ class Places(NamedTuple):
     start: Integers
     """(p,) first of the six coordinates."""
     spin: Integers
-    """(s,) spins of bodies with their spin alone, whose places follow, where a mesh sees them beside other bodies."""
+    """(s,) spins of bodies with spin only, whose positions follow, where a mesh connects them with other bodies."""
 
 
 class Pairs(NamedTuple):
@@ -243,7 +243,7 @@ class Work(NamedTuple):
 # An assembly and its loads as the arrays of the compiled solver
 
 ROUND_OFF = 1e-14
-"""Entries of a bearing's matrix this small beside its diagonal are left-overs of rotating it, and left out."""
+"""Entries of a bearing's matrix this small relative to its diagonal are rotation round-off, and are neglected."""
 
 
 def extended_size(assembly: Assembly) -> int:
@@ -270,7 +270,7 @@ class _Numbers:
         return self.starts.index(start)
 
     def slot(self, coordinate: int) -> int:
-        """Tell where a coordinate's sine stands, taking it up if it is new; 0 for none."""
+        """Return the index of a coordinate's sine, which is added if it is new; 0 for none."""
         if coordinate < 0:
             return 0
         if coordinate not in self.turning:
@@ -376,14 +376,14 @@ def _damping_time(stiffness: Floats, damping: Floats) -> float:
 
 
 def _without_round_off(matrix: Floats) -> Floats:
-    """Set entries to zero that are nothing beside the translations' and the tilts' stiffness."""
+    """Set entries to zero that are negligible relative to the translational and tilting stiffness."""
     entries = np.abs(matrix)
     size = np.sqrt(np.repeat([entries[:TILT, :TILT].max(), entries[TILT:, TILT:].max()], 3))
     return np.where(entries <= ROUND_OFF * np.outer(size, size), 0.0, matrix)
 
 
 def spinning_alone(meshes: MeshArrays) -> Booleans:
-    """Tell of each mesh whether its gears have their spins alone, (m,)."""
+    """Return for each mesh whether its gears have spin only, (m,)."""
     others = np.delete(meshes.coordinates[:, :FRAME], [SPIN_1, SPIN_2], axis=1)
     return np.asarray((others < 0).all(axis=1))
 
@@ -512,7 +512,7 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
 
 
 def _rolling_inverse(assembly: Assembly) -> Floats:
-    """Inverse mass matrix of spins that only roll: B (B^T M B)^-1 B^T with the free motions B."""
+    """Inverse mass matrix of spins in a kinematic gear train: B (B^T M B)^-1 B^T with the free motions B."""
     free = assembly.motions
     mass = assembly.mass_matrix
     inverse = free @ np.linalg.solve(free.T @ mass @ free, free.T)

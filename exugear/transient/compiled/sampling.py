@@ -1,7 +1,7 @@
-"""Signals, energies and powers of the state that was evaluated last, compiled.
+"""Compiled signals, energies and powers of the last evaluated state.
 
-What there is to observe stands in `exugear.system.signals.SIGNALS`, with the kernel here that fills it. Where a
-signal stands among the columns of a sample is handed over as `Columns`.
+Observable signals are listed in `exugear.system.signals.SIGNALS`, with the kernel here that fills each. The columns of
+the signals in a sample are passed as `Columns`.
 """
 
 from __future__ import annotations

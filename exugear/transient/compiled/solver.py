@@ -1,13 +1,13 @@
 """The compiled solver: an assembly's equations integrated without Exudyn.
 
-Same coordinates and same laws as the Exudyn system built from the same assembly (see
-`exugear.transient.compiled.equations`), so that by the same method the trajectories differ by round-off only.
+Coordinates and models are the same as in the Exudyn system built from the same assembly (see
+`exugear.transient.compiled.equations`), so that with the same method the trajectories differ only by round-off.
 
-Methods stand in `exugear.transient.compiled.integrator`. Signals and powers come from the evaluation that each step
-makes at its new state anyway. A multistep method evaluates at the predicted state: what the correction changes of
-signals is known, and taken off here or when they are stored (`exugear.transient.filters`).
+Methods are in `exugear.transient.compiled.integrator`. Signals and powers follow from the evaluation that each step
+makes at its new state anyway. A multistep method evaluates at the predicted state: the change of signals by the
+correction is known, and subtracted here or when they are stored (`exugear.transient.filters`).
 
-Numbers here become part of machine code: `fe_ste.tools.compilation` compiles anew when this file changes.
+Numbers here become part of machine code: `fe_ste.tools.compilation` recompiles when this file changes.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ def keep_acceleration(as_new: bool, work: Work, past: StepHistory) -> None:
 
 @kernel
 def copy_state(work: Work, q: Floats, v: Floats) -> bool:
-    """Copy the state into q, v (size,); tell whether it is finite."""
+    """Copy the state into q, v (size,); return whether it is finite."""
     # Nothing is left of a number times zero, but of one that is not finite.
     check = all_eight(0.0)
     filled = q.size - q.size % SIZE
@@ -262,7 +262,7 @@ POWER_INTERVAL = 1.0 / 30e3
 """Time between observations of powers, s: a sum over samples errs by what lies at the rate of the samples itself, and
 powers of motions up to 10 kHz reach up to twice that."""
 POWER_INTERVAL_PARTING = 1.0 / 60e3
-"""The same where teeth may part: powers then change from one step to the next."""
+"""The same with contact loss: powers then change from one step to the next."""
 
 
 def unsupported_reason(assembly: Assembly) -> str:
@@ -296,8 +296,8 @@ class CompiledSystem:
     step : time step, s; see `exugear.transient.compiled.integrator`
     method : the classical Runge-Kutta method by default
     past : (n, size)
-        Accelerations at the steps before, the latest at the state itself. A multistep method goes on from them as if
-        it had not stopped; without them it starts anew.
+        Accelerations at the steps before, the latest at the state itself. A multistep method continues from them as if
+        it had not stopped; without them it starts afresh.
     """
 
     def __init__(
@@ -327,7 +327,7 @@ class CompiledSystem:
 
     @property
     def past(self) -> Floats:
-        """Accelerations (n, size) to go on from."""
+        """Accelerations (n, size) from which to continue."""
         return self._past.in_order()[:, : self._size]
 
     def accelerations(self, time: float = 0.0) -> Floats:

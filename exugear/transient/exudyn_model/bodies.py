@@ -1,12 +1,12 @@
-"""Bodies of an assembly in an Exudyn system: rigid ones, those with their spin alone, and elastic ones.
+"""Bodies of an assembly in an Exudyn system: rigid ones, those with spin only, and flexible ones.
 
-Rigid bodies are ``NodeRigidBodyRxyz`` with z as spin axis, so that the unwrapped angle is a coordinate. An elastic body
+Rigid bodies are ``NodeRigidBodyRxyz`` with z as spin axis, so that the unwrapped angle is a coordinate. A flexible body
 has such a node at each seat, one node for its modal coordinates, and its matrices in one ``ObjectGenericODE2`` on all.
 
-What is special about Exudyn's floating frame is told in `exugear.transient.exudyn_model.floating`.
+`exugear.transient.exudyn_model.floating` describes the particular properties of Exudyn's floating frame.
 
-What Exudyn would compute from a mesh (nodes, mass matrix, modes) it is given as integrals, so that rigid rings on seats
-count and a run needs no mesh.
+Quantities that Exudyn would compute from a mesh (nodes, mass matrix, modes) are passed as integrals, so that rigid
+rings on seats count and a run needs no mesh.
 """
 
 from __future__ import annotations
@@ -92,9 +92,9 @@ DIFFERENCE = 1e-6
 class FloatingBodies:
     """The bodies of an assembly that move in floating frames, and the forces that they share with others.
 
-    The laws of meshes, bearings and couplings stay those of the assembly on its own coordinates: those of each floating
-    body follow from its frame and modes, and forces go back by the transposed matrix of their rates. In the solver's
-    vector of coordinates those of the frame and modes stand where the assembly has those of the body.
+    Meshes, bearings and couplings keep the models of the assembly on its own coordinates: the coordinates of each
+    floating body follow from its frame and modes, and forces are mapped back by the transposed matrix of their rates.
+    The solver's vector has the coordinates of frame and modes in place of the body's coordinates in the assembly.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class FloatingBodies:
     ----------
     nodes : rigid and modal node of each body by name
     connectors, couplings : numbers of the bearings and couplings that act on these bodies
-    slices : place of each elastic body in the solver's vector
+    slices : position of each flexible body in the solver's vector
     size : its length
     """
 
@@ -256,7 +256,7 @@ class FloatingBodies:
         factor_q: float,
         factor_v: float,
     ) -> Floats:
-        """Do the same with derivatives (size, size) of forces that stand on the left-hand side."""
+        """Do the same with derivatives (size, size) of forces on the left-hand side."""
         rows = np.empty((self.size, self._assembly.size))
         on_solver = np.empty((self.size, self.size))
         rigid = slice(0, self._rigid_count)
@@ -338,7 +338,7 @@ class Parts:
         return self.mbs.AddMarker(items.MarkerBodyRigid(bodyNumber=number, localPosition=np.asarray(local).tolist()))
 
     def support_spin(self, body: str, item: str) -> Callable[[], float]:
-        """Tell how to ask for the spin (rad, unwrapped) of what carries a support: a body, its seat, or the ground."""
+        """Return a function for the unwrapped spin (rad) of a support's base: a body, its seat, or the ground."""
         node = self.nodes.get(seat_key(body, item), self.nodes.get(body))
         if node is None:
             return lambda: 0.0

@@ -1,17 +1,17 @@
-"""A floating body in an Exudyn system of its own, with any forces on its seats.
+"""A floating body in a separate Exudyn system, with any forces on its seats.
 
 The modes of a solid (`exugear.system.bodies.solids`) are those of an ``ObjectFFRFreducedOrder`` on a rigid-body node
 with Euler parameters. Forces on its seats are an ``ObjectGenericODE2`` on the object's two nodes. In a gearbox such
-bodies are `exugear.transient.exudyn_model.bodies`. For shafts it is the second way beside the frame that does
-not turn (`exugear.system.bodies.reduction`), whose constant matrices run far faster.
+bodies are `exugear.transient.exudyn_model.bodies`. For shafts it is an alternative to the non-rotating frame
+(`exugear.system.bodies.reduction`), whose constant matrices are far faster.
 
-What the object of Exudyn 1.13 gets wrong, and what is done about it:
+Errors of the object of Exudyn 1.13, and their corrections:
 
-- It softens a spinning body by the centrifugal forces of its deformation without the tension that they make: torsion
+- It softens a spinning body by the centrifugal forces of its deformation without the tension that they cause: torsion
   falls to sqrt(w^2 - Omega^2). The missing stiffness Omega^2 int rho d_phi phi_i . d_phi phi_j, d_phi = x d_y - y d_x,
-  is added (`stiffening`). It is that of a body of revolution that spins about z and follows the speed from instant to
-  instant. Forces of angular acceleration are Exudyn's own; the frame that does not turn leaves them out (Omega' C q),
-  which is about the angular acceleration over speed times frequency: nothing in a run-up of seconds.
+  is added (`stiffening`). It is valid for a body of revolution that spins about z, and follows the instantaneous speed.
+  Forces of angular acceleration are Exudyn's own; the non-rotating frame neglects them (Omega' C q), an error of about
+  the angular acceleration over speed times frequency: negligible in a run-up of seconds.
 - On Tait-Bryan angles its gyroscopic moments are wrong. It is built on Euler parameters, whose angle is not unwrapped:
   the spin at a seat of a body by itself is the elastic twist alone, in a gearbox the one nearest to the last step's.
 """

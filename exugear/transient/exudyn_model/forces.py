@@ -1,7 +1,7 @@
-"""What acts between bodies in an Exudyn system: bearings, couplings, gear meshes, torques, the variant rigid.
+"""Forces between bodies in an Exudyn system: bearings, couplings, gear meshes, torques, the variant rigid.
 
-Bearings are ``RigidBodySpringDamper``, with a user function where they have a rolling law. What acts on a body in a
-floating frame is left to `exugear.transient.exudyn_model.bodies`.
+Bearings are ``RigidBodySpringDamper``, with a user function if they have rows of rolling elements. Forces on a body in
+a floating frame are in `exugear.transient.exudyn_model.bodies`.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def _offset(connectors: ConnectorArrays, n: int) -> Floats:
 
 
 def _rolling_law(parts: Parts, n: int) -> Callable[..., Floats]:
-    """User function of a support whose rolling law acts beside its linear one; it stands in for both."""
+    """Return the user function of a support with rolling elements and a linear part; it evaluates both."""
     offset = parts.assembly.connectors.offset[n]
     bearing = parts.assembly.supports[n]
     rolling = parts.assembly.connectors.rolling

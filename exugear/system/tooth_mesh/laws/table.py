@@ -377,7 +377,7 @@ def fast_flank_force(
     law_memory: Scratch,
     memory: MeshMemory,
 ) -> None:
-    """Add what one flank (1, -1) of a mesh with a table contributes to `memory.states`, and its force to `memory.gradient`.
+    """Add the part of one flank (1, -1) of a mesh with a table to `memory.states`; its force to `memory.gradient`.
 
     The latter is the negative generalized force. The states already contain the change of centre distance; the loaded
     flank stores deflection, rate and misalignment there. c and s are cosine and sine of the frame's angle.
