@@ -501,11 +501,11 @@ def displaced_axis(pair: GearPair, along: float, across: float) -> tuple[float, 
 
     Notes
     -----
-    As the line of centres turns by psi, both gears have turned back against it: the loaded flanks separate by (r_b2 +-
-    r_b1) psi. As the working pressure angle becomes alpha', they separate by (r_b2 + r_b1) [inv(alpha') - inv(alpha)]
-    in an external pair, and come nearer by (r_b2 - r_b1) times that in an internal one. First order: cos(alpha) across
-    +- sin(alpha) along. A table's states at other centre distances count from the rolling position there, so that this
-    gap comes in addition.
+    As the line of centres turns by psi, both gears have turned back against it: the loaded flanks separate by
+    (r_b2 +- r_b1) psi. As the working pressure angle becomes alpha', they separate by
+    (r_b2 + r_b1) [inv(alpha') - inv(alpha)] in an external pair, and come nearer by (r_b2 - r_b1) times that in an
+    internal one. First order: cos(alpha) across +- sin(alpha) along. A table's states at other centre distances count
+    from the rolling position there, so that this gap comes in addition.
 
     Examples
     --------

@@ -65,7 +65,7 @@ MOST_LINES = 500
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """Meshes of a gearbox in the averaged system at one speed; m components, r outputs (readings), f forces, n orders.
+    """Meshes of a gearbox in the averaged system at one speed; m components, r readings, f forces, n orders.
 
     Components of nonlinear bearings follow those of the meshes.
     """

@@ -1,4 +1,4 @@
-"""Steady-state response by mesh forces evaluated in time: position varies with the vibration, with contact loss.
+"""Steady-state response by mesh forces evaluated in time: position varies with the vibration, contact loss included.
 
 Orders are converted to samples on a lattice of the bases' angles, the models are evaluated there, and their forces are
 converted back to orders. Newton's method solves the balance, each step by GMRES on the tangents along the lattice.
@@ -486,7 +486,7 @@ def _mean_of_waves(there: Floats, back: Floats, slopes: Floats) -> Floats:
 # Stability of steady states: what varying meshes do to a disturbance
 
 SMOOTH_KICKS, PARTING_KICKS = 400, 1000
-"""Minimum kicks per period, and with contact loss, so that the instants of contact loss are resolved."""
+"""Minimum number of kicks per period, without and with contact loss, whose instants have to be resolved."""
 ROLLING = 2
 """Multipliers of free rolling, which are one: angle and speed."""
 CHECKED = 3

@@ -165,8 +165,8 @@ def planet_sidebands(
 ) -> tuple[Sideband, ...]:
     """Return the sidebands of a peak in the force of one planet's meshes, from the cosine and sine components.
 
-    With components F_c cos theta + F_s sin theta and a carrier at the angular speed W, the force on a planet is (F_c -+
-    i F_s) / 2 at the frequency of the order plus and minus W, as its position rotates.
+    With components F_c cos theta + F_s sin theta and a carrier at the angular speed W, the force on a planet is
+    (F_c -+ i F_s) / 2 at the frequency of the order plus and minus W, as its position rotates.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
 
 
 def _pulling(data: xr.Dataset, places: list[int]) -> Floats:
-    """Fraction of time at each speed with tensile mesh force, from its components: common part of the planets first."""
+    """Fraction of time at each speed with tensile mesh force, from its components: common one first, then others."""
     own = data[["amplitude", "phase"]].isel(signal=places)
     force = own["amplitude"].to_numpy() * np.exp(1j * own["phase"].to_numpy().astype(np.float64))
     static = force[:, 0, 0].real

@@ -14,8 +14,8 @@ transmission error on the transverse line of action, which is longer by 1 / cos(
 flanks are separated. Misalignment (rad) is the relative rotation of the axes in the plane of action, positive for a gap
 at the +z end.
 
-Involutes. A point of a flank is described by its roll angle tan(alpha), alpha the profile angle at its radius r: r =
-r_b sqrt(1 + tan(alpha)^2), and its polar angle falls with inv(alpha) = tan(alpha) - alpha (ISO 21771).
+Involutes. A point of a flank is described by its roll angle tan(alpha), alpha the profile angle at its radius r:
+r = r_b sqrt(1 + tan(alpha)^2), and its polar angle falls with inv(alpha) = tan(alpha) - alpha (ISO 21771).
 
 Each slice of the face width has a window of cells around its contact line. Cells are equal in arc length along the
 involute, in which the contact of two flanks is nearly that of two parabolas.

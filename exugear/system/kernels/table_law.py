@@ -523,9 +523,10 @@ def surface_tangent(t: float, piece: int, m: int, tables: TableArrays, memory: S
 def surface_damping(t: float, piece: int, m: int, tables: TableArrays, memory: Scratch, out: Floats) -> None:
     """Compute directions and sizes of the damping, proportional to the tangent, after `surface_law` with derivatives.
 
-    At a frozen position the tangent of the potential in x = (delta, a, gamma) is that of the force on e = delta - s_a a
-    - s_gamma gamma at a constant load, plus the part at constant load: -U*_xx. Where the tangent would be negative, its
-    diagonal is limited to zero, and its off-diagonal entries to the range of a positive semidefinite damper.
+    At a frozen position the tangent of the potential in x = (delta, a, gamma) is that of the force on
+    e = delta - s_a a - s_gamma gamma at a constant load, plus the part at constant load: -U*_xx. Where the
+    tangent would be negative, its diagonal is limited to zero, and its off-diagonal entries to the range of a positive
+    semidefinite damper.
 
     Parameters
     ----------

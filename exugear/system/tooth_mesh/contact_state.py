@@ -4,10 +4,10 @@ With the deflection d at mid-face and the misalignment g, both of the loaded fla
 
     e = d - (zt + w) (g - g0),   force F(e),   moment M = F0 zc + zt (F - F0) + w F - kg (g - g0),
 
-which has a potential, U = U(e) + (zt - zc) F0 (g - g0) + kg (g - g0)^2 / 2: the generalized force of the mesh is -F
-dd/dq + M dg/dq. The deflection changes with the centre distance a by sa (a - a0): the row of d includes this, so that
-the load also acts between the axes. The load centroid zc and the centroid zt of an increment of load are means over the
-mesh cycle, in the transverse plane of action from the middle of the common face towards +z.
+which has a potential, U = U(e) + (zt - zc) F0 (g - g0) + kg (g - g0)^2 / 2: the generalized force of the mesh is
+-F dd/dq + M dg/dq. The deflection changes with the centre distance a by sa (a - a0): the row of d includes this, so
+that the load also acts between the axes. The load centroid zc and the centroid zt of an increment of load are means
+over the mesh cycle, in the transverse plane of action from the middle of the common face towards +z.
 
 Over the mesh cycle the load shuttles, most with helical teeth, and the increment of load shuttles differently: c(pmc)
 and w(pmc) are load centroid and tangent load centroid relative to their means. Through w the deflection under a
