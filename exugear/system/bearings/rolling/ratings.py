@@ -443,5 +443,5 @@ def _tabulated(table: tuple[tuple[float, ...], ...], angle: float, load: float) 
 
 
 def _interpolate_angle(values: Sequence[float], angle: float) -> float:
-    """Interpolate linearly between the tabulated contact angles, as the standard says; constant beyond them."""
+    """Interpolate linearly between the tabulated contact angles as the standard does; constant beyond them."""
     return float(np.interp(math.degrees(angle), CONTACT_ANGLES, values))
