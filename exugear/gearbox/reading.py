@@ -60,20 +60,32 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     GearboxFileError
         No regular file, nothing in it, far too much in it, or not TOML (with line and column).
     """
+    text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
+    return parsed(lambda: tomllib.loads(text), str(path), "TOML")
+
+
+def read_text(path: str | Path) -> str:
+    """Read the text of a gearbox or study file with its line ends; other files are refused before they are read.
+
+    Raises
+    ------
+    GearboxFileError
+        No regular file, nothing in it, far too much in it, or not UTF-8.
+    """
     path = Path(path)
     try:
         check_regular(path, LARGEST_CASE)
     except NamedFileError as error:
         raise GearboxFileError(f"{path}: {error}; expected a gearbox file such as cases/grc750/gearbox.toml") from None
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise GearboxFileError(f"{path}: not UTF-8 text at byte {error.start}; expected TOML") from None
     except OSError as error:
         raise GearboxFileError(f"{path}: cannot be read ({error.strerror}); expected a gearbox file") from None
     if not text.strip():
         raise GearboxFileError(f"{path}: the file is empty; expected sections such as [gears.sun]")
-    return parsed(lambda: tomllib.loads(text), str(path), "TOML")
+    return text
 
 
 def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[str, Any]:

@@ -112,7 +112,9 @@ def migrated(text: str) -> tuple[str, list[str]]:
     """
     try:
         before = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise MigrationError("not valid TOML: nested too deep") from None
+    except ValueError as error:
         raise MigrationError(f"not valid TOML: {error}") from None
     renames = GEARBOX_RENAMES
     if "case" in before and "parameters" in before:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import secrets
@@ -30,7 +31,8 @@ def replacement(path: Path, folder: Path | None = None) -> Iterator[IO[bytes]]:
     """Open a new file that replaces `path` when the context ends without error; on any error it is removed.
 
     It is never written through a link: a link of that name is replaced. Its mode follows the umask. It is flushed to
-    disk before it is renamed, so that after a power cut either the old or the new file exists.
+    disk before it is renamed, so that after a power cut either the old or the new file exists. A pipe or a device of
+    that name is refused, because it would be replaced by a file.
 
     Parameters
     ----------
@@ -39,6 +41,8 @@ def replacement(path: Path, folder: Path | None = None) -> Iterator[IO[bytes]]:
     """
     folder = path.parent if folder is None else folder
     with _named_after(path):
+        if path.exists() and not (path.is_symlink() or path.is_file() or path.is_dir()):
+            raise OSError(errno.EINVAL, "is a pipe or a device", str(path))
         path.parent.mkdir(parents=True, exist_ok=True)
         folder.mkdir(parents=True, exist_ok=True)
         _remove_abandoned(folder, path.name)

@@ -18,15 +18,12 @@ def migrate(
 ) -> None:
     """Update the key names of an older file; comments are kept."""
     with exit_codes():
+        from exugear.gearbox.reading import read_text
         from exugear.gearbox.renames import MigrationError, migrated
         from fe_ste.tools.files import write_file
 
         try:
-            text, changes = migrated(file.read_bytes().decode("utf-8"))
-        except OSError as error:
-            raise BadInputError(f"{file}: cannot be read ({error.strerror})") from error
-        except UnicodeDecodeError as error:
-            raise BadInputError(f"{file}: not a text in UTF-8") from error
+            text, changes = migrated(read_text(file))
         except MigrationError as error:
             raise BadInputError(f"{file}: {error}") from error
         target = out or file

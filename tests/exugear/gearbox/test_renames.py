@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import random
 import tomllib
 from pathlib import Path
 
 import pytest
 
+from exugear.cli.app import old_name
 from exugear.gearbox.reading import GearboxFileError, parse_case
 from exugear.gearbox.renames import GEARBOX_RENAMES, STUDY_RENAMES, MigrationError, Rename, migrated, new_name
 from exugear.studies.sections import StudyError, parse_study
@@ -146,10 +148,38 @@ def test_the_command_rewrites_the_file_or_another_one(tmp_path):
     assert "no old names" in exugear("migrate", file).stdout
 
 
-def test_a_folder_a_missing_file_and_bytes_are_refused(tmp_path):
+def test_what_is_no_gearbox_file_is_refused_before_it_is_read(tmp_path):
     (tmp_path / "bytes.toml").write_bytes(b"\xff\xfe")
-    for name in ("nothing.toml", "bytes.toml", "."):
-        assert exugear("migrate", tmp_path / name).exit_code == 2
+    (tmp_path / "empty.toml").write_bytes(b"")
+    (tmp_path / "deep.toml").write_text(f"a = {20_000 * '['}", encoding="utf-8")
+    for name in ("nothing.toml", "bytes.toml", "empty.toml", "deep.toml", ".", "/dev/zero"):
+        outcome = exugear("migrate", tmp_path / name)
+        assert outcome.exit_code == 2, name
+        assert "Traceback" not in outcome.stderr
+
+
+def test_a_file_that_cannot_be_written_stays_as_it_is(tmp_path):
+    file = tmp_path / "my.toml"
+    file.write_text(GEARBOX, encoding="utf-8")
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for target in (pipe, tmp_path, file / "below.toml"):
+        assert exugear("migrate", file, "--out", target).exit_code == 2
+    assert pipe.is_fifo()
+    assert file.read_text(encoding="utf-8") == GEARBOX
+
+
+def test_line_ends_are_kept(tmp_path):
+    file = tmp_path / "my.toml"
+    file.write_bytes(GEARBOX.replace("\n", "\r\n").encode())
+    assert exugear("migrate", file).exit_code == 0
+    assert file.read_bytes() == NEW_GEARBOX.replace("\n", "\r\n").encode()
+
+
+def test_old_names_on_the_command_line_are_refused_with_the_new_ones():
+    for arguments in (["sweep", "a.toml"], ["run", "a.toml", "--mesh-law", "seed"], ["steady", "--level=linear"]):
+        assert "was renamed to" in old_name(arguments)
+    assert old_name(["study", "sweep", "--method", "linear"]) == ""
 
 
 def test_damaged_files_are_rewritten_right_or_refused():
