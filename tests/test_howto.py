@@ -24,7 +24,16 @@ BLOCK = re.compile(
     r"^( *)```(sh|python)\n(.*?)^\1```$((?:\s*<!-- (?:expect|exit): .*? -->)*)", re.MULTILINE | re.DOTALL
 )
 QUICK = ("catalogue_bearings", "damping", "python", "untrusted_files")
-LONG = ("drive_with_duty_cycle", "flexible_bodies", "reference_analysis", "solids_in_python", "te_tables_over_load")
+LONG = (
+    "drive_with_duty_cycle",
+    "flexible_bodies",
+    "lubricant",
+    "operating_range",
+    "reference_analysis",
+    "solids_in_python",
+    "studies",
+    "te_tables_over_load",
+)
 NEEDS_GMSH = ("flexible_bodies", "solids_in_python")
 
 
