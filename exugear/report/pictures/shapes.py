@@ -271,20 +271,23 @@ def _pieces(shape: ShapeSection, body: Body) -> list[Surface]:
 def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, Surface]]:
     """Blanks on a stepped shaft other than those of its gears: place (m) and surface, by the name of the seat.
 
-    Drawn is the solid disc that has the mass and both moments of inertia of the blank.
+    Drawn is the solid disc that has the mass and both moments of inertia of the blank, such as the inner ring of a
+    bearing. A rotor, whose disc would be wider than its shaft is long, is drawn with that diameter: it would hide all
+    else.
     """
     shape = gearbox.case.bodies[body.family].shape
     if shape is None:
         return {}
     places = blank_places(gearbox.case, body.family)
+    length = MM * sum(piece.length_mm for piece in shape.sections)
     discs = {}
     for name, blank in shape.blanks.items():
         if name in body.wheels:
             continue
         z = MM * places[name]
-        diameter = math.sqrt(8.0 * blank.axial_kg_m2 / blank.mass_kg)
+        diameter = min(math.sqrt(8.0 * blank.axial_kg_m2 / blank.mass_kg), length)
         width = math.sqrt(max(12.0 * blank.transverse_kg_m2 - 6.0 * blank.axial_kg_m2, 0.0) / blank.mass_kg)
-        half = 0.5 * max(width, THINNEST_DISC * diameter)
+        half = 0.5 * min(max(width, THINNEST_DISC * diameter), length)
         discs[name] = (z, tube_surface(diameter, z - half, z + half, centre=body.axis))
     return discs
 
