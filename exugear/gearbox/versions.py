@@ -16,6 +16,6 @@ RUN = 10
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 8
 #: Steady responses (`exugear.steady`, and all that modes rest on).
-STEADY = 12
+STEADY = 13
 #: Points of studies (`exugear.studies`: their outputs; what these rest on has its own version).
 STUDY = 2

@@ -22,6 +22,7 @@ from exugear.results.folder import times_spent
 from exugear.results.run_file import verdict_of
 from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
 from exugear.results.spectra.run_spectra import VariantRun
+from exugear.system.modal_damping import damping_in_words
 from fe_ste.tools.files import FileError
 
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
@@ -91,9 +92,7 @@ def _assumptions(material: ReportData) -> str:
     listed = [
         f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}.",
         f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}.",
-        f"Stiffness-proportional damping: bearings {1e6 * case.damping.bearing_time_s:g} µs, meshes "
-        f"{1e6 * case.damping.mesh_time_s:g} µs, couplings {1e6 * case.damping.coupling_time_s:g} µs times the "
-        "stiffness.",
+        f"Damping: {damping_in_words(case.damping)}.",
         f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
         f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral, the time with "
         "tensile mesh force is recorded.",

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg
 
-from exugear.gearbox.sections.case import DampingSection
+from exugear.gearbox.sections.case import DampedElement, DampingSection
 from exugear.gearbox.variant import VariantError
 from exugear.system.bearings.stiffness import equally_spaced, planet_families
 from exugear.system.kernels.modal_damping import ModalArrays
@@ -23,12 +23,17 @@ from exugear.system.statics import RIGID_BODY_LIMIT, linearise, static_state
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 
+KINDS: tuple[DampedElement, ...] = ("bearing", "mesh", "coupling")
 TAKEN = 0.05
 """Largest distance of a mode from the frequency that names it in `modal_modes`, over that frequency."""
 
 
-def with_modal_damping(assembly: Assembly) -> Assembly:
+def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Assembly:
     """Return an assembly with the modal damping that its file states; itself where the file states none.
+
+    Parameters
+    ----------
+    percent : damping of every mode in percent of critical, in place of that of the file
 
     Raises
     ------
@@ -38,6 +43,8 @@ def with_modal_damping(assembly: Assembly) -> Assembly:
     section = assembly.gearbox.case.damping
     if section.modal_percent is None:
         return assembly
+    if percent is not None:
+        section = DampingSection(modal_percent=percent)
     if assembly.turning:
         raise VariantError(
             f"damping.modal_percent: the flexible body {next(iter(assembly.turning))} turns with planets, so the modes "
@@ -53,7 +60,45 @@ def with_modal_damping(assembly: Assembly) -> Assembly:
     stated = np.einsum("im,ij,jm->m", shapes, linear.total_damping, shapes)
     wanted = 2.0 * damping_ratios(section, frequency) * 2.0 * np.pi * frequency
     columns = linear.mass @ shapes * np.sqrt(np.maximum(wanted - stated, 0.0))
-    return replace(assembly, modal=_arrays(assembly, columns, q))
+    # Under preload the mode without stiffness differs from rolling by 1e-5; rolling itself is to have no damping.
+    rolling = _rolling(assembly)
+    carried = linear.mass @ rolling
+    columns -= carried @ np.linalg.solve(rolling.T @ carried, rolling.T @ columns)
+    return replace(assembly, modal=_arrays(assembly, columns))
+
+
+def _rolling(assembly: Assembly) -> Floats:
+    """Velocities (size, n) of the gear train as it rolls, one column for each of its degrees of freedom."""
+    gearbox = assembly.gearbox
+    train = gearbox.train
+    still = np.zeros(assembly.size)
+    speeds = [dict(zip(train.spins, column.tolist(), strict=True)) for column in train.kinematic_modes.T]
+    return np.array([assembly.rolling_velocity(still, own) for own in speeds]).T
+
+
+def damping_in_words(section: DampingSection) -> str:
+    """Describe the damping that a file states.
+
+    Examples
+    --------
+    >>> damping_in_words(DampingSection(modal_percent=2.0))
+    '2 % of critical in every mode'
+    >>> damping_in_words(DampingSection(modal_percent=((100.0, 1.0), (3000.0, 4.0)), modal_modes=((642.0, 1.5),)))
+    '1 % at 100 Hz to 4 % at 3000 Hz, 1.5 % in the mode near 642 Hz'
+    >>> damping_in_words(DampingSection())
+    'in proportion to stiffness: bearings 4 µs, meshes 4 µs, couplings 4 µs'
+    """
+    given = section.modal_percent
+    if given is None:
+        times = ((f"{kind}s" if kind != "mesh" else "meshes", section.time_of(kind)) for kind in KINDS)
+        return f"in proportion to stiffness: {', '.join(f'{name} {1e6 * time:g} µs' for name, time in times)}"
+    if isinstance(given, float):
+        words = [f"{given:g} % of critical in every mode"]
+    else:
+        (first, low), (last, high) = given[0], given[-1]
+        words = [f"{low:g} % at {first:g} Hz to {high:g} % at {last:g} Hz"]
+    words += [f"{percent:g} % in the mode near {near:g} Hz" for near, percent in section.modal_modes]
+    return ", ".join(words)
 
 
 def damping_ratios(section: DampingSection, frequency: Floats) -> Floats:
@@ -102,7 +147,7 @@ def real_modes(mass: Floats, stiffness: Floats, motions: Floats) -> tuple[Floats
     return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), free @ vectors
 
 
-def _arrays(assembly: Assembly, columns: Floats, q: Floats) -> ModalArrays:
+def _arrays(assembly: Assembly, columns: Floats) -> ModalArrays:
     """Arrays for the kernel, with the planets by their carriers."""
     sets = planet_families(assembly.bodies)
     spins = [assembly.spin.get(str(planets[0].carrier), -1) for planets in sets]
@@ -111,7 +156,6 @@ def _arrays(assembly: Assembly, columns: Floats, q: Floats) -> ModalArrays:
         columns=np.ascontiguousarray(columns),
         rows=np.ascontiguousarray(columns.T),
         frame=np.array(spins, dtype=np.int64),
-        angle=np.array([q[spin] if spin >= 0 else 0.0 for spin in spins], dtype=np.float64),
         first=np.cumsum([0, *map(len, sets)]).astype(np.int64),
         planets=np.array([assembly.coordinates[planet.name] for planet in planets], dtype=np.int64).reshape(-1, 6),
         place=np.array([planet.orbit_angle for planet in planets], dtype=np.float64),

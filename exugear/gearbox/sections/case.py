@@ -118,6 +118,10 @@ class StaticLoadSection(Section):
     """Bodies that are held against these torques: as many as the train has degrees of freedom."""
 
 
+DampedElement = Literal["bearing", "mesh", "coupling"]
+"""Elements with a damping time of their own."""
+
+
 class DampingSection(Section):
     """Damping: a share of critical damping of each mode, or times in proportion to stiffness, c = time * k.
 
@@ -164,7 +168,7 @@ class DampingSection(Section):
         """Whether damping is stated for modes."""
         return self.modal_percent is not None
 
-    def time_of(self, kind: Literal["bearing", "mesh", "coupling"]) -> float:
+    def time_of(self, kind: DampedElement) -> float:
         """Damping over stiffness (s) of bearings, meshes or couplings; zero where damping is stated for modes."""
         return 0.0 if self.is_modal else float(getattr(self, f"{kind}_time_s"))
 
@@ -326,7 +330,7 @@ class GearboxFile(Section):
     pins: Entries[PinSection] = {}
     """Errors of planets' pins, by name."""
     damping: DampingSection = DampingSection()
-    """Damping in proportion to stiffness."""
+    """Damping: a share of critical damping of each mode, or times in proportion to stiffness."""
     elasticity: ElasticitySection = ElasticitySection()
     """How finely elastic bodies are described."""
     housing: HousingSection = HousingSection()

@@ -40,6 +40,16 @@ BOTH = "shafts and housing"
 
 
 @dataclass(frozen=True)
+class Limit:
+    """How high a resonance is in one quantity at one end of the range of damping."""
+
+    amplitude: float
+    """Peak amplitude, in the quantity's unit."""
+    place: int | None
+    """Among the peaks of that quantity with the same damping, 1 for the highest; None without a peak."""
+
+
+@dataclass(frozen=True)
 class Loudness:
     """How loud a resonance is in one quantity."""
 
@@ -49,6 +59,16 @@ class Loudness:
     """Bearing where it is largest, of planets their family; empty for the transmission error."""
     place: int | None
     """Among the peaks of that quantity, 1 for the loudest; None where it rises to a louder one."""
+    limits: tuple[Limit, Limit] | None = None
+    """With the least and with the largest plausible damping; None where it was not solved again."""
+
+    @property
+    def places(self) -> tuple[int, int] | None:
+        """Best and worst place over the range of damping; None without a peak or without that range."""
+        if self.place is None or self.limits is None:
+            return None
+        known = [self.place, *(limit.place for limit in self.limits if limit.place is not None)]
+        return min(known), max(known)
 
 
 @dataclass(frozen=True)
@@ -120,8 +140,33 @@ def ranking_of(data: xr.Dataset) -> Ranking:
             groups.append(group)
             others.append(group)
         group[name] = place, point, line
-    found = tuple(_resonance(data, quantities, sizes, group) for group in groups)
+    limits = _limits(data, quantities, peaks)
+    found = tuple(_resonance(data, quantities, sizes, group, limits) for group in groups)
     return Ranking(found, (low, high), whole, _whose(data))
+
+
+Limits = Mapping[tuple[int, int, str], tuple[Limit, Limit]]
+"""By point, line and quantity."""
+
+
+def _limits(data: xr.Dataset, quantities: tuple[Quantity, ...], peaks: Mapping[str, list[tuple[int, int]]]) -> Limits:
+    """Amplitudes at both ends of the range of damping, and the places of those that are peaks."""
+    solved = data["band_amplitude"].to_numpy()
+    at = list(zip(data["band_point"].to_numpy().tolist(), data["band_line"].to_numpy().tolist(), strict=True))
+    names = [str(name) for name in data["quantity"].to_numpy()]
+    found: dict[tuple[int, int, str], tuple[Limit, Limit]] = {}
+    for quantity in quantities:
+        values = solved[:, names.index(quantity.name)]
+        ranked = set(peaks[quantity.name])
+        known = [n for n, (point, line) in enumerate(at) if (point, line - 1) in ranked]
+        places = [
+            {n: place for place, n in enumerate(sorted(known, key=lambda n: -values[n, end]), start=1)}
+            for end in range(2)
+        ]
+        for n, (point, line) in enumerate(at):
+            low, high = (Limit(float(values[n, end]), places[end].get(n)) for end in range(2))
+            found[point, line - 1, quantity.name] = low, high
+    return found
 
 
 def _range(data: xr.Dataset, speed: Floats) -> tuple[float, float, bool]:
@@ -151,13 +196,16 @@ def _resonance(
     quantities: tuple[Quantity, ...],
     sizes: Mapping[str, Floats],
     group: Mapping[str, tuple[int, int, int]],
+    limits: Limits,
 ) -> Resonance:
     _, first, line = next(iter(group.values()))
     loudness = {}
     for quantity in quantities:
         place, point, _ = group.get(quantity.name, (None, first, line))
         at = sizes[quantity.name][point, line]
-        loudness[quantity.name] = Loudness(float(at.max()), quantity.places[int(at.argmax())], place)
+        loudness[quantity.name] = Loudness(
+            float(at.max()), quantity.places[int(at.argmax())], place, limits.get((point, line, quantity.name))
+        )
     bases = tuple(str(name) for name in data["base"].to_numpy())
     order = float(data["order"][line + 1])
     speed = float(data["speed"][first])

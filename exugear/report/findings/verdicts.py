@@ -29,6 +29,7 @@ from exugear.results.run_file import read_run, verdict_of
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.steady.peaks import bearing_swings, pulls
 from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.modal_damping import damping_in_words
 from exugear.system.sensitivity import Parameter, ParameterVariation, assumed_parameters, vary_parameter
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
 from exugear.system.statics import BalanceError
@@ -90,10 +91,7 @@ def verdicts_of(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
     verdicts.append(
         CheckResult(
             False,
-            (
-                f"mesh damping is assumed (stiffness-proportional, {1e6 * case.damping.mesh_time_s:g} µs). Resonance "
-                "amplitudes depend on it directly"
-            ),
+            (f"damping is assumed ({damping_in_words(case.damping)}). Resonance amplitudes depend on it directly"),
         )
     )
     sets = context.gearbox.inertia_sets

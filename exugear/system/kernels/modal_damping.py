@@ -39,8 +39,6 @@ class ModalArrays(NamedTuple):
     """(c, n) and (n, c): the matrix B, and its transpose, sqrt(N s/m)."""
     frame: Integers
     """(s,) coordinate of the spin of each set's carrier, -1 for a carrier that does not turn."""
-    angle: Floats
-    """(s,) that spin where the modes were computed, rad."""
     first: Integers
     """(s + 1,) first planet of each set."""
     planets: Integers
@@ -68,7 +66,7 @@ def turn_planets(q: Floats, modal: ModalArrays, back: bool, given: Floats, out: 
     for s in range(modal.frame.size):
         begin = modal.first[s]
         count = modal.first[s + 1] - begin
-        turned = 0.0 if modal.frame[s] < 0 else q[modal.frame[s]] - modal.angle[s]
+        turned = 0.0 if modal.frame[s] < 0 else q[modal.frame[s]]
         for a in range(count):
             to = modal.planets[begin + a]
             for axis in range(BODY_SIZE):
