@@ -29,8 +29,7 @@ Values = float | Mapping[str, float]
 """One number, or several by name along the output's dimension."""
 Needs = Literal["", "run", "steady", "life", "bearings"]
 """Source of an output other than modes, tables and the static state: a run, a steady-state response, a rating or the
-bearings in it.
-"""
+bearings in it."""
 
 
 class OutputError(ValueError):
@@ -43,8 +42,7 @@ class Quantity:
 
     function: Callable[..., Values]
     """Function of `PointResults` and keyword options, at module level so that workers can import it. Each option is a
-    keyword-only parameter; its annotation gives its type, a default makes it optional.
-    """
+    keyword-only parameter; its annotation gives its type, a default makes it optional."""
     units: str
     dimension: str = ""
     """Name of the dimension of several numbers; empty for a single number."""

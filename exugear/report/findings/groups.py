@@ -121,8 +121,7 @@ class RunGroup:
     """By variant, the steady-state responses of the group; empty for run-ups."""
     in_operation: Ranking | None = None
     """Resonances of the main variant's steady-state response in the operating range, ranked by three quantities; None
-    without such a response.
-    """
+    without such a response."""
 
     @property
     def name(self) -> str:
@@ -304,8 +303,7 @@ class Channel:
     """Number of equal parts that it represents."""
     mean: float
     """Mean force over the middle third of the run, N; for bearings that revolve with a carrier, the mean magnitude.
-    NaN for a steady-state response, which has dynamic parts only.
-    """
+    NaN for a steady-state response, which has dynamic parts only."""
     axial: float
     """Mean axial force of a bearing over the same time, N; NaN for a mesh and for a steady-state response."""
     spectra: Waterfall
