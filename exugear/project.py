@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases import gearbox_at_load
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import OFFERED, Variant, VariantError
@@ -132,6 +133,28 @@ class Project(ReprMixin):
     def chosen(self, **changes: Any) -> Project:
         """Return the same gearbox and folder with other settings: `variant`, `mesh_model`, `inertias`, `load_case`."""
         return replace(self, choice=replace(self.choice, **changes))
+
+    def at_load_case(self, name: str) -> Self:
+        """Return the same gearbox with the torques at the start of a load case as its static load.
+
+        Tables, load distribution of the teeth and bearing stiffness are then those at this load. The results go to
+        the subfolder ``at-NAME`` of the results folder.
+
+        Raises
+        ------
+        GearboxFileError
+            There is no such load case, or it has no torque for the static load.
+
+        Examples
+        --------
+        >>> project = Project.from_toml("cases/grc750/gearbox.toml", "results/grc750").at_load_case("rated")
+        >>> project.gearbox.case.static_load.torques_N_m, project.folder.name
+        ({'carrier': 240000.0}, 'at-rated')
+        """
+        known = self.gearbox.load_cases
+        if name not in known:
+            raise self.gearbox.fault(f"no load case {name!r}; choose one of: {', '.join(known) or 'none in the file'}")
+        return replace(self, gearbox=gearbox_at_load(self.gearbox, known[name]), folder=self.folder / f"at-{name}")
 
     def _line(self) -> str:
         choice = self.choice

@@ -281,8 +281,8 @@ def other_load_warning(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool =
         return ""
     return (
         f"other load: {', '.join(told)} of the static load ({static_load_in_words(gearbox)}), at which transmission "
-        "error and stiffness are computed; set this load in [static_load], or use --mesh-model table, which covers a "
-        "range of loads"
+        "error and stiffness are computed; add --at-load-case to the command run, or use --mesh-model table, which "
+        "covers a range of loads"
     )
 
 

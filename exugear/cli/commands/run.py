@@ -64,6 +64,13 @@ def run(
     load_case: Annotated[
         str | None, typer.Option("--load-case", metavar="NAME", help="Load case. (default: first of the gearbox file)")
     ] = None,
+    at_load_case: Annotated[
+        bool,
+        typer.Option(
+            "--at-load-case",
+            help="Compute tables, tooth contact and bearings at the torques of the load case; results in at-NAME.",
+        ),
+    ] = False,
     solver: Annotated[Solver, typer.Option(metavar="NAME", help="Solver: compiled or exudyn.")] = Solver.compiled,
     integrator: Annotated[
         Integrator | None,
@@ -116,6 +123,8 @@ def run(
 
         choice = Choice(variant.value, mesh_model.value, inertias, load_case)
         project = open_project(case, choice, out, allow_dir, scripts)
+        if at_load_case:
+            project = project.at_load_case(_load_case(project).name)
         if resume:
             duration = _duration_to_resume(project, duration)
         kept = _kept_band(project, band, resume)

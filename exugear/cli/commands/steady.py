@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from contextlib import suppress
-from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -39,7 +38,6 @@ from exugear.cli.tables import HARD_SPACE, print_table, significant
 if TYPE_CHECKING:
     import xarray as xr
 
-    from exugear.cli.watched import WatchedProject
     from exugear.gearbox.gearbox import Gearbox
     from exugear.project import Project
     from exugear.report.findings.loudness import Ranking, Resonance
@@ -136,24 +134,12 @@ def steady(
         choice = Choice(variant.value, mesh_model.value, inertias, load_case)
         project = open_project(case, choice, out, allow_dir, scripts)
         if load_case is not None:
-            project = _project_at_load(project, load_case)
+            project = project.at_load_case(load_case)
         settings = _settings(project, method, speeds, harmonics, branches)
         _refuse_what_has_none(project)
         project.begin()
         project.prepare()
         _tell(project, settings, project.steady(settings), as_json)
-
-
-def _project_at_load(project: WatchedProject, load_case: str) -> WatchedProject:
-    """Take the torques of a load case as the static load, in a results folder of its own."""
-    from exugear.gearbox.load_cases import gearbox_at_load
-
-    gearbox = project.gearbox
-    return replace(
-        project,
-        gearbox=gearbox_at_load(gearbox, gearbox.load_cases[load_case]),
-        folder=project.folder / f"at-{load_case}",
-    )
 
 
 def _tell_of_other_loads(gearbox: Gearbox) -> None:

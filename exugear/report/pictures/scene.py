@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 
 from exugear.gearbox.parts import seat_key
-from exugear.report.pictures.shapes import BodyShape, ModeScene, gear_surface, placed
+from exugear.report.pictures.shapes import BodyShape, ModeScene, blank_discs, gear_surface, placed
 from exugear.system.bodies.reduction import ReducedBody, Surface
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats, Integers, Pixels
@@ -336,7 +336,7 @@ class DeformedBody:
 
 @dataclass(frozen=True)
 class ElasticScene:
-    """Flexible bodies in a mode, and their gears, which move with their seats."""
+    """Flexible bodies in a mode, and the gears and discs on their seats, which move as rigid bodies."""
 
     bodies: tuple[DeformedBody, ...]
     gears: tuple[BodyShape, ...]
@@ -410,6 +410,7 @@ def _density_below(density: Floats, area: Floats) -> float:
 
 
 def _gears(assembly: Assembly, shape: Floats) -> tuple[tuple[BodyShape, ...], tuple[Floats, ...]]:
+    """Return gears and discs on flexible shafts, and the motion (6,) of each in a mode shape."""
     gears = []
     motions = []
     for body in assembly.bodies:
@@ -419,6 +420,9 @@ def _gears(assembly: Assembly, shape: Floats) -> tuple[tuple[BodyShape, ...], tu
             centre = np.array([*body.axis, z])
             gears.append(BodyShape(gear, gear, gear_surface(assembly.gearbox.gears[gear]).moved(centre), centre))
             motions.append(shape[list(assembly.coordinates[seat_key(body.name, gear)])])
+        for seat, (z, disc) in blank_discs(assembly.gearbox, body).items():
+            gears.append(BodyShape(seat, seat, disc, np.array([*body.axis, z])))
+            motions.append(shape[list(assembly.coordinates[seat_key(body.name, seat)])])
     return tuple(gears), tuple(motions)
 
 

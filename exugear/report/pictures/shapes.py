@@ -270,20 +270,23 @@ def _pieces(shape: ShapeSection, body: Body) -> list[Surface]:
 def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, Surface]]:
     """Return blanks on a stepped shaft without own gear: position (m) and surface, by name of the seat.
 
-    The surface is that of the solid disc with the mass and both moments of inertia of the blank.
+    The surface is that of the solid disc with the mass and both moments of inertia of the blank, such as the inner
+    ring of a bearing. Diameter and width are limited to the length of the shaft, because the disc of a rotor would
+    otherwise hide all other parts.
     """
     shape = gearbox.case.bodies[body.family].shape
     if shape is None:
         return {}
     places = blank_places(gearbox.case, body.family)
+    length = MM * sum(piece.length_mm for piece in shape.sections)
     discs = {}
     for name, blank in shape.blanks.items():
         if name in body.wheels:
             continue
         z = MM * places[name]
-        diameter = math.sqrt(8.0 * blank.axial_kg_m2 / blank.mass_kg)
+        diameter = min(math.sqrt(8.0 * blank.axial_kg_m2 / blank.mass_kg), length)
         width = math.sqrt(max(12.0 * blank.transverse_kg_m2 - 6.0 * blank.axial_kg_m2, 0.0) / blank.mass_kg)
-        half = 0.5 * max(width, THINNEST_DISC * diameter)
+        half = 0.5 * min(max(width, THINNEST_DISC * diameter), length)
         discs[name] = (z, tube_surface(diameter, z - half, z + half, centre=body.axis))
     return discs
 

@@ -10,6 +10,7 @@ import xarray as xr
 
 from exugear.cli.commands.steady import Method
 from exugear.steady.settings import METHODS
+from fe_ste.transmission_error.table import MeshTable
 
 from ..cases.bearing import BEARING_CASE
 from ..cases.command import exugear
@@ -66,6 +67,11 @@ def test_loads_of_runs_and_responses_are_told_and_a_response_can_be_at_that_of_a
     run = exugear("run", case, "--variant", "rigid", "--out", case.parent / "out")
     assert "run_up (shaft_1 40 N m, shaft_2 50 N m), mesh model" in run.stdout
     assert "load_cases.run_up: other load: spur 37 % of the static load" in run.stderr
+    there = exugear("run", case, "--variant", "rigid", "--out", case.parent / "out", "--at-load-case", "--json")
+    assert there.exit_code == 0, there.stderr
+    assert "other load" not in there.stderr
+    assert Path(json.loads(there.stdout)["file"]).is_relative_to(case.parent / "out" / "at-run_up")
+    assert MeshTable.open(case.parent / "out" / "at-run_up" / "tables" / "spur.nc").static_state["torque"] == 40.0
     report = exugear("report", case.parent / "out")
     assert "the run-up of the load case run_up is at another load, shaft_1 40 N m" in report.stdout
 

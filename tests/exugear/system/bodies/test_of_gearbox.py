@@ -274,7 +274,9 @@ def test_a_scene_shows_every_shaft_with_its_gears(flexible: Assembly, tmp_path: 
     modes = modes_of(flexible)
     bending = next(n for n, name in enumerate(modes.names) if name.startswith("ims bending"))
     scene = elastic_scene(flexible, modes.shapes[:, bending], title="a mode", amplitude=0.05)
-    assert [gear.name for gear in scene.gears] == ["sun", "im_gear", "im_pinion", "hs_gear", "hs_pinion"]
+    gears = ["sun", "im_gear", "im_pinion", "hs_gear", "hs_pinion"]
+    inner_rings = ["ims_a", "ims_bc", "hss_a", "hss_bc"]
+    assert sorted(part.name for part in scene.gears) == sorted(gears + inner_rings)
     largest = max(np.linalg.norm(shaft.displacement, axis=1).max() for shaft in scene.bodies)
     assert largest == pytest.approx(0.05 * 0.8795, rel=1e-6)  # the low-speed shaft is the longest
     assert [shaft.energy.max() for shaft in scene.bodies].index(1.0) == 1
@@ -283,6 +285,17 @@ def test_a_scene_shows_every_shaft_with_its_gears(flexible: Assembly, tmp_path: 
     assert {file.name for file in tmp_path.iterdir()} == {"mode.png", "mode.gif"}
     with pytest.raises(ValueError, match="suffix must be .gif"):
         animate_elastic_bodies(scene, tmp_path / "mode.png", frames=4, size=(200, 150))
+
+
+@pytest.mark.validation
+def test_a_disc_at_a_bearing_moves_with_its_seat_in_a_scene(flexible: Assembly) -> None:
+    shape = np.random.default_rng(3).normal(size=flexible.size)
+    scene = elastic_scene(flexible, shape)
+    moved = dict(zip([part.name for part in scene.gears], scene.motions, strict=True))
+    disc, pinion = (shape[list(flexible.coordinates[f"hss.{name}"])] for name in ("hss_bc", "hs_pinion"))
+    scale = np.linalg.norm(moved["hs_pinion"]) / np.linalg.norm(pinion)
+    assert moved["hs_pinion"] == pytest.approx(scale * pinion, rel=1e-12)
+    assert moved["hss_bc"] == pytest.approx(scale * disc, rel=1e-12)
 
 
 def test_a_variant_without_elastic_bodies_has_no_such_scene(grc: Gearbox, stiffness: dict) -> None:

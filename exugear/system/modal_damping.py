@@ -1,0 +1,119 @@
+"""Damping of a gearbox stated as a share of critical damping of its modes, `[damping] modal_percent`.
+
+Modal damping replaces the damping times of meshes, bearings and couplings. Dampers whose values stand in the file, and
+elastic bodies (`body_time_s`), count towards the stated share: modal damping adds what they leave to it, so that each
+mode has the share that is stated, or more where they alone give more.
+
+Modes are those at rest under the static load, as `exugear modes` shows them, and of elastic bodies those within their
+band (`elasticity.band_Hz`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg
+
+from exugear.gearbox.sections.case import DampingSection
+from exugear.gearbox.variant import VariantError
+from exugear.system.bearings.stiffness import equally_spaced, planet_families
+from exugear.system.kernels.modal_damping import ModalArrays
+from exugear.system.statics import RIGID_BODY_LIMIT, linearise, static_state
+from exugear.system.system import Assembly
+from fe_ste.tools.arrays import Floats
+
+TAKEN = 0.05
+"""Largest distance of a mode from the frequency that names it in `modal_modes`, over that frequency."""
+
+
+def with_modal_damping(assembly: Assembly) -> Assembly:
+    """Return an assembly with the modal damping that its file states; itself where the file states none.
+
+    Raises
+    ------
+    VariantError
+        Elastic bodies turn with planets, or no mode is near a frequency of `modal_modes`.
+    """
+    section = assembly.gearbox.case.damping
+    if section.modal_percent is None:
+        return assembly
+    if assembly.turning:
+        raise VariantError(
+            f"damping.modal_percent: the flexible body {next(iter(assembly.turning))} turns with planets, so the modes "
+            "have no constant shapes; use damping times, or set its flexibility = 'none'"
+        )
+    q = static_state(assembly).q
+    linear = linearise(assembly, q)
+    frequency, shapes = real_modes(linear.mass, linear.total_stiffness, assembly.motions)
+    damped = frequency > RIGID_BODY_LIMIT
+    if assembly.elastic_bodies:
+        damped &= frequency <= assembly.gearbox.case.elasticity.band_Hz
+    frequency, shapes = frequency[damped], shapes[:, damped]
+    stated = np.einsum("im,ij,jm->m", shapes, linear.total_damping, shapes)
+    wanted = 2.0 * damping_ratios(section, frequency) * 2.0 * np.pi * frequency
+    columns = linear.mass @ shapes * np.sqrt(np.maximum(wanted - stated, 0.0))
+    return replace(assembly, modal=_arrays(assembly, columns, q))
+
+
+def damping_ratios(section: DampingSection, frequency: Floats) -> Floats:
+    """Share of critical damping that a file states for modes at frequencies (n,), Hz.
+
+    A table is interpolated linearly over frequency and constant beyond its ends.
+
+    Raises
+    ------
+    VariantError
+        No mode is near a frequency of `modal_modes`.
+
+    Examples
+    --------
+    >>> section = DampingSection(modal_percent=((100.0, 1.0), (1100.0, 3.0)), modal_modes=((610.0, 0.5),))
+    >>> damping_ratios(section, np.array([50.0, 600.0, 5000.0]))
+    array([0.01 , 0.005, 0.03 ])
+    """
+    given = section.modal_percent
+    if given is None:
+        return np.zeros(len(frequency))
+    if isinstance(given, float):
+        ratios = np.full(len(frequency), 0.01 * given)
+    else:
+        points, percent = np.array(given).T
+        ratios = 0.01 * np.interp(frequency, points, percent)
+    for near, percent_of_mode in section.modal_modes:
+        place = int(np.argmin(np.abs(frequency - near))) if len(frequency) else -1
+        if place < 0 or abs(frequency[place] - near) > TAKEN * near:
+            nearest = f"the nearest is at {frequency[place]:.4g} Hz" if place >= 0 else "there are no modes"
+            raise VariantError(
+                f"damping.modal_modes: no mode within {100 * TAKEN:g} % of {near:g} Hz; {nearest}: see exugear modes"
+            )
+        ratios[place] = 0.01 * percent_of_mode
+    return np.asarray(ratios)
+
+
+def real_modes(mass: Floats, stiffness: Floats, motions: Floats) -> tuple[Floats, Floats]:
+    """Frequencies (n,), Hz, and shapes (size, n) of unit modal mass that are orthogonal in mass.
+
+    A stiffness that is not symmetric counts with its symmetric part. `motions` (size, n) are those that are free.
+    """
+    root = np.linalg.cholesky(mass)
+    free = np.linalg.solve(root.T, scipy.linalg.orth(root.T @ motions))
+    values, vectors = np.linalg.eigh(free.T @ (0.5 * (stiffness + stiffness.T)) @ free)
+    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), free @ vectors
+
+
+def _arrays(assembly: Assembly, columns: Floats, q: Floats) -> ModalArrays:
+    """Arrays for the kernel, with the planets by their carriers."""
+    sets = planet_families(assembly.bodies)
+    spins = [assembly.spin.get(str(planets[0].carrier), -1) for planets in sets]
+    planets = [planet for family in sets for planet in family]
+    return ModalArrays(
+        columns=np.ascontiguousarray(columns),
+        rows=np.ascontiguousarray(columns.T),
+        frame=np.array(spins, dtype=np.int64),
+        angle=np.array([q[spin] if spin >= 0 else 0.0 for spin in spins], dtype=np.float64),
+        first=np.cumsum([0, *map(len, sets)]).astype(np.int64),
+        planets=np.array([assembly.coordinates[planet.name] for planet in planets], dtype=np.int64).reshape(-1, 6),
+        place=np.array([planet.orbit_angle for planet in planets], dtype=np.float64),
+        equal=np.array([int(equally_spaced(family)) for family in sets], dtype=np.int64),
+    )
