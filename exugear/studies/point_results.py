@@ -382,7 +382,6 @@ class PointResults:
             A static state without equilibrium.
         """
         from exugear.life.life import rating_of
-        # deferred import, moved here
 
         rating = rating_of(self.gearbox)
         if rating.dynamic_factor_run is not None:

@@ -268,7 +268,7 @@ def _pieces(shape: ShapeSection, body: Body) -> list[Surface]:
 
 
 def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, Surface]]:
-    """Return blanks on a stepped shaft without own gear: position (m) and surface, by name of the seat.
+    """Return the blanks at seats of a stepped shaft without gear: position (m) and surface, by name of the seat.
 
     The surface is that of the solid disc with the mass and both moments of inertia of the blank, such as the inner
     ring of a bearing. Diameter and width are limited to the length of the shaft, because the disc of a rotor would
