@@ -1,10 +1,10 @@
-"""Damping of a gearbox stated as a share of critical damping of its modes, `[damping] modal_percent`.
+"""Modal damping of a gearbox, stated as damping ratios of its modes: `[damping] modal_percent`.
 
-Modal damping replaces the damping times of meshes, bearings and couplings. Dampers whose values stand in the file, and
-elastic bodies (`body_time_s`), count towards the stated share: modal damping adds what they leave to it, so that each
-mode has the share that is stated, or more where they alone give more.
+Modal damping replaces the damping times of meshes, bearings and couplings. Dampers with values in the file, and
+flexible bodies (`body_time_s`), count towards the stated ratio: modal damping adds only the difference. Each mode thus
+has the stated damping ratio, or more where these dampers alone exceed it.
 
-Modes are those at rest under the static load, as `exugear modes` shows them, and of elastic bodies those within their
+Modes are those at the static load, as `exugear modes` lists them; with flexible bodies, those within their frequency
 band (`elasticity.band_Hz`).
 """
 
@@ -25,11 +25,11 @@ from fe_ste.tools.arrays import Floats
 
 KINDS: tuple[DampedElement, ...] = ("bearing", "mesh", "coupling")
 TAKEN = 0.05
-"""Largest distance of a mode from the frequency that names it in `modal_modes`, over that frequency."""
+"""Permissible relative distance of a mode from its frequency in `modal_modes`."""
 
 
 def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Assembly:
-    """Return an assembly with the modal damping that its file states; itself where the file states none.
+    """Return an assembly with the modal damping of its gearbox file; the assembly itself if the file has none.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
     Raises
     ------
     VariantError
-        Elastic bodies turn with planets, or no mode is near a frequency of `modal_modes`.
+        Flexible bodies rotate with planets, or no mode is near a frequency of `modal_modes`.
     """
     section = assembly.gearbox.case.damping
     if section.modal_percent is None:
@@ -102,7 +102,7 @@ def damping_in_words(section: DampingSection) -> str:
 
 
 def damping_ratios(section: DampingSection, frequency: Floats) -> Floats:
-    """Share of critical damping that a file states for modes at frequencies (n,), Hz.
+    """Return the damping ratios of a gearbox file for modes at frequencies (n,), Hz.
 
     A table is interpolated linearly over frequency and constant beyond its ends.
 
@@ -137,9 +137,9 @@ def damping_ratios(section: DampingSection, frequency: Floats) -> Floats:
 
 
 def real_modes(mass: Floats, stiffness: Floats, motions: Floats) -> tuple[Floats, Floats]:
-    """Frequencies (n,), Hz, and shapes (size, n) of unit modal mass that are orthogonal in mass.
+    """Return frequencies (n,), Hz, and mass-orthogonal shapes (size, n) of unit modal mass.
 
-    A stiffness that is not symmetric counts with its symmetric part. `motions` (size, n) are those that are free.
+    Only the symmetric part of the stiffness is used. `motions` (size, n) are the free motions.
     """
     root = np.linalg.cholesky(mass)
     free = np.linalg.solve(root.T, scipy.linalg.orth(root.T @ motions))
@@ -148,7 +148,7 @@ def real_modes(mass: Floats, stiffness: Floats, motions: Floats) -> tuple[Floats
 
 
 def _arrays(assembly: Assembly, columns: Floats) -> ModalArrays:
-    """Arrays for the kernel, with the planets by their carriers."""
+    """Return the arrays for the kernel, with planets grouped by carrier."""
     sets = planet_families(assembly.bodies)
     spins = [assembly.spin.get(str(planets[0].carrier), -1) for planets in sets]
     planets = [planet for family in sets for planet in family]

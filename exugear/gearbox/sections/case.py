@@ -134,7 +134,7 @@ class DampingSection(Section):
     modal_modes: Annotated[tuple[q.ModalPoint, ...], Field(strict=False, max_length=MOST_ENTRIES)] = ()
     """Damping of single modes: pairs of the mode's frequency (Hz) and percent of critical."""
     modal_band_percent: Annotated[tuple[q.ModalPercent, q.ModalPercent], Field(strict=False)] | None = None
-    """Least and largest plausible damping of all modes, for the bands of amplitudes; by default half and twice."""
+    """Minimum and maximum plausible damping of all modes, for amplitude bands; by default half and twice the value."""
     bearing_time_s: q.DampingTimeS = 4e-6
     """Damping of bearings over their stiffness."""
     mesh_time_s: q.DampingTimeS = 4e-6
