@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.gearbox.named_files import LARGEST_TABLE
-from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase, PointForce
+from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
-from exugear.gearbox.sections.case import ForceSection, GearboxFile, LoadCaseSection
+from exugear.gearbox.sections.case import DampingSection, ForceSection, GearboxFile, LoadCaseSection
 from exugear.gearbox.sections.connections import (
     BearingSection,
     ConnectorDampingSection,
@@ -24,6 +24,19 @@ from exugear.gearbox.units import MM, RPM, UM
 from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
 
 # Bodies from their sections, position errors of planets' pins, and load cases
+
+
+def damping_times(section: DampingSection) -> DampingTimes:
+    """Return damping over stiffness; zero where the file states the damping of modes.
+
+    Examples
+    --------
+    >>> damping_times(DampingSection()).mesh, damping_times(DampingSection(modal_percent=2.0)).mesh
+    (4e-06, 0.0)
+    """
+    if section.modal_percent is not None:
+        return DampingTimes(0.0, 0.0, 0.0)
+    return DampingTimes(section.bearing_time_s, section.mesh_time_s, section.coupling_time_s)
 
 
 def inertia_sets(origin: Origin) -> tuple[str, ...]:
@@ -370,7 +383,7 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
             place = MM * seat.z_mm
         damping = section.damping_N_m_s_per_rad
         if damping is None:
-            damping = origin.case.damping.time_of("coupling") * section.stiffness_N_m_per_rad
+            damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
         yield Bearing(
             name=name,
             family=name,
@@ -481,7 +494,7 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
             raise origin.fault(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
         damping = section.damping_N_m_s_per_rad
         if damping is None:
-            damping = origin.case.damping.time_of("coupling") * section.stiffness_N_m_per_rad
+            damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
         return (Coupling(name, *section.bodies, section.seat, section.stiffness_N_m_per_rad, damping),)
 
     return parts_of_each(of_section, origin.case.couplings)

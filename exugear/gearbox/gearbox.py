@@ -21,6 +21,7 @@ from exugear.gearbox.parts import (
     Bearing,
     Body,
     Coupling,
+    DampingTimes,
     Joint,
     LoadCase,
     Mesh,
@@ -274,6 +275,11 @@ class Gearbox(ReprMixin):
     def pin_offsets(self) -> dict[str, tuple[float, float]]:
         """Position error of planets in their carrier at zero angles, x and y, m."""
         return body_parts.pin_offsets(self._origin, self.named_bodies)
+
+    @property
+    def damping_times(self) -> DampingTimes:
+        """Damping over stiffness of bearings, meshes and couplings; zero where the file states the damping of modes."""
+        return body_parts.damping_times(self.case.damping)
 
     @cached_property
     def load_cases(self) -> dict[str, LoadCase]:

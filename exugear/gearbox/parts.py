@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -68,6 +68,14 @@ class Body(ReprMixin, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 abo
         if self.spin_only:
             return "spin only"
         return "turning"
+
+
+class DampingTimes(NamedTuple):
+    """Damping over stiffness of elements without a damper of their own, s."""
+
+    bearing: float
+    mesh: float
+    coupling: float
 
 
 @dataclass(frozen=True)

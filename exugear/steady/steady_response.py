@@ -228,7 +228,7 @@ class SteadyResponse(ReprMixin):
     """Largest relative change of the ten highest peaks with 1.5 times as many harmonics; NaN where each state has as
     many orders as it needs."""
     band: DampingBand
-    """How high the highest peaks are with the least and the largest plausible damping."""
+    """How high the highest peaks are with the lowest and the highest plausible damping."""
     campbell: Campbell
     """Modes over the speeds, up to the highest orders that `crossings` evaluates."""
 

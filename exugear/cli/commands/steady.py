@@ -66,7 +66,7 @@ NOTICED_WAY = 0.3
 
 
 BAND_LEGEND = (
-    "Zero-to-peak amplitudes with the largest and with the least damping; (ranks) where the rank within the quantity "
+    "Zero-to-peak amplitudes with the highest and with the lowest damping; (ranks) where the rank within the quantity "
     "depends on the damping."
 )
 
@@ -238,7 +238,9 @@ def _print_bands(gearbox: Gearbox, ranking: Ranking) -> None:
     if not shown:
         return
     band = gearbox.case.damping.modal_band_percent
-    damping = "half to twice the damping" if band is None else f"{band[0]:g} to {band[1]:g} % of critical damping"
+    damping = "half to twice the damping"
+    if band is not None:
+        damping = f"{band[0]:g} to {band[1]:g} % of critical damping"
     print_table(f"Amplitudes with {damping}", [_band_row(resonance) for resonance in shown], legend=BAND_LEGEND)
 
 
@@ -505,9 +507,9 @@ def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
         if loudness.at:
             found[f"{quantity}_at"] = loudness.at
         if loudness.limits:
-            least, largest = loudness.limits
-            found[f"{quantity}_least_damping_{KEYS[quantity]}"] = least.amplitude
-            found[f"{quantity}_largest_damping_{KEYS[quantity]}"] = largest.amplitude
+            lowest, highest = loudness.limits
+            found[f"{quantity}_lowest_damping_{KEYS[quantity]}"] = lowest.amplitude
+            found[f"{quantity}_highest_damping_{KEYS[quantity]}"] = highest.amplitude
             found[f"{quantity}_places_over_damping"] = loudness.places
     return found
 

@@ -118,10 +118,6 @@ class StaticLoadSection(Section):
     """Bodies that are held against these torques: as many as the train has degrees of freedom."""
 
 
-DampedElement = Literal["bearing", "mesh", "coupling"]
-"""Elements with a damping time of their own."""
-
-
 class DampingSection(Section):
     """Damping: a share of critical damping of each mode, or times in proportion to stiffness, c = time * k.
 
@@ -162,15 +158,6 @@ class DampingSection(Section):
         if self.modal_band_percent is not None and not self.modal_band_percent[0] < self.modal_band_percent[1]:
             raise ValueError("modal_band_percent: the first value must be smaller than the second")
         return self
-
-    @property
-    def is_modal(self) -> bool:
-        """Whether damping is stated for modes."""
-        return self.modal_percent is not None
-
-    def time_of(self, kind: DampedElement) -> float:
-        """Damping over stiffness (s) of bearings, meshes or couplings; zero where damping is stated for modes."""
-        return 0.0 if self.is_modal else float(getattr(self, f"{kind}_time_s"))
 
 
 class ElasticitySection(Section):

@@ -49,6 +49,7 @@ UNITS = {
     "years": "years",
     "rpm": "rpm",
     "Hz": "Hz",
+    "percent": "%",
 }
 """Units by the end of a key."""
 
@@ -180,7 +181,7 @@ def _kind(kind: Any) -> str:
     if origin is tuple:
         count = "" if parts[-1] is Ellipsis else f"{len(parts)} of "
         return f"list: {count}{_kind(parts[0])}"
-    return " or ".join(_kind(part) for part in parts)
+    return " or ".join(_kind(part) for part in parts if part is not NoneType)
 
 
 def _default(field: FieldInfo) -> str:
