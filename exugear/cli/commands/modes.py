@@ -72,7 +72,7 @@ def modes(
 
 
 def _draw_campbell(found: Modes, path: Path) -> Path:
-    """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
+    """Plot modes with participation in the overall transmission error over the speeds of the fastest load case."""
     from exugear.report.pictures.diagrams import plot_campbell
     from exugear.results.spectra.run_spectra import mobility_shares
     from exugear.results.spectra.waterfall import order_lines
@@ -115,7 +115,7 @@ def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
 
 
 def _print_modes(found: Modes, rows: list[dict[str, Any]]) -> None:
-    """Print the table of modes: those that vibrate have damping and shares, rigid-body motions have none."""
+    """Print the table of modes; damping and TE participation are omitted for rigid-body modes."""
     assembly = found.assembly
     title = f"Modes: variant {assembly.variant}, mesh model {assembly.mesh_model}, inertia set {assembly.inertias}"
     texts = ("kinetic energy\n%", "strain energy\n%")
