@@ -1,6 +1,6 @@
 """Gearbox dynamics in Exudyn with finite-element transmission error tables.
 
-Names are imported when first used, so that ``import exugear`` and the command line's help stay quick.
+Names are imported at first use, so that ``import exugear`` and the command line's help start quickly.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from exugear.transient.outcome import Run
     from exugear.transient.runup import simulate
 
-#: Public names and the modules they stand in.
+#: Public names and their modules.
 _HOMES = {
     "GearboxFileError": "exugear.gearbox.reading",
     "Choice": "exugear.gearbox.choice",

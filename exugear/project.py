@@ -1,7 +1,7 @@
-"""A gearbox, the folder of its results and the choices made: tables, bodies, modes, runs and the report from there.
+"""Project: a gearbox, its results folder and the model settings, with tables, bodies, modes, runs and the report.
 
-The command line, the case scripts and a notebook stand on this one noun. It computes what is missing, takes what is
-there and fits, and writes into its folder only.
+The command line, the case scripts and notebooks are based on this class. It computes missing results, reuses stored
+ones that match the input, and writes only into its folder.
 """
 
 from __future__ import annotations
@@ -68,16 +68,16 @@ if TYPE_CHECKING:
     from exugear.steady.settings import SteadySettings
 
 Figures = dict[tuple[str, str, str], dict[str, float]]
-"""Figures of flanks by gear, family of meshes and flank, and then by symbol."""
+"""Values of flanks by gear, family of meshes and flank, and then by symbol."""
 
 
 @dataclass(frozen=True)
 class Project(ReprMixin):
-    """A gearbox with the folder of its results and the choices made.
+    """Gearbox with the folder of its results and the model settings.
 
-    Tables, elastic bodies, modes, steady responses and lives are kept in the folder, and taken as they are where they
-    belong to this input and method. A run is made anew each time, or goes on (`resume`); what bearings and meshes bear,
-    and a rating, are found anew.
+    Tables, flexible bodies, modes, steady-state responses and ratings of life are stored in the folder, and reused if
+    they match input and method. A run is repeated each time, or resumed (`resume`). Static loads of bearings and meshes
+    and rating sheets are always recomputed.
 
     Examples
     --------
@@ -90,12 +90,12 @@ class Project(ReprMixin):
 
     gearbox: Gearbox
     folder: Path
-    """Results folder; made when something is written."""
+    """Results folder; created when something is written."""
     choice: Choice = Choice()
-    """Variant, mesh law, inertia set and load case, nothing left open."""
+    """Model settings: variant, mesh model, inertia set and load case, with defaults filled in."""
 
     def __post_init__(self) -> None:
-        """Fill in what the choice leaves open."""
+        """Fill in defaults of the model settings."""
         object.__setattr__(self, "folder", Path(self.folder))
         object.__setattr__(self, "choice", self.choice.of(self.gearbox))
 
@@ -112,7 +112,7 @@ class Project(ReprMixin):
         Raises
         ------
         GearboxFileError
-            Anything wrong with the file.
+            The file is invalid.
         """
         gearbox = Gearbox.from_toml(case, permissions)
         return cls(gearbox, default_folder(case) if folder is None else Path(folder), choice or Choice())
@@ -121,29 +121,29 @@ class Project(ReprMixin):
     def from_folder(
         cls, folder: str | Path, choice: Choice | None = None, permissions: Permissions = NOTHING_MORE
     ) -> Project:
-        """Take up the gearbox that the results of a folder belong to.
+        """Open the gearbox whose results are in a folder.
 
         Raises
         ------
         GearboxFileError
-            The folder holds no results, or what it says of its case cannot be used.
+            The folder holds no results, or its stored gearbox file is invalid.
         """
         return cls(kept_case(Path(folder), permissions), Path(folder), choice or Choice())
 
     def chosen(self, **changes: Any) -> Project:
-        """Return the same gearbox and folder with other choices: `variant`, `mesh_model`, `inertias`, `load_case`."""
+        """Return the same gearbox and folder with other settings: `variant`, `mesh_model`, `inertias`, `load_case`."""
         return replace(self, choice=replace(self.choice, **changes))
 
     def at_load_case(self, name: str) -> Self:
         """Return the same gearbox with the torques at the start of a load case as its static load.
 
-        Tables, load distribution of the teeth and bearing stiffness are then those at this load. The results go to the
-        folder ``at-NAME`` within that of this project.
+        Tables, load distribution of the teeth and bearing stiffness are then those at this load. The results go to
+        the subfolder ``at-NAME`` of the results folder.
 
         Raises
         ------
         GearboxFileError
-            No such load case, or it has no torque that the static load could take.
+            There is no such load case, or it has no torque for the static load.
 
         Examples
         --------
@@ -168,31 +168,31 @@ class Project(ReprMixin):
 
     @property
     def bearings_path(self) -> Path:
-        """File of what the bearings bear."""
+        """File of the static bearing and mesh loads."""
         return bearings_path(self.folder, self.choice)
 
     @property
     def run_directory(self) -> Path:
-        """Folder of the run: its files, what was stopped included."""
+        """Folder of the run, with its files, including those of an interrupted run."""
         return run_directory(self.folder, self.choice)
 
     @property
     def run_path(self) -> Path:
-        """File of the finished run."""
+        """File of the completed run."""
         return self.run_directory / FINAL_NAME
 
     def requested_tables(
         self, names: Iterable[str] = (), positions: int | None = None, *, grid: bool = False
     ) -> list[TableRequest]:
-        """List tables and find those that are there: see `exugear.system.tooth_mesh.tables.requested_tables`."""
+        """List tables and load the stored ones: see `exugear.system.tooth_mesh.tables.requested_tables`."""
         axes = self.grid_axes() if grid or self.gearbox.ste.grid else {}
         return requested_tables(self.gearbox, self.folder, names, positions, grid, axes)
 
     def grid_axes(self) -> dict[str, GridAxes]:
-        """Axes of tables over centre distance and misalignment where the file names none, by gear pair.
+        """Return table axes over centre distance and misalignment, where the file has none, by gear pair.
 
-        They reach three times as far as the gears stand from their nominal place at rest on their bearings, with teeth
-        as stiff as ISO 6336 has them; usual ones where that state is not known.
+        They cover three times the static displacement of the gears on their bearings, with mesh stiffness to ISO 6336;
+        default axes are used if that state is not known.
         """
         ste = self.gearbox.ste
         if ste.misalignment_um is not None and ste.centre_distance_offsets_um is not None:
@@ -218,14 +218,14 @@ class Project(ReprMixin):
         grid: bool = False,
         progress: Callable[[int, int], None] | None = None,
     ) -> dict[str, MeshTable]:
-        """Transmission error tables by gear pair; those that are missing are computed, which takes minutes.
+        """Return transmission error tables by gear pair; missing ones are computed, which takes minutes.
 
         Parameters
         ----------
-        names : pairs; all that the file wants a table of by default
-        positions : positions of the mesh cycle; without it what the file says
-        grid : over load, centre distance and misalignment, too
-        progress : called with the number of finished states of the table at work, and of all its states
+        names : pairs; by default all that need a table according to the file
+        positions : number of positions in the mesh cycle; by default that of the file
+        grid : whether tables are also over load, centre distance and misalignment
+        progress : called with the number of finished states of the current table, and the total
         """
         self.keep_case()
         return self.computed(self.requested_tables(names, positions, grid=grid), progress)
@@ -233,11 +233,11 @@ class Project(ReprMixin):
     def computed(
         self, requests: Sequence[TableRequest], progress: Callable[[int, int], None] | None = None
     ) -> dict[str, MeshTable]:
-        """Table of each request by its name; those that are not stored are computed, as `tables` does."""
+        """Return the table of each request by its name; missing ones are computed, as in `tables`."""
         return {request.name: request.stored or request.compute(progress) for request in requests}
 
     def missing_tables(self) -> list[TableRequest]:
-        """Tables that the mesh law needs, and that are not there or belong to another input."""
+        """Return the tables that the mesh model needs and that are missing or belong to another input."""
         law = LAWS.get(self.choice.mesh_model)
         if law is None or not law.needs_tables:
             return []
@@ -245,17 +245,17 @@ class Project(ReprMixin):
         return missing_tables(self.gearbox, self.folder, grid=law.needs_axes, axes=axes)
 
     def tables_at_work(self) -> dict[str, MeshTable]:
-        """Tables that the mesh law reads, as far as they are there."""
+        """Return the available tables that the mesh model reads."""
         law = LAWS.get(self.choice.mesh_model)
         if law is None or not law.needs_tables:
             return {}
         return tables_at_work(self.gearbox, self.folder, grid=law.needs_axes)
 
     def stiffness(self) -> dict[str, MeshData]:
-        """Mesh stiffness by gear pair, as the mesh law needs it; tables that are missing are computed first."""
+        """Return the mesh stiffness by gear pair for the mesh model; missing tables are computed first."""
         try:
             return self._read_stiffness()
-        except MeshError:  # looking for what is missing reads the tables once more
+        except MeshError:  # the search for missing tables reads the tables again
             if requests := self.missing_tables():
                 self.keep_case()
                 self.computed(requests)
@@ -265,7 +265,7 @@ class Project(ReprMixin):
         return dict(mesh_stiffness(self.gearbox, self.choice.mesh_model, self.folder))
 
     def bodies(self, begin: Callable[[str], None] | None = None) -> dict[str, ElasticBody]:
-        """Reduced elastic bodies of the variant by name; those that are missing are reduced and kept.
+        """Return the reduced flexible bodies of the variant by name; missing ones are reduced and stored.
 
         Parameters
         ----------
@@ -279,11 +279,11 @@ class Project(ReprMixin):
         return reduced_bodies(self.gearbox, inertias, bodies_folder(self.folder), begin)
 
     def assembly(self) -> Assembly:
-        """Equations of motion."""
+        """Return the equations of motion."""
         return assemble(self.gearbox, self.choice, self.stiffness(), self.bodies())
 
     def modes(self) -> Modes:
-        """Eigenmodes at the static load, written to `modes_path`; those that are there and fit are taken."""
+        """Return the eigenmodes at the static load, stored in `modes_path`; matching stored ones are reused."""
         assembly = self.assembly()
         choice = self.choice
         modes = kept_modes(self.modes_path, assembly)
@@ -297,14 +297,14 @@ class Project(ReprMixin):
     def steady(
         self, settings: SteadySettings | None = None, progress: Callable[[int, int], None] | None = None
     ) -> xr.Dataset:
-        """Steady response over speed, written to `steady_path`; one that is there and fits is taken as it is.
+        """Return the steady-state response over speed, stored in `steady_path`; a matching stored one is reused.
 
         Parameters
         ----------
-        settings : speeds and level; those that the first load case passes, and `parametric`, by default
-        progress : called with the number of speeds that are solved, and of all
+        settings : speeds and method; by default the speed range of the first load case, and `parametric`
+        progress : called with the number of finished speeds and the total
         """
-        from exugear.steady.settings import SteadySettings, usual_speeds  # which a run needs not
+        from exugear.steady.settings import SteadySettings, usual_speeds  # not needed by a run
         from exugear.steady.steady_file import stored_or_computed
 
         settings = settings or SteadySettings(usual_speeds(self.gearbox))
@@ -315,13 +315,13 @@ class Project(ReprMixin):
             return stored_or_computed(self.steady_path(settings), assembly, settings, progress)
 
     def steady_path(self, settings: SteadySettings) -> Path:
-        """File of the steady response."""
+        """Return the path of the steady-state response."""
         from exugear.steady.steady_file import steady_path
 
         return steady_path(self.folder, self.choice, settings)
 
     def duties(self) -> tuple[tuple[BearingLoadState, ...], tuple[MeshLoadState, ...]]:
-        """Find what catalogue bearings and meshes bear at the static load, written to `bearings_path`."""
+        """Compute the loads of catalogue bearings and meshes at the static load, and write them to `bearings_path`."""
         assembly = self.assembly()
         duties = bearing_duties(assembly)
         meshes = mesh_duties(assembly)
@@ -330,37 +330,37 @@ class Project(ReprMixin):
         return duties, meshes
 
     def bearings(self) -> tuple[BearingLoadState, ...]:
-        """Find what catalogue bearings bear at the static load: see `duties`."""
+        """Compute the loads of catalogue bearings at the static load: see `duties`."""
         return self.duties()[0]
 
     def meshes(self) -> tuple[MeshLoadState, ...]:
-        """Find how gears stand at the static load, and how evenly their teeth bear: see `duties`."""
+        """Compute misalignment and load distribution of meshes at the static load: see `duties`."""
         return self.duties()[1]
 
     def life_tables(self) -> list[TableRequest]:
-        """List the tables that a life needs, and find those that are there: of all pairs that get one."""
+        """List the tables that a rating needs, of all pairs with a table, and load the stored ones."""
         return self.requested_tables(grid=LAWS[self.choice.mesh_model].needs_axes)
 
     def stress_tables(self, counted: CountedLoads) -> list[TableRequest]:
-        """List the tables that stresses of a life come from, and find those that are there.
+        """List the tables for stresses in a rating, and load the stored ones.
 
-        Without axes of the file they go over load and misalignment around where the gears stand.
+        If the file has no axes, they are over load and misalignment around the static positions of the gears.
         """
         from exugear.life.static_balance import life_requests
 
         return life_requests(self.assembly(), counted, self.folder)
 
     def checked_loads(self, progress: Callable[[int, int], None] | None = None) -> CountedLoads:
-        """Read the loads of a life, and check all that is asked for before any work begins.
+        """Read the load spectrum, and check all required input before the computation begins.
 
         Parameters
         ----------
-        progress : called with the number of files of loads that are read, and of all
+        progress : called with the number of load files read and the total
 
         Raises
         ------
         GearboxFileError
-            Loads that cannot be used, or that go far beyond the tables; strengths that do not fit the gears.
+            Invalid loads, or loads far beyond the tables; strengths that do not fit the gears.
         """
         from exugear.life.life import check_reach, checked_loads
 
@@ -376,20 +376,20 @@ class Project(ReprMixin):
         progress: Callable[[int, int], None] | None = None,
         counted: CountedLoads | None = None,
     ) -> xr.Dataset:
-        """Rate gears and bearings under the loads of the file, written to `life_path`; one that fits is taken as it is.
+        """Rate gears and bearings under the load spectrum, stored in `life_path`; a matching stored rating is reused.
 
-        Tables that are missing are computed first. What is stopped leaves tables, stresses of pairs and solved
-        angles of the carrier, and goes on from there.
+        Missing tables are computed first. An interrupted computation keeps its tables, stresses of pairs and solved
+        carrier angles, and resumes from them.
 
         Parameters
         ----------
         begin : called with the name of each pair before its root stress is computed
-        progress : called with the number of static states that are solved, and of all
-        counted : what `checked_loads` gave; read anew without it
+        progress : called with the number of solved static states and the total
+        counted : result of `checked_loads`; by default the loads are read again
         """
         from exugear.life.dynamic_factors import factors, source_hash
         from exugear.life.gear_life import pair_stresses
-        from exugear.life.life import compute_life, life_hash, rating_of  # root stress, which a run needs not
+        from exugear.life.life import compute_life, life_hash, rating_of  # root stress modules, not needed by a run
         from exugear.life.life_file import stored_life, write_life
         from exugear.life.static_balance import KeptAngles
 
@@ -405,7 +405,7 @@ class Project(ReprMixin):
         angles = Store(self.life_path.with_suffix(".partial.npz"), digest)
         kept = stored_life(self.life_path, digest)
         if kept is not None:
-            angles.discard()  # what was killed behind its last file left them
+            angles.discard()  # left by a process that was killed after its last file
             return kept
         self.keep_case()
         with time_noted(self.folder, f"life, {self.choice.variant}, {self.choice.mesh_model}"):
@@ -421,20 +421,20 @@ class Project(ReprMixin):
         begin: Callable[[str], None] | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> RatingSheet:
-        """Rate all gears by the standard under the loads of the file, or under the static load; write nothing.
+        """Rate all gears to ISO 6336 under the load spectrum, or under the static load; nothing is written.
 
-        Beside it stands what the finite elements say: of the life in the folder if it fits, or under the static load
-        from tables that are there. Nothing of that is computed but stresses from tables.
+        Finite element results are listed next to the standard's: those of a matching life in the folder, or under the
+        static load from stored tables. Apart from stresses from tables, none of these is computed.
 
         Parameters
         ----------
         begin : called with the name of each pair before its root stress is computed
-        progress : called with the number of static states that are solved, and of all
+        progress : called with the number of solved static states and the total
 
         Raises
         ------
         GearboxFileError
-            No section `[rating]`, loads that cannot be used, or strengths that do not fit the gears.
+            No section `[rating]`, invalid loads, or strengths that do not fit the gears.
         """
         from exugear.life.rating.sheet import RATED_AS, balanced, rated, rated_loads
 
@@ -448,7 +448,7 @@ class Project(ReprMixin):
         return rated(self.gearbox, counted, balance, found, remarks)
 
     def _rated_by_life(self, counted: CountedLoads) -> tuple[Figures, tuple[str, ...]]:
-        """Figures of the life in the folder, of the variant chosen or else of another; none, and why, if none fits."""
+        """Return values of a stored life, preferably of the selected variant; otherwise none, with the reason."""
         from exugear.life.rating.sheet import of_life
 
         missing = "no finite element results: compute them by `exugear life`"
@@ -462,7 +462,7 @@ class Project(ReprMixin):
         return {}, ("; ".join([missing, *reasons]),)
 
     def _fitting_life(self, counted: CountedLoads) -> tuple[xr.Dataset | None, str]:
-        """Life of this choice that is in the folder; None, and why one that is there does not fit."""
+        """Return the stored life for these settings; None if none matches, with the reason."""
         if not self.life_path.is_file() or any(request.stored is None for request in self.life_tables()):
             return None, ""
         try:
@@ -476,7 +476,7 @@ class Project(ReprMixin):
     def _rated_by_tables(
         self, balance: StaticBalance, begin: Callable[[str], None] | None
     ) -> tuple[Figures, tuple[str, ...]]:
-        """Figures of the nominal load from tables that are there."""
+        """Return values for the nominal load from stored tables."""
         from exugear.life.gear_life import pair_stresses
         from exugear.life.life import rating_of
         from exugear.life.rating.sheet import nominal_load_values, nominal_loads, remarks_on
@@ -494,7 +494,7 @@ class Project(ReprMixin):
         return found, (*lines, *remarks_on(stresses))
 
     def stored_life(self, counted: CountedLoads) -> xr.Dataset | None:
-        """Life in the folder that was computed from exactly this input; None without one."""
+        """Return the stored life computed from exactly this input; None without one."""
         from exugear.life.dynamic_factors import source_hash
         from exugear.life.life import life_hash, rating_of
         from exugear.life.life_file import stored_life
@@ -514,9 +514,9 @@ class Project(ReprMixin):
         return life_path(self.folder, self.choice)
 
     def run(self, **options: Any) -> Run:
-        """Run the load case in time; options as those of `exugear.transient.runup.simulate`.
+        """Run the load case in time; options as in `exugear.transient.runup.simulate`.
 
-        Results are written to `run_directory` while it goes on.
+        Results are written to `run_directory` during the run.
         """
         stiffness = self.stiffness()
         bodies = self.bodies()
@@ -524,12 +524,12 @@ class Project(ReprMixin):
         return simulate(self.gearbox, self.choice, stiffness, self.folder, bodies=bodies, **options)
 
     def compare_with_exudyn(self, duration: float, **options: Any) -> SolverComparison:
-        """Integrate the beginning of the run by Exudyn, too, and compare it with the run that is there.
+        """Integrate the beginning of the run with Exudyn, and compare it with the stored run.
 
         Parameters
         ----------
         duration : simulated time, s
-        options : as of `exugear.transient.runup.simulate`
+        options : as in `exugear.transient.runup.simulate`
 
         Raises
         ------
@@ -545,20 +545,20 @@ class Project(ReprMixin):
         return compare_solvers(self.run_directory / FINAL_NAME, exudyn.path)
 
     def report(self, near: float | None = None, tell: Callable[[str], None] | None = None) -> Report:
-        """Write the report of all that the folder holds: see `exugear.report.writer.write_report`."""
-        from exugear.report.writer import write_report  # what draws, which a run needs not
+        """Write the report of all results in the folder: see `exugear.report.writer.write_report`."""
+        from exugear.report.writer import write_report  # for drawing, not needed by a run
 
         with time_noted(self.folder, "report"):
             return write_report(self.folder, near, tell, self.gearbox.permissions.below)
 
     def keep_case(self) -> None:
-        """Make the folder, and write into it which gearbox its results belong to."""
+        """Create the folder, and store the gearbox file of its results in it."""
         self.folder.mkdir(parents=True, exist_ok=True)
         keep_case(self.gearbox, self.folder)
 
 
 def default_folder(case: str | Path) -> Path:
-    """Results folder of a gearbox file that no other was named for.
+    """Return the default results folder of a gearbox file.
 
     Examples
     --------

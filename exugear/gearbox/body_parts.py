@@ -375,7 +375,7 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
             place = MM * seat.z_mm
         damping = section.damping_N_m_s_per_rad
         if damping is None:
-            damping = origin.case.damping.coupling_time_s * section.stiffness_N_m_per_rad
+            damping = origin.case.damping.time_of("coupling") * section.stiffness_N_m_per_rad
         yield Bearing(
             name=name,
             family=name,
@@ -491,7 +491,7 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
             raise origin.fault(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
         damping = section.damping_N_m_s_per_rad
         if damping is None:
-            damping = origin.case.damping.coupling_time_s * section.stiffness_N_m_per_rad
+            damping = origin.case.damping.time_of("coupling") * section.stiffness_N_m_per_rad
         return (Coupling(name, *section.bodies, section.seat, section.stiffness_N_m_per_rad, damping),)
 
     return parts_of_each(of_section, origin.case.couplings)

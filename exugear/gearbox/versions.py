@@ -16,6 +16,6 @@ RUN = 10
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
 LIFE = 8
 #: Steady-state responses (`exugear.steady`, and all methods that modes use).
-STEADY = 12
+STEADY = 13
 #: Points of studies (`exugear.studies`: their outputs; the methods that these use have their own versions).
 STUDY = 2

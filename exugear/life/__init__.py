@@ -1,1 +1,1 @@
-"""From loads over time to the life of gears and bearings, and to what limits it."""
+"""Rating and life of gears and bearings from load series, and the parts that limit it."""

@@ -1,7 +1,8 @@
 """Life of rolling bearings under a load duration distribution: L10 of ISO 281, L10r of ISO/TS 16281, static safety.
 
-Both are basic; L10m of ISO 281 has lubricant and cleanliness where the gearbox file gives them. Ribs and cages are left
-out. Loads are those of the static balance; each turn meets each angle of the carrier once.
+Both are basic rating lives; L10m of ISO 281 includes lubricant and cleanliness if the gearbox file has them. Ribs and
+cages are neglected. Loads are those of the static balance; the revolutions at each load are shared equally among the
+angles of the carrier.
 """
 
 from __future__ import annotations
@@ -41,44 +42,44 @@ from exugear.system.bearings.rolling.rows import (
 from fe_ste.tools.arrays import Floats
 
 LAMINAE = 40
-"""Slices of a roller for its loads; 60 change the life by 0.1 %."""
+"""Number of roller laminae for the roller loads; 60 change the life by 0.1 %."""
 LOAD_SHARES = (0.15, 0.3, 0.5, 0.7, 0.85, 1.0)
-"""Loads over the largest at which roller loads are solved; lives between them are straight in logarithms."""
+"""Fractions of the largest load at which roller loads are solved; lives are interpolated linearly in logarithms."""
 
 
 @dataclass(frozen=True)
 class BearingLife:
-    """What a bearing bears over the life of the gearbox."""
+    """Loads, damages and lives of a bearing over the life of the gearbox."""
 
     name: str
     revolutions: float
-    """Of its rings against each other in the life."""
+    """Relative revolutions of its rings in the life."""
     largest_load: float
-    """Radial, N, extremes with their partial factors among them."""
+    """Largest radial load, N, including extreme loads with their partial factors."""
     equivalent: float
-    """Constant equivalent load of the same damage by ISO 281, N."""
+    """Constant equivalent load with the same damage to ISO 281, N."""
     damage: float
     basic_hours: float
     """Miner's sum, and hours of operation until it is one, by L10."""
     reference_damage: float
     reference_hours: float
-    """The same by L10r; NaN where no balance of the rollers was found."""
+    """The same by L10r; NaN if no equilibrium of the rollers was found."""
     modified_damage: float
     modified_hours: float
-    """The same by L10m, with a_ISO at each load and speed; NaN without oil."""
+    """The same by L10m, with a_ISO at each load and speed; NaN without oil data."""
     viscosity_ratio: float
-    """Least kappa of all speeds under load; NaN likewise."""
+    """Minimum kappa over all speeds under load; NaN without oil data."""
     minimum_load: float
-    """Radial load below which elements may slide, N."""
+    """Minimum required radial load, below which rolling elements may slide, N."""
     pressure: float
-    """Largest of rollers or balls under the largest load, Pa; NaN likewise."""
+    """Maximum contact stress of rolling elements under the largest load, Pa; NaN as for L10r."""
     static_safety: float
     """C_0r over the largest static equivalent load."""
     ratings: Ratings
     remarks: tuple[str, ...]
     by_bin: Floats
     reference_by_bin: Floats
-    """(bins,) parts of the damages by bin of torque, by L10 and by L10r."""
+    """(bins,) parts of the damages by torque bin, by L10 and by L10r."""
 
 
 def bearing_lives(
@@ -88,7 +89,7 @@ def bearing_lives(
     balance: StaticBalance,
     oil: LubricantSection | None = None,
 ) -> tuple[BearingLife, ...]:
-    """Rate all bearings that turn and have catalogue data.
+    """Rate all rotating bearings that have catalogue data.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ def bearing_lives(
 
 @dataclass(frozen=True)
 class _Case:
-    """One bearing, and its number among those of the balance."""
+    """One bearing with its index in the balance."""
 
     support: Bearing
     acting: ActingLoads
@@ -178,9 +179,9 @@ class _Case:
     def _life_factor(
         self, rows: tuple[RollingRow, ...], ratings: Ratings, loads: Floats, speed: Floats
     ) -> tuple[Floats, float]:
-        """a_ISO of equivalent loads (points, angles) at speeds (points,) of the rings, and the least viscosity ratio.
+        """Return a_ISO for equivalent loads (points, angles) at ring speeds (points,), and the minimum viscosity ratio.
 
-        NaN where the gearbox file does not say what oil, how warm, and how clean.
+        NaN if the gearbox file lacks oil, temperature or cleanliness.
         """
         oil, section = self.oil, self.support.catalogue
         assert section is not None
@@ -201,10 +202,10 @@ class _Case:
     def _reference(
         self, rows: tuple[RollingRow, ...], ratings: Ratings, loads: Floats, revolutions: Floats, worst: Floats
     ) -> tuple[tuple[Floats, Floats] | None, float, list[str]]:
-        """L10r (millions of revolutions) over radial load (N), the largest pressure (Pa), and remarks.
+        """Return L10r (millions of revolutions) over radial load (N), maximum contact stress (Pa), and remarks.
 
-        Direction, axial load and tilt keep the proportions that they have at the load and angle nearest to the mean of
-        the fourth power over the revolutions.
+        Direction, axial load and tilt have the proportions at the load and angle nearest to the mean of the fourth
+        power over the revolutions.
         """
         size = np.hypot(loads[..., 0], loads[..., 1])
         mean = np.average(np.mean(size**4.0, axis=1), weights=revolutions) ** 0.25
@@ -235,7 +236,7 @@ class _Case:
     def _life_at(
         self, rows: tuple[RollingRow, ...], ratings: Ratings, force: Floats, tilt: Floats
     ) -> tuple[float, float]:
-        """L10r in millions of revolutions, and the largest pressure (Pa), under a force (N) and a tilt (rad)."""
+        """Return L10r (millions of revolutions) and maximum contact stress (Pa) under a force (N) and a tilt (rad)."""
         section = self.support.catalogue
         assert section is not None
         bearing = BearingOfRows(rows)
@@ -257,7 +258,7 @@ def _sliced(row: RollingRow) -> RollingRow:
 
 
 def _interpolated(lives: tuple[Floats, Floats], radial: Floats) -> Floats:
-    """Lives at radial loads, straight in logarithms; below the least load by its slope."""
+    """Interpolate lives at radial loads linearly in logarithms; below the smallest load, extrapolate with its slope."""
     x, y = np.log(lives[0]), np.log(lives[1])
     with np.errstate(divide="ignore"):
         at = np.log(radial)

@@ -1,10 +1,11 @@
-"""The dynamic factor K_v of meshes over speed: as stated, or from the forces of a run.
+"""Dynamic factor K_v of meshes over speed: as stated, from a run, or from a steady-state response.
 
-In a run it is the largest over the mean force of a mesh within a few mesh cycles. Longer windows would count what the
-carrier's turn does to load sharing, and what the load itself does, which the static balance has.
+In a run, K_v is the ratio of maximum to mean force of a mesh within a few mesh cycles. Longer windows would include
+variations of load sharing with the carrier rotation and of the load itself, which the static balance already includes.
 
-Of a response forces are put together again from its lines, over windows of as many mesh cycles as those of a run, so
-that both say the same of one speed. A steady response has settled at every speed; a run-up passes its resonances.
+For a steady-state response, forces are synthesised from its spectral components over windows of the same number of
+mesh cycles, so that both sources give the same factor at a given speed. A steady-state response has settled at every
+speed, whereas a run-up passes its resonances.
 """
 
 from __future__ import annotations
@@ -35,11 +36,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CYCLES = 20.0
-"""Mesh cycles of a window: K_v is that of some teeth in turn, and speed hardly changes in it."""
+"""Mesh cycles per window: several teeth contribute to K_v, and the speed is nearly constant."""
 LEAST_SAMPLES = 8
-"""Samples of a mesh cycle below which its largest force may lie between them."""
+"""Minimum number of samples per mesh cycle; with fewer, the maximum force may lie between samples."""
 WITHIN = 0.05
-"""Part of a speed within which the largest factor counts: a machine does not run at one speed exactly."""
+"""Relative speed band in which the largest factor counts, as operating speeds are not exact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,17 +49,17 @@ class DynamicFactor(ReprMixin):
 
     speed: Floats
     value: Floats
-    """(n,) rad/s without sign, rising; factors."""
+    """(n,) absolute speed, rad/s, ascending; factors."""
     least: float = 1.0
-    """Factor below which none is taken."""
+    """Minimum factor."""
     source: str = ""
-    """What it is of, in words."""
+    """Source as text."""
 
     def _line(self) -> str:
         return f": {self.value.min():.3f} to {self.value.max():.3f} at {len(self.speed)} speeds"
 
     def at(self, speed: Floats) -> Floats:
-        """Largest factor near each speed (rad/s); beyond the run that of its end."""
+        """Return the largest factor near each speed (rad/s); outside the speed range, the factor at its end."""
         found = np.empty(len(speed))
         for place, one in enumerate(np.clip(np.abs(speed), self.speed[0], self.speed[-1])):
             near = np.abs(self.speed - one) <= WITHIN * one
@@ -66,31 +67,31 @@ class DynamicFactor(ReprMixin):
         return np.maximum(found, self.least)
 
     def largest(self, slowest: float, fastest: float) -> float:
-        """Largest factor of a range of speeds (rad/s without sign)."""
+        """Return the largest factor in a range of absolute speeds, rad/s."""
         inside = (self.speed >= slowest * (1.0 - WITHIN)) & (self.speed <= fastest * (1.0 + WITHIN))
         ends = self.at(np.array([slowest, fastest]))
         return float(max(self.value[inside].max(initial=self.least), ends.max()))
 
 
 def stated_factors(gearbox: Gearbox, value: float) -> dict[str, DynamicFactor]:
-    """One factor for all mesh families and speeds."""
+    """Return one factor for all mesh families and speeds."""
     dynamicfactor = DynamicFactor(np.zeros(1), np.full(1, value), source="as stated")
     return {mesh.family: dynamicfactor for mesh in gearbox.meshes}
 
 
 def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
-    """Factors of mesh families over the speed of a body, from a run of the same variant.
+    """Return the factors of mesh families over the speed of a body, from a run of the same variant.
 
     Parameters
     ----------
-    rating : with the load case that the run is of, and the least factor
+    rating : with the load case of the run, and the minimum factor
     path : file of the run
     body : loaded body, whose speed counts
 
     Raises
     ------
     GearboxFileError
-        No run there, one of another input, or one that is sampled too coarsely for its meshes.
+        The run is missing, has another input, or is sampled too coarsely for its meshes.
     """
     gearbox = assembly.gearbox
     key = f"rating.dynamic_factor_run = {rating.dynamic_factor_run!r}"
@@ -118,7 +119,7 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
 
 
 def window_factors(time: Floats, frequency: Floats, force: Floats) -> tuple[Floats, Floats] | None:
-    """Largest over mean force in windows of `CYCLES` mesh cycles, and their middles (s); None without a whole one.
+    """Return maximum over mean force in windows of `CYCLES` mesh cycles, and their middles (s); None without any.
 
     Parameters
     ----------
@@ -126,11 +127,11 @@ def window_factors(time: Floats, frequency: Floats, force: Floats) -> tuple[Floa
 
     Notes
     -----
-    Windows with fewer than `LEAST_SAMPLES` samples a cycle, or without load, are left out.
+    Windows with fewer than `LEAST_SAMPLES` samples per cycle, or without load, are skipped.
     """
     cycles = np.append(0.0, np.cumsum(0.5 * (frequency[1:] + frequency[:-1]) * np.diff(time)))
     window = np.floor(cycles / CYCLES).astype(int)
-    starts = np.flatnonzero(np.append(True, np.diff(window) > 0))[:-1]  # the last one is not whole
+    starts = np.flatnonzero(np.append(True, np.diff(window) > 0))[:-1]  # the last window is incomplete
     if not len(starts):
         return None
     ends = np.append(starts[1:], np.flatnonzero(window == window[starts[-1]])[-1] + 1)
@@ -148,24 +149,24 @@ def window_factors(time: Floats, frequency: Floats, force: Floats) -> tuple[Floa
 
 
 def merged(parts: list[tuple[Floats, Floats]], least: float, source: str) -> DynamicFactor:
-    """Speeds (rad/s) and factors of all meshes of a family as one, by speed."""
+    """Merge the speeds (rad/s) and factors of all meshes of a family, sorted by speed."""
     speed, value = (np.concatenate([part[place] for part in parts]) for place in (0, 1))
     order = np.argsort(speed)
     return DynamicFactor(speed[order], value[order], least, source)
 
 
-# The dynamic factor K_v as a gearbox file wants it: stated, of a run, or of a steady response
+# Dynamic factor K_v from the source in the gearbox file: stated value, run, or steady-state response
 
 WINDOWS = 4
-"""Windows at each speed: slow beats of several meshes show themselves in some of them."""
+"""Number of windows at each speed, to include slow beats between meshes."""
 SAMPLES = 6
-"""Samples of the shortest period: the largest lies within a seventh of a line's amplitude."""
+"""Samples per shortest period; the error of the maximum is below one seventh of a component's amplitude."""
 SMALLEST = 1e-4
-"""Share of the mean force below which a line is left out."""
+"""Fraction of the mean force below which a spectral component is neglected."""
 
 
 def factors(assembly: Assembly, rating: RatingSection, folder: Path, body: str) -> Mapping[str, DynamicFactor]:
-    """Factors of mesh families, from what a results folder holds where the gearbox file wants them of that.
+    """Return the factors of mesh families from the source in the gearbox file, reading the results folder if necessary.
 
     Parameters
     ----------
@@ -186,7 +187,7 @@ def factors(assembly: Assembly, rating: RatingSection, folder: Path, body: str) 
 
 
 def source_hash(assembly: Assembly, rating: RatingSection, folder: Path) -> str:
-    """Hash of the input of what gives K_v; empty where it is stated, or where there is no such response."""
+    """Return the input hash of the source of K_v; empty for a stated value or a missing response."""
     if rating.dynamic_factor_run is not None:
         return input_hash(assembly, rating.dynamic_factor_run)
     if rating.dynamic_factor_steady is not None:
@@ -196,7 +197,7 @@ def source_hash(assembly: Assembly, rating: RatingSection, folder: Path) -> str:
 
 
 def response_path(folder: Path, assembly: Assembly, rating: RatingSection) -> Path:
-    """Place of the steady response that gives K_v."""
+    """Return the path of the steady-state response for K_v."""
     name = f"steady-{rating.dynamic_factor_steady}.nc"
     return modes_path(folder, _choice(assembly)).with_name(name)
 
@@ -206,18 +207,18 @@ def _choice(assembly: Assembly, load_case: str | None = None) -> Choice:
 
 
 def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, body: str) -> dict[str, DynamicFactor]:
-    """Factors of mesh families over the speed of a body, from a steady response of the same variant.
+    """Return the factors of mesh families over the speed of a body, from a steady-state response of the same variant.
 
     Parameters
     ----------
-    rating : with the level that the response is of, and the least factor
+    rating : with the method of the response, and the minimum factor
     path : file of the response
     body : loaded body, whose speed counts
 
     Raises
     ------
     GearboxFileError
-        No response there, or one of another input.
+        The response is missing or has another input.
     """
     gearbox = assembly.gearbox
     level = rating.dynamic_factor_steady
@@ -250,7 +251,7 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
 
 
 def family_factors(data: xr.Dataset, family: str, mesh: str, planets: PlanetSet | None, order: float) -> Floats:
-    """Largest over mean force in a window, at each speed, the largest of all windows and planets."""
+    """Return the largest ratio of maximum to mean force in a window at each speed, over all windows and planets."""
     signals = [str(name) for name in data["signal"].to_numpy()]
     labels = [mesh] if planets is None else _labels(family, planets)
     places = [signals.index(f"mesh_force {label}") for label in labels if f"mesh_force {label}" in signals]
@@ -276,9 +277,9 @@ def _labels(family: str, planets: PlanetSet) -> list[str]:
 
 
 def _sampled(lines: Complexes, orders: Floats, order: float) -> tuple[Floats, Floats]:
-    """Sum lines (lines, waves) over `WINDOWS` windows: (samples, waves), and angles of the input (samples,), rad.
+    """Sum components (lines, waves) over `WINDOWS` windows: (samples, waves), and input angles (samples,), rad.
 
-    Samples are even, so that each is a product of a coarse and a fine turn: few exponentials make all.
+    Samples are equidistant, so that each phase factor is a product of a coarse and a fine rotation: few exponentials.
     """
     each = CYCLES / order * 2.0 * np.pi
     fine = int(np.ceil(SAMPLES * CYCLES * max(1.0, float(orders.max()) / order)))

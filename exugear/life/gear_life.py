@@ -1,8 +1,8 @@
-"""Life of gears by ISO 6336:2006 with stresses of finite-element contact: Miner sums and safety factors by flank.
+"""Life of gears to ISO 6336:2006 with stresses from finite element contact: Miner's sums and safety factors by flank.
 
-Load sharing, misalignment and the load along face and profile are in the stresses; K_gamma is in the forces of the
-static balance, each planet and angle by its own share; K_v alone is a factor. So none counts twice. Contact stress is
-that of line loads inside the path of contact, root stress that of gauges on the closed ring.
+Load sharing, misalignment and the load distribution along face and profile are included in the stresses. K_gamma is
+included in the forces of the static balance, for each planet and angle; only K_v is a separate factor, so no influence
+counts twice. Contact stress is from line loads inside the path of contact, root stress from gauges on the closed ring.
 """
 
 from __future__ import annotations
@@ -59,12 +59,12 @@ if TYPE_CHECKING:
 RZ_OF_RA = 6.0
 """Rz over Ra (ISO 6336-2)."""
 PLAIN_TEST_GEAR = 2.0
-"""Y_ST: stress correction of the test gears that sigma_F_lim belongs to (ISO 6336-3)."""
+"""Y_ST: stress correction factor of the reference test gears for sigma_F_lim (ISO 6336-3)."""
 
 
 @dataclass(frozen=True)
 class FlankLife:
-    """What one flank of a gear's teeth, and the root below it, bear in one family of meshes; the worst of planets."""
+    """Stresses, damages and safeties of a gear's flank and root in one family of meshes; for planets the worst."""
 
     gear: str
     family: str
@@ -72,52 +72,51 @@ class FlankLife:
     """Flank ``+`` faces the sense of +z rotation."""
     contact_holder: str
     root_holder: str
-    """Body whose teeth are worn most, where several have them: which of the planets."""
+    """Body with the largest damage, for several equal ones: the planet."""
     cycles: float
-    """In the life."""
+    """Load cycles in the life."""
     contact_stress: float
     root_stress: float
-    """Largest of the life, K_v in them, Pa."""
+    """Maximum stress of the life including K_v, Pa."""
     compression: float
-    """Least principal stress of the root, Pa."""
+    """Minimum principal stress of the root (compression), Pa."""
     contact_worn: float
     root_worn: float
-    """Largest stress of what wears, extremes left out, Pa."""
+    """Maximum stress of the fatigue loads, without extreme loads, Pa."""
     contact_limit: float
     root_limit: float
-    """Stress that not even the first cycles of the S-N curve endure, Pa: a larger one makes the damage infinite; NaN
-    without strength."""
+    """Stress at the first cycles of the S-N curve, Pa: above it, the damage is infinite; NaN without strength."""
     reach: float
-    """Largest torque, K_v in it, over the largest of the pair's table."""
+    """Largest torque including K_v, over the largest torque of the pair's table."""
     contact_damage: float
     root_damage: float
     """Miner's sums; NaN without strength."""
     contact_safety: float
     root_safety: float
-    """Factors on stress at which they are one; NaN without strength."""
+    """Factors on stress at which the damages are one; NaN without strength."""
     contact_static: float
     root_static: float
-    """Safety under the largest load, extremes with their partial factors among them; NaN without strength."""
+    """Safety factors under the largest load, extreme loads with partial factors included; NaN without strength."""
     nominal_contact: float
     nominal_root: float
     """sigma_H0 of ISO 6336-2 and sigma_F0 of ISO 6336-3 at the largest load, for comparison."""
     standard_contact_safety: float
     standard_root_safety: float
-    """S_H and S_F over the life by the nominal stresses of ISO 6336-2 and -3 with K_gamma and K_v of each load,
-    K_Hbeta of the finite elements and K_Fbeta of it, K_Halpha = K_Falpha = 1; NaN without strength."""
+    """S_H and S_F over the life with nominal stresses of ISO 6336-2 and -3, K_gamma and K_v of each load, K_Hbeta of
+    finite elements, K_Fbeta from K_Hbeta, and K_Halpha = K_Falpha = 1; NaN without strength."""
     outside: float
-    """Largest share of the load outside the path of contact: what tip relief would take away."""
+    """Largest fraction of the load outside the path of contact, which tip relief would remove."""
     face_load: float
-    """Highest over mean line load along the face at the largest load."""
+    """Maximum over mean line load along the face width at the largest load."""
     contact_by_bin: Floats
     root_by_bin: Floats
-    """(bins,) parts of the damages by bin of torque; NaN without strength."""
+    """(bins,) parts of the damages by torque bin; NaN without strength."""
 
 
 def check_strengths(
     gearbox: Gearbox, rating: RatingSection, teeth: Sequence[ToothExposure], reversed_too: bool
 ) -> None:
-    """Refuse strengths of unknown gears, and gears that bend both ways without Y_M, all at once."""
+    """Refuse strengths of unknown gears, and alternating bending without Y_M; all errors are raised together."""
     faults: list[str] = []
     for name, strength in rating.gears.items():
         flanks = {one.flank for one in teeth if one.gear == name}
@@ -136,7 +135,7 @@ def check_strengths(
 def warn_beyond_tables(
     gearbox: Gearbox, acting: ActingLoads, balance: StaticBalance, stresses: Mapping[str, MeshCycleStress]
 ) -> Iterator[str]:
-    """Tell of pairs whose misalignment leaves the axis of their tables, where stresses are those at its end."""
+    """Warn of pairs whose misalignment exceeds the range of their tables, where the stresses at its end are used."""
     hub = np.concatenate([acting.points.other, acting.worst_hub])
     tilts = balance.at(balance.misalignment, acting.torques, hub)
     for name, stress in stresses.items():
@@ -166,7 +165,7 @@ def flank_lives(
     stresses: Mapping[str, MeshCycleStress],
     dynamic: Mapping[str, DynamicFactor],
 ) -> tuple[FlankLife, ...]:
-    """Rate all gears of pairs whose stresses are known.
+    """Rate all gears of pairs with known stresses.
 
     Parameters
     ----------
@@ -188,11 +187,11 @@ def flank_lives(
 
 
 LEAST_COUNTS = ("compression", "contact_limit", "root_limit")
-"""Figures of a flank whose least, beside safeties, is the worst."""
+"""Values of a flank for which the minimum is the worst, in addition to safeties."""
 
 
 def worst_of(lives: Sequence[FlankLife]) -> FlankLife:
-    """Take the worst of each figure of flanks that are alike but for the planet that has them."""
+    """Return the worst of each value over the flanks of equal planets."""
     contact = max(lives, key=lambda one: (np.nan_to_num(one.contact_damage, posinf=np.inf), one.contact_stress))
     root = max(lives, key=lambda one: (np.nan_to_num(one.root_damage, posinf=np.inf), one.root_stress))
     worst: dict[str, Any] = {}
@@ -212,7 +211,7 @@ def worst_of(lives: Sequence[FlankLife]) -> FlankLife:
 
 @dataclass(frozen=True)
 class _Case:
-    """One tooth in one family of meshes under torques of one sense."""
+    """One tooth in one family of meshes under torques of one sign."""
 
     gearbox: Gearbox
     rating: RatingSection
@@ -230,7 +229,7 @@ class _Case:
         worn = np.sign(points.torque) == self.sense
         speed = points.speed[worn]
         hertz, root, _ = self._stresses(points.torque[worn], points.other[worn], self.dynamic.at(speed))
-        # Each turn meets each angle and each mesh once: cycles are shared evenly among them.
+        # A tooth meets each carrier angle and each mesh equally often: cycles are shared evenly among them.
         share = tooth.cycles / (len(tooth.meshes) * len(self.balance.angle))
         cycles = np.broadcast_to((points.revolutions[worn] * share)[:, None, None], hertz.shape)
         worst_torque, worst_hub = acting.worst(self.sense)
@@ -268,14 +267,14 @@ class _Case:
         )
 
     def _loads(self, torques: Floats, hub: Floats) -> tuple[Floats, Floats]:
-        """Torque on gear 1 (N m) and misalignment (rad) of each mesh, (loads, angles, meshes)."""
+        """Return torque on gear 1 (N m) and misalignment (rad) of each mesh, (loads, angles, meshes)."""
         passed = list(self.tooth.meshes)
         force = np.abs(self.balance.at(self.balance.mesh_force, torques, hub)[..., passed])
         tilt = self.balance.at(self.balance.misalignment, torques, hub)[..., passed]
         return force * self.pair.pinion.base_radius, tilt
 
     def _stresses(self, torques: Floats, hub: Floats, dynamic: Floats) -> tuple[Floats, Floats, Floats]:
-        """Contact stress, root stress and root compression of each mesh, (loads, angles, meshes), Pa."""
+        """Return contact stress, root stress and root compression of each mesh, (loads, angles, meshes), Pa."""
         torque, tilt = self._loads(torques, hub)
         torque = torque * dynamic[:, None, None]
         stress = self.stress
@@ -319,7 +318,7 @@ class _Case:
         return {**dict(zip(keys, values, strict=True)), "by_point": np.stack([by_contact, by_root])}
 
     def _standard_safeties(self, torques: Floats, hub: Floats, speed: Floats, cycles: Floats) -> tuple[float, float]:
-        """S_H and S_F of the nominal stresses of the standard, with K_Hbeta of the finite elements."""
+        """Return S_H and S_F with the nominal stresses of the standard and K_Hbeta from finite elements."""
         strength = self.rating.gears.get(self.tooth.gear)
         if strength is None:
             return math.nan, math.nan
@@ -335,7 +334,7 @@ class _Case:
         return flank, safety_factor(bending, root, root_strength(strength, self.pair, self.tooth.member), cycles)
 
     def _contact_strength(self, strength: StrengthSection, speed: Floats) -> Floats:
-        """Pa at a life factor of one, for each speed (rad/s) of the loaded body."""
+        """Return the contact strength (Pa) for a life factor of one, at each speed (rad/s) of the loaded body."""
         other = (self.pair.gear, self.pair.pinion)[self.tooth.member].name
         mate = self.rating.gears.get(other, strength)
         softer = MPA * min(strength.sigma_H_lim_MPa, mate.sigma_H_lim_MPa)
@@ -346,23 +345,23 @@ class _Case:
         return MPA * strength.sigma_H_lim_MPa * still * moving
 
     def _velocity(self, speed: float) -> float:
-        """Pitch line velocity (m/s) at a speed (rad/s) of the loaded body."""
+        """Return the pitch line velocity (m/s) at a speed (rad/s) of the loaded body."""
         gear = (self.pair.pinion, self.pair.gear)[self.tooth.member]
         return speed * self.tooth.cycles / len(self.tooth.meshes) * gear.reference_radius
 
 
 def roughness_of(strength: StrengthSection) -> float:
-    """Rz of a gear's flanks, m."""
+    """Return Rz of a gear's flanks, m."""
     return UM * (strength.roughness_Rz_um or RZ_OF_RA * (strength.roughness_Ra_um or 0.0))
 
 
 def hardening_of(strength: StrengthSection) -> Hardening:
-    """Steel whose constants count: case-hardened ones, which run in least, where curves have no name."""
+    """Return the material group for constants; case-hardened (smallest running-in) if none is given."""
     return strength.curve or "case_hardened"
 
 
 def root_factors(strength: StrengthSection, pair: GearPair, member: int) -> tuple[float, float, float]:
-    """Y_delta_rel_T, Y_R_rel_T and Y_X of a gear; the product that the file states in the place of the first."""
+    """Return Y_delta_rel_T, Y_R_rel_T and Y_X of a gear; or the product stated in the file, in place of the first."""
     if strength.root_roughness_Rz_um is None:
         return strength.root_factor or 1.0, 1.0, 1.0
     hardening = hardening_of(strength)
@@ -375,14 +374,14 @@ def root_factors(strength: StrengthSection, pair: GearPair, member: int) -> tupl
 
 
 def root_strength(strength: StrengthSection, pair: GearPair, member: int) -> float:
-    """Root stress (Pa) that a gear withstands at a life factor of one."""
+    """Return the root strength (Pa) of a gear for a life factor of one."""
     both_ways = strength.mean_stress_factor or 1.0
     factors = math.prod(root_factors(strength, pair, member))
     return MPA * strength.sigma_F_lim_MPa * PLAIN_TEST_GEAR * factors * both_ways
 
 
 def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:
-    """S-N curves of contact and of bending of a gear."""
+    """Return the S-N curves of contact and of bending of a gear."""
     if strength.contact_curve is None or strength.bending_curve is None:
         if strength.curve == "through_hardened":
             return THROUGH_HARDENED_CONTACT, THROUGH_HARDENED_BENDING
@@ -394,7 +393,7 @@ def life_curves(strength: StrengthSection) -> tuple[LifeCurve, LifeCurve]:
     return contact, bending
 
 
-# Stresses of gear pairs from their tables, computed once and kept beside these
+# Stresses of gear pairs from their tables, computed once and stored next to them
 
 _FIELDS = {
     "hertz": (("torque", "misalignment"), "Pa", "largest Hertzian stress inside the path of contact"),
@@ -418,13 +417,13 @@ def pair_stresses(
     begin: Callable[[str], None] | None = None,
     keep: bool = True,
 ) -> dict[str, MeshCycleStress]:
-    """Stresses of all pairs whose tables are there; those that are missing, or belong to another table, are computed.
+    """Return the stresses of all pairs with tables; stresses that are missing or belong to another table are computed.
 
     Parameters
     ----------
-    folder : where they are kept: ``stress/<pair>.nc``
+    folder : for the files ``stress/<pair>.nc``
     begin : called with the name of each pair before it is computed
-    keep : whether what is computed is written
+    keep : whether to store computed stresses
     """
     known: dict[tuple[Gear, int], RootGauges] = {}
 

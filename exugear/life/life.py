@@ -1,4 +1,4 @@
-"""The life of a gearbox under its loads: gears by flank, bearings, extremes, and what limits it."""
+"""Rating and life of a gearbox under its load spectrum: gears by flank, bearings, extreme loads, limiting parts."""
 
 from __future__ import annotations
 
@@ -25,27 +25,27 @@ from exugear.system.system import Assembly, input_hash
 from fe_ste.root_stress import MeshCycleStress
 from fe_ste.tools.display import ReprMixin
 
-# What a life comes to: parts that fail, that fall short of what is asked for, and pairs that need relief
+# Summary of a rating: parts that fail, parts below required values, and pairs that need relief
 
 LEAST_OUTSIDE = 0.01
-"""Share of the load outside the path of contact below which no relief is asked for."""
+"""Fraction of the load outside the path of contact below which no relief is recommended."""
 LARGEST_REACH = 2.5
-"""Torque over the largest of a table beyond which loads are refused: up to three times stresses that are continued with
-constant load sharing are 0 to 6 % above those of a table at that torque, on the safe side."""
+"""Ratio to the largest torque of a table above which loads are refused. Up to three, stresses extrapolated with
+constant load sharing are 0 to 6 % above those of a table at that torque (conservative)."""
 UNTRUSTED_REACH = 3.0
-"""The same of what meshes carry with load sharing, loads of a hub and K_v, from where on no safety is told as good."""
+"""Limit of the same ratio with load sharing, rotor loads and K_v included; above it, safeties are invalid."""
 TOLD_REACH = 1.001
-"""From here on that is told."""
+"""Ratio above which the extrapolation is reported."""
 LEFT_OUT = (
     "scuffing (ISO/TS 6336-20, -21): not rated by this program",
     "micropitting (ISO/TS 6336-22): not rated by this program",
     "tooth flank fracture (ISO/TS 6336-4): not rated by this program",
 )
-"""Damages of gears that are not rated, and why."""
+"""Failure modes of gears that are not rated, with the reason."""
 
 
 def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, float]) -> None:
-    """Refuse loads far beyond the tables that their stresses come from, before any work begins.
+    """Refuse loads far beyond the tables of their stresses, before the computation begins.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, fl
 
 
 def failures(flanks: Iterable[FlankLife]) -> Iterator[str]:
-    """Tell which flanks and roots bear stresses that not one load cycle endures: their damage is infinite."""
+    """Report flanks and roots with stresses above the S-N curve, whose damage is infinite."""
     for flank in flanks:
         for what, damage, worn, limit, holder in (
             ("contact", flank.contact_damage, flank.contact_worn, flank.contact_limit, flank.contact_holder),
@@ -86,14 +86,14 @@ def failures(flanks: Iterable[FlankLife]) -> Iterator[str]:
 
 
 def label(life: FlankLife, holder: str) -> str:
-    """Gear, flank and family of meshes in one text, and the body where it is one of several."""
+    """Return a label of gear, flank and family of meshes, with the body if there are several."""
     return f"{life.gear} {life.flank} {life.family}" + (f" ({holder})" if holder else "")
 
 
 def shortfalls(
     rating: RatingSection, flanks: Iterable[FlankLife], bearings: Iterable[BearingLife], hours: float
 ) -> Iterator[str]:
-    """Tell which parts have less safety, over the life or under the largest load, or live less long than is asked for.
+    """Report parts below the required safety, over the life or under the largest load, or below the required life.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def shortfalls(
 
 
 def reaches(flanks: Iterable[FlankLife]) -> Iterator[str]:
-    """Tell of pairs whose loads go beyond their tables."""
+    """Report pairs with loads beyond their tables."""
     largest: dict[str, float] = {}
     for flank in flanks:
         largest[flank.family] = max(flank.reach, largest.get(flank.family, 0.0))
@@ -142,7 +142,7 @@ def reaches(flanks: Iterable[FlankLife]) -> Iterator[str]:
 
 
 def needs_of_relief(gearbox: Gearbox, flanks: Iterable[FlankLife]) -> Iterator[str]:
-    """Tell which pairs need relief of their tips: those that carry more than `LEAST_OUTSIDE` outside their path."""
+    """Report pairs that need tip relief: more than `LEAST_OUTSIDE` of the load is outside their path of contact."""
     pairs = {mesh.family: mesh.pair for mesh in gearbox.meshes}
     largest: dict[str, float] = {}
     for flank in flanks:
@@ -159,28 +159,28 @@ def needs_of_relief(gearbox: Gearbox, flanks: Iterable[FlankLife]) -> Iterator[s
 
 
 def _relief_in_words(gearbox: Gearbox, name: str) -> str:
-    """Name the tip relief that the file gives a gear; empty without one."""
+    """Describe the tip relief of a gear in the file; empty without one."""
     modification = gearbox.case.gears[name].modification
     if modification is None or not modification.tip_relief_um:
         return ""
     return f"{modification.tip_relief_um:g} µm of tip relief on {name}"
 
 
-# The life of a gearbox under its loads: gears by flank, bearings, extremes, and what limits it
+# Rating and life of a gearbox under its load spectrum: gears by flank, bearings, extreme loads, limiting parts
 
 TOLD_SHARING = 1.0005
-"""K_gamma of a single mesh from which it is told: loads of a hub turn into forces of teeth."""
+"""K_gamma of a single mesh above which it is reported, as rotor loads then change tooth forces."""
 
 
 @dataclass(frozen=True, eq=False)
 class Life(ReprMixin, line=" of {variant}: {flanks!n} flanks, {bearings!n} bearings"):
-    """What a gearbox bears over its life."""
+    """Rating and life of a gearbox."""
 
     variant: str
     mesh_model: str
     inertias: str
     edition: str
-    """What the forces are of, and the edition of the standard that gears are rated by."""
+    """Model of the forces, and edition of the standard for the gears."""
     counted: CountedLoads
     balance: StaticBalance
     load_sharing: Mapping[str, float]
@@ -188,22 +188,21 @@ class Life(ReprMixin, line=" of {variant}: {flanks!n} flanks, {bearings!n} beari
     flanks: tuple[FlankLife, ...]
     bearings: tuple[BearingLife, ...]
     unrated: tuple[str, ...]
-    """Why parts have no life."""
+    """Reasons why parts have no rating."""
     failures: tuple[str, ...]
-    """Parts whose damage is infinite, with the stress that causes it."""
+    """Parts with infinite damage, and the stress that causes it."""
     shortfalls: tuple[str, ...]
-    """Parts whose safety is less than `[rating]` asks for, that live less long than `[loads]` asks for, or whose
-    stresses are not to be trusted."""
+    """Parts below the safety required by `[rating]` or the life required by `[loads]`, or with invalid stresses."""
     reliefs: tuple[str, ...]
-    """Pairs that carry load outside their path of contact: what relief of their tips would take away."""
+    """Pairs with load outside their path of contact, which tip relief would remove."""
     assumptions: tuple[str, ...]
-    """What the figures rest on."""
+    """Assumptions of the results."""
     input_hash: str
-    """Of gearbox file, choices, tables, files of loads and versions of methods."""
+    """Hash of gearbox file, model settings, tables, load files and versions of methods."""
 
 
 def rating_of(gearbox: Gearbox) -> RatingSection:
-    """Section [rating] of a gearbox file.
+    """Return the section [rating] of a gearbox file.
 
     Raises
     ------
@@ -219,16 +218,16 @@ def rating_of(gearbox: Gearbox) -> RatingSection:
 
 
 def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLoads:
-    """Read the loads, and check what is asked for before any work begins.
+    """Read the load spectrum, and check all required input before the computation begins.
 
     Parameters
     ----------
-    progress : called with the number of files that are read, and of all
+    progress : called with the number of files read and the total
 
     Raises
     ------
     GearboxFileError
-        Loads that cannot be used, or strengths that do not fit the gears.
+        Invalid loads, or strengths that do not fit the gears.
     """
     check_keys(gearbox)
     counted = count_loads(gearbox, progress)
@@ -237,12 +236,12 @@ def checked_loads(gearbox: Gearbox, progress: Progress | None = None) -> Counted
 
 
 def check_keys(gearbox: Gearbox) -> None:
-    """Refuse a file without what a life needs, without reading loads; all that is missing is told at once.
+    """Refuse a file without the input for a rating, without reading loads; all errors are raised together.
 
     Raises
     ------
     GearboxFileError
-        Sections or keys that are missing, or a load case that is none.
+        Missing sections or keys, or an unknown load case.
     """
     faults: list[str] = []
     for asked in (rating_of, section_of, lambda given: given.viscosity_40):
@@ -262,12 +261,12 @@ def check_keys(gearbox: Gearbox) -> None:
 
 
 def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str], run: str = "") -> str:
-    """SHA-256 of all that a life depends on.
+    """Return the SHA-256 of all input of a rating.
 
     Parameters
     ----------
     tables : by pair name, hashes of the tables' inputs
-    run : hash of the input of the run or the steady response that gives K_v
+    run : input hash of the run or steady-state response for K_v
     """
     case = assembly.gearbox.content
     content = {
@@ -292,21 +291,21 @@ def compute_life(
     progress: Callable[[int, int], None] | None = None,
     store: AngleStore | None = None,
 ) -> Life:
-    """Rate gears and bearings of a variant under the loads of its gearbox file.
+    """Rate gears and bearings of a variant under the load spectrum of its gearbox file.
 
     Parameters
     ----------
-    counted : of `checked_loads`
+    counted : from `checked_loads`
     stresses : by pair name, pairs without are not rated
     dynamic : by mesh family, K_v
-    digest : of `life_hash`
-    progress : called with the number of solved static states, and of all
-    store : keeps solved angles of the carrier
+    digest : from `life_hash`
+    progress : called with the number of solved static states and the total
+    store : stores solved angles of the carrier
 
     Raises
     ------
     BalanceError
-        A static state that is not held.
+        A static state without equilibrium.
     """
     gearbox = assembly.gearbox
     rating = rating_of(assembly.gearbox)

@@ -1,4 +1,4 @@
-"""The file of a life: sealed netCDF with the hash of its input, and tables with commas beside it."""
+"""File of a rating: netCDF with the hash of its input and a checksum, and CSV tables in the same folder."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ FLANK_UNITS = dict.fromkeys(
 )
 FLANK_WORDS = ("contact_holder", "root_holder")
 INFINITE = "infinite"
-"""For programs in place of a number, where JSON has none: a damage without end, or a life that nothing ends."""
+"""Text in JSON for infinite numbers: an infinite damage or life."""
 DAMAGES = {
     "pitting": ("flank", "contact_damage", "contact_by_bin"),
     "root": ("flank", "root_damage", "root_by_bin"),
     "L10": ("bearing", "damage", "by_bin"),
     "L10r": ("bearing", "reference_damage", "reference_by_bin"),
 }
-"""Dimension, figure and figure by bin of each kind of damage."""
+"""Dimension, value and value by bin of each kind of damage."""
 LISTS = ("assumptions", "unrated", "failures", "shortfalls", "reliefs")
-"""What a life says in words, lists of sentences."""
+"""Lists of sentences of a rating."""
 BEARING_UNITS = {"largest_load": "N", "equivalent": "N", "basic_hours": "h", "reference_hours": "h", "pressure": "Pa"}
 BEARING_UNITS |= {"modified_hours": "h", "minimum_load": "N"}
 FLANK_NUMBERS = tuple(one.name for one in fields(FlankLife) if one.type in (float, "float"))
@@ -70,12 +70,12 @@ _LAYOUT = Layout(
 
 
 def life_path(folder: Path, choice: Choice) -> Path:
-    """Place of the life of a choice that names its inertia set: beside its modes."""
+    """Return the path of the rating for model settings with an inertia set: in the folder of its modes."""
     return modes_path(folder, choice).with_name("life.nc")
 
 
 def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
-    """Labelled arrays with units, what `write_life` writes."""
+    """Return labelled arrays with units, as `write_life` writes them."""
     import xarray as xr
 
     distribution = life.counted.distribution
@@ -127,28 +127,28 @@ def to_dataset(life: Life, gearbox: str) -> xr.Dataset:
 
 
 def flank_label(life: FlankLife) -> str:
-    """Gear, flank and family of meshes in one text."""
+    """Return a label of gear, flank and family of meshes."""
     return f"{life.gear} {life.flank} {life.family}"
 
 
 def stored_life(path: Path, input_hash: str) -> xr.Dataset | None:
-    """Life of a file that was computed from exactly this input; None without one."""
+    """Return a stored rating that was computed from exactly this input; None without one."""
     return Store(path, input_hash).read_dataset(_LAYOUT)
 
 
 def read_life(path: Path) -> xr.Dataset:
-    """Life of a file.
+    """Read a rating from a file.
 
     Raises
     ------
     FileError
-        It is missing, damaged, or of another version.
+        The file is missing, damaged, or of another version.
     """
     return load_dataset(path, _LAYOUT)
 
 
 def write_life(path: Path, life: Life, gearbox: str) -> xr.Dataset:
-    """Write a life whole or not at all, with tables of its flanks and bearings beside it; return its arrays."""
+    """Write a rating and CSV tables of its flanks and bearings as atomic operations; return its arrays."""
     dataset = to_dataset(life, gearbox)
     write_table(path.with_name("life_gears.csv"), ("flank", *FLANK_NUMBERS), _rows(dataset, "flank", FLANK_NUMBERS))
     write_table(
@@ -164,7 +164,7 @@ def _rows(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator[li
 
 
 def limits(dataset: xr.Dataset) -> list[tuple[str, str, float]]:
-    """Damages of all parts of a stored life, largest first: part, kind, Miner's sum, which may be infinite."""
+    """Return the damages of all parts of a stored rating, largest first: part, kind, Miner's sum (may be infinite)."""
     found = []
     for kind, (name, key, _) in DAMAGES.items():
         values = dataset[f"{name}_{key}"].to_numpy().tolist()
@@ -173,7 +173,7 @@ def limits(dataset: xr.Dataset) -> list[tuple[str, str, float]]:
 
 
 def summary(dataset: xr.Dataset) -> dict[str, Any]:
-    """Figures for programs: numbers that are none are left out, those without end are `INFINITE`."""
+    """Return the values for JSON: NaN is omitted, infinite values are `INFINITE`."""
     return {
         "failures": json.loads(dataset.attrs["failures"]),
         "shortfalls": json.loads(dataset.attrs["shortfalls"]),
@@ -205,27 +205,27 @@ def _entries(dataset: xr.Dataset, name: str, numbers: Sequence[str]) -> Iterator
         yield {name: label, **told, **{key: _number(value) for key, value in given if not math.isnan(value)}}
 
 
-# Lives in a results folder that belong to its case
+# Ratings in a results folder that belong to its gearbox file
 
 
 @dataclass(frozen=True)
 class StoredLife:
-    """A file of a life."""
+    """File of a rating."""
 
     path: Path
     data: xr.Dataset | None
-    """None where it does not belong to the case."""
+    """Content; None if it does not belong to the gearbox file."""
     reason: str = ""
-    """Why it does not."""
+    """Reason in that case."""
 
 
 def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], Assembly]) -> Iterator[StoredLife]:
-    """Read all lives of a folder.
+    """Read all ratings of a folder.
 
     Parameters
     ----------
-    gearbox : case of the folder
-    assembled : gives the equations of a choice
+    gearbox : gearbox of the folder
+    assembled : returns the model for given settings
     """
     for path in sorted(folder.glob("*/*/life.nc")):
         try:
@@ -242,23 +242,23 @@ def stored_lives(gearbox: Gearbox, folder: Path, assembled: Callable[[Choice], A
         yield StoredLife(path, data if fits else None, "" if fits else "was computed from another input")
 
 
-# Pictures of a life: what limits it, and which torques do the damage
+# Pictures of a rating: limiting parts, and damage by torque
 
 SHOWN = 16
-"""Most parts that are drawn."""
+"""Maximum number of drawn parts."""
 LEAST_DAMAGE = 1e-6
 """Smaller damages are not drawn."""
 LARGEST_DAMAGE = 1e6
-"""Length of the bar of a larger one, infinite ones among them."""
+"""Damage at which bars are truncated, including infinite damages."""
 
 
 def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
-    """Draw the damages of the parts that limit a life, and over torque where they come from.
+    """Draw the damages of the limiting parts, and their distribution over torque.
 
     Parameters
     ----------
-    data : as `exugear.life.life_file.read_life` gives it
-    path : where to write the picture
+    data : as `exugear.life.life_file.read_life` returns it
+    path : file for the picture
     """
     shown = [limit for limit in limits(data) if limit[2] > LEAST_DAMAGE][:SHOWN]
     with drawing_style():
@@ -288,11 +288,11 @@ def draw_life(data: xr.Dataset, path: str | Path | None = None) -> Figure:
 
 
 def damage_matrix(data: xr.Dataset, parts: list[tuple[str, str, float]]) -> tuple[Floats, Floats]:
-    """Edges of the bins (bins + 1,), N m, and the share of each bin in the damage of each part (parts, bins).
+    """Return the edges of the bins (bins + 1,), N m, and the fraction of each bin in each part's damage (parts, bins).
 
     Parameters
     ----------
-    parts : (part, kind, damage) as `exugear.life.life_file.limits` gives them
+    parts : (part, kind, damage) as `exugear.life.life_file.limits` returns them
     """
     torque = data["torque"].to_numpy()
     order = np.argsort(torque)

@@ -1,11 +1,11 @@
-"""What meshes and bearings carry at rest: the static balance of a variant over torques and angles of the carrier.
+"""Static balance of a variant over torques and carrier angles: loads of meshes and bearings.
 
-For fatigue the balance at rest is enough: what a turbine's torque swings with lies far below the first mode of a
-gearbox. Linear laws are solved once an angle and scaled; others on some torques, and forces over torque are linear
-between these.
+For fatigue, the static balance is sufficient, because the torque of a turbine varies far below the first natural
+frequency of a gearbox. Linear models are solved once per angle and scaled. Nonlinear models are solved at some torques,
+with linear interpolation of forces between them.
 
-A table of one load knows gears that stand straight. Where contact is solved at the static misalignment, stresses come
-from tables of their own: over the loads of the life, and over misalignments from straight to beyond the static ones.
+A table of one load is valid for aligned gears. Where contact is solved at the static misalignment, stresses are from
+separate tables: over the loads of the life, and over misalignments from aligned to beyond the static ones.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ from fe_ste.tools.stores import Arrays, Store
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput
 
 TORQUE_SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
-"""Torques over the largest at which laws that are not linear are solved."""
+"""Fractions of the largest torque at which nonlinear models are solved."""
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Something of the balance over torques and angles, and what the loads of a hub add to it."""
+    """Result of the balance over torques and angles, and its change by rotor loads."""
 
     values: Floats
-    """(t, a, ...) at the torques of the balance without loads of a hub."""
+    """(t, a, ...) at the torques of the balance without rotor loads."""
     by_hub: Floats | None = None
-    """(t, 5, a, ...) what a unit of each of these adds."""
+    """(t, 5, a, ...) change per unit of each rotor load."""
 
     def of(self, number: int) -> Response:
-        """Response of one bearing alone: that number of the axis behind the angles."""
+        """Return the response of one bearing, by its index on the axis after the angles."""
         return Response(self.values[:, :, number], None if self.by_hub is None else self.by_hub[:, :, :, number])
 
 
@@ -57,25 +57,25 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
 
     torque: Floats
     angle: Floats
-    """(t,), (a,) on the loaded body, N m, rising and without zero; of the carrier, rad."""
+    """(t,) torque on the loaded body, N m, ascending, without zero; (a,) angle of the carrier, rad."""
     mesh_force: Response
     misalignment: Response
-    """(t, a, meshes) F_bt, N, positive on the flank that the static load presses; on tables' flank, rad."""
+    """(t, a, meshes) F_bt, N, positive on the flank of the static load; misalignment on the tables' flank, rad."""
     bearing_load: Response
-    """(t, a, bearings, 6) force and moment of the shaft on the inner ring in the axes of what the bearing sits on, N
+    """(t, a, bearings, 6) force and moment of the shaft on the inner ring, in the axes of the supporting body, N
     and N m."""
     bearing_tilt: Response
-    """(t, a, bearings, 2) of the inner ring against the outer one in the same axes, rad."""
+    """(t, a, bearings, 2) tilt of the inner relative to the outer ring in the same axes, rad."""
     linear: bool
-    """Whether all that is proportional to the loads."""
+    """Whether all results are proportional to the loads."""
     outside: tuple[str, ...] = ()
-    """Meshes whose load, centre distance or misalignment lies outside their table in some of these states, where
-    that goes on in a straight line."""
+    """Meshes whose load, centre distance or misalignment is outside the range of their table in any state, where it is
+    extrapolated linearly."""
 
     def at(self, response: Response, torque: Floats, hub: Floats | None = None) -> Floats:
-        """Values of a response at torques (n,) and loads of a hub (n, 5): (n, a, ...).
+        """Return the values of a response at torques (n,) and rotor loads (n, 5): (n, a, ...).
 
-        Values over torque are linear between the torques that were solved, those of the same sign.
+        Values are interpolated linearly between solved torques of the same sign.
         """
         found = self._interpolate_torque(response.values / _like(self.torque, response.values), torque)
         found *= _like(torque, found)
@@ -91,22 +91,22 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
             wanted = torque >= 0.0 if sign > 0.0 else torque < 0.0
             own = np.sign(self.torque) == sign
             if not own.any():
-                own = ~own  # linear laws need one torque, of either sign
+                own = ~own  # linear models are solved at one torque, of either sign
             flat = values[own].reshape(int(own.sum()), -1)
             inside = np.array([np.interp(torque[wanted], self.torque[own], column) for column in flat.T]).T
             found[wanted] = inside.reshape(-1, *values.shape[1:])
         return found
 
     def load_sharing(self, meshes: Sequence[int], torque: Floats | None = None, hub: Floats | None = None) -> float:
-        """K_gamma of the meshes of a family, over all angles.
+        """Return K_gamma of the meshes of a family, over all angles.
 
         Parameters
         ----------
-        torque, hub : (n,), (n, 5) torques and loads of a hub; without them the largest torque alone
+        torque, hub : (n,), (n, 5) torques and rotor loads; by default the largest torque alone
 
         Returns
         -------
-        largest of all forces over the mean that the same torque gives without loads of a hub
+        largest force over the mean force at the same torque without rotor loads
         """
         if torque is None:
             torque = self.torque[[np.abs(self.torque).argmax()]]
@@ -120,7 +120,7 @@ class StaticBalance(ReprMixin, line=": {torque!n} torques, {angle!n} angles, lin
 
 
 class States(NamedTuple):
-    """What is kept of states at rest (...): at one angle over torques and loads of a hub, the first of these none."""
+    """Stored static states (...): at one angle over torques and rotor loads; the first has no rotor load."""
 
     force: Floats
     misalignment: Floats
@@ -129,11 +129,11 @@ class States(NamedTuple):
     tilt: Floats
     """(..., bearings, 6), (..., bearings, 2)"""
     outside: Floats
-    """(..., meshes) 1 where load, centre distance or misalignment lies outside the table."""
+    """(..., meshes) 1 where load, centre distance or misalignment is outside the table."""
 
     @classmethod
     def of(cls, assembly: Assembly, q: Floats) -> States:
-        """Take them from coordinates (size,) at rest."""
+        """Extract them from static coordinates (size,)."""
         meshes = assembly.mesh_states(q, np.zeros_like(q), assembly.mean_meshes)
         flanks = np.array([element.flank for element in assembly.elements])
         tilts = flanks * assembly.gear_positions(q)[:, 1]
@@ -141,18 +141,18 @@ class States(NamedTuple):
 
 
 def _like(weights: Floats, values: Floats) -> Floats:
-    """Weights of the first axis, ready to be multiplied with values."""
+    """Reshape weights of the first axis for multiplication with values."""
     return weights.reshape(-1, *(1,) * (values.ndim - 1))
 
 
 class AngleStore(Protocol):
-    """What keeps solved angles of the carrier, so that a computation that was stopped goes on behind them."""
+    """Storage of solved carrier angles, from which an interrupted computation resumes."""
 
     def stored(self, number: int) -> States | None:
-        """States of an angle by its number, None where they are not there."""
+        """Return the states of an angle by its index; None if not stored."""
 
     def store(self, number: int, states: States) -> None:
-        """Keep the states of an angle."""
+        """Store the states of an angle."""
 
 
 def static_balance(
@@ -164,24 +164,24 @@ def static_balance(
     hub: Floats | None = None,
     store: AngleStore | None = None,
 ) -> StaticBalance:
-    """Solve the static balance of a variant for the range of some torques on a body.
+    """Solve the static balance of a variant over the range of given torques on a body.
 
     Parameters
     ----------
-    torques : N m; what is solved covers them
-    angles : angles of the carrier within its turn; without planets one is all
-    progress : called with the number of solved states, and of all
+    torques : N m; the solved torques cover their range
+    angles : number of carrier angles per revolution; without planets one is sufficient
+    progress : called with the number of solved states and the total
     hub : (5,)
-        Sizes of the force along x, y, z (N) and the moment about x and y (N m) on the body: those above zero are solved
-        beside each torque.
-    store : where each angle goes when it is solved, and where those that were solved before are taken from
+        Magnitudes of the forces along x, y, z (N) and the moments about x and y (N m) on the body; nonzero ones are
+        solved in addition to each torque.
+    store : storage of solved angles
 
     Raises
     ------
     BalanceError
-        A state that is not held.
+        A state without equilibrium.
     VariantError
-        Loads of a hub on a body that has no place in space.
+        Rotor loads on a body without translational coordinates.
     """
     assembly = assembly.at_rest
     linear = is_linear(assembly)
@@ -218,15 +218,15 @@ def _solve_angle(
     wrenches: Sequence[Floats | None],
     count: Callable[[int], None],
 ) -> States:
-    """Solve all torques, and each load of a hub beside them, at one angle of the carrier."""
+    """Solve all torques, and each rotor load in addition to them, at one angle of the carrier."""
     carrier = _carrier(assembly)
     about = rolled_coordinates(assembly, carrier, turn) if carrier else np.zeros(assembly.size)
     rows: list[list[States]] = [[] for _ in torques]
     before: dict[float, list[tuple[float, Floats]]] = {1.0: [], -1.0: []}
-    for done, t in enumerate(np.argsort(-np.abs(torques)).tolist()):  # the largest first: it closes all clearances
+    for done, t in enumerate(np.argsort(-np.abs(torques)).tolist()):  # the largest first, as it closes all clearances
         count(done)
         torque = float(torques[t])
-        known = before[math.copysign(1.0, torque)]  # the other flanks of a torque of the other sign tell nothing
+        known = before[math.copysign(1.0, torque)]  # a torque of opposite sign loads other flanks
         q = _static_coordinates(assembly, body, torque, about, None, _ahead(known, torque))
         alone = States.of(assembly, q)
         beside = (
@@ -239,7 +239,7 @@ def _solve_angle(
 
 
 def _ahead(known: Sequence[tuple[float, Floats]], torque: float) -> Floats | None:
-    """Coordinates from which the search under a torque begins: straight through the last two states, or the last."""
+    """Return start coordinates for a torque: extrapolated from the last two states, or the last state."""
     if len(known) < 2:
         if known:
             return known[-1][1]
@@ -251,7 +251,7 @@ def _ahead(known: Sequence[tuple[float, Floats]], torque: float) -> Floats | Non
 def _static_coordinates(
     assembly: Assembly, body: str, torque: float, about: Floats, wrench: Floats | None, near: Floats | None
 ) -> Floats:
-    """Coordinates at rest, (size,)."""
+    """Return the static coordinates, (size,)."""
     locked = assembly.gearbox.locked
     try:
         return locked_equilibrium(assembly, {body: torque}, locked, assembly.mean_meshes, about, wrench, near)
@@ -262,7 +262,7 @@ def _static_coordinates(
 
 
 def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]:
-    """Generalized forces (size,) of each load of a hub by itself, None for those of no size."""
+    """Return the generalised forces (size,) of each rotor load alone; None for zero loads."""
     coordinate = assembly.coordinates[body][: len(hub)]
     if hub.any() and min(coordinate) < 0:
         raise VariantError(
@@ -278,8 +278,8 @@ def _wrenches(assembly: Assembly, body: str, hub: Floats) -> list[Floats | None]
 
 
 def _response(parts: Sequence[Floats], sizes: Floats) -> Response:
-    """One part of the states of all angles, over torque and angle, and its differences by the loads of a hub."""
-    together = np.stack(parts, axis=2)  # torque, load of the hub, angle
+    """Return one result of the states of all angles over torque and angle, with its changes by rotor loads."""
+    together = np.stack(parts, axis=2)  # torque, rotor load, angle
     values = np.ascontiguousarray(together[:, 0])
     if not sizes.any():
         return Response(values)
@@ -288,9 +288,9 @@ def _response(parts: Sequence[Floats], sizes: Floats) -> Response:
 
 
 def is_linear(assembly: Assembly) -> bool:
-    """Tell whether forces are proportional to torque: teeth and bearings linear and through the origin, no weight.
+    """Return whether forces are proportional to torque: meshes and bearings linear through the origin, no weight.
 
-    Constant forces on bodies are as much in the way as weight is.
+    Constant forces on bodies exclude proportionality, as weight does.
     """
     constant = any(assembly.gearbox.case.gravity.acceleration_m_per_s2) or bool(assembly.gearbox.forces)
     through_points = bool(assembly.connectors.point_load.any())
@@ -323,12 +323,12 @@ def _angles(assembly: Assembly, count: int) -> Floats:
 
 
 def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
-    """Load on the inner ring (bearings, 6) and its tilt (bearings, 2) in the axes of what each bearing sits on."""
+    """Return load (bearings, 6) and tilt (bearings, 2) of inner rings, in the axes of the supporting body."""
     if not assembly.supports:
         return np.zeros((0, 6)), np.zeros((0, 2))
     loads = assembly.bearing_loads(q, np.zeros_like(q))
     strains = assembly.support_strains(q)
-    # The bearing takes its factor of a deflection, the seat the rest; the outer ring moves the other way.
+    # The bearing has its factor's fraction of the deflection, the seat the rest; outer rings move the opposite way.
     scales = np.array([one.factor * (-1.0 if one.carries_outer_ring else 1.0) for one in assembly.supports])
     turned = np.empty_like(loads)
     for number, support in enumerate(assembly.supports):
@@ -340,15 +340,15 @@ def _inner_rings(assembly: Assembly, q: Floats) -> tuple[Floats, Floats]:
     return turned, scales[:, None] * strains[:, 3:5]
 
 
-# Solved angles of a static balance, kept until the life is there: what was stopped goes on with the same bits
+# Solved angles of a static balance, stored until the rating is complete: a resumed computation has identical results
 
 
 class KeptAngles(ReprMixin):
-    """Solved angles in one file, written anew with each.
+    """Solved angles in one file, which is rewritten with each.
 
     Parameters
     ----------
-    store : of all that the life rests on
+    store : for all input of the rating
 
     Examples
     --------
@@ -365,11 +365,11 @@ class KeptAngles(ReprMixin):
         return f": {len(self._angles)} in {self._store.path.as_posix()}"
 
     def stored(self, number: int) -> States | None:
-        """States of an angle by its number, None where they are not there."""
+        """Return the states of an angle by its index; None if not stored."""
         return self._angles.get(number)
 
     def store(self, number: int, states: States) -> None:
-        """Keep the states of an angle."""
+        """Store the states of an angle."""
         self._angles[number] = states
         self._store.write(
             {f"{name}_{angle}": array for angle, kept in self._angles.items() for name, array in kept._asdict().items()}
@@ -381,7 +381,7 @@ def _unpacked(arrays: Arrays) -> dict[int, States]:
     return {number: States(*(arrays[f"{name}_{number}"] for name in States._fields)) for number in numbers}
 
 
-# What acts on a gearbox, as its parts are rated under it: points of its distribution, and the worst of all
+# Loads for the rating: points of the distribution, and worst cases
 
 
 @dataclass(frozen=True, eq=False)
@@ -389,16 +389,16 @@ class ActingLoads:
     """Loads over a life."""
 
     points: LoadPoints
-    """What wears, with the loads of a hub beside the torque."""
+    """Fatigue loads: torques with simultaneous rotor loads."""
     worst_torque: Floats
     worst_hub: Floats
-    """(w,), (w, 5) what counts for static safety: the ends of the distribution, and extreme sources with their
-    partial factors; N m, N and N m."""
+    """(w,), (w, 5) loads for static safety: ends of the distribution, and extreme sources with their partial factors;
+    N m, N and N m."""
     bins: int
-    """Bins of the distribution that the points belong to."""
+    """Number of bins of the distribution of the points."""
     slowest: float
     fastest: float
-    """Least and largest speed of the body under a torque, rad/s without sign, extreme sources among them."""
+    """Minimum and maximum absolute speed of the body under load, rad/s, including extreme sources."""
 
     @property
     def torques(self) -> Floats:
@@ -407,11 +407,11 @@ class ActingLoads:
 
     @property
     def hub_sizes(self) -> Floats:
-        """Largest of each load of a hub without sign, (5,)."""
+        """Largest absolute value of each rotor load, (5,)."""
         return np.asarray(np.abs(np.concatenate([self.points.other, self.worst_hub])).max(axis=0))
 
     def worst(self, sense: int) -> tuple[Floats, Floats]:
-        """Torques of one sign, points among them, and the loads of a hub beside them."""
+        """Return the torques of one sign, including the points, with their rotor loads."""
         torque = self.torques
         hub = np.concatenate([self.points.other, self.worst_hub])
         own = torque * sense > 0.0
@@ -423,7 +423,7 @@ class ActingLoads:
 
 
 def acting_loads(counted: CountedLoads) -> ActingLoads:
-    """Gather what acts of counted loads."""
+    """Return the loads for the rating from counted loads."""
     distribution = counted.distribution
     extremes = [source for source in counted.sources if source.kind == "extreme"]
     ends = np.array([distribution.upper.max(), distribution.upper.min()])
@@ -439,24 +439,24 @@ def acting_loads(counted: CountedLoads) -> ActingLoads:
     )
 
 
-# Tables that stresses of a life are taken from: around the places where gears stand, where no grid of the file says
+# Tables for stresses in a rating: around the static positions of the gears, unless the file defines a grid
 
 TABLE_TORQUE_SHARES = (0.35, 0.7, 1.0)
-"""Torques over the static one; a larger one follows from the loads."""
+"""Torques over the static torque; a larger one is added if the loads require it."""
 REACH_STEP = 0.25
-"""Step to which the largest of them is rounded up, so that loads that change a little leave tables as they are."""
+"""Step to which the largest of them is rounded up, so that small changes of loads keep the tables valid."""
 ROOM = 1.25
-"""How far misalignments reach beyond the static one at the largest torque: planets share loads unequally."""
+"""Factor on the static misalignment at the largest torque, because planets share loads unequally."""
 LARGEST_STEP, ROUNDING = 15e-6, 2.5e-6
-"""Largest step of misalignment as an opening over the face, and what its ends are rounded to, m."""
+"""Largest step of the misalignment as a gap over the face width, and rounding of the ends, m."""
 STRAIGHT = 1e-6
-"""Opening over the face up to which gears stand straight, m."""
+"""Gap over the face width up to which gears count as aligned, m."""
 
 
 def life_requests(assembly: Assembly, counted: CountedLoads, folder: Path) -> list[TableRequest]:
-    """Tables that stresses of a life come from, and those of them that are in a results folder.
+    """Return the tables for stresses in a rating; those already in a results folder are loaded.
 
-    Of a law that reads grids these are its grids; else see `stress_requests`.
+    For a mesh model with grids, these grids are used; otherwise see `stress_requests`.
     """
     grid = LAWS[assembly.mesh_model].needs_axes
     requests = requested_tables(assembly.gearbox, folder, grid=grid)
@@ -468,17 +468,17 @@ def life_requests(assembly: Assembly, counted: CountedLoads, folder: Path) -> li
 def stress_requests(
     assembly: Assembly, requests: Iterable[TableRequest], counted: CountedLoads, folder: Path
 ) -> list[TableRequest]:
-    """Tables of a life: those that are wanted, or wider ones where gears stand off straight and contact can be solved.
+    """Return the tables of a rating: the requested ones, or wider ones for misaligned gears with solvable contact.
 
     Parameters
     ----------
-    requests : of the pairs; those with axes of the file stay as they are
-    folder : results folder: wider tables are kept in ``stress/<pair>.states.nc``
+    requests : of the pairs; those with axes in the file are kept
+    folder : results folder; wider tables are stored in ``stress/<pair>.states.nc``
 
     Raises
     ------
     BalanceError
-        The static load cannot be held.
+        No equilibrium under the static load.
     """
     tilts = _misalignments(assembly)
     reaches = _reaches(assembly, counted)
@@ -495,7 +495,7 @@ def stress_requests(
 
 
 def _misalignments(assembly: Assembly) -> dict[str, list[float]]:
-    """Find the static misalignments of the meshes of each pair in the axes of its table, rad."""
+    """Return the static misalignments of the meshes of each pair in the axes of its table, rad."""
     tilts: dict[str, list[float]] = {}
     if assembly.contacts.contacts:
         state = static_state(assembly)
@@ -505,7 +505,7 @@ def _misalignments(assembly: Assembly) -> dict[str, list[float]]:
 
 
 def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, tuple[float, float]]:
-    """Largest torque of the loads over the static one by pair, at least 1, and the largest reversed one over it."""
+    """Return by pair the largest torque (ratio at least 1) and largest reversed torque over the static torque."""
     gearbox = assembly.gearbox
     largest = max(float(abs(source.torque).max()) for source in counted.sources)
     static_forces = gearbox.train.static_mesh_forces()
@@ -525,9 +525,9 @@ def _reaches(assembly: Assembly, counted: CountedLoads) -> dict[str, tuple[float
 def _wider(
     request: TableRequest, tilts: Sequence[float], reach: float, reversed_reach: float, folder: Path
 ) -> TableRequest:
-    """Ask for a pair's table over load and misalignment, and find it where it is kept.
+    """Return the request for a pair's table over load and misalignment, loaded if it is stored.
 
-    A reversed load tilts gears the other way: nodes for it are added beyond those of the load itself.
+    A reversed load causes the opposite misalignment: nodes for it are added beyond those of the load itself.
     """
     static = request.wanted
     width = request.wanted.pair.face_width
@@ -550,13 +550,13 @@ def _wider(
 
 
 def _ends(openings: Sequence[float]) -> tuple[float, float]:
-    """Return the ends of an axis that holds openings over the face (m) and none."""
+    """Return the rounded ends of an axis that includes the gaps over the face width (m) and zero."""
     low = math.floor(min(0.0, *openings) / ROUNDING) * ROUNDING
     return low, math.ceil(max(0.0, *openings) / ROUNDING) * ROUNDING
 
 
 def _nodes(begin: float, end: float) -> list[float]:
-    """Return even nodes after a beginning up to an end, at most `LARGEST_STEP` apart; none if both are one."""
+    """Return equidistant nodes after a beginning up to an end, at most `LARGEST_STEP` apart; none if they coincide."""
     steps = math.ceil(abs(end - begin) / LARGEST_STEP - 1e-6)
     return [begin + (end - begin) * step / steps for step in range(1, steps + 1)]
 

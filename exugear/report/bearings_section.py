@@ -1,4 +1,4 @@
-"""Section "At the bearings": forces by source, accelerations of seats, and what bearings bear at rest."""
+"""Section "Bearing forces and accelerations": dynamic forces, seat accelerations and static bearing loads."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState
 
 LIFTS = 1.0
-"""Swing over the mean force from which a linear bearing is said to have to lift off."""
+"""Dynamic over mean force above which a linear bearing model would lose contact; the page warns then."""
 NOISE = 1e-3
-"""Share of the mean transverse force below which an axial force is told as none."""
+"""Fraction of the mean transverse force below which an axial force is shown as zero."""
 NOISE_OF_ALL = 1e-5
-"""Share of the largest force of all bearings below which a force is told as none."""
+"""Fraction of the largest force of all bearings below which a force is shown as zero."""
 MEANS = (
     "Mean force over the middle third of the run-up, and largest zero-to-peak amplitude along an order (root sum "
     "square of both transverse directions). For planet sets, the bearing with the largest amplitude. Axial force: of "
     "the shaft on the bearing or joint, positive along +z."
 )
-"""What is told of forces in run-ups."""
+"""Note above the table of forces in run-ups."""
 WAVES = (
     "Largest zero-to-peak amplitude along an order at constant speed (root sum square of both transverse "
     "directions). Planet bearing forces are multi-blade components (mean, cosine, sine). Static loads are listed "
     "below."
 )
-"""What is told of forces at constant speed."""
+"""Note above the table of forces at constant speed."""
 SEATS = 12
-"""Seats whose accelerations are listed."""
+"""Maximum number of seats in the table of accelerations."""
 QUIET = 1e-3
-"""Share of the largest acceleration below which none is listed."""
+"""Fraction of the largest acceleration below which a seat is not listed."""
 
 
 def bearings_section(material: ReportData) -> Part:
-    """List forces at bearings by source, accelerations by steady response, and duties by model."""
+    """List bearing forces by result group, accelerations by steady-state response and static bearing loads by model."""
     forces = [
         only_for(_forces(material, data, group, variant), group.name, variant)
         for data, group in zip(material.run_data["groups"], material.groups, strict=True)
@@ -128,21 +128,21 @@ def _force_row(
 
 
 def _above(force: float | None, felt: float) -> float:
-    """Force, or none where it is no more than rounding beside the other bearings' forces."""
+    """Return the force, or zero where it is only rounding error compared with the forces at other bearings."""
     if force and force > felt:
         return force
     return 0.0
 
 
 def _without_noise(value: float, mean: float) -> float:
-    """Force (kN) beside a mean one (N): zero where only rounding and start-up are left."""
+    """Return an axial force (kN), or zero where it is negligible (round-off, start-up) against the mean force (N)."""
     if abs(value) > NOISE * 1e-3 * mean:
         return value
     return 0.0
 
 
 def _accelerations(material: ReportData, data: xr.Dataset) -> str:
-    """Largest accelerations of seats in a steady response, over all its lines and speeds."""
+    """Tabulate the largest seat accelerations of a steady-state response over all orders and speeds."""
     signals = [str(name) for name in data["signal"].to_numpy()]
     places = [place for place, name in enumerate(signals) if name.startswith("seat_acceleration ")]
     if not places:
@@ -184,7 +184,7 @@ def _line_words(material: ReportData, data: xr.Dataset, line: int) -> str:
 
 
 def _seat_words(material: ReportData, signal: str) -> str:
-    """Words for a signal such as ``seat_acceleration hss_a x``."""
+    """Return the label of a signal such as ``seat_acceleration hss_a x``."""
     _, name, *rest = signal.split(" ")
     return " ".join([material.words.of(name), *rest])
 
@@ -216,7 +216,7 @@ def _duties(material: ReportData, assembly: Assembly) -> str:
 
 
 def _meshes(material: ReportData, assembly: Assembly) -> str:
-    """How gears stand under the static load, and how evenly their teeth bear; nothing where no contact was solved."""
+    """Tabulate mesh misalignment and face load distribution under static load; empty without solved tooth contact."""
     if not assembly.contacts.contacts:
         return ""
     name = words_of(assembly.choice)

@@ -1,4 +1,4 @@
-"""Section "Gears and excitation": transmission errors over the mesh cycle with their harmonics, and the gears."""
+"""Section "Static transmission error and gears": error curves over the mesh cycle, harmonics and gear data."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ PRESSURE = (
     "Contact stress: maximum over the mesh cycle without tip-edge contact, under this torque, aligned gears, no load "
     "factors."
 )
-"""What pressures of tables are of."""
+"""Note on the contact stresses of TE tables."""
 
 
 def gears_section(material: ReportData) -> Part:
-    """Show what excites: each pair's transmission error, its harmonics and stiffness; and the gears' geometry."""
+    """Show the static transmission error of each pair with harmonics and stiffness, and the gear geometry."""
     found = excitations(material.context, material.results)
     charts: dict[str, Any] = {}
     content = []

@@ -1,4 +1,4 @@
-"""Section "How long it lasts": damages of gears and bearings under the loads of a life, and what limits it."""
+"""Sections "Rating and life" (damage of gears and bearings under the load spectrum, limiting parts) and "Studies"."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ WORDS = (
 )
 
 LEAST_DAMAGE = 1e-6
-"""Damages below this are told as such."""
+"""Damages below this value are shown as "below" it."""
 WIDTH = 850
-"""Of the picture, pixels."""
+"""Width of the picture, pixels."""
 
 
 def life_section(material: ReportData) -> Part:
-    """List what parts bear over the life, for each variant that was rated; with the rating sheet as data."""
+    """List loads, damages and safety factors for each rated variant, and add the rating sheet to the page's data."""
     context = material.context
     found: dict[FlankKey, dict[str, float]] = {}
     if context.gearbox.case.loads is None:
@@ -70,7 +70,7 @@ def life_section(material: ReportData) -> Part:
 
 
 def _rating(material: ReportData, beside: Mapping[FlankKey, Mapping[str, float]]) -> dict[str, Any]:
-    """Rating sheet by ISO 6336 under the key ``rating``, as `check --rating --json` has it, if it can be had."""
+    """Return the rating sheet to ISO 6336 under the key ``rating``, as in `check --rating --json`, if available."""
     context = material.context
     if context.gearbox.case.rating is None:
         return {}
@@ -168,16 +168,16 @@ def _told(data: xr.Dataset, name: str, place: int, key: str, factor: float, form
     return Cell(figure_text(float(format(value, form))) if key.endswith("hours") else format(value, form), value)
 
 
-# Section "Studies": what variations of the gearbox showed, by the pictures of each
+# Section "Studies": pictures of each study of the gearbox
 
 LARGEST_PICTURE = 2_000_000
-"""Bytes of a picture that a page takes in."""
+"""Maximum size of a picture embedded in the page, bytes."""
 STUDY_WIDTH = 640
-"""Of a picture, pixels."""
+"""Width of the picture, pixels."""
 
 
 def studies_section(material: ReportData) -> Part:
-    """Show the pictures of the studies that the results folder holds."""
+    """Show the pictures of the studies in the results folder."""
     found = list(stored_studies(material.context.folder, material.context.gearbox))
     if not found:
         return Part("")

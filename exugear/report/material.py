@@ -1,4 +1,4 @@
-"""What all sections are made of, and what each of them gives."""
+"""Common input of all report sections (`ReportData`) and their output (`Part`)."""
 
 from __future__ import annotations
 
@@ -23,59 +23,59 @@ from exugear.results.spectra.waterfall import OrderLine, order_lines
 
 @dataclass(frozen=True)
 class ReportData:
-    """What all sections are made of."""
+    """Data from which all sections are made."""
 
     context: Context
     results: StoredResults
     words: Labels
     groups: Sequence[RunGroup]
-    """Those of run-ups first, then those of steady responses; of each the default inertia set first."""
+    """Groups of run-ups first, then of steady-state responses; in each, the default inertia set comes first."""
     variations: Sequence[ModelVariations]
     lines: Sequence[OrderLine]
-    """Orders that are drawn."""
+    """Orders drawn on the page."""
     arrays: ArrayStore
-    """Takes the arrays of the page."""
+    """Store for the arrays of the page."""
     run_data: Mapping[str, Any] = field(default_factory=dict)
-    """Run-ups and steady responses as data of the page, as `exugear.report.run_data.run_data` makes them."""
+    """Run-ups and steady-state responses as data of the page, from `exugear.report.run_data.run_data`."""
 
     @property
     def input_words(self) -> str:
-        """Words for the overall input, whose speed all figures are over."""
+        """Label of the overall input, whose speed is the abscissa of all diagrams."""
         return self.words.of(self.context.gearbox.case.overall.input)
 
     @property
     def file_words(self) -> str:
-        """Gearbox file with its folder; the page goes to others, and where that lies is nobody's business."""
+        """Gearbox file with its folder only, as the page may be passed on and should not show local paths."""
         return "/".join(Path(self.context.gearbox.source).parts[-2:])
 
 
 def lines_of(context: Context) -> tuple[OrderLine, ...]:
-    """Orders that the page draws."""
+    """Return the orders drawn on the page."""
     return order_lines(context.gearbox)
 
 
 @dataclass(frozen=True)
 class Part:
-    """What a section gives."""
+    """Output of a section."""
 
     html: str
-    """Empty where it has nothing to show."""
+    """HTML of the section; empty if it has nothing to show."""
     data: Mapping[str, Any] = field(default_factory=dict)
-    """For the scripts, by keys of its own."""
+    """Data for the scripts, under keys of this section."""
     title: str = ""
     name: str = ""
-    """Its entry in the table of contents; empty for none."""
+    """Title and anchor of the entry in the table of contents; empty for none."""
 
 
 def only_for(content: str, group: str, variant: str = "") -> str:
-    """Mark content as that of a group of results, or of one variant: scripts show what was chosen, paper shows all."""
+    """Mark content as belonging to a result group or a variant: scripts show the selected one, print shows all."""
     if content:
         return element("div", content, data_group=group, data_variant=variant or None)
     return ""
 
 
 def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
-    """Tell one group from the others in few words: its source, and law and inertia set where these differ."""
+    """Return a short label that identifies a group: source, and mesh model and inertia set where these differ."""
     parts = [own.source]
     if len({group.mesh_model for group in groups}) > 1:
         parts.append(f"law {own.mesh_model}")
@@ -86,21 +86,21 @@ def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
 
 
 def told_groups(groups: Sequence[RunGroup]) -> list[RunGroup]:
-    """List the groups that the command line tells of: run-ups, or else steady responses."""
+    """List the groups that the command line reports: run-ups, or steady-state responses if there are none."""
     return [group for group in groups if not group.responses] or list(groups)
 
 
 def model_name(choice: Choice) -> str:
-    """Name of a model for links and data: variant, law, inertia set."""
+    """Return the name of a model for links and data: variant, mesh model, inertia set."""
     return f"{choice.variant}-{choice.mesh_model}-{choice.inertias}"
 
 
-# Line figures as data: curves with axes and marks, which one script draws
+# Line charts as data: curves with axes and marks, drawn by one script
 
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve of a line figure."""
+    """Curve of a line chart."""
 
     label: str
     x: ArrayLike
@@ -109,15 +109,15 @@ class Curve:
     style: str = "line"
     """{"line", "dashed", "thin", "points"}"""
     right: bool = False
-    """Whether the axis on the right is its."""
+    """Whether it belongs to the axis on the right."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of a line figure."""
+    """Axis of a line chart."""
 
     label: str
-    """With its unit."""
+    """Label with unit."""
     logarithmic: bool = False
 
 
@@ -131,15 +131,15 @@ def chart(
     arrays: ArrayStore,
     marks: Sequence[tuple[float, str]] = (),
 ) -> tuple[str, dict[str, Any]]:
-    """Make a line figure.
+    """Return the HTML and data of a line chart.
 
     Parameters
     ----------
-    name : identity in the page
-    title, hint, words : what it shows; what can be done; what it says in words
-    axes : below, on the left, and on the right if curves are there
-    arrays : takes the curves
-    marks : upright lines at values of x, with words
+    name : identifier in the page
+    title, hint, words : heading, note on the use of the chart, and its content as text
+    axes : below, on the left, and on the right if any curve needs it
+    arrays : store for the curves
+    marks : vertical lines at values of x, with labels
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Section "Modes and orders": Campbell diagram and list of modes of each model, and the bodies that move in them."""
+"""Sections "Modes and orders" (Campbell diagrams, lists of modes) and "Design sensitivity" (frequency shifts)."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from exugear.system.modes import modes_of
 from exugear.system.sensitivity import FrequencyMatch, assumed_parameters, frequency_matches
 
 DEFORMED = 32
-"""Modes in which elastic bodies deform in the page: those of resonances, and those that are seen most."""
+"""Number of modes in which flexible bodies deform on the page: those of resonances, and the most visible ones."""
 
 
 def modes_section(material: ReportData) -> Part:
-    """Show the modes of all models."""
+    """Show Campbell diagram and list of modes of all models."""
     modes = material.results.modes
     if not modes:
         return Part("")
@@ -54,7 +54,7 @@ def modes_section(material: ReportData) -> Part:
         pieces.element("label", "Model " + pieces.element("select", "", id="model")),
         class_="controls scripts-only",
     )
-    # Without run-ups nothing else shows the modes in motion.
+    # Without run-ups, no other section has the animated mode shapes.
     stage = "" if material.groups else _stage_alone()
     lists = [_all_modes(material, model, data) for model, data in modes.items()]
     framed = pieces.element("div", campbell, class_="scripts-only")
@@ -93,7 +93,7 @@ def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, A
 
 
 def _fastest(material: ReportData, model: Choice) -> float:
-    """Highest speed (rpm) of the run-ups of a model, or of the load cases."""
+    """Return the highest speed (rpm) of the run-ups of a model, or of the load cases."""
     speeds = [
         float(group.runs[model.variant].spectra.speed.max())
         for group in material.groups
@@ -153,12 +153,12 @@ def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> str:
     return pieces.folded(title, pieces.paragraph(note, "note") + table)
 
 
-# Section on modes near a frequency that the case or the user names, such as one that was measured
+# Section on modes near a target frequency from the gearbox file or the command line, such as a measured one
 
 
 @dataclass(frozen=True)
 class ModelMatch:
-    """An assumption that brings a mode of a model to the target frequency."""
+    """Parameter change that shifts a mode of a model to the target frequency."""
 
     model: Choice
     match: FrequencyMatch
@@ -170,7 +170,7 @@ class ModelMatch:
 
 
 def target_frequency_section(material: ReportData) -> Part:
-    """Tell which modes lie near the target frequency, and which assumptions would bring one there."""
+    """List the modes near the target frequency, and parameter changes that would shift a mode there."""
     target = material.context.target
     modes = material.results.modes
     if target is None or not modes:
@@ -228,7 +228,7 @@ def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: Mo
 
 
 def _matches(material: ReportData, target: float) -> Iterator[str]:
-    """Table of the assumptions that bring a mode to the target, or that none does."""
+    """Tabulate the parameter changes that shift a mode to the target, or state that there is none."""
     modelmatchs = [
         ModelMatch(variation.choice, match)
         for variation in material.variations
@@ -271,7 +271,7 @@ def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[s
 
 
 def _reference_frequency(material: ReportData, found: ModelMatch, target: float) -> float:
-    """Frequency (Hz) of the nearest visible mode of the reference variant under the same assumption."""
+    """Return the frequency (Hz) of the nearest visible mode of the reference variant with the same parameter value."""
     context = material.context
     match = found.match
     reference = replace(found.model, variant=REFERENCE_VARIANT)
@@ -284,14 +284,14 @@ def _reference_frequency(material: ReportData, found: ModelMatch, target: float)
     return math.nan
 
 
-# Section "What to change": first-order shifts of the loudest mode, and full variations with their guard
+# Section "Design sensitivity": first-order shifts of the mode with the highest resonance, and full variations
 
 LEVERS = 8
-"""Levers of each kind in the table."""
+"""Maximum number of parameters of each kind in the table."""
 
 
 def change_section(material: ReportData) -> Part:
-    """Show what moves the loudest mode of each group of run-ups."""
+    """Show the sensitivity of the mode with the highest resonance of each group."""
     charts: dict[str, Any] = {}
     content = [only_for(_group(material, group, charts), group.name) for group in material.groups]
     if not any(content):

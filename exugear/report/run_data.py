@@ -1,4 +1,4 @@
-"""Run-ups and steady responses as data of the page: waterfalls and order cuts of all channels, resonances."""
+"""Run-ups and steady-state responses as data of the page: waterfalls and order cuts of all channels, resonances."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from exugear.results.spectra.run_spectra import VariantRun
 from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from fe_ste.tools.arrays import Floats
 
-# Waterfalls made smaller for a page: levels in bytes, the highest of each cell, so that no peak is lost
+# Waterfalls reduced for the page: levels in bytes, the maximum of each cell, so that no peak is lost
 
 NO_LEVEL = -32768
-"""What stands in a cut where the order has no level."""
+"""Value in a cut where the order has no level."""
 
 
 def pooled(level: Floats, speed: Floats, columns: int, lines: int) -> Floats:
-    """Highest level in cells of equal speed and of some spectral lines: a peak is widened to its cell, never lost.
+    """Return the highest level in cells of equal speed range and several spectral lines; peaks widen to their cell.
 
     Parameters
     ----------
     level : (n, m) dB
     speed : (n,) rad/s
     columns : cells over the speed
-    lines : spectral lines of a cell; what is left over at the top falls away
+    lines : spectral lines per cell; an incomplete cell at the top is dropped
 
     Returns
     -------
-    (columns, m // lines) where frames are rarer than cells, that of the nearest frame
+    (columns, m // lines); cells without a frame take the nearest frame
     """
     count = level.shape[1] // lines * lines
     narrow = level[:, :count:lines].copy()
@@ -59,7 +59,7 @@ def pooled(level: Floats, speed: Floats, columns: int, lines: int) -> Floats:
 
 
 def level_bytes(level: Floats, floor: float, step: float) -> NDArray[np.uint8]:
-    """Levels (dB) as steps above a floor.
+    """Return levels (dB) as numbers of steps above a floor.
 
     Examples
     --------
@@ -71,13 +71,13 @@ def level_bytes(level: Floats, floor: float, step: float) -> NDArray[np.uint8]:
 
 
 def cut_levels(spectra: Waterfall, lines: Sequence[OrderLine]) -> NDArray[Any]:
-    """Level along each order (frames, lines), tenths of a dB; `NO_LEVEL` where there is none."""
+    """Return the level along each order (frames, lines), tenths of a dB; `NO_LEVEL` where there is none."""
     levels = np.array([spectra.along(line) for line in lines]).reshape(len(lines), spectra.time.size).T
     return tenths(levels)
 
 
 def tenths(levels: Floats) -> NDArray[Any]:
-    """Levels (dB) as tenths of a dB; `NO_LEVEL` where there is none.
+    """Return levels (dB) as tenths of a dB; `NO_LEVEL` where there is none.
 
     Examples
     --------
@@ -87,24 +87,24 @@ def tenths(levels: Floats) -> NDArray[Any]:
     return np.where(np.isfinite(levels), np.round(10.0 * levels), NO_LEVEL).astype("i2")
 
 
-# Run-ups and steady responses as data of the page: waterfalls and order cuts of all channels, resonances
+# Run-ups and steady-state responses as data of the page
 
 SPEEDS, CHANNEL_SPEEDS = 438, 160
-"""Columns of the waterfall of the transmission error, and of other channels."""
+"""Columns of the waterfalls of the transmission error and of the other channels."""
 STEP, CHANNEL_STEP = 0.5, 1.5
-"""dB per step of a byte."""
+"""Level difference per byte step, dB; for the transmission error and the other channels."""
 SPAN = 110.0
-"""Span below the highest level (dB) that is kept at least."""
+"""Minimum stored span below the highest level, dB."""
 CHANNEL_LINES = 3
-"""Spectral lines of another channel that are drawn as one."""
+"""Number of spectral lines of another channel that are drawn as one."""
 CUTS_EVERY = 2
-"""Every which frame of other channels their order cuts hold."""
+"""Stride of the frames in order cuts of other channels."""
 ALSO = 4
-"""Further orders that are told to show a resonance."""
+"""Maximum number of further orders listed for a resonance."""
 
 
 def run_data(material: ReportData) -> dict[str, Any]:
-    """Gather what the scripts need of all run-ups and steady responses: ``lines`` and ``groups``."""
+    """Return the script data of all run-ups and steady-state responses: ``lines`` and ``groups``."""
     return {
         "lines": [_line(material, line) for line in material.lines],
         "groups": [_group(material, group) for group in material.groups],
@@ -138,7 +138,7 @@ def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str
     material.context.tell(f"channels of {run.variant}, {group.source}, {group.inertias}")
     channels = [_overall(material, run.spectra)]
     loudest: dict[str, dict[str, Any] | None] = {}
-    # One at a time: spectra are large.
+    # One channel at a time, as spectra are large.
     for channel in channels_of(run, material.words, group.responses.get(run.variant)):
         channels.append(_channel(material, channel))
         if channel.kind == "support":
@@ -155,7 +155,7 @@ def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str
 
 
 def _highest(material: ReportData, spectra: Waterfall) -> int:
-    """Count the spectral lines that are drawn."""
+    """Return the number of spectral lines that are drawn."""
     fundamental = max(material.context.gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=math.inf)
     top = TOP * fundamental * float(spectra.speed.max()) / (2.0 * math.pi)
     return max(4, int(np.searchsorted(spectra.frequency, min(top, float(spectra.frequency[-1])))))
@@ -188,7 +188,7 @@ def _channel(material: ReportData, channel: Channel) -> dict[str, Any]:
 
 
 def _floor(spectra: Waterfall, count: int) -> float:
-    """Level (dB) of the lowest step, a round one."""
+    """Return the lowest level of the scale (dB), a multiple of ten."""
     return 10.0 * math.floor((float(spectra.level[:, 2:count].max()) - SPAN) / 10.0)
 
 
@@ -215,7 +215,7 @@ def _cuts(material: ReportData, spectra: Waterfall, every: int) -> dict[str, Any
 
 
 def _constant(material: ReportData, speed: ConstantSpeed | None) -> dict[str, Any] | None:
-    """Levels along the orders at constant speed, for the cuts of the overall transmission error."""
+    """Return the levels along the orders at constant speed, for the order cuts of the overall transmission error."""
     if speed is None:
         return None
     along = [speed.along(line) for line in material.lines]
@@ -228,9 +228,10 @@ def _constant(material: ReportData, speed: ConstantSpeed | None) -> dict[str, An
 
 
 def axial_of_shaft(gearbox: Gearbox, channel: Channel) -> float:
-    """Mean axial force on the inner ring of a bearing, as `exugear bearings` has it; of a joint that of its body on it.
+    """Return the mean axial force of a shaft on a bearing's inner ring, as `exugear bearings` prints it, or on a joint.
 
-    A run records the force on the body, which most bearings hold by their inner ring.
+    A run records the force on the body, which in most bearings is on the inner ring. Only where the body carries the
+    outer ring does the recorded sign already apply.
     """
     if any(bearing.name == channel.name and bearing.carries_outer_ring for bearing in gearbox.bearings):
         return channel.axial
@@ -238,7 +239,7 @@ def axial_of_shaft(gearbox: Gearbox, channel: Channel) -> float:
 
 
 def _loudest(material: ReportData, channel: Channel) -> dict[str, Any] | None:
-    """Figures of a bearing for its table."""
+    """Return the values of a bearing for its table."""
     order = loudest_order(channel.spectra, material.lines)
     return {
         "words": channel.words,
@@ -269,7 +270,7 @@ def _resonance(material: ReportData, group: RunGroup, run: VariantRun, own: Rank
 
 
 def _facts(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> list[list[str]]:
-    """Terms and words of a resonance for the panel beside the waterfall."""
+    """Return headings and text on a resonance for the panel next to the waterfall."""
     words = material.words
     peak = resonance.peak
     others = list(dict.fromkeys(p.line for p in resonance.finding.resonance.picks[1:] if p.line != peak.line))[:ALSO]

@@ -1,4 +1,4 @@
-"""Section "Steady response": levels along orders, peaks, run-ups that are too fast, modes over speed, sidebands."""
+"""Section "Steady-state response": order cuts, peaks, run-ups that are too fast, modes over speed, sidebands."""
 
 from __future__ import annotations
 
@@ -27,26 +27,26 @@ from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Floats
 
 SHOWN = 20
-"""Peaks in a table."""
+"""Number of peaks in the table."""
 LEAST_SHARE, MOST_TOLD = 0.05, 3
-"""Least share that is told of what makes a resonance, and how many."""
+"""Minimum listed contribution to a resonance, and maximum number of contributions."""
 STRONG = 0.1
-"""Share of the largest peak from which a crossing counts as strong."""
+"""Fraction of the largest peak from which a crossing counts as strong."""
 TELL_FAST = "too fast"
 EXPLAINED, BESIDE = 5, 6
-"""Peaks whose sidebands are told, the loudest of each line, and how many of each kind at most."""
+"""Number of peaks with listed sidebands (the highest of each order), and maximum number of sidebands of each kind."""
 OTHER_KIND = "other"
-"""Kind of modes that no planet set carries, in the legend."""
+"""Legend for modes that belong to no planet set."""
 WHIRLING = 0.3
-"""Whirl from which its sense is told."""
+"""Whirl ratio above which forward or backward whirl is listed."""
 BELOW = 6.0
-"""Levels (dB) below the lowest steady one at which a cut out of a run-up shows noise."""
+"""Margin (dB) below the lowest steady-state level under which an order cut of a run-up is only noise."""
 SAME_SPEED = 0.02
-"""Share of the speed within which a peak belongs to the crossing of its line with a mode."""
+"""Relative speed difference within which a peak belongs to the crossing of its order with a mode."""
 
 
 def steady_section(material: ReportData) -> Part:
-    """Show the steady responses, each with the run-ups of the same variant, law and inertia set over it."""
+    """Show the steady-state responses, each with the run-ups of the same variant, mesh model and inertia set."""
     if not material.results.steady:
         return Part("")
     charts: dict[str, Any] = {}
@@ -104,7 +104,7 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
 
 
 def _other_load(run: VariantRun) -> str:
-    """Say that a run-up beside a response is at another load."""
+    """State that the run-up shown with a response has another load."""
     return (
         f"the run-up of the load case {run.attributes['load_case']} is at another load, {run.attributes['load']}; its "
         "levels also differ for that reason."
@@ -112,7 +112,7 @@ def _other_load(run: VariantRun) -> str:
 
 
 def _shared_lines(material: ReportData, data: xr.Dataset) -> str:
-    """Say which mesh frequencies share lines: what excites such a line cannot be told from its frequency."""
+    """State which mesh frequencies have common orders: the source of such an order is not identifiable by frequency."""
     shared = str(data.attrs["shared_lines"])
     if not shared:
         return ""
@@ -125,7 +125,7 @@ def _shared_lines(material: ReportData, data: xr.Dataset) -> str:
 
 
 def _remarks(data: xr.Dataset, name: str) -> str:
-    """Table of the speeds that something is to be said of, and of those at which no state was found."""
+    """Tabulate the speeds with warnings, and those without a converged state."""
     speeds = data["speed"].to_numpy()
     said = [(abs(float(speed)), str(words)) for speed, words in zip(speeds, data["remark"].to_numpy(), strict=True)]
     lost = [
@@ -143,7 +143,7 @@ def _remarks(data: xr.Dataset, name: str) -> str:
 def _order_charts(
     material: ReportData, data: xr.Dataset, runs: Sequence[VariantRun], name: str, charts: dict[str, Any]
 ) -> str:
-    """Levels along the orders at steady speed, the same cut out of run-ups beside them; a figure for each order."""
+    """Draw order cuts at constant speed together with those of run-ups, one chart per order."""
     figures = []
     for number, line in enumerate(order_lines(material.context.gearbox, 2)):
         if _place(data, line) is None:
@@ -167,7 +167,7 @@ def _order_charts(
 
 
 def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> str:
-    """Table of what makes the strongest resonances at the level `linear`."""
+    """Tabulate the contributions to the strongest resonances (method `linear`)."""
     told = material.words.told
     bases = tuple(str(name) for name in data["base"].to_numpy())
     index = data["index"].to_numpy()
@@ -203,7 +203,7 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> s
 
 
 def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, charts: dict[str, Any]) -> str:
-    """Figure and table of the modes over speed, with the crossings that excite them."""
+    """Draw and tabulate the modes over speed, with the crossings that excite them."""
     diagram = campbell_from(data)
     if not diagram.names or len(diagram.speeds) < 2:
         return ""
@@ -251,7 +251,7 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
 
 
 def _speed_ranges(context: Context) -> str:
-    """Speeds that the load cases pass, in words."""
+    """List the speed ranges of the load cases as text."""
     told = [f"{name}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm" for name, (slow, fast) in _ranges(context).items()]
     if told:
         return pieces.paragraph(f"Speeds of the load cases. {'; '.join(told)}.", "note")
@@ -259,7 +259,7 @@ def _speed_ranges(context: Context) -> str:
 
 
 def _ranges(context: Context) -> dict[str, tuple[float, float]]:
-    """Speeds of the input that each load case passes, without sign, rad/s."""
+    """Return the absolute input speed range of each load case, rad/s."""
     ranges = {}
     for name, case in context.gearbox.load_cases.items():
         try:
@@ -275,7 +275,7 @@ def _ranges(context: Context) -> dict[str, tuple[float, float]]:
 def _mode_rows(
     material: ReportData, diagram: Campbell, data: xr.Dataset, crossings: Sequence[Mapping[str, float]]
 ) -> list[dict[str, object]]:
-    """Rows of the modes, those that are excited most first."""
+    """Return the rows of the modes, most excited first."""
     bases = tuple(str(name) for name in data["base"].to_numpy())
     index = data["index"].to_numpy()
     strongest: dict[int, Mapping[str, float]] = {}
@@ -310,7 +310,7 @@ def _mode_rows(
 
 
 def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Peak]) -> str:
-    """Table of the lines beside the loudest peaks, each with its cause."""
+    """Tabulate the sidebands of the highest peaks, each with its cause."""
     context = material.context
     told = material.words.told
     carriers = _carriers(context)
@@ -343,7 +343,7 @@ def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Pea
 
 
 def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> str:
-    """Tell how often planets pass a place of the housing, and how that goes into the order of their meshes."""
+    """State the planet passing order at the housing, and the ratio of the mesh order to it."""
     gearbox = context.gearbox
     orders = {mesh.family: gearbox.train.mesh_frequencies(2.0 * np.pi)[mesh.name] for mesh in gearbox.meshes}
     told = []
@@ -364,7 +364,7 @@ def _amplitude(line: str, amplitude: float) -> str:
 
 
 def _carriers(context: Context) -> dict[str, tuple[str, float]]:
-    """Carrier of the planets of each family of meshes, and its turns per turn of the input."""
+    """Return the carrier of the planets of each mesh family, and its revolutions per revolution of the input."""
     gearbox = context.gearbox
     speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
     own = {mesh.family: mesh.frame for mesh in gearbox.meshes if mesh.frame != GROUND}
@@ -382,7 +382,7 @@ def _slopes_of(slopes: Mapping[str, float]) -> str:
 
 
 def _place(data: xr.Dataset, line: OrderLine) -> int | None:
-    """Place of an order among the lines of a response."""
+    """Return the index of an order among the spectral components of a response."""
     order = data["order"].to_numpy()
     index = int(np.argmin(np.abs(order - line.order)))
     if abs(order[index] - line.order) < 1e-6 * line.order:
@@ -404,22 +404,22 @@ def _curves(data: xr.Dataset, runs: Sequence[VariantRun], line: OrderLine) -> li
         cut_level = _level(np.abs(cut.amplitude))
         heard = np.where(cut_level > quiet, cut_level, np.nan)
         curves.append(Curve(label, np.abs(cut.speed) / RPM, heard, "dashed"))
-    # Above the others: what shows of a run-up is where it departs.
+    # The steady-state curve comes last, above the run-ups, which show only where they deviate from it.
     if settings_of(data.attrs).branches:
         return [*curves, *branch_curves(speed, level, data["growth"].to_numpy())]
     return [*curves, Curve("steady", speed, level)]
 
 
 def branch_curves(speed: Floats, level: Floats, growth: Floats) -> list[Curve]:
-    """Parts of a branch that goes back at its folds: no part has two values at a speed, or changes its stability.
+    """Split a continuation curve at turning points and stability changes; each part is a function of speed.
 
     Parameters
     ----------
-    speed, level, growth : (n,) along the branch; what grows (1/s) is unstable
+    speed, level, growth : (n,) along the curve; states with a positive growth rate (1/s) are unstable
     """
     stable = ~(growth > 0.0)
     rising = np.diff(speed) >= 0.0
-    # A part ends where the next step turns back, and where the next point is of the other stability.
+    # A part ends at a turning point, and before a point of different stability.
     turns = np.flatnonzero(rising[1:] != rising[:-1]) + 1
     ends = np.unique(np.concatenate([turns, np.flatnonzero(stable[1:] != stable[:-1]) + 1, [len(speed) - 1]]))
     curves = []
@@ -433,12 +433,12 @@ def branch_curves(speed: Floats, level: Floats, growth: Floats) -> list[Curve]:
 
 
 def _level(amplitude: Floats) -> Floats:
-    """Level of an amplitude (m), dB re 1 µm."""
+    """Return the level of an amplitude (m), dB re 1 µm."""
     return np.asarray(20.0 * np.log10(np.maximum(amplitude / 1e-6, 1e-6)))
 
 
 def _unit_rate(run: VariantRun) -> float:
-    """Rate at which order one sweeps in a run, Hz/s."""
+    """Return the sweep rate of order one in a run, Hz/s."""
     stored, _ = read_run(run.path, ("time", "input_speed"))
     return sweep_rate(stored["time"], stored["input_speed"], 1.0)
 
@@ -470,7 +470,7 @@ def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, fl
 
 
 def _damping(peak: Peak, data: xr.Dataset) -> float | None:
-    """Damping of the mode that the line of a peak crosses there, where one is known."""
+    """Return the damping of the mode that the order of a peak crosses there, if known."""
     orders = data["order"].to_numpy()
     near = []
     for crossing in json.loads(data.attrs["crossings"]):

@@ -1,4 +1,4 @@
-"""Section "In short": three facts in plain words, checks that were passed, and things to mind."""
+"""Sections "Summary", "Waterfall and order cuts" and "Resonance ranking"."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, Var
 
 
 def short_section(material: ReportData) -> Part:
-    """Tell the facts of each group of results as cards; the command line prints the same sentences.
+    """Show the findings of each result group as cards; the command line prints the same sentences.
 
-    Those of steady responses are printed where there is no run-up, which else tells of both.
+    It prints findings of steady-state responses only if there is no run-up; otherwise those of run-ups include them.
     """
     context = material.context
     groups = told_groups(material.groups)
@@ -57,7 +57,7 @@ def _group(material: ReportData, group: RunGroup, facts: Sequence[SummaryCard], 
 
 
 def _load_of(material: ReportData, group: RunGroup) -> str:
-    """Name the load of a group: that of its load case, or the static load."""
+    """Describe the load of a group: that of its load case, or the static load."""
     static = static_load_in_words(material.context.gearbox)
     loads = {str(run.attributes.get("load", "")) for run in group.runs.values()}
     if group.responses or not any(loads):
@@ -66,7 +66,7 @@ def _load_of(material: ReportData, group: RunGroup) -> str:
 
 
 def _without_groups(material: ReportData) -> str:
-    """Tell what branches and responses at few speeds know, and what tells more."""
+    """Show findings of continuation results and responses at few speeds, and advise a run-up."""
     facts = [fact for data in material.results.steady for fact in facts_of_response(material.words, data)]
     material.context.notes.statements.extend(fact.line for fact in facts)
     cards = pieces.element("div", "".join(map(_card, facts)), class_="cards") if facts else ""
@@ -84,7 +84,7 @@ def _card(fact: SummaryCard) -> str:
 
 
 def verdict_list(verdicts: Sequence[CheckResult]) -> str:
-    """List what was passed and what to mind; words say which is which beside colours."""
+    """List passed checks and warnings; hidden text distinguishes them in addition to colour."""
     entries = []
     for verdict in verdicts:
         sign = pieces.element("b", "✓" if verdict.passed else "!", aria_hidden="true")
@@ -97,13 +97,13 @@ def verdict_list(verdicts: Sequence[CheckResult]) -> str:
     return pieces.element("ul", "".join(entries), class_="verdicts", aria_label="Validity checks")
 
 
-# Section "Where it rings": waterfall, order cuts, the chosen resonance in words, and its mode in motion
+# Section "Waterfall and order cuts", with the selected resonance as text and its animated mode shape
 
 NO_MODES = "No modes computed; run `exugear modes` to show mode shapes."
 
 
 def rings_section(material: ReportData) -> Part:
-    """Draw the waterfalls of all run-ups and steady responses; the sentences stand in the ranking, too."""
+    """Draw the waterfalls of all run-ups and steady-state responses; the ranking has the same text."""
     if not material.groups:
         return Part("")
     return Part(_html(material), material.run_data, "Waterfall and order cuts", "rings")
@@ -123,7 +123,7 @@ def _html(material: ReportData) -> str:
     left = pieces.element(
         "div", waterfall.replace("</figure>", f"{scale}</figure>") + cuts.replace("</figure>", f"{orders}</figure>")
     )
-    # Without modes nothing moves.
+    # The 3-D view needs mode shapes.
     stage = stage_figure() if material.results.modes else pieces.paragraph(NO_MODES, "note")
     right = pieces.element("div", detail + stage)
     controls = pieces.element("div", channel + views, class_="controls scripts-only")
@@ -143,26 +143,26 @@ def _groups_text(groups: Sequence[RunGroup]) -> str:
     return f"Highest resonances, {Variant.of(group.main).label}, {group.source}: {'; '.join(told) or 'none found'}."
 
 
-# Section "Resonances, loudest first": what rings, by which mesh, whether other variants have it, and what moves
+# Section "Resonance ranking": exciting mesh, comparison of variants, and mode shape of each resonance
 
 SHOWN_SPAN = 60.0
-"""dB below the loudest at which the bar of a level ends."""
+"""Level difference (dB) below the highest resonance at which the bar has zero length."""
 BUILT_UP = 3.0
-"""dB below the level at constant speed from which a run-up counts as too fast for a resonance."""
+"""Deficit (dB) against the level at constant speed from which a run-up counts as too fast for a resonance."""
 NOT_NEAR = "no mode near"
 SHOWN = 10
-"""Resonances in the table by three quantities."""
+"""Number of resonances in the table by three quantities."""
 QUANTITIES = {
     "error": ("Transmission error / µm", 1e6),
     "force": ("Bearing force / kN", 1e-3),
     "acceleration": ("Acceleration / m/s²", 1.0),
 }
-"""Titles of the three quantities, and their units over those of SI."""
+"""Column titles of the three quantities, and factors from SI units."""
 AT_CONSTANT = "Constant speed / dB, Hz"
 
 
 def ranking_section(material: ReportData) -> Part:
-    """Rank the resonances of each run-up, and of each steady response, in a table."""
+    """Rank the resonances of each run-up and each steady-state response in a table."""
     in_operation = [only_for(_operating_resonances(material, group), group.name) for group in material.groups]
     tables = [
         only_for(_table(material, group, variant), group.name, variant)
@@ -186,7 +186,7 @@ def ranking_section(material: ReportData) -> Part:
 
 
 def _operating_resonances(material: ReportData, group: RunGroup) -> str:
-    """Table of the resonances of the main variant at constant speed, where the gearbox works, by three quantities."""
+    """Tabulate the main variant's resonances at constant speed in the operating range, by three quantities."""
     ranking = group.in_operation
     if ranking is None or not ranking.resonances:
         return ""
@@ -315,7 +315,7 @@ def _row(
 
 
 def _level(resonance: RankedResonance, loudest: float) -> Cell:
-    """Level of the run-up; marked where it is too fast."""
+    """Return the level in the run-up; marked if the run-up is too fast."""
     level = resonance.peak.level
     if resonance.constant is None:
         return Cell(f"{level:.1f}", level, bar=1.0 - (loudest - level) / SHOWN_SPAN)
@@ -325,7 +325,7 @@ def _level(resonance: RankedResonance, loudest: float) -> Cell:
 
 
 def _constant_speed_cell(resonance: RankedResonance, loudest: float) -> Cell:
-    """Level at constant speed, and the frequency where it is highest."""
+    """Return the level at constant speed and the frequency of its maximum."""
     at = resonance.constant
     if at is None:
         return Cell("–", -1e4)
@@ -348,7 +348,7 @@ def _story(material: ReportData, group: RunGroup, run: VariantRun, resonance: Ra
 
 
 def _note_comparisons(material: ReportData, group: RunGroup) -> None:
-    """Tell which resonances only one of two variants has; unsteady ones are not counted."""
+    """Note resonances that only one of two variants has; window-dependent ones are not counted."""
     for variant, comparison in group.comparisons.items():
         reference = comparison.second.variant
         here = _only(group, variant, reference)

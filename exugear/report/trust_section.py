@@ -1,4 +1,4 @@
-"""Section "What was assumed, and where it comes from": assumptions, checks, all inputs, provenance, glossary."""
+"""Section "Assumptions and checks": assumptions, checks, all inputs, provenance, glossary."""
 
 from __future__ import annotations
 
@@ -22,10 +22,11 @@ from exugear.results.folder import times_spent
 from exugear.results.run_file import verdict_of
 from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
 from exugear.results.spectra.run_spectra import VariantRun
+from exugear.system.modal_damping import damping_in_words
 from fe_ste.tools.files import FileError
 
 PACKAGES = ("exugear", "exudyn", "numpy", "scipy", "numba", "scikit-fem", "xarray", "h5netcdf", "matplotlib", "pyvista")
-"""Packages whose versions a report names."""
+"""Packages with versions listed in the report."""
 MESH_TIME_LABELS = (
     "longest tensile mesh force",
     "longest contact loss",
@@ -62,11 +63,11 @@ GLOSSARY = {
     "damage": "Miner's sum: number of cycles over permissible cycles, summed over all loads; 1 is failure.",
     "S_H, S_F": "Factor on flank or root stress at which the damage is 1.",
 }
-"""Words of the field that the page uses."""
+"""Terms used on the page."""
 
 
 def trust_section(material: ReportData) -> Part:
-    """List what results rest on."""
+    """List assumptions, checks, inputs and provenance of the results."""
     charts: dict[str, Any] = {}
     compared = "".join(_exudyn_comparison(material, run, charts) for run in material.results.runs)
     parts = [
@@ -91,9 +92,7 @@ def _assumptions(material: ReportData) -> str:
     listed = [
         f"Inertia sets: {', '.join(gearbox.inertia_sets)}; default {case.default_inertias}.",
         f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}.",
-        f"Stiffness-proportional damping: bearings {1e6 * case.damping.bearing_time_s:g} µs, meshes "
-        f"{1e6 * case.damping.mesh_time_s:g} µs, couplings {1e6 * case.damping.coupling_time_s:g} µs times the "
-        "stiffness.",
+        f"Damping: {damping_in_words(case.damping)}.",
         f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
         f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral, the time with "
         "tensile mesh force is recorded.",
@@ -106,7 +105,7 @@ def _assumptions(material: ReportData) -> str:
 
 
 def _elastic_words(material: ReportData) -> Iterator[str]:
-    """Say which bodies are elastic in the models of the report, and how finely."""
+    """Describe which bodies are flexible in the models of the report, and the sizes of their reduced models."""
     context = material.context
     assembly = next((assembly for assembly in context.assemblies.values() if assembly.elastic_bodies), None)
     if assembly is None:
@@ -138,7 +137,7 @@ def _runs(material: ReportData) -> str:
 
 
 def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, Any]) -> str:
-    """Say how far the compiled solver is from Exudyn where the beginning of the run was integrated by both."""
+    """Compare the compiled solver with Exudyn where both integrated the beginning of the run."""
     name = material.context.name_of(run.path)
     path = material.context.folder / EXUDYN_FOLDER / name
     if not path.exists():
@@ -200,7 +199,7 @@ def _inputs(material: ReportData) -> str:
 
 
 def flat_keys(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
-    """Yield all keys of a case with their tables, and their values as text.
+    """Yield all keys of a gearbox file with their tables, and their values as text.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""The report of a results folder: one web page that needs nothing else, its headline and what stands around sections.
+"""Self-contained web page with the report of a results folder: its sections, headline, controls and footer.
 
-`SECTIONS` is the order of the page; a section is a function of the `Material` that gives its `Part`.
+`SECTIONS` has the order of the page; a section is a function from `ReportData` to its `Part`.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from exugear.report.web.document import ArrayStore, whole_page
 from exugear.results.folder import REPORT_FILE, kept_case
 from fe_ste.tools.files import write_file
 
-# What stands around the sections of the report: head, table of contents, controls of the whole page, foot
+# Page elements outside the sections: head, table of contents, controls of the whole page, footer
 
 
 def page_body(material: ReportData, parts: Sequence[Part]) -> str:
-    """Put the sections together: warnings first, then what was found, then what is left out."""
+    """Combine the sections: invalid runs first, then the findings, then skipped results."""
     notes = material.context.notes
     warning = "Invalid runs; they are included in the results below"
     head = html.element(
@@ -84,14 +84,14 @@ def _contents(parts: Sequence[Part]) -> str:
 
 
 def _sets(material: ReportData) -> str:
-    """Choice of the group of results, where there are several: which source the figures are read from."""
+    """Return the selector of the result group, if there are several."""
     if len(material.groups) < 2:
         return ""
     choices = html.element("div", "", class_="choices", id="group", role="group", aria_label="Results shown")
     return html.element("div", f"Results of: {choices}", class_="controls scripts-only")
 
 
-# The report of a results folder: one web page that needs nothing else
+# The report of a results folder as a self-contained web page
 
 SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
     short_section,
@@ -107,27 +107,27 @@ SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
     studies_section,
     trust_section,
 )
-"""Sections of the page in their order. A new one is a function in ``sections`` and a line here."""
+"""Sections of the page in their order. A new section is a function in a module of this package and an entry here."""
 LIBRARIES: Final = ("uPlot.iife.min.js", "three.min.js")
 """Vendored libraries that the page needs."""
 WORTH_A_PROCESS: Final = 3e7
-"""Bytes of run-ups that take longer to analyse than another process takes to start, a second or two."""
+"""Size of run-ups (bytes) whose analysis takes longer than the start of another process, a second or two."""
 
 
 class ReportError(ValueError):
-    """A folder that nothing can be reported from."""
+    """Error: the folder contains no results for a report."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """A report that was written."""
+    """Report that was written."""
 
     path: Path
-    """The page."""
+    """Path of the page."""
     statements: tuple[str, ...]
-    """What it says in short."""
+    """Statements of the summary."""
     left_out: tuple[str, ...]
-    """Files that do not belong to the case, and what could not be computed, with the reason."""
+    """Skipped files that do not belong to the gearbox file, and results that could not be computed, with the reason."""
 
 
 def write_report(
@@ -137,24 +137,24 @@ def write_report(
     allow_dir: Path | None = None,
     executor: Executor | None = None,
 ) -> Report:
-    """Write ``report.html`` from what a results folder holds: tables, runs, modes, steady responses.
+    """Write ``report.html`` from the content of a results folder: tables, runs, modes, steady-state responses.
 
     Parameters
     ----------
-    folder : what ``exugear ste``, ``run``, ``modes`` and ``steady`` wrote into
-    target : frequency to look for modes at, Hz; the case's reference frequency by default
-    tell : called with what is being done
+    folder : output folder of ``exugear ste``, ``run``, ``modes`` and ``steady``
+    target : target frequency for modes, Hz; by default the reference frequency of the gearbox file
+    tell : callback for progress messages
     allow_dir
-        A further folder that files may lie in which the gearbox file names. Scripts among them never run: what they
-        would make must be kept in the folder.
-    executor : works beside this process where that saves time, such as `fe_ste.tools.threads.Workers`
+        A further permitted folder for files that the gearbox file names. Scripts among them never run: their output
+        must be stored in the folder.
+    executor : runs tasks in parallel where that saves time, such as `fe_ste.tools.threads.Workers`
 
     Raises
     ------
     GearboxFileError
         The folder holds no results.
     ReportError
-        Neither tables nor modes nor runs in it belong to its case.
+        None of its tables, modes and runs belongs to its gearbox file.
     """
     folder = Path(folder)
     gearbox = kept_case(folder, Permissions(below=allow_dir))
@@ -162,7 +162,7 @@ def write_report(
     context = Context(folder, gearbox, reference, tell or (lambda what: None))
     material = _material(context, executor)
     parts = [section(material) for section in SECTIONS]
-    # The body comes last: sections note what its head tells.
+    # The body is made last, because sections add notes that its head shows.
     body = page_body(material, parts)
     data = {**_head_data(material), **_merged(parts)}
     title = f"{gearbox.name}: resonance report"
@@ -184,7 +184,7 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
     groups = groups_of(context, results)
     words = Labels(context.gearbox)
     material = ReportData(context, results, words, groups, (), lines_of(context), ArrayStore())
-    # Last what another process computes meanwhile.
+    # Variations come last; another process may compute them in the meantime.
     drawn = run_data(material)
     return replace(material, run_data=drawn, variations=model_variations(context, results.modes, begun))
 
@@ -202,7 +202,7 @@ def _head_data(material: ReportData) -> dict[str, Any]:
 
 
 def _merged(parts: list[Part]) -> Mapping[str, Any]:
-    """Put the data of all sections together, their figures under ``charts``."""
+    """Merge the data of all sections; their charts are collected under ``charts``."""
     merged: dict[str, Any] = {"charts": {}}
     for part in parts:
         for key, value in part.data.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -284,6 +284,12 @@ class HarmonicBalanceModel:
             other._least = 0
         if reach != self._reach:
             other._reach, other.larger, other._least = reach, _lines_within(self.waves, reach), 0
+        return other
+
+    def with_system(self, system: MeanSystem) -> HarmonicBalanceModel:
+        """Copy with another averaged system of the same coordinates, such as one with another damping."""
+        other = self._copied()
+        other.waves = replace(self.waves, system=system)
         return other
 
     def of(self, which: Booleans) -> HarmonicBalanceModel:

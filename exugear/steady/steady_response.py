@@ -23,6 +23,7 @@ from exugear.steady.crossings import (
     missed_tops,
     with_crossings,
 )
+from exugear.steady.damping_band import DampingBand, damping_band, no_band
 from exugear.steady.excitation import HarmonicBalanceModel
 from exugear.steady.harmonics.branches import Branch, Scales, standing_peaks, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
@@ -226,6 +227,8 @@ class SteadyResponse(ReprMixin):
     change_with_more: float
     """Largest relative change of the ten highest peaks with 1.5 times as many harmonics; NaN where each state has as
     many orders as it needs."""
+    band: DampingBand
+    """How high the highest peaks are with the least and the largest plausible damping."""
     campbell: Campbell
     """Modes over the speeds, up to the highest orders that `crossings` evaluates."""
 
@@ -337,8 +340,17 @@ def response_of(
         harmonics=gearset.usual_harmonics,
         left_out=gearset.waves.left_out(gearset.usual_harmonics),
         change_with_more=_change_with_more(solver, settings, solved.part(there)),
+        band=_band(solver, settings, solved.part(there)),
         campbell=campbell,
     )
+
+
+def _band(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints) -> DampingBand:
+    """Find how high the highest peaks are over the range of damping, where the method is linear in the deflections."""
+    gearset = solver.linear
+    if settings.method == "nonlinear" or gearset.parting:
+        return no_band(tuple(quantity.name for quantity in quantities_of([s.name for s in gearset.signal_names])))
+    return damping_band(gearset, settings.method, solved.speed, np.abs(solved.amplitude).astype(np.float64))
 
 
 def _evaluate_mean_system(

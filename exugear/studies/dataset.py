@@ -1,4 +1,4 @@
-"""The result of a study: one labelled dataset over its parameters, with where it comes from."""
+"""Result of a study: one labelled dataset over its parameters, with its provenance."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 _PACKAGES = ("exugear", "numpy", "scipy", "numba", "exudyn")
 _LOCAL = "slope_"
-"""Before the name of a output: its local derivative."""
+"""Prefix of the name of an output for its local derivative."""
 
 
 def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
-    """Put finished points together; what is missing or failed is not a number, `error` says why.
+    """Combine finished points into a dataset; missing and failed points are NaN, with the reason in `error`.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def dataset_of(study: Study, records: Mapping[str, Record]) -> xr.Dataset:
     -------
     xarray.Dataset
         Outputs over the parameters; `error`, `doubts`, `seconds` and `memory` of each point; as attributes the study,
-        its case, versions and numbers of points.
+        its gearbox file, versions and numbers of points.
     """
     import xarray as xr
 
@@ -96,7 +96,7 @@ def _row(record: Record, name: str, labels: list[str]) -> list[float]:
 def _point_variables(
     dimensions: tuple[str, ...], sizes: tuple[int, ...], at: list[tuple[tuple[int, ...], Record | None]]
 ) -> dict[str, Any]:
-    """Tell of every point what is no figure."""
+    """Return the variables of each point other than outputs: error, warnings, wall time and memory."""
     error, doubts = (np.full(sizes, "", dtype=object) for _ in range(2))
     seconds, memory = (np.full(sizes, math.nan) for _ in range(2))
     for index, record in at:
@@ -114,7 +114,7 @@ def _point_variables(
 
 
 def _attributes(study: Study, at: list[tuple[tuple[int, ...], Record | None]]) -> dict[str, Any]:
-    """Where the dataset comes from."""
+    """Return the provenance of the dataset."""
     return {
         "title": study.file.name,
         "description": study.file.description,
@@ -151,7 +151,7 @@ def with_slopes(dataset: xr.Dataset, study: Study) -> xr.Dataset:
 
 
 def slopes(dataset: xr.Dataset) -> Iterator[tuple[str, str, float]]:
-    """Quantity, parameter and relative change for a step up of each single output of local derivatives."""
+    """Yield output, parameter and relative change per step, for each scalar output with local derivatives."""
     for name in dataset.data_vars:
         output = str(name).removeprefix(_LOCAL)
         if output == name or dataset[name].ndim > 1:
@@ -163,7 +163,7 @@ def slopes(dataset: xr.Dataset) -> Iterator[tuple[str, str, float]]:
 
 
 def write_study(folder: Path, dataset: xr.Dataset) -> Path:
-    """Write the dataset of a study into its folder, whole or not at all; return its path."""
+    """Write the dataset of a study into its folder as an atomic operation; return its path."""
     path = folder / DATASET
     write_dataset(path, dataset)
     return path
@@ -186,50 +186,50 @@ def load_study(path: str | Path) -> xr.Dataset:
     return load_dataset(Path(path), STUDY_LAYOUT)
 
 
-# What a search looked at: points by their outputs and limits, and the dataset of all of them
+# Points evaluated by an optimisation, with outputs and limits, and the dataset of all of them
 
 EVALUATION = "evaluation"
-"""Dimension of the points that a search looked at, in its order; the first is the case as it is."""
+"""Dimension of the points evaluated by an optimisation, in their order; the first is the unchanged gearbox."""
 USUAL_PERCENTILE = 95.0
 FAR = 1e9
-"""Violation of a limit by what has no end."""
+"""Violation of a limit by an infinite value."""
 Side = Literal["high", "low"]
-"""The end of a output's spread over tolerances that counts: the high one of what is made small or limited above."""
+"""Relevant end of an output's spread over tolerances: the high one for minimised outputs and upper limits."""
 
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedPoint:
-    """A point that a search looked at."""
+    """Point evaluated by an optimisation."""
 
     row: Floats
-    """(parameters,) NaN for the case as it is."""
+    """(parameters,) NaN for the unchanged gearbox."""
     draws: tuple[tuple[str, Mapping[str, Any]], ...]
-    """Hash and values at paths of the case of each draw of the tolerances; one without tolerances."""
+    """Hash and values by path in the gearbox file for each draw of the tolerances; one entry without tolerances."""
 
     @property
     def key(self) -> str:
-        """What it is found by: equal parameters are one point."""
+        """Key of the point: equal parameters give the same point."""
         return self.draws[0][0]
 
 
 Quantity = Callable[[EvaluatedPoint, str], Floats]
-"""Gives a output of all draws of a point; NaN where one failed."""
+"""Function that returns an output for all draws of a point; NaN for failed draws."""
 
 
 @dataclass(frozen=True)
 class Criteria:
-    """What points of a search are judged by."""
+    """Criteria for the points of an optimisation."""
 
     outputs: tuple[str, ...]
-    """Made small."""
+    """Minimised outputs."""
     limits: tuple[tuple[str, Side, float], ...]
-    """Quantity, the side that is limited, and the limit."""
+    """Output, limited side and limit."""
     percentile: float
-    """Over tolerances, of the bad side."""
+    """Percentile over tolerances, on the unfavourable side."""
 
     @classmethod
     def of(cls, study: StudyFile) -> Criteria:
-        """Read them from a study file with a section `optimise`."""
+        """Read the criteria from a study file with a section `optimise`."""
         wanted = study.optimise
         assert wanted is not None
         limits = tuple(one for name, limit in wanted.limits.items() for one in _limits(name, limit))
@@ -237,18 +237,18 @@ class Criteria:
 
     @property
     def sides(self) -> list[tuple[str, Side]]:
-        """Outputs with the side of their spread that counts, each once."""
+        """Outputs with the relevant side of their spread, each once."""
         minimised: list[tuple[str, Side]] = [(name, "high") for name in self.outputs]
         return list(dict.fromkeys([*minimised, *((name, side) for name, side, _ in self.limits)]))
 
     def percent(self, side: Side) -> float:
-        """Percentile of a side."""
+        """Return the percentile for a side."""
         if side == "high":
             return self.percentile
         return 100.0 - self.percentile
 
     def over_draws(self, values: Floats, side: Side) -> Floats:
-        """Bring a output (..., draws) into one value; a draw that failed counts as worst."""
+        """Reduce an output (..., draws) to one value; a failed draw counts as the worst."""
         filled = np.where(np.isnan(values), np.inf if side == "high" else -np.inf, values)
         if filled.shape[-1] == 1:
             return filled[..., 0]
@@ -260,7 +260,7 @@ class Criteria:
         return np.array(found).reshape(len(points), len(self.outputs))
 
     def violations(self, quantity: Quantity, points: Sequence[EvaluatedPoint]) -> Floats:
-        """How far points are beyond limits (points, limits), over the size of the limit; negative within."""
+        """Return the violations of limits (points, limits), relative to the absolute limit; negative within limits."""
         found = [
             [
                 beyond(float(self.over_draws(quantity(point, name), side)), side, limit)
@@ -277,7 +277,7 @@ def _limits(name: str, limit: LimitSection) -> list[tuple[str, Side, float]]:
 
 
 def beyond(value: float, side: Side, limit: float) -> float:
-    """How far a value is beyond a limit of its high or low side, over the size of the limit.
+    """Return the violation of an upper (high) or lower (low) limit, relative to the absolute limit.
 
     Examples
     --------
@@ -289,7 +289,7 @@ def beyond(value: float, side: Side, limit: float) -> float:
 
 
 def is_pareto_optimal(outputs: Floats) -> Booleans:
-    """Tell which points (points, outputs) no other one beats: not larger in any output and smaller in one.
+    """Return which points (points, outputs) are Pareto-optimal: no other is smaller in one output and larger in none.
 
     Examples
     --------
@@ -306,7 +306,7 @@ def is_pareto_optimal(outputs: Floats) -> Booleans:
 def searched_dataset(
     study: Study, criteria: Criteria, points: Sequence[EvaluatedPoint], records: Mapping[str, Record]
 ) -> xr.Dataset:
-    """All points that a search looked at, in their order, with the percentiles that they were judged by.
+    """Return all evaluated points of an optimisation in their order, with the percentiles used as criteria.
 
     Parameters
     ----------
@@ -329,14 +329,14 @@ def searched_dataset(
 
 
 def judged_name(study: Study, name: str, side: Side) -> str:
-    """Variable of the dataset that points are judged by: the output, or its percentile over the tolerances."""
+    """Return the variable of the dataset used as criterion: the output, or its percentile over the tolerances."""
     if study.tolerances is None:
         return name
     return f"{name}_{side}"
 
 
 def _judged(dataset: xr.Dataset, study: Study, criteria: Criteria, name: str, side: Side) -> xr.DataArray:
-    """Give a output of each point, or its percentile over tolerances; infinite where draws failed."""
+    """Return an output of each point, or its percentile over tolerances; infinite where draws failed."""
     import xarray as xr
 
     values = dataset[name].to_numpy().reshape(dataset.sizes[EVALUATION], -1)
@@ -347,7 +347,7 @@ def _judged(dataset: xr.Dataset, study: Study, criteria: Criteria, name: str, si
 
 
 def _design(study: Study, points: Sequence[EvaluatedPoint]) -> Design:
-    """Points over evaluations, and over the draws of tolerances."""
+    """Return the points over evaluations, and over the draws of tolerances."""
     rows = np.array([point.row for point in points])
     tolerances = study.tolerances
     axes = {EVALUATION: Axis((EVALUATION,), np.arange(len(points)))}

@@ -1,8 +1,8 @@
-"""Where points are computed: in this process, in processes, on a Dask cluster, or on any executor of that protocol.
+"""Computation of points in this process, in worker processes, on a Dask cluster or on any executor of that protocol.
 
-Every process writes a journal of its own, so that none waits for another and any number can work in one folder. A line
-is added by one write and carries a checksum: one that a kill cut short is no point. Journals of one study can be
-copied together.
+Each process writes its own journal, so that processes do not wait for each other and any number can work in one
+folder. A line is added by a single write and has a checksum, so that truncated lines are ignored. Journals of one
+study can be copied into one folder.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ from exugear.system.readiness import check_parts
 from fe_ste.tools.files import FileError, open_regular, write_all
 from fe_ste.tools.threads import AtOnce, StoppedError, Workers, available_cores, stop_if_asked
 
-# Journals of finished points: a line for each, keyed by the hash of its input, whole or not there at all
+# Journals of finished points: one line per point, keyed by the hash of its input, complete or ignored
 
 FOLDER = "points"
 INFINITE = "infinite"
-"""In place of a number that has no end, which JSON has not; with a sign where it is below all others."""
+"""Placeholder for infinite numbers, which JSON does not support; with a minus sign for negative infinity."""
 _END = ".jsonl"
 _DIGITS = 16
 """Digits of a line's checksum."""
@@ -54,23 +54,23 @@ _DIGITS = 16
 
 @dataclass(frozen=True)
 class Record:
-    """What is kept of a point."""
+    """Stored result of a point."""
 
     point: str
     """Hash of its input."""
     values: Mapping[str, Any] = field(default_factory=dict)
-    """Outputs by name: a number, or numbers by name; None for one that is none, `INFINITE` for one without end."""
+    """Outputs by name: a number, or numbers by name; None for NaN, `INFINITE` for infinite values."""
     error: str = ""
-    """Why it failed; empty if it did not."""
+    """Reason of failure; empty for success."""
     doubts: list[str] = field(default_factory=list)
-    """What speaks against trusting it."""
+    """Warnings about the validity of the results."""
     seconds: float = 0.0
-    """Wall time that it took."""
+    """Wall time, s."""
     memory: float = 0.0
-    """Peak of the memory of its process so far, bytes."""
+    """Peak memory of the process so far, bytes."""
 
     def line(self) -> str:
-        """Return it as a line of a journal."""
+        """Return the record as a line of a journal."""
         text = json.dumps(asdict(self), allow_nan=False)
         return f'{{"checksum": "{_checksum(text)}", "record": {text}}}\n'
 
@@ -80,12 +80,12 @@ def _checksum(text: str) -> str:
 
 
 _POINT = re.compile(r'"record": \{"point": "([^"]*)"')
-"""Where a line says of which point it is: those that are not wanted are not read any further."""
+"""Key of the point in a line; lines of other points are not parsed further."""
 _LINE = re.compile(rf'\{{"checksum": "([0-9a-f]{{{_DIGITS}}})", "record": (.*)\}}')
 
 
 def _record(line: str) -> Record | None:
-    """Record of a line; None if it was cut short or changed."""
+    """Return the record of a line; None if it is truncated or damaged."""
     match = _LINE.fullmatch(line)
     if match is None or _checksum(match[2]) != match[1]:
         return None
@@ -96,7 +96,7 @@ def _record(line: str) -> Record | None:
 
 
 def told_in_json(value: float) -> float | str | None:
-    """Write a number as a record has it.
+    """Return a number in the form used in records.
 
     Examples
     --------
@@ -113,7 +113,7 @@ def told_in_json(value: float) -> float | str | None:
 
 
 def number_of(value: Any) -> float:
-    """Read a number that a record tells.
+    """Return a number from its form in records.
 
     Examples
     --------
@@ -130,7 +130,7 @@ def number_of(value: Any) -> float:
 
 
 class Journal:
-    """The journal of this process in a folder, begun with its first line.
+    """Journal of this process in a folder, created with its first line.
 
     Parameters
     ----------
@@ -142,12 +142,12 @@ class Journal:
         self._path = folder / FOLDER / f"{host}-{os.getpid()}-{secrets.token_hex(4)}{_END}"
 
     def add(self, record: Record) -> None:
-        """Add a point; it is there for every process from then on.
+        """Append a point, which is then visible to all processes.
 
         Raises
         ------
         OSError
-            The disk is full, say.
+            The file cannot be written, for example because the disk is full.
         """
         self._path.parent.mkdir(parents=True, exist_ok=True)
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
@@ -155,14 +155,14 @@ class Journal:
             write_all(file, record.line().encode("utf-8"))
 
     def settle(self) -> None:
-        """Bring what was added to the disk, so that a power cut does not lose it."""
+        """Flush the journal to disk, so that a power failure does not lose it."""
         if self._path.exists():
             with open(self._path, "rb+") as file:
                 os.fsync(file.fileno())
 
 
 def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
-    """Finished points of a folder, of those that are wanted; one that did not fail stands before one that did.
+    """Return the finished points of a folder among those wanted; a success has priority over a failure.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
             with open_regular(path) as file:
                 lines = file.read().decode("utf-8", errors="replace").splitlines()
         except FileError:
-            continue  # what is no journal holds no points
+            continue  # files that are not journals hold no points
         for line in lines:
             match = _POINT.search(line)
             if match is None or match[1] not in wanted:
@@ -187,22 +187,22 @@ def read_journals(folder: Path, wanted: Collection[str]) -> dict[str, Record]:
     return journals
 
 
-# Points computed in a worker, one after the other, each noted as soon as it is finished
+# Points computed by a worker one after the other, each recorded as soon as it is finished
 
 LONG = 1.0
-"""Seconds of a point after which it is brought to the disk by itself."""
+"""Computing time of a point (s) above which its record is flushed to disk at once."""
 SHARED_FOLDER = "shared"
 WORK_FOLDER = "work"
 SHOWN_VALUES, LONGEST_VALUE = 5, 200
-"""Most parameters that the error of a point names, and most letters of each."""
+"""Maximum number of parameters in the error of a point, and maximum characters of each."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """What all points of a study have in common, as it is sent to a worker."""
+    """Common data of all points of a study, sent to the workers."""
 
     content: Mapping[str, Any]
-    """Of the gearbox file, with the changes that all points have."""
+    """Content of the gearbox file, with the changes common to all points."""
     source: str
     permissions: Permissions
     choice: Choice
@@ -210,14 +210,14 @@ class Task:
     outputs: Mapping[str, Output]
     """By name."""
     folder: Path
-    """Of the study."""
+    """Folder of the study."""
     parameters: Mapping[str, str] = field(default_factory=dict)
-    """Mapping of path to str. Names of the parameters that set paths of the case."""
+    """Mapping of path to str. Names of the parameters that set paths in the gearbox file."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """A point as it is sent to a worker: the hash of its input, and values at paths of the case."""
+    """Data of a point sent to a worker: the hash of its input, and values by path in the gearbox file."""
 
     point: str
     changes: Mapping[str, Any]
@@ -225,17 +225,17 @@ class Work:
 
 @lru_cache(maxsize=4)
 def _journal(folder: Path) -> Journal:
-    """Journal of this process; a worker takes batches of one study after the other."""
+    """Return the journal of this process; a worker takes batches of one study at a time."""
     return Journal(folder)
 
 
 def compute_batch(task: Task, batch: Sequence[Work]) -> list[Record]:
-    """Compute points; dense linear algebra keeps to one thread meanwhile.
+    """Compute points, with dense linear algebra limited to one thread.
 
     Raises
     ------
     StoppedError
-        The results are wanted no more; what is finished is noted.
+        The computation was cancelled; finished points are recorded.
     OSError
         A finished point cannot be written.
     """
@@ -256,7 +256,7 @@ def compute_batch(task: Task, batch: Sequence[Work]) -> list[Record]:
 
 
 def compute_point(task: Task, work: Work) -> Record:
-    """Compute one point; whatever goes wrong with it is part of its record."""
+    """Compute one point; errors become part of its record."""
     start = time.perf_counter()
     values: dict[str, Any] = {}
     error = ""
@@ -270,14 +270,14 @@ def compute_point(task: Task, work: Work) -> Record:
         results.clear()
     except StoppedError:
         raise
-    except Exception as reason:  # one point must not end the others, whatever it is
+    except Exception as reason:  # the failure of one point must not end the others
         values = {}
         error = f"{type(reason).__name__}: {reason}"
     return Record(work.point, values, error, doubts, round(time.perf_counter() - start, 6), peak_memory())
 
 
 def _built(task: Task, work: Work) -> Gearbox:
-    """Gearbox of a point; of one that cannot be, the error begins with the parameters and their values."""
+    """Return the gearbox of a point; the error of an invalid one begins with the parameters and their values."""
     try:
         gearbox = Gearbox.from_dict(changed(task.content, work.changes), task.source, task.permissions)
         check_parts(gearbox)
@@ -292,24 +292,24 @@ def _built(task: Task, work: Work) -> Gearbox:
 
 
 def _told(values: Values) -> Any:
-    """Values as a journal has them."""
+    """Return values in the form used in a journal."""
     if isinstance(values, Mapping):
         return {name: told_in_json(float(value)) for name, value in values.items()}
     return told_in_json(float(values))
 
 
-# Where points are computed: in this process, in processes, on a Dask cluster, or on any executor of that protocol
+# Executors: this process, worker processes, a Dask cluster, or any executor of that protocol
 
 CONNECT_SECONDS = 30.0
-"""Time within which a scheduler has to answer."""
+"""Time limit for the answer of a scheduler, s."""
 
 
 class ExecutorError(RuntimeError):
-    """Workers that cannot be reached, or that were lost and cannot be replaced; what is finished is kept."""
+    """Error: workers cannot be reached, or were lost and cannot be replaced; finished points are kept."""
 
 
 class Submits(Protocol):
-    """What a study asks of an executor."""
+    """Protocol required of an executor."""
 
     def submit(self, fn: Callable[[Task, Sequence[Work]], list[Record]], /, *args: Any) -> Future[list[Record]]:
         """Schedule a call and return its future."""
@@ -318,16 +318,16 @@ class Submits(Protocol):
 
 @dataclass(frozen=True)
 class Pool:
-    """An executor at work."""
+    """Running executor."""
 
     executor: Submits
     """Object with the protocol of `concurrent.futures.Executor`."""
     workers: int
-    """Batches that it computes at once."""
+    """Number of batches computed at the same time."""
 
 
 Opens = Callable[[], AbstractContextManager[Pool]]
-"""Starts workers; called again after workers were lost."""
+"""Function that starts workers; called again after workers were lost."""
 
 
 @contextmanager
@@ -336,7 +336,7 @@ def _here() -> Iterator[Pool]:
 
 
 def processes(workers: int | None = None) -> Opens:
-    """Worker processes; all cores by default. One is this process itself.
+    """Return worker processes, by default on all cores; with one worker, this process itself.
 
     Examples
     --------
@@ -357,7 +357,7 @@ def processes(workers: int | None = None) -> Opens:
 
 
 def dask_cluster(address: str) -> Opens:
-    """Return the workers of a Dask scheduler, which see the same folders as this process.
+    """Return the workers of a Dask scheduler; they need access to the same folders as this process.
 
     Parameters
     ----------
@@ -381,12 +381,12 @@ def dask_cluster(address: str) -> Opens:
 
 
 def given(executor: Submits, workers: int | None = None) -> Opens:
-    """Return an executor that somebody else starts and ends.
+    """Return an executor that the caller starts and ends.
 
     Parameters
     ----------
     executor : object with the protocol of `concurrent.futures.Executor`
-    workers : batches that it computes at once; the cores of this machine by default
+    workers : number of simultaneous batches; by default the cores of this machine
     """
     opened_before = False
 
@@ -404,7 +404,7 @@ def given(executor: Submits, workers: int | None = None) -> Opens:
 
 
 class PersistentPool:
-    """Workers that stay for several calls, and are started anew only after they were lost.
+    """Workers that are kept for several calls, and restarted only after they were lost.
 
     Parameters
     ----------
@@ -419,7 +419,7 @@ class PersistentPool:
 
     @contextmanager
     def opened(self) -> Iterator[Pool]:
-        """Lend the workers; an error of those who have them sends them away."""
+        """Provide the workers; an error in the calling block stops them."""
         if self._pool is None:
             self._pool = self._stack.enter_context(self._opens())
         try:
@@ -430,24 +430,24 @@ class PersistentPool:
                 raise
 
     def __enter__(self) -> Self:
-        """Begin without workers."""
+        """Enter without starting workers."""
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Let the workers go."""
+        """Stop the workers."""
         self._pool = None
         self._stack.close()
 
 
 def lost_worker(error: BaseException) -> bool:
-    """Tell whether an error of a future says that its worker alone is gone; `BrokenExecutor` says that all are."""
+    """Return whether a future's error means the loss of its worker only; `BrokenExecutor` is the loss of all."""
     return isinstance(error, CancelledError) or type(error).__name__ == "KilledWorker"
 
 
 class Pace:
-    """How many points make a batch: some tenths of a second of work, so that little is sent and little is waited for.
+    """Size of a batch: about half a second of work, which limits both communication and waiting time.
 
     Examples
     --------
@@ -466,31 +466,31 @@ class Pace:
         self._took: list[float] = []
 
     def learn(self, seconds: Sequence[float]) -> None:
-        """Take note of the seconds that points took."""
+        """Record the computing times of points, s."""
         self._took = [*self._took, *seconds][-2 * self.most :]
 
     @property
     def count(self) -> int:
-        """Points of the next batch."""
+        """Number of points of the next batch."""
         if not self._took:
             return 1
-        usual = statistics.median(self._took)  # the first ones load libraries
+        usual = statistics.median(self._took)  # median, because the first points also load libraries
         return max(1, min(self.most, math.floor(self.seconds / max(usual, 1e-9))))
 
 
-# Points sent to workers in batches, sent again when workers are lost, and told while they come back
+# Points sent to workers in batches, sent again when workers are lost, and reported on return
 
 MOST_LOSSES = 3
-"""A point whose worker was lost so often, the last time while it was alone at work, is given up."""
+"""Number of worker losses after which a point is abandoned; the last one while it was the only running point."""
 ALONE_AFTER = 2
-"""Losses after which a point is computed while nothing else is, so that no other is blamed."""
+"""Number of worker losses after which a point is computed while no other runs, to identify the cause."""
 BATCHES_A_WORKER = 2
-"""Batches sent ahead: one is computed, one waits."""
+"""Number of batches sent per worker: one is computed, one waits."""
 Tell = Callable[[Record], None]
 
 
 class _Running:
-    """Points that wait, batches that workers have, and records that came back."""
+    """Waiting points, batches of workers, and returned records."""
 
     def __init__(self, task: Task, points: Iterable[Work], tell: Tell) -> None:
         self.task, self.tell = task, tell
@@ -500,19 +500,19 @@ class _Running:
         self.pace = Pace()
 
     def take(self, records: Iterable[Record]) -> None:
-        """Keep and tell what came back."""
+        """Store and report returned records."""
         for record in records:
             if record.point not in self.found:
                 self.found[record.point] = record
                 self.tell(record)
 
     def work(self, pool: Pool) -> None:
-        """Work until nothing is left.
+        """Process points until none is left.
 
         Raises
         ------
         BrokenExecutor
-            The pool has lost its workers; their points wait again.
+            The pool has lost its workers; their points are queued again.
         """
         at_work: dict[Future[list[Record]], list[Work]] = {}
         try:
@@ -540,7 +540,7 @@ class _Running:
             self.alone.popleft()
 
     def _gather(self, future: Future[list[Record]], batch: list[Work]) -> None:
-        """Take what is done.
+        """Take the result of a finished batch.
 
         Raises
         ------
@@ -560,7 +560,7 @@ class _Running:
         self.take(records)
 
     def again(self, lost: list[Work]) -> None:
-        """Put the points of lost workers back, but for those that they had finished; give up what loses them."""
+        """Queue the unfinished points of lost workers again; abandon points that repeatedly lose their worker."""
         self.take(read_journals(self.task.folder, {work.point for work in lost}).values())
         for work in lost:
             if work.point in self.found:
@@ -582,7 +582,7 @@ def compute_points(task: Task, points: Iterable[Work], opens: Opens, tell: Tell)
     opens : callable
         Starts workers, as `exugear.studies.executors.processes`; called again when they are lost.
     tell : callable
-        Called with each record as it comes back.
+        Called with each returned record.
 
     Returns
     -------
@@ -605,7 +605,7 @@ def compute_points(task: Task, points: Iterable[Work], opens: Opens, tell: Tell)
 
 
 def _note_here(task: Task, records: list[Record]) -> None:
-    """Note what workers wrote into a folder that this process does not see."""
+    """Record points that workers wrote into a folder that is not visible to this process."""
     journal = Journal(task.folder)
     for record in records:
         journal.add(record)

@@ -1,4 +1,4 @@
-"""Pictures of a study's dataset: curves over parameters, spreads of draws, rankings of slopes, fronts of searches."""
+"""Pictures of a study: curves over parameters, distributions of draws, rankings of slopes, Pareto fronts."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ if TYPE_CHECKING:
 
 _OF_POINTS = ("error", "doubts", "seconds", "memory", "on_front", "meets_limits", "step")
 MOST_CURVES = 12
-"""Curves of one picture; of more values those spread over their range."""
+"""Maximum number of curves per picture; of more values, a selection over their range is drawn."""
 MOST_PANELS = 6
-"""Panels of one picture."""
+"""Maximum number of panels per picture."""
 MARKED = (0.25, 0.5, 0.75, 0.95)
-"""Shares of draws that a spread marks."""
+"""Quantiles marked in a distribution."""
 WIDE = 30.0
-"""Ratio of the largest to the smallest value from which a scale is logarithmic."""
+"""Ratio of largest to smallest value above which a scale is logarithmic."""
 MOST_PICTURES = 24
-"""Pictures of one study."""
+"""Maximum number of pictures per study."""
 LEAST_SHARE = 1e-3
-"""Share of the longest bar below which a bar is left out."""
+"""Fraction of the longest bar below which a bar is omitted."""
 MOST_ROWS = 24
-"""Bars of a ranking."""
+"""Maximum number of bars in a ranking."""
 
 
 def draw_study(dataset: xr.Dataset, folder: Path, minimised: tuple[str, ...] = ()) -> list[Path]:
-    """Draw a study into ``pictures`` in its folder; a picture a figure, as its dimensions ask for.
+    """Draw a study into ``pictures`` in its folder; one picture per output, in a form that suits its dimensions.
 
     Parameters
     ----------
     dataset : as `exugear.studies.dataset.dataset_of` makes it
     folder : of the study
-    minimised : figures that a search made small, or their percentiles over tolerances
+    minimised : outputs minimised by an optimisation, or their percentiles over tolerances
     """
     drawn = []
     with drawing_style():
@@ -61,7 +61,7 @@ def draw_study(dataset: xr.Dataset, folder: Path, minimised: tuple[str, ...] = (
 
 
 def _pictures(dataset: xr.Dataset, minimised: tuple[str, ...]) -> Iterator[tuple[str, Callable[[Figure], None]]]:
-    """Names of the pictures, and what draws each into a figure."""
+    """Yield the names of the pictures, and the functions that draw them."""
     if SIDE in dataset.dims:
         yield "slopes", lambda figure: _draw_ranking(figure, dataset)
         return
@@ -78,7 +78,7 @@ def _pictures(dataset: xr.Dataset, minimised: tuple[str, ...]) -> Iterator[tuple
 
 
 def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
-    """Draw a figure over parameters: along one, a curve for each value of another, a panel for each of all others."""
+    """Draw an output over one parameter, with a curve for each value of another and a panel for each of the others."""
     dimensions = [str(dim) for dim in values.dims if values.sizes[dim] > 1] or [str(values.dims[-1])]
     values = values.squeeze([dim for dim in values.dims if dim not in dimensions])
     numeric = [dimension for dimension in dimensions if _is_number(values, dimension)]
@@ -110,14 +110,14 @@ def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
 
 
 def _tell_of_infinite(axes: Axes, rows: Floats) -> None:
-    """Say how many values have no end: no scale has a place for them."""
+    """State the number of infinite values, which the scale cannot show."""
     count = int(np.isinf(rows).sum())
     if count:
         axes.text(0.02, 0.98, f"{count} of {rows.size} infinite", va="top", transform=axes.transAxes, fontsize=7.5)
 
 
 def _finite(values: Floats) -> Floats:
-    """Values with those left out that have no place on a scale."""
+    """Replace infinite values by NaN."""
     return np.asarray(np.where(np.isfinite(values), values, np.nan))
 
 
@@ -148,7 +148,7 @@ def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, lab
 
 
 def _logarithmic(axes: Axes, which: Literal["x", "y"]) -> None:
-    """Give an axis a logarithmic scale whose numbers are plain words: the style draws no formulas."""
+    """Set a logarithmic scale with numbers as plain text, as the style draws no formulas."""
     from matplotlib.ticker import FuncFormatter, NullFormatter
 
     if which == "x":
@@ -161,7 +161,7 @@ def _logarithmic(axes: Axes, which: Literal["x", "y"]) -> None:
 
 
 def _combinations(values: xr.DataArray, dimensions: list[str]) -> list[str]:
-    """Names of all combinations along some dimensions."""
+    """Return the labels of all combinations along some dimensions."""
     labels = [""]
     for dimension in dimensions:
         own = values[dimension].to_numpy() if dimension in values.coords else np.arange(values.sizes[dimension])
@@ -186,7 +186,7 @@ def _draw_bars(axes: Axes, values: xr.DataArray, along: str, rows: Floats, label
 
 
 def _draw_spread(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:
-    """Draw the share of draws below a value; quartiles and 95 % are marked."""
+    """Draw the cumulative distribution of draws; quartiles and the 95 % quantile are marked."""
     for n, (row, label) in enumerate(zip(rows[:MOST_CURVES], labels, strict=False)):
         known: Floats = np.sort(row[~np.isnan(row)])
         if not np.isfinite(known).any():
@@ -205,7 +205,7 @@ def _draw_spread(axes: Axes, values: xr.DataArray, along: str, rows: Floats, lab
 
 
 def _draw_ranking(figure: Figure, dataset: xr.Dataset) -> None:
-    """Draw what a step of each parameter changes, in percent, the strongest on top."""
+    """Draw the change of outputs per step of each parameter, in percent, the largest at the top."""
     axes = figure.add_subplot()
     ranked = sorted(slopes(dataset), key=lambda entry: abs(entry[2]))[-MOST_ROWS:]
     ranked = [entry for entry in ranked if abs(entry[2]) >= LEAST_SHARE * abs(ranked[-1][2])]
@@ -219,7 +219,7 @@ def _draw_ranking(figure: Figure, dataset: xr.Dataset) -> None:
 
 
 def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> None:
-    """Draw all points of a search over its two figures, those that no other beats, and the case as it is."""
+    """Draw all points of an optimisation over its two outputs, with the Pareto front and the unchanged gearbox."""
     x, y = (_finite(dataset[name].to_numpy()) for name in (first, second))
     front = dataset["on_front"].to_numpy() == 1
     order = np.argsort(x[front])
@@ -238,7 +238,7 @@ def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> Non
 
 
 def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
-    """Draw a figure at the points that a search looked at, and the best so far."""
+    """Draw an output at the evaluated points of an optimisation, and its best value so far."""
     values = _finite(dataset[name].to_numpy())
     kept = _keeps_limits(dataset)
     axes.plot(np.where(kept, values, np.nan), ".", color="#BBBBBB")
@@ -254,7 +254,7 @@ def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
 
 
 def _keeps_limits(dataset: xr.Dataset) -> Booleans:
-    """Tell which points of a search keep its limits; all where it has none."""
+    """Return which points of an optimisation meet its limits; all without limits."""
     if "meets_limits" not in dataset:
         return np.ones(dataset.sizes[EVALUATION], dtype=bool)
     return np.asarray(dataset["meets_limits"].to_numpy() == 1)

@@ -1,4 +1,4 @@
-"""Results of one point: computed when a output asks for them, each once."""
+"""Results of one point, each computed once when an output requires it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
     from exugear.transient.runup import Solver
 
-# Tables, stresses and reductions that points of a study share: computed once, whoever asks first, locked meanwhile
+# Tables, stresses and reductions shared by the points of a study: computed once under a lock, by the first to need them
 
 UNRELATED = (
     "name",
@@ -56,16 +56,16 @@ UNRELATED = (
     "pins",
     "deviations",
 )
-"""Sections of a gearbox file that a reduction of its bodies does not read."""
+"""Sections of a gearbox file that do not affect the reduction of its bodies."""
 
 
 class SharedTableError(RuntimeError):
-    """A table that is not to be trusted."""
+    """Error: a table failed a validity check."""
 
 
 @contextmanager
 def _waiting(path: Path) -> Iterator[None]:
-    """Hold a lock that others wait for; the system takes it back from a process that is killed."""
+    """Hold a lock that other processes wait for; the system releases it if a process is killed."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with filelock.FileLock(path):
         yield
@@ -73,26 +73,26 @@ def _waiting(path: Path) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Shared:
-    """Folder of what points share, by the hash of its input."""
+    """Folder of results shared by points, by the hash of their input."""
 
     folder: Path
 
     def results_folder(self, gearbox: Gearbox, pair: str, grid: bool = False) -> Path:
-        """Results folder that holds the table of a pair of this gearbox, and no other of this pair."""
+        """Return the results folder with the table of a pair of this gearbox and no other table of this pair."""
         wanted = wanted_table(gearbox, pair, gearbox.ste.positions, grid or gearbox.ste.grid)
         return self.folder / "tables" / wanted.hash[:32]
 
     def table(
         self, gearbox: Gearbox, pair: str, grid: bool = False, progress: Callable[[int, int], None] | None = None
     ) -> MeshTable:
-        """Table of a pair; the first that asks computes it, others wait for it.
+        """Return the table of a pair; the first process computes it, others wait for it.
 
         Raises
         ------
         GearboxFileError
             The pair carries no load.
         SharedTableError
-            It is not to be trusted.
+            The table failed a validity check.
         """
         folder = self.results_folder(gearbox, pair, grid)
         (request,) = requested_tables(gearbox, folder, [pair], grid=grid)
@@ -107,12 +107,12 @@ class Shared:
         return table
 
     def stresses(self, request: TableRequest, progress: Callable[[int, int], None] | None = None) -> MeshCycleStress:
-        """Stresses of a pair from its table of loads and misalignments, which is computed first; likewise.
+        """Return the stresses of a pair from its table of loads and misalignments; both computed once, under a lock.
 
         Raises
         ------
         SharedTableError
-            The table is not to be trusted.
+            The table failed a validity check.
         """
         from exugear.life.gear_life import pair_stresses
 
@@ -128,7 +128,7 @@ class Shared:
             return pair_stresses([replace(request, stored=table)], folder)[request.name]
 
     def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:
-        """Reduced elastic bodies; likewise."""
+        """Return the reduced flexible bodies; computed once, under a lock."""
         from exugear.system.bodies.of_gearbox import reduced_bodies
 
         own = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
@@ -145,20 +145,20 @@ def _stored(path: Path, wanted: TableInput) -> MeshTable | None:
         return None
 
 
-# The life of one point: rated as the verb `life` does, with tables and stresses that points share
+# Rating and life of one point, as in the command `life`, with shared tables and stresses
 
 Progress = Callable[[int, int], None]
 KEPT_ANGLES = "life.partial.npz"
-"""Solved angles of the carrier in the folder of a point: a life that was stopped goes on from these."""
+"""File with the solved carrier angles in the folder of a point, from which an interrupted rating resumes."""
 
 
 def life_loads(gearbox: Gearbox, choice: Choice) -> CountedLoads:
-    """Read the loads of a life, and check all that is asked for before any work begins.
+    """Read the load spectrum and check all required input before any computation.
 
     Raises
     ------
     GearboxFileError
-        Loads that cannot be used, or that go far beyond the tables; strengths that do not fit the gears.
+        Invalid loads, or loads far beyond the tables; strengths that do not fit the gears.
     """
     counted = checked_loads(gearbox)
     largest = {request.name: max(request.wanted.torque) for request in _requests(gearbox, choice, Path())}
@@ -174,13 +174,13 @@ def point_life(
     Parameters
     ----------
     shared : holds tables of pairs and the stresses from them
-    folder : of the point: K_v of a run or a response lies there
-    progress : called between steps, so that what is stopped ends
+    folder : of the point, with the run or response for K_v
+    progress : called between steps, so that a cancelled computation ends
 
     Returns
     -------
     dataset, list of str
-        As `exugear.life.life_file.to_dataset` has it, and what speaks against trusting it.
+        As from `exugear.life.life_file.to_dataset`, and warnings about its validity.
 
     Raises
     ------
@@ -207,7 +207,7 @@ def point_life(
 
 
 def _doubts(data: xr.Dataset) -> Iterator[str]:
-    """Tell whose stresses lie too far beyond their tables."""
+    """Yield warnings for flanks whose loads are too far beyond their tables."""
     for label, reach in zip(data["flank"].to_numpy().tolist(), data["flank_reach"].to_numpy().tolist(), strict=True):
         if reach > UNTRUSTED_REACH:
             yield f"{label}: the largest torque is {reach:.3g} times the largest torque of its table: stresses invalid"
@@ -216,7 +216,7 @@ def _doubts(data: xr.Dataset) -> Iterator[str]:
 def response_of_factors(
     assembly: Assembly, choice: Choice, settings: SteadySettings | None, folder: Path, progress: Progress
 ) -> None:
-    """Compute the steady response that K_v is taken from, at the speeds of the study or the usual ones."""
+    """Compute the steady-state response for K_v, at the speeds of the study or the default ones."""
     level = rating_of(assembly.gearbox).dynamic_factor_steady
     assert level is not None
     if settings is None or settings.method != level:
@@ -233,39 +233,39 @@ def _has_axes(choice: Choice) -> bool:
     return law is not None and law.needs_axes
 
 
-# Results of one point: computed when a output asks for them, each once
+# Results of one point, each computed once when an output requires it
 
 
 class PointError(RuntimeError):
-    """A point that cannot give a figure."""
+    """Error: a point cannot provide an output."""
 
 
 @dataclass(frozen=True)
 class PointSettings:
-    """What results of points are computed with."""
+    """Settings for the results of points."""
 
     steady: SteadySettings | None = None
     duration: float | None = None
-    """Of runs, s; that of the load case by default."""
+    """Duration of runs, s; by default that of the load case."""
     solver: Solver | None = None
-    """Str, optional. Of runs."""
+    """Str, optional. Solver of runs."""
 
 
 @dataclass
 class PointResults:
-    """What is computed of one variation of a gearbox."""
+    """Results computed for one variation of a gearbox."""
 
     gearbox: Gearbox
     choice: Choice
     settings: PointSettings
     shared: Shared
     folder: Path
-    """Where a run grows; removed by `clear`."""
+    """Working folder of a run; removed by `clear`."""
     doubts: list[str] = field(default_factory=list)
-    """What speaks against trusting the numbers."""
+    """Warnings about the validity of the results."""
 
     def table(self, pair: str) -> MeshTable:
-        """Table of the transmission error of a pair.
+        """Return the transmission error table of a pair.
 
         Raises
         ------
@@ -278,7 +278,7 @@ class PointResults:
 
     @cached_property
     def stiffness(self) -> dict[str, MeshData]:
-        """Mesh stiffness by pair at work, as the mesh law needs it."""
+        """Mesh stiffness by active pair, as required by the mesh model."""
         law = LAWS.get(self.choice.mesh_model)
         if law is not None and not law.has_force:
             return {}
@@ -294,7 +294,7 @@ class PointResults:
 
     @cached_property
     def bodies(self) -> dict[str, ElasticBody]:
-        """Reduced elastic bodies of the variant."""
+        """Reduced flexible bodies of the variant."""
         if not self.choice.variant.is_elastic:
             return {}
         return self.shared.bodies(self.gearbox, self.choice.inertia_set(self.gearbox))
@@ -306,7 +306,7 @@ class PointResults:
 
     @cached_property
     def static(self) -> StaticState:
-        """State at rest under the static load."""
+        """Static equilibrium under the static load."""
         return static_state(self.assembly)
 
     @cached_property
@@ -316,12 +316,12 @@ class PointResults:
 
     @cached_property
     def steady(self) -> xr.Dataset:
-        """Steady response over speed.
+        """Steady-state response over speed.
 
         Raises
         ------
         PointError
-            The study does not say over which speeds.
+            The study has no speed range.
         """
         if self.settings.steady is None:
             raise PointError("results of the steady-state response require a section [steady] with speeds")
@@ -332,12 +332,12 @@ class PointResults:
 
     @cached_property
     def run(self) -> xr.Dataset:
-        """Load case in time; one that was stopped is gone on with.
+        """Load case in time; an interrupted run is resumed.
 
         Raises
         ------
         RunError
-            It went wrong.
+            The run failed.
         KeyboardInterrupt
             The user stopped it.
         """
@@ -346,7 +346,7 @@ class PointResults:
         return load_run(self._simulated(self.choice))
 
     def _simulated(self, choice: Choice) -> Path:
-        """File of a run; doubts about it are kept."""
+        """Return the file of a run; warnings about its validity are stored."""
         from exugear.results.folder import run_directory
         from exugear.transient.runup import simulate
         from exugear.transient.start import refuse_to_resume
@@ -370,19 +370,18 @@ class PointResults:
 
     @cached_property
     def life(self) -> xr.Dataset:
-        """Life of gears and bearings under the loads of the gearbox file, as `exugear life` has it.
+        """Rating and life of gears and bearings under the load spectrum of the gearbox file, as from `exugear life`.
 
-        K_v of a run or of a steady response is computed first: a point has no results folder that holds one.
+        The run or steady-state response for K_v is computed first, because a point has no results folder with one.
 
         Raises
         ------
         GearboxFileError
-            No loads or strengths, or such as cannot be used.
+            Missing or invalid loads or strengths.
         BalanceError
-            A static state that is not held.
+            A static state without equilibrium.
         """
         from exugear.life.life import rating_of
-        # imported here before
 
         rating = rating_of(self.gearbox)
         if rating.dynamic_factor_run is not None:
@@ -396,7 +395,7 @@ class PointResults:
     def states(
         self, pair: str, positions: int, torque_factors: Sequence[float], misalignment_um: Sequence[float]
     ) -> xr.Dataset:
-        """States of contact of a pair over loads and misalignments, kept for the next output that asks the same."""
+        """Return contact states of a pair over loads and misalignments, cached for outputs with the same settings."""
         key = (pair, positions, tuple(torque_factors), tuple(misalignment_um))
         if key not in self._states:
             self._states[key] = self._computed_states(*key)
@@ -424,7 +423,7 @@ class PointResults:
         )
 
     def clear(self) -> None:
-        """Remove what a run left in the folder."""
+        """Remove the working folder of a run."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
 

@@ -1,7 +1,6 @@
-"""Outputs that studies keep of a point, of modes, statics, tables, steady responses, runs, lives; their table.
+"""Outputs of studies, from modes, static equilibrium, tables, steady-state responses, runs and ratings; their table.
 
-Of several planets the one that is worn most is rated. A damage without end is infinite, and so is a life that nothing
-ends.
+Of the planets of a set, the one with the largest damage is rated. A damage or a life without limit is infinite.
 """
 
 from __future__ import annotations
@@ -24,44 +23,43 @@ from exugear.system.modes import FREE_ROTATION, Modes
 from exugear.system.signals import SIGNALS
 from fe_ste.tools.arrays import Floats
 
-# A output: a number of a point, or some by name, with unit, and the options that say which
+# Output: one number of a point or several by name, with unit and options
 
 Values = float | Mapping[str, float]
 """One number, or several by name along the output's dimension."""
 Needs = Literal["", "run", "steady", "life", "bearings"]
-"""What a output is read from, where it is more than modes, tables and the static state: a run, a steady response, a
-life, or bearings in that life."""
+"""Source of an output other than modes, tables and the static state: a run, a steady-state response, a rating or the
+bearings in it."""
 
 
 class OutputError(ValueError):
-    """A output that is not known, or options that it has not got."""
+    """Error: an unknown output, or options that it does not have."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is kept of a point."""
+    """Kind of output of a point."""
 
     function: Callable[..., Values]
-    """Takes `PointResults` and options by keyword; a function of a module, since workers look it up there. Each
-    option is a keyword-only parameter; its annotation names its type, its default makes it optional."""
+    """Function of `PointResults` and keyword options, at module level so that workers can import it. Each option is a
+    keyword-only parameter; its annotation gives its type, a default makes it optional."""
     units: str
     dimension: str = ""
-    """Name of the dimension of several numbers; empty for one."""
+    """Name of the dimension of several numbers; empty for a single number."""
     needs: Needs = ""
-    """{"", "run", "steady", "life", "bearings"}: what it is read from, where that is more than modes, tables and the
-    static state."""
+    """{"", "run", "steady", "life", "bearings"}: source of the output; empty for modes, tables and the static state."""
 
     @property
     def description(self) -> str:
-        """What it is, in a line."""
+        """Description in one line."""
         return (inspect.getdoc(self.function) or "").split("\n")[0]
 
     def of(self, results: PointResults, options: Mapping[str, Any]) -> Values:
-        """Compute it for a point."""
+        """Compute the output for a point."""
         return self.function(results, **options)
 
     def check(self, name: str, options: Mapping[str, Any]) -> None:
-        """Refuse options that it has not got, are of another type, or are missing."""
+        """Refuse unknown options, options of a wrong type, and missing ones."""
         known = {
             key: parameter
             for key, parameter in inspect.signature(self.function).parameters.items()
@@ -90,7 +88,7 @@ _TYPES: dict[str, tuple[type, ...]] = {"float": (int, float), "int": (int,), "st
 
 
 def _fits(value: object, kind: str) -> bool:
-    """Whether a value is of the type that an annotation names."""
+    """Return whether a value has the type of an annotation."""
     if kind == "Sequence[float]":
         return isinstance(value, list) and bool(value) and all(_fits(entry, "float") for entry in value)
     return isinstance(value, _TYPES[kind]) and (kind == "bool" or not isinstance(value, bool))
@@ -107,28 +105,28 @@ def frequencies(results: PointResults, *, count: int = 12) -> dict[str, float]:
 
 
 def nearest_frequency(results: PointResults, *, near_Hz: float, element: str = "") -> float:
-    """Eigenfrequency nearest to a frequency, or of the modes that strain an element most."""
+    """Eigenfrequency nearest to a frequency; with an element, of the modes with most strain energy in it."""
     return float(results.modes.frequency[_mode(results.modes, near_Hz, element)])
 
 
 def nearest_damping(results: PointResults, *, near_Hz: float, element: str = "") -> float:
-    """Share of critical damping of that mode."""
+    """Damping ratio of that mode."""
     return float(results.modes.damping_ratio[_mode(results.modes, near_Hz, element)])
 
 
 def nearest_amplification(results: PointResults, *, near_Hz: float, element: str = "") -> float:
-    """Overall transmission error at resonance of that mode per transmission error of the mesh that excites it most."""
+    """TE amplification of that mode: overall TE at resonance per TE of the mesh that excites it most."""
     return float(results.modes.amplification[_mode(results.modes, near_Hz, element)].max())
 
 
 def nearest_strain(results: PointResults, *, near_Hz: float, element: str) -> float:
-    """Share of strain energy of an element in the mode nearest to a frequency."""
+    """Fraction of the strain energy in an element, in the mode nearest to a frequency."""
     modes = results.modes
     return float(modes.strain[_mode(modes, near_Hz, ""), _element(modes, element)])
 
 
 def loudest_frequency(results: PointResults, *, from_Hz: float = 0.0, to_Hz: float = 1e6) -> float:
-    """Eigenfrequency of the mode between two frequencies that amplifies a mesh's transmission error most."""
+    """Eigenfrequency of the mode with the largest TE amplification between two frequencies."""
     modes = results.modes
     inside = (modes.frequency >= from_Hz) & (modes.frequency <= to_Hz)
     if not inside.any():
@@ -137,7 +135,7 @@ def loudest_frequency(results: PointResults, *, from_Hz: float = 0.0, to_Hz: flo
 
 
 def _mode(modes: Modes, near: float, element: str) -> int:
-    """Mode nearest to a frequency (Hz), of those in which an element has the largest share if one is named."""
+    """Return the mode nearest to a frequency (Hz); with an element, of the modes with the largest fraction in it."""
     elastic = np.array([name != FREE_ROTATION for name in modes.names])
     if element:
         shares = modes.strain[:, _element(modes, element)]
@@ -152,7 +150,7 @@ def _element(modes: Modes, name: str) -> int:
     return modes.element_names.index(name)
 
 
-# Outputs of the static state: what meshes carry, and how evenly planets share it
+# Outputs of the static state: mesh forces, misalignments and load sharing of planets
 
 
 def mesh_forces(results: PointResults) -> dict[str, float]:
@@ -161,7 +159,7 @@ def mesh_forces(results: PointResults) -> dict[str, float]:
 
 
 def misalignments(results: PointResults) -> dict[str, float]:
-    """Misalignment of each mesh under the static load, positive where the gap opens at the +z end."""
+    """Misalignment of each mesh under the static load, positive with a gap at the +z end."""
     return dict(zip(results.assembly.mesh_names, map(float, results.static.misalignment), strict=True))
 
 
@@ -172,7 +170,7 @@ def load_sharing(results: PointResults, *, meshes: str) -> float:
 
 
 def of_planets(results: PointResults, family: str, values: Floats) -> Floats:
-    """Pick the values of the meshes of a family, one for each planet.
+    """Return the values of the meshes of a family, one for each planet.
 
     Raises
     ------
@@ -189,12 +187,12 @@ def of_planets(results: PointResults, family: str, values: Floats) -> Floats:
 # Outputs of runs in time
 
 SETTLING = 0.25
-"""Share of a run that is left out at its beginning."""
+"""Fraction of a run at its beginning that is skipped."""
 OVERALL = "overall_dte"
 
 
 def _settled(results: PointResults, signal: str) -> Floats:
-    """Values of a signal over time, the beginning left out."""
+    """Return the values of a signal over time, without the beginning."""
     if signal not in results.run.variables or results.run[signal].dims[:1] != ("time",):
         known = ", ".join(
             str(name) for name, variable in results.run.variables.items() if variable.dims[:1] == ("time",)
@@ -205,12 +203,12 @@ def _settled(results: PointResults, signal: str) -> Floats:
 
 
 def rms(results: PointResults, *, signal: str = OVERALL) -> float:
-    """Root mean square of a signal about its mean; of several the largest."""
+    """Root mean square of a signal about its mean; the largest of several."""
     return float(np.max(np.std(_settled(results, signal), axis=0)))
 
 
 def peak_to_peak(results: PointResults, *, signal: str = OVERALL) -> float:
-    """Peak to peak of a signal; of several the largest."""
+    """Peak-to-peak value of a signal; the largest of several."""
     return float(np.max(np.ptp(_settled(results, signal), axis=0)))
 
 
@@ -237,7 +235,7 @@ def order_amplitudes(
 
 
 def run_harmonics(results: PointResults, *, mesh: str, count: int = 6, signal: str = OVERALL) -> dict[str, float]:
-    """Amplitudes of a signal at the order of a mesh and its multiples, in a run of two turns of the input or more."""
+    """Amplitudes of a signal at the order of a mesh and its multiples, in a run of at least two input revolutions."""
     meshes = {own.family: own.name for own in results.gearbox.meshes}
     if mesh not in meshes:
         raise PointError(f"no meshes {mesh!r}; meshes are {', '.join(meshes)}")
@@ -247,9 +245,9 @@ def run_harmonics(results: PointResults, *, mesh: str, count: int = 6, signal: s
 
 
 def _order_amplitudes(results: PointResults, signal: str, orders: list[float], spacing: float) -> list[float]:
-    """Peak amplitudes of a signal at orders of the input, those `spacing` apart told from each other.
+    """Return the zero-to-peak amplitudes of a signal at orders of the input that are `spacing` apart.
 
-    Hann's window over a whole number of periods of the spacing, at least two: its zeros then fall on all neighbours.
+    A Hann window over a whole number of periods of the spacing, at least two, has its zeros at all neighbouring orders.
     """
     values = _settled(results, signal)
     time = results.run["time"].to_numpy()
@@ -269,11 +267,11 @@ def _order_amplitudes(results: PointResults, signal: str, orders: list[float], s
     return [float(abs(np.exp(-1j * order * angle[:whole]) @ weighed)) for order in orders]
 
 
-# Outputs of steady responses over speed
+# Outputs of steady-state responses over speed
 
 
 def _amplitudes(results: PointResults, signal: str) -> Floats:
-    """Amplitudes (points, lines) of a signal."""
+    """Return the amplitudes (points, lines) of a signal."""
     names = [str(name) for name in results.steady["signal"].to_numpy()]
     if signal not in names:
         raise PointError(f"no signal {signal!r}; signals are {', '.join(names)}")
@@ -281,7 +279,7 @@ def _amplitudes(results: PointResults, signal: str) -> Floats:
 
 
 def _line(results: PointResults, name: str) -> int:
-    """Place of a line by its name, such as ``2 x sun_planet``."""
+    """Return the index of an order by its name, such as ``2 x sun_planet``."""
     bases = tuple(str(base) for base in results.steady["base"].to_numpy())
     names = [line_name(tuple(int(n) for n in row), bases) for row in results.steady["index"].to_numpy()]
     if name not in names:
@@ -290,17 +288,17 @@ def _line(results: PointResults, name: str) -> int:
 
 
 def largest_line(results: PointResults, *, line: str, signal: str = OVERALL) -> float:
-    """Largest amplitude over speed of a line of a signal, such as the line ``2 x sun_planet``."""
+    """Largest amplitude over speed of an order of a signal, such as the order ``2 x sun_planet``."""
     return float(_amplitudes(results, signal)[:, _line(results, line)].max())
 
 
 def loudest_peak(results: PointResults, *, signal: str = OVERALL) -> float:
-    """Amplitude of the loudest line of a signal over all speeds."""
+    """Amplitude of the highest order of a signal over all speeds."""
     return float(_amplitudes(results, signal)[:, 1:].max())
 
 
 def loudest_speed(results: PointResults, *, signal: str = OVERALL) -> float:
-    """Speed of the input at which a line of a signal is loudest."""
+    """Input speed at which an order of a signal is highest."""
     found = peaks(results.steady, signal)
     if found:
         return float(abs(found[0].speed))
@@ -310,7 +308,7 @@ def loudest_speed(results: PointResults, *, signal: str = OVERALL) -> float:
 def harmonics(
     results: PointResults, *, mesh: str, speed_rpm: float, count: int = 6, signal: str = OVERALL
 ) -> dict[str, float]:
-    """Amplitudes of the harmonics of a mesh in a signal, at the speed nearest to one."""
+    """Amplitudes of the harmonics of a mesh in a signal, at the speed nearest to a given one."""
     speeds = np.abs(results.steady["speed"].to_numpy())
     at = int(np.argmin(np.abs(speeds - abs(speed_rpm) * RPM)))
     values = _amplitudes(results, signal)[at]
@@ -321,14 +319,14 @@ def harmonics(
 # Outputs of transmission error tables and of contact over loads and misalignments
 
 LOADS = (0.25, 0.5, 1.0, 1.5)
-"""Loads over the static one that a ripple is looked at."""
+"""Default torques over the static torque, for outputs over loads and misalignments."""
 MISALIGNMENTS_UM = (-20.0, 0.0, 20.0)
-"""Openings at the +z end over the common face width."""
+"""Default gaps at the +z end over the common face width, µm."""
 POSITIONS = 16
 
 
 def ste_peak_to_peak(results: PointResults, *, pair: str) -> float:
-    """Peak to peak of the static transmission error of a pair at its static load."""
+    """Peak-to-peak static transmission error of a pair at its static load."""
     return float(np.ptp(results.table(pair).static_state["ste"].to_numpy()))
 
 
@@ -339,17 +337,17 @@ def ste_harmonic(results: PointResults, *, pair: str, harmonic: int = 1) -> floa
 
 
 def mesh_stiffness(results: PointResults, *, pair: str) -> float:
-    """Mean of the mesh stiffness of a pair over the cycle at its static load."""
+    """Mean mesh stiffness of a pair over the mesh cycle at its static load."""
     return float(results.table(pair).static_state["mesh_stiffness"].mean())
 
 
 def contact_pressure(results: PointResults, *, pair: str) -> float:
-    """Highest contact pressure of a pair over the cycle at its static load."""
+    """Maximum contact stress of a pair over the mesh cycle at its static load."""
     return float(results.table(pair).static_state["max_pressure"].max())
 
 
 def ripples(ste: Floats) -> Floats:
-    """Peak to peak over positions (the first axis) of a transmission error."""
+    """Return the peak-to-peak values of a transmission error over positions (the first axis)."""
     return np.asarray(np.ptp(ste, axis=0), dtype=np.float64)
 
 
@@ -361,7 +359,7 @@ def worst_ripple(
     misalignment_um: Sequence[float] = MISALIGNMENTS_UM,
     positions: int = POSITIONS,
 ) -> float:
-    """Largest peak to peak of the static transmission error over loads and misalignments."""
+    """Largest peak-to-peak static transmission error over loads and misalignments."""
     data = results.states(pair, positions, torque_factors, misalignment_um)
     return float(ripples(data["ste"].to_numpy()).max())
 
@@ -374,7 +372,7 @@ def mean_ripple(
     misalignment_um: Sequence[float] = MISALIGNMENTS_UM,
     positions: int = POSITIONS,
 ) -> float:
-    """Mean peak to peak of the static transmission error over loads and misalignments."""
+    """Mean peak-to-peak static transmission error over loads and misalignments."""
     data = results.states(pair, positions, torque_factors, misalignment_um)
     return float(ripples(data["ste"].to_numpy()).mean())
 
@@ -387,81 +385,81 @@ def worst_pressure(
     misalignment_um: Sequence[float] = MISALIGNMENTS_UM,
     positions: int = POSITIONS,
 ) -> float:
-    """Highest contact pressure inside the flank over loads and misalignments."""
+    """Maximum contact stress inside the flank over loads and misalignments."""
     data = results.states(pair, positions, torque_factors, misalignment_um)
     return float(data["max_pressure"].max())
 
 
-# Outputs of lives: safeties, damages and hours of gears and bearings, as the verb `life` tells them
+# Outputs of ratings: safeties, damages and hours of gears and bearings, as in the command `life`
 
 SAFETIES: Mapping[str, str] = {"life": "{}_safety", "static": "{}_static", "iso6336": "standard_{}_safety"}
-"""Words of the option `of`: over the life, under the largest load, over the life by stresses of the standard."""
+"""Values of the option `of`: over the life, under the largest load, over the life with stresses to ISO 6336."""
 LIVES: Mapping[str, str] = {"L10": "basic", "L10r": "reference", "L10m": "modified"}
-"""Words of the option `by`."""
+"""Values of the option `by`."""
 MINIMUM = "minimum"
-"""Word of the option `by`: whichever is worst for a bearing."""
+"""Value of the option `by` for the worst kind of life of each bearing."""
 Worst = Callable[[Iterable[float]], float]
 
 
 def contact_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
-    """Safety S_H against pitting by gear, flank and meshes, the worst of planets."""
+    """Safety factor S_H (pitting) by gear, flank and meshes; for planets the worst."""
     return _flank_values(results, SAFETIES[of].format("contact"))
 
 
 def root_safeties(results: PointResults, *, of: str = "life") -> dict[str, float]:
-    """Safety S_F against breakage of teeth by gear, flank and meshes, the worst of planets."""
+    """Safety factor S_F (tooth root breakage) by gear, flank and meshes; for planets the worst."""
     return _flank_values(results, SAFETIES[of].format("root"))
 
 
 def contact_damages(results: PointResults) -> dict[str, float]:
-    """Miner's sum of pitting by gear, flank and meshes, the worst of planets."""
+    """Pitting damage (Miner's sum) by gear, flank and meshes; for planets the worst."""
     return _flank_values(results, "contact_damage")
 
 
 def root_damages(results: PointResults) -> dict[str, float]:
-    """Miner's sum of breakage of teeth by gear, flank and meshes, the worst of planets."""
+    """Tooth root damage (Miner's sum) by gear, flank and meshes; for planets the worst."""
     return _flank_values(results, "root_damage")
 
 
 def worst_planets(results: PointResults) -> dict[str, float]:
-    """Which planet's flanks are worn most, by gear, flank and meshes: its number; none where there is but one body."""
+    """Planet (number) with the largest pitting damage by gear, flank and meshes; NaN for a single body."""
     data = results.life
     holders = zip(data["flank"].to_numpy().tolist(), data["flank_contact_holder"].to_numpy().tolist(), strict=True)
     return {str(label): _number_of(str(holder)) for label, holder in holders}
 
 
 def contact_safety(results: PointResults, *, gear: str = "", of: str = "life") -> float:
-    """Least safety S_H against pitting, of all gears or of one."""
+    """Minimum safety factor S_H (pitting), of all gears or of one."""
     return _worst(contact_safeties(results, of=of), gear, min)
 
 
 def root_safety(results: PointResults, *, gear: str = "", of: str = "life") -> float:
-    """Least safety S_F against breakage of teeth, of all gears or of one."""
+    """Minimum safety factor S_F (tooth root breakage), of all gears or of one."""
     return _worst(root_safeties(results, of=of), gear, min)
 
 
 def contact_damage(results: PointResults, *, gear: str = "") -> float:
-    """Largest Miner's sum of pitting, of all gears or of one."""
+    """Largest pitting damage (Miner's sum), of all gears or of one."""
     return _worst(contact_damages(results), gear, max)
 
 
 def root_damage(results: PointResults, *, gear: str = "") -> float:
-    """Largest Miner's sum of breakage of teeth, of all gears or of one."""
+    """Largest tooth root damage (Miner's sum), of all gears or of one."""
     return _worst(root_damages(results), gear, max)
 
 
 def bearing_lives(results: PointResults, *, by: str = MINIMUM) -> dict[str, float]:
-    """Hours until bearings fail by L10, L10r or L10m, or by whichever is least."""
+    """Bearing lives L10, L10r or L10m in hours, or the shortest of them."""
     return _bearing_values(results, "hours", by, min)
 
 
 def bearing_damages(results: PointResults, *, by: str = MINIMUM) -> dict[str, float]:
-    """Miner's sum of bearings by L10, L10r or L10m, or by whichever is worst."""
+    """Bearing damages (Miner's sums) by L10, L10r or L10m, or the largest of them."""
     return _bearing_values(results, "damage", by, max)
 
 
 def static_safeties(results: PointResults) -> dict[str, float]:
-    """Safety S_0 of bearings under the largest load."""
+    """Safety factor S_0 (static) of bearings under the largest load."""
     data = results.life
     return dict(
         zip(map(str, data["bearing"].to_numpy()), map(float, data["bearing_static_safety"].to_numpy()), strict=True)
@@ -469,22 +467,22 @@ def static_safeties(results: PointResults) -> dict[str, float]:
 
 
 def bearing_life(results: PointResults, *, bearing: str = "", by: str = MINIMUM) -> float:
-    """Least hours until a bearing fails, of all or of one."""
+    """Shortest bearing life in hours, of all bearings or of one."""
     return _worst(bearing_lives(results, by=by), bearing, min)
 
 
 def bearing_damage(results: PointResults, *, bearing: str = "", by: str = MINIMUM) -> float:
-    """Largest Miner's sum of bearings, of all or of one."""
+    """Largest bearing damage (Miner's sum), of all bearings or of one."""
     return _worst(bearing_damages(results, by=by), bearing, max)
 
 
 def static_safety(results: PointResults, *, bearing: str = "") -> float:
-    """Least static safety S_0 of bearings, of all or of one."""
+    """Minimum static safety factor S_0, of all bearings or of one."""
     return _worst(static_safeties(results), bearing, min)
 
 
 def life_hours(results: PointResults) -> float:
-    """Hours of operation until the first Miner's sum of a gear or a bearing is one."""
+    """Hours of operation until the first Miner's sum of a gear or a bearing reaches one."""
     from exugear.life.life_file import limits
 
     largest = max((damage for _, _, damage in limits(results.life)), default=math.nan)
@@ -497,7 +495,7 @@ def life_hours(results: PointResults) -> float:
 
 
 def shortfalls(results: PointResults) -> float:
-    """How many sentences the verb `life` ends with: parts that fail, or fall short of what is asked for."""
+    """Total number of failures and shortfalls in the command `life`: parts that fail or miss a required value."""
     return float(sum(len(json.loads(results.life.attrs[key])) for key in ("failures", "shortfalls")))
 
 
@@ -507,7 +505,7 @@ def _flank_values(results: PointResults, key: str) -> dict[str, float]:
 
 
 def _bearing_values(results: PointResults, key: str, by: str, worst: Worst) -> dict[str, float]:
-    """Return values by bearing, of one kind of life or the worst of all known ones."""
+    """Return values by bearing, for one kind of life or the worst of all known ones."""
     data = results.life
     names = [_name_of(kind, key) for kind in (LIVES.values() if by == MINIMUM else [LIVES[by]])]
     columns = zip(*(data[name].to_numpy().tolist() for name in names), strict=True)
@@ -523,7 +521,7 @@ def _name_of(kind: str, key: str) -> str:
 
 
 def _worst(values: Mapping[str, float], part: str, worst: Worst) -> float:
-    """Least or largest of those that are known, of all parts or of one."""
+    """Return the worst known value of all parts or of one."""
     own = {name: value for name, value in values.items() if part in ("", name, name.split(" ")[0])}
     known = [value for value in own.values() if not math.isnan(value)]
     if not known:
@@ -538,10 +536,10 @@ def _number_of(holder: str) -> float:
     return math.nan
 
 
-# All outputs that a study file can name; a study in Python may bring its own
+# Table of all outputs for study files; a study in Python may add its own
 
 AS_SIGNAL = "as the signal"
-"""Unit of outputs that an option `signal` names."""
+"""Unit of outputs with the unit of the signal in their option `signal`."""
 QUANTITIES: dict[str, Quantity] = {
     "ste_peak_to_peak": Quantity(ste_peak_to_peak, "m"),
     "ste_harmonic": Quantity(ste_harmonic, "m"),
@@ -587,26 +585,26 @@ QUANTITIES: dict[str, Quantity] = {
     "life_hours": Quantity(life_hours, "h", needs="life"),
     "shortfalls": Quantity(shortfalls, "1", needs="life"),
 }
-"""By the name in a study file."""
+"""Outputs by the name in a study file."""
 
 
 @dataclass(frozen=True)
 class Output:
-    """A output with its options, as a study keeps it."""
+    """Output with its options."""
 
     quantity: Quantity
     options: Mapping[str, Any]
 
     @property
     def units(self) -> str:
-        """Unit of its numbers; of a signal that one's."""
+        """Unit of its numbers; for a signal, the unit of the signal."""
         if self.quantity.units != AS_SIGNAL:
             return self.quantity.units
         named = str(self.options.get("signal", OVERALL)).split(" ")[0]
         return next((signal.units for signal in SIGNALS if signal.name == named), "")
 
     def of(self, results: PointResults) -> Values:
-        """Compute it for a point."""
+        """Compute the output for a point."""
         return self.quantity.of(results, self.options)
 
 
@@ -616,7 +614,7 @@ def outputs_of(sections: Mapping[str, Mapping[str, Any]], known: Mapping[str, Qu
     Parameters
     ----------
     sections : by the name in the dataset: ``quantity`` and its options
-    known : quantities that may be named
+    known : available kinds of output
 
     Raises
     ------

@@ -1,9 +1,9 @@
-"""A study carried out: what is there is taken, what is missing computed, all put together.
+"""Execution of studies and optimisations: missing points are computed, and all points combined into a dataset.
 
-Each search is scipy's differential evolution: generations of points, computed as any points of a study, so that they
-are kept, shared by all searches, and found again after a kill. Two outputs are brought into one by the larger of both,
-weighed and over their values of the case as it is (Chebyshev), which reaches bent-in fronts as well. Limits are
-constraints of the evolution. With tolerances every point is as many as there are draws, the same at every point, and
+Each optimisation uses scipy's differential evolution. Its generations of points are computed like those of any study:
+they are stored, shared by all searches, and reused after an interruption. Two outputs are combined as the larger of
+both, weighted and relative to their values for the unchanged gearbox (Chebyshev), which also reaches non-convex Pareto
+fronts. Limits are constraints of the evolution. With tolerances, each point is evaluated for the same set of draws, and
 a percentile of each output counts.
 """
 
@@ -43,14 +43,14 @@ STUDY_FILE = "study.json"
 
 @dataclass(frozen=True)
 class Shard:
-    """A part of a study: every n-th point."""
+    """Part of a study: every n-th point."""
 
     number: int
     of: int
-    """Part `number` of `of`, counted from 1."""
+    """Number of parts; this is part `number` of `of`, counted from 1."""
 
     def __post_init__(self) -> None:
-        """Refuse a part that there is not."""
+        """Refuse a part that does not exist."""
         if not 1 <= self.number <= self.of:
             raise ValueError(f"shard {self.number}/{self.of}: parts are 1/{self.of} to {self.of}/{self.of}")
 
@@ -71,25 +71,25 @@ class Shard:
 
 WHOLE = Shard(1, 1)
 Progress = Callable[[int, int, int], None]
-"""Called with the finished points, those that failed among them, and all."""
+"""Called with the numbers of finished points, of failed points among them, and of all points."""
 
 
 @dataclass(frozen=True)
 class StudyResult:
-    """What came of a study."""
+    """Result of the execution of a study."""
 
     records: Mapping[str, Record]
-    """By hash, of all its points that are finished."""
+    """By hash, all its finished points."""
     computed: int
-    """Points that were computed now."""
+    """Number of points computed in this call."""
     path: Path | None
-    """File of the dataset; none was written for a part whose other parts are not finished."""
+    """File of the dataset; None for a part if other parts are not finished."""
     dataset: xr.Dataset | None
-    """What it holds."""
+    """Content of the dataset."""
 
     @property
     def failed(self) -> list[Record]:
-        """Points that failed."""
+        """Failed points."""
         return [record for record in self.records.values() if record.error]
 
 
@@ -103,16 +103,16 @@ def run_study(
     merge: bool = False,
     progress: Progress | None = None,
 ) -> StudyResult:
-    """Carry out a study; points that are finished in the folder are not computed again.
+    """Execute a study; points already finished in the folder are reused.
 
     Parameters
     ----------
-    folder : where points, what they share and the dataset are kept
+    folder : folder of the points, shared results and the dataset
     opens : callable, optional
         Starts workers, see `exugear.studies.executors`; processes on all cores by default.
     shard : the part to compute
-    retry : whether points that failed before are computed again
-    merge : compute nothing; put together what is there
+    retry : whether to compute failed points again
+    merge : whether to combine the available points without any computation
 
     Raises
     ------
@@ -151,26 +151,26 @@ def run_study(
 
 
 def task_of(study: Study, folder: Path) -> Task:
-    """Gather what all points have in common."""
+    """Return the common data of all points."""
     gearbox = study.gearbox
     names = {path: name for name, parameter in study.file.parameters.items() for path in parameter.targets}
     settings = (study.choice, study.settings, study.outputs)
     return Task(gearbox.content, gearbox.source, gearbox.permissions, *settings, folder, names)
 
 
-# Search for parameters that make one output small, or two weighed against each other, within limits of others
+# Optimisation: parameters that minimise one output, or two with weights, within limits of other outputs
 
 BLEND = 0.05
-"""Share of the sum of both outputs beside the larger one: of two points that are equal in one, the better wins."""
+"""Weight of the sum of both outputs next to the larger one, which decides between points with an equal maximum."""
 
 
 class OptimisationError(RuntimeError):
-    """A search that cannot begin."""
+    """Error: an optimisation cannot begin."""
 
 
 @dataclass
 class _Evaluated:
-    """Points that searches looked at."""
+    """Points evaluated by optimisations."""
 
     study: Study
     task: Task
@@ -182,11 +182,11 @@ class _Evaluated:
 
     @cached_property
     def criteria(self) -> Criteria:
-        """What points are judged by."""
+        """Criteria for the points."""
         return Criteria.of(self.study.file)
 
     def look_at(self, values: Floats) -> list[EvaluatedPoint]:
-        """Compute what is not known yet of parameters (points, parameters)."""
+        """Evaluate parameters (points, parameters); known points are reused."""
         return self._seen([self._looked(row, self._changes(row)) for row in values])
 
     def of_case(self) -> Floats:
@@ -195,7 +195,7 @@ class _Evaluated:
         Raises
         ------
         OptimisationError
-            It has none.
+            They are not available.
         """
         nothing = np.full(len(self.study.file.parameters), math.nan)
         (looked,) = self._seen([self._looked(nothing, {})])
@@ -211,7 +211,7 @@ class _Evaluated:
         return self.criteria.minimised(self._figure, points)
 
     def violations(self, points: Sequence[EvaluatedPoint]) -> Floats:
-        """How far points are beyond limits (points, limits), over the limit; negative within."""
+        """Return the violations of limits (points, limits), relative to the limit; negative within limits."""
         return self.criteria.violations(self._figure, points)
 
     def _figure(self, looked: EvaluatedPoint, output: str) -> Floats:
@@ -249,7 +249,7 @@ class _Evaluated:
 
     @property
     def expected(self) -> int:
-        """Most points that all searches look at."""
+        """Maximum number of points of all searches."""
         wanted = self.study.file.optimise
         assert wanted is not None
         searches = wanted.weightings if len(wanted.minimise) == 2 else 1
@@ -260,24 +260,24 @@ class _Evaluated:
 def optimise(
     study: Study, folder: str | Path, opens: Opens | None = None, *, progress: Progress | None = None
 ) -> StudyResult:
-    """Search for the parameters of a study that has a section ``optimise``.
+    """Optimise the parameters of a study with a section ``optimise``.
 
     Parameters
     ----------
-    folder : where points and the dataset are kept
+    folder : folder of the points and the dataset
     opens : callable, optional
         Starts workers; processes on all cores by default.
 
     Returns
     -------
     StudyResult
-        Its dataset holds all points that were looked at; `on_front` says which of them no other beats in all outputs,
-        `meets_limits` which keep the limits.
+        Its dataset holds all evaluated points; `on_front` marks the Pareto-optimal ones, `meets_limits` those within
+        all limits.
 
     Raises
     ------
     OptimisationError
-        The case as it is has no outputs, or there is no such section.
+        The unchanged gearbox has no outputs, or there is no such section.
     ExecutorError, OSError
         As `exugear.studies.runner.run_study`.
     """
@@ -299,7 +299,7 @@ def optimise(
 
 
 def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
-    """One search; it begins with points spread evenly and with the best that was seen before."""
+    """Run one search from evenly distributed points and the best known ones."""
     from scipy.optimize import Bounds, NonlinearConstraint, differential_evolution
 
     wanted = seen.study.file.optimise
@@ -311,7 +311,7 @@ def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
     known = _best(seen, weights, wanted.population // 4)
     begin[: len(known)] = known
 
-    def objective(columns: Floats, /, *_: Any) -> Any:  # of all columns at once, which its type does not know
+    def objective(columns: Floats, /, *_: Any) -> Any:  # takes all columns at once, which its type does not state
         return mixed(seen.minimised(seen.look_at(np.atleast_2d(columns.T))), weights)
 
     def beyond(columns: Floats) -> Any:
@@ -332,7 +332,7 @@ def _search(seen: _Evaluated, weights: Floats, seed: int) -> None:
 
 
 def mixed(outputs: Floats, weights: Floats) -> Floats:
-    """Bring outputs (points, outputs) into one number each: the largest when weighed, and a little of all.
+    """Combine outputs (points, outputs) into one number each: the weighted maximum plus a small part of the sum.
 
     Examples
     --------
@@ -344,7 +344,7 @@ def mixed(outputs: Floats, weights: Floats) -> Floats:
 
 
 def _best(seen: _Evaluated, weights: Floats, count: int) -> Floats:
-    """Parameters (count, parameters) of the best points that were seen, those within all limits first."""
+    """Return the parameters (count, parameters) of the best known points, those within all limits first."""
     points = [looked for looked in seen.points.values() if np.isfinite(looked.row).all()]
     if not points or not count:
         return np.zeros((0, len(seen.study.file.parameters)))

@@ -1,4 +1,4 @@
-"""The points of a study: every combination of listed values with every draw, as values at paths of the case."""
+"""Points of a study: all combinations of listed values with all draws, as values by path in the gearbox file."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from exugear.studies.sections import ParameterSection, StudyFile
 from fe_ste.standards.iso1328 import tolerance
 from fe_ste.tools.arrays import Floats
 
-# Distributions of parameters, by the inverse of their distribution functions, and draws that are correlated
+# Distributions of parameters by their inverse distribution functions, and correlated draws
 
 Sampling = Literal["sobol", "latin_hypercube", "random"]
 _OPEN = 1e-15
-"""Distance from 0 and 1 at which a share is kept: a normal distribution has no end."""
+"""Minimum distance of a probability from 0 and 1, as a normal distribution is unbounded."""
 
 
 class Distribution(Protocol):
-    """What draws are taken from."""
+    """Distribution of draws."""
 
     def at(self, share: Floats) -> Floats:
-        """Values that a share (0 to 1) of all draws lies below."""
+        """Return the quantiles for probabilities (0 to 1)."""
         ...
 
 
 @dataclass(frozen=True)
 class Normal:
-    """Normal distribution, cut off where limits are given.
+    """Normal distribution, truncated at limits if these are given.
 
     Examples
     --------
@@ -46,13 +46,13 @@ class Normal:
 
     mean: float
     deviation: float
-    """Of the distribution before it is cut off."""
+    """Standard deviation before truncation."""
     least: float = -math.inf
     most: float = math.inf
-    """Draws lie between."""
+    """Limits of the draws."""
 
     def at(self, share: Floats) -> Floats:
-        """Values that a share (0 to 1) of all draws lies below."""
+        """Return the quantiles for probabilities (0 to 1)."""
         low, high = ndtr((np.array([self.least, self.most]) - self.mean) / self.deviation)
         inside = np.clip(low + share * (high - low), _OPEN, 1.0 - _OPEN)
         values = self.mean + self.deviation * ndtri(inside)
@@ -61,7 +61,7 @@ class Normal:
 
 @dataclass(frozen=True)
 class Uniform:
-    """Every value between two is as likely.
+    """Uniform distribution between two values.
 
     Examples
     --------
@@ -73,19 +73,19 @@ class Uniform:
     most: float
 
     def at(self, share: Floats) -> Floats:
-        """Values that a share (0 to 1) of all draws lies below."""
+        """Return the quantiles for probabilities (0 to 1)."""
         return np.asarray(self.least + share * (self.most - self.least), dtype=np.float64)
 
 
 def shares(sampling: Sampling, count: int, dimensions: int, seed: int) -> Floats:
-    """Points of the unit cube (count, dimensions), evenly spread; the same for the same seed.
+    """Return points of the unit cube (count, dimensions), evenly distributed; reproducible by the seed.
 
-    A Sobol sequence that is made longer begins with the points it had.
+    A longer Sobol sequence begins with the points of a shorter one.
 
     Parameters
     ----------
     sampling : {"sobol", "latin_hypercube", "random"}
-    count : of Sobol points a power of two
+    count : for Sobol points a power of two
 
     Examples
     --------
@@ -103,11 +103,11 @@ def shares(sampling: Sampling, count: int, dimensions: int, seed: int) -> Floats
 
 
 def correlated(independent: Floats, correlation: float) -> Floats:
-    """Shares (count, members) of a group whose members are correlated pair by pair (Gaussian copula).
+    """Return probabilities (count, members) of a group with equal pairwise correlation (Gaussian copula).
 
     Parameters
     ----------
-    independent : (count, members) shares that are not correlated
+    independent : (count, members) uncorrelated probabilities
     correlation : of the normal variables behind any two members, 0 to 1
 
     Examples
@@ -126,23 +126,23 @@ def correlated(independent: Floats, correlation: float) -> Floats:
     return np.asarray(ndtr(normal), dtype=np.float64)
 
 
-# Dotted paths into a gearbox file: what stands there, what may stand there, and a content with other values
+# Dotted paths into a gearbox file: present values, permitted paths, and contents with other values
 
 SHOWN_MATCHES = 3
-"""Most near matches that a message names."""
+"""Maximum number of near matches in a message."""
 
 
 class PathError(ValueError):
-    """A path that leads nowhere in a gearbox file; the message names near matches."""
+    """Error: a path does not exist in a gearbox file; the message lists near matches."""
 
 
 def value_at(content: Mapping[str, Any], path: str) -> Any:
-    """Return what stands at a path; None where nothing does.
+    """Return the value at a path; None if there is none.
 
     Parameters
     ----------
     content : of a gearbox file
-    path : keys joined by dots; an entry of a list by its number from 0
+    path : keys joined by dots; list entries are numbered from 0
 
     Examples
     --------
@@ -163,12 +163,12 @@ def value_at(content: Mapping[str, Any], path: str) -> Any:
 
 
 def changed(content: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a content with other values at some paths; tables on the way are made, what is not changed is shared.
+    """Return a content with other values at some paths; missing tables are created, unchanged parts are shared.
 
     Raises
     ------
     PathError
-        A path leads through what is neither table nor list, or beyond the end of a list.
+        A path passes through a value that is neither table nor list, or beyond the end of a list.
 
     Examples
     --------
@@ -199,7 +199,7 @@ def _inner(section: Any, key: str, path: str) -> Any:
 
 
 def _place(section: Any, key: str, path: str) -> Any:
-    """Key of a table, or number of an entry of a list."""
+    """Return the key of a table, or the index of a list entry."""
     if not isinstance(section, list):
         return key
     if not (key.isdigit() and int(key) < len(section)):
@@ -208,14 +208,14 @@ def _place(section: Any, key: str, path: str) -> Any:
 
 
 def check_path(content: Mapping[str, Any], path: str) -> None:
-    """Refuse a path that leads nowhere.
+    """Refuse a path that does not exist.
 
-    A key that the file leaves out, and that may stand there, is fine.
+    Optional keys that the file omits are permitted.
 
     Raises
     ------
     PathError
-        It names near matches.
+        The message lists near matches.
 
     Examples
     --------
@@ -237,7 +237,7 @@ def check_path(content: Mapping[str, Any], path: str) -> None:
 
 
 def _present(content: Any, before: str) -> Iterator[str]:
-    """Paths of all single values of a content."""
+    """Yield the paths of all single values of a content."""
     if isinstance(content, Mapping):
         for key, value in content.items():
             yield from _present(value, f"{before}.{key}" if before else key)
@@ -246,14 +246,14 @@ def _present(content: Any, before: str) -> Iterator[str]:
 
 
 def _possible(content: Mapping[str, Any]) -> Iterator[str]:
-    """Paths of all keys that may stand in the file, for the names that it has."""
+    """Yield the paths of all keys permitted in the file, for the names that it contains."""
     for table, model in tables().items():
         for place in _named(content, table.split(".") if table else []):
             yield from (f"{place}.{key}" if place else key for key in model.model_fields)
 
 
 def _named(content: Any, pattern: list[str], before: str = "") -> Iterator[str]:
-    """Places of a table: the word NAME of its pattern stands for each entry that is there."""
+    """Yield the paths of a table, with each existing entry in place of NAME in its pattern."""
     if not pattern:
         yield before
         return
@@ -265,7 +265,7 @@ def _named(content: Any, pattern: list[str], before: str = "") -> Iterator[str]:
         yield from _named(inner, rest, f"{before}.{name}" if before else name)
 
 
-# The points of a study: every combination of listed values with every draw, as values at paths of the case
+# Points of a study: all combinations of listed values with all draws, as values by path in the gearbox file
 
 MOST_POINTS = 10_000_000
 SAMPLE = "sample"
@@ -274,29 +274,29 @@ PARAMETER, SIDE = "parameter", "side"
 """Dimensions of local derivatives."""
 SIDES = ("below", "above")
 _DEVIATIONS_WITHIN = 3.0
-"""Standard deviations of a production within its tolerance."""
+"""Number of standard deviations of production within its tolerance."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """One variation."""
+    """One variation of the gearbox."""
 
     index: tuple[int, ...]
-    """Its place along the dimensions of the study."""
+    """Index along the dimensions of the study."""
     changes: Mapping[str, Any]
-    """Values at paths of the case."""
+    """Values by path in the gearbox file."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A coordinate of the study's dataset."""
+    """Coordinate of the study's dataset."""
 
     dimensions: tuple[str, ...]
     values: Any
     """Array."""
     units: str = ""
     path: str = ""
-    """What it sets, in words."""
+    """Paths that it sets, as text."""
 
 
 @dataclass(frozen=True)
@@ -309,26 +309,26 @@ class Design:
     """By name."""
     points: tuple[Point, ...]
     levels: Mapping[str, tuple[Mapping[str, Any], ...]] = field(default_factory=dict)
-    """By dimension, values at paths of the case along each dimension; points are all their combinations."""
+    """By dimension, values by path in the gearbox file along each dimension; points are all their combinations."""
 
 
 @dataclass(frozen=True)
 class _Levels:
-    """Values that a listed parameter takes one after the other."""
+    """Successive values of a listed parameter."""
 
     axes: Mapping[str, Axis]
     changes: tuple[Mapping[str, Any], ...]
 
 
 def design_of(study: StudyFile, gearbox: Gearbox) -> Design:
-    """Make the points of a study of a gearbox whose `changes` are made.
+    """Return the points of a study for a gearbox that already has its `changes`.
 
     Raises
     ------
     PathError
-        Values are scaled or shifted that are no numbers, or there are too many points.
+        Values to be scaled or shifted are not numbers, or there are too many points.
     ValueError
-        A tolerance class that the gear has not got.
+        A tolerance class is not available for the gear.
     """
     if any(parameter.kind == "step" for parameter in study.parameters.values()):
         return _derivatives(study, gearbox)
@@ -357,7 +357,7 @@ def design_of(study: StudyFile, gearbox: Gearbox) -> Design:
 
 
 def _levels(name: str, parameter: ParameterSection, gearbox: Gearbox) -> _Levels:
-    """Values of a parameter that lists them."""
+    """Return the values of a parameter that lists them."""
     if parameter.settings is not None:
         labels = np.array(list(parameter.settings), dtype=object)
         axis = Axis((name,), labels, "", ", ".join(parameter.targets))
@@ -369,7 +369,7 @@ def _levels(name: str, parameter: ParameterSection, gearbox: Gearbox) -> _Levels
 
 
 def listed_values(parameter: ParameterSection) -> list[Any]:
-    """Values of a list or a range."""
+    """Return the values of a list or a range."""
     if parameter.range is None:
         return list(parameter.values or [])
     spread = np.geomspace if parameter.range.scale == "logarithmic" else np.linspace
@@ -377,30 +377,30 @@ def listed_values(parameter: ParameterSection) -> list[Any]:
 
 
 def _labels(values: list[Any]) -> Any:
-    """Numbers as they are; anything else in words."""
+    """Return numbers as they are, and other values as text."""
     if all(isinstance(value, int | float) and not isinstance(value, bool) for value in values):
         return np.array(values, dtype=np.float64)
     return np.array([value if isinstance(value, str) else str(value) for value in values], dtype=object)
 
 
 def acting(parameter: ParameterSection, gearbox: Gearbox, path: str, value: Any) -> Any:
-    """Value at a path: as it is, or by that of the case.
+    """Return the new value at a path: the value itself, or the gearbox file's value scaled or shifted by it.
 
     Raises
     ------
     PathError
-        The case has no number there.
+        The gearbox file has no number there.
     """
     return acted(parameter, own_value(gearbox, path), path, value)
 
 
 def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
-    """Value at a path: as it is, or by one that stands there.
+    """Return the new value at a path: the value itself, or the present one scaled or shifted by it.
 
     Raises
     ------
     PathError
-        No number stands there.
+        The present value is not a number.
     """
     if parameter.acts == "replaces":
         return value
@@ -413,7 +413,7 @@ def acted(parameter: ParameterSection, own: Any, path: str, value: Any) -> Any:
 
 
 def own_value(gearbox: Gearbox, path: str) -> Any:
-    """Value that a case has at a path, also where the file leaves it to the default."""
+    """Return the value of a gearbox file at a path, or the default of an omitted key."""
     given = value_at(gearbox.content, path)
     if given is not None:
         return given
@@ -424,12 +424,12 @@ def own_value(gearbox: Gearbox, path: str) -> Any:
 
 
 def _rounded(value: float) -> float:
-    """Twelve digits: what another machine computes is the same point."""
+    """Round to twelve digits, so that results of different machines give the same point."""
     return float(f"{value:.12g}")
 
 
 def units_of(parameter: ParameterSection) -> str:
-    """Return the unit of the values, from the ends of the keys that they set."""
+    """Return the unit of the values, from the suffixes of the keys that they set."""
     if parameter.acts == "scales":
         return "1"
     units = {unit_of(path.rpartition(".")[2]) for path in parameter.targets}
@@ -439,7 +439,7 @@ def units_of(parameter: ParameterSection) -> str:
 
 
 def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox) -> _Levels:
-    """Values of all parameters with distributions, drawn together."""
+    """Return the values of all parameters with distributions, drawn together."""
     axes, draws = drawn_values(study, drawn, gearbox)
     axes = {SAMPLE: Axis((SAMPLE,), np.arange(1, len(draws) + 1)), **axes}
     owners = {path: parameter for parameter in drawn.values() for path in parameter.targets}
@@ -450,7 +450,7 @@ def _draws(study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gea
 def drawn_values(
     study: StudyFile, drawn: Mapping[str, ParameterSection], gearbox: Gearbox
 ) -> tuple[dict[str, Axis], list[dict[str, float]]]:
-    """Coordinates of parameters with distributions over their draws, and values by path before they act.
+    """Return the coordinates of drawn parameters over the draws, and the values by path before scaling or shifting.
 
     Raises
     ------
@@ -475,7 +475,7 @@ def drawn_values(
 
 
 def _drawn_axes(name: str, parameter: ParameterSection, values: Floats) -> dict[str, Axis]:
-    """Coordinates of a drawn parameter: over the draws, and over its paths where these are drawn by themselves."""
+    """Return the coordinates of a drawn parameter: over the draws, and over its paths if drawn separately."""
     units = units_of(parameter)
     paths = ", ".join(parameter.targets)
     if values.shape[1] == 1:
@@ -488,12 +488,12 @@ def _drawn_axes(name: str, parameter: ParameterSection, values: Floats) -> dict[
 
 
 def distribution_of(parameter: ParameterSection, gearbox: Gearbox) -> Distribution:
-    """Distribution of a parameter.
+    """Return the distribution of a parameter.
 
     Raises
     ------
     ValueError
-        The case has no such gear, or it lies outside ISO 1328.
+        The gearbox file has no such gear, or the gear is outside the range of ISO 1328.
     """
     if parameter.uniform is not None:
         return Uniform(parameter.uniform.min, parameter.uniform.max)
@@ -513,12 +513,12 @@ def distribution_of(parameter: ParameterSection, gearbox: Gearbox) -> Distributi
         normal_module=gear.normal_module,
         face_width=gear.face_width,
     )
-    least = 0.0 if wanted.deviation == "runout" else -most  # half of the normal distribution: it has no sign
+    least = 0.0 if wanted.deviation == "runout" else -most  # half-normal distribution, as the deviation has no sign
     return Normal(0.0, most / _DEVIATIONS_WITHIN, least, most)
 
 
 def _derivatives(study: StudyFile, gearbox: Gearbox) -> Design:
-    """Two points for each parameter, a step below and a step above the case."""
+    """Return two points for each parameter, one step below and above its present value."""
     points = []
     steps = []
     for number, parameter in enumerate(study.parameters.values()):
@@ -542,27 +542,27 @@ def _derivatives(study: StudyFile, gearbox: Gearbox) -> Design:
     return Design({PARAMETER: len(study.parameters), SIDE: len(SIDES)}, axes, tuple(points), levels)
 
 
-# Tolerances of a search: what production does not hold, the same draws at every point that is looked at
+# Tolerances of an optimisation: production scatter, with the same draws at every evaluated point
 
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Draws of all tolerances together."""
+    """Joint draws of all tolerances."""
 
     axes: Mapping[str, Axis]
     """By name, coordinates over the draws."""
     draws: tuple[Mapping[str, float], ...]
-    """Tuple of mapping of path to float. Values before they act."""
+    """Tuple of mapping of path to float. Values before scaling or shifting."""
     acting: Mapping[str, ParameterSection]
-    """Mapping of path to ParameterSection. What a value at a path does."""
+    """Mapping of path to ParameterSection. Parameter with the action of a value at a path."""
 
     def produced(self, gearbox: Gearbox, changes: Mapping[str, Any]) -> list[dict[str, Any]]:
-        """Values at paths of the case, of each draw: a tolerance shifts or scales what a point has set.
+        """Return the values by path of each draw: a tolerance shifts or scales the value of the point.
 
         Raises
         ------
         PathError
-            There is no number that a value scales or shifts.
+            The value to be scaled or shifted is not a number.
         """
         return [
             {
@@ -577,7 +577,7 @@ class Tolerances:
 
 
 def tolerances_of(study: StudyFile, gearbox: Gearbox) -> Tolerances | None:
-    """Draw the tolerances of a study; None where it has none.
+    """Draw the tolerances of a study; None if it has none.
 
     Raises
     ------
@@ -594,16 +594,16 @@ def tolerances_of(study: StudyFile, gearbox: Gearbox) -> Tolerances | None:
 
 
 def percentile_of(values: Floats, percent: float) -> Floats:
-    """Percentile along the last axis, of a sample of draws; one beside a value without end is that of the worse draw.
+    """Return the percentile along the last axis of a sample of draws; next to an infinite value, the worse draw counts.
 
     Parameters
     ----------
     values : (..., draws)
-    percent : 50 and above; below it the mirrored one, which errs to the side of small values
+    percent : for values below 50 the percentile is mirrored, so that the worse draw is the smaller one
 
     Notes
     -----
-    Between draws by Hyndman and Fan's eighth rule, whose median error is least whatever the distribution.
+    Values are interpolated by rule 8 of Hyndman and Fan, which is approximately median-unbiased for any distribution.
 
     Examples
     --------
@@ -613,6 +613,6 @@ def percentile_of(values: Floats, percent: float) -> Floats:
     if percent < 50.0:
         return np.asarray(-percentile_of(-values, 100.0 - percent))
     finite = np.isfinite(values).all(axis=-1)
-    with np.errstate(invalid="ignore"):  # beside what has no end
+    with np.errstate(invalid="ignore"):  # next to infinite values
         between = np.percentile(values, percent, axis=-1, method="median_unbiased")
     return np.where(finite, between, np.percentile(values, percent, axis=-1, method="higher"))

@@ -1,4 +1,4 @@
-"""Sections of a study file as it is written: parameters, what is computed, and which outputs are kept."""
+"""Sections of a study file: parameters, computations and outputs."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from exugear.gearbox.variant import Variant
 from fe_ste.tools.files import FileError, read_text
 
 Value = int | Annotated[float, AllowInfNan(True)] | str | bool | list[Any]
-"""What may stand at a key of a case; what may not becomes a failed point with its name."""
+"""Value of a key of the gearbox file; an invalid one yields a failed point with its name."""
 MOST_VALUES = 100_000
 DottedPath = Annotated[str, Field(min_length=1, max_length=400)]
 
 
 class StudyPart(BaseModel):
-    """A table of the study file; no key or type is guessed."""
+    """Table of the study file; unknown keys and wrong types are refused."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 class RangeSection(StudyPart):
-    """Values from one to another."""
+    """Range of values."""
 
     first: float
     """First value."""
     last: float
     """Last value."""
     count: Annotated[int, Field(ge=2, le=MOST_VALUES)]
-    """How many, both ends included."""
+    """Number of values, both ends included."""
     scale: Literal["linear", "logarithmic"] = "linear"
-    """Equal differences, or equal ratios."""
+    """Equal differences or equal ratios."""
 
     @model_validator(mode="after")
     def _signs(self) -> RangeSection:
@@ -47,16 +47,16 @@ class RangeSection(StudyPart):
 
 
 class NormalSection(StudyPart):
-    """Normal distribution, cut off at limits where they are given."""
+    """Normal distribution, truncated at limits if these are given."""
 
     mean: float = 0.0
     """Mean."""
     deviation: Annotated[float, Field(gt=0.0)]
-    """Standard deviation before it is cut off."""
+    """Standard deviation before truncation."""
     min: float | None = None
-    """No draw lies below."""
+    """Lower limit of the draws."""
     max: float | None = None
-    """No draw lies above."""
+    """Upper limit of the draws."""
 
     @model_validator(mode="after")
     def _order(self) -> NormalSection:
@@ -66,7 +66,7 @@ class NormalSection(StudyPart):
 
 
 class UniformSection(StudyPart):
-    """Every value between two is as likely."""
+    """Uniform distribution between two values."""
 
     min: float
     """Lower end."""
@@ -81,10 +81,10 @@ class UniformSection(StudyPart):
 
 
 class ToleranceSection(StudyPart):
-    """Flank deviation of a tolerance class of ISO 1328-1: normal, cut off at the tolerance, three deviations away."""
+    """Flank deviation of a tolerance class of ISO 1328-1: normal, truncated at the tolerance (three sigma)."""
 
     gear: Name
-    """Gear of the case."""
+    """Gear of the gearbox file."""
     deviation: Literal["profile_slope", "helix_slope", "single_pitch", "cumulative_pitch", "runout"]
     """Kind of deviation."""
     tolerance_class: Annotated[int, Field(ge=1, le=11)]
@@ -92,43 +92,43 @@ class ToleranceSection(StudyPart):
 
 
 KINDS = ("values", "range", "normal", "uniform", "iso1328", "settings", "step")
-"""Keys that say which values a parameter takes."""
+"""Keys for the values of a parameter."""
 
 
 class ParameterSection(StudyPart):
-    """What is varied: one key of the case or several together, and the values they take."""
+    """Parameter: one key of the gearbox file, or several together, and their values."""
 
     path: DottedPath | None = None
-    """Key of the case, such as ``housing.factor``."""
+    """Key of the gearbox file, such as ``housing.factor``."""
     paths: Annotated[list[DottedPath], Field(min_length=2, max_length=500)] | None = None
-    """Several keys: with one value for all, or with `correlation` draws of their own."""
+    """Several keys: with a common value, or with separate draws according to `correlation`."""
     acts: Literal["replaces", "scales", "shifts"] = "replaces"
-    """Whether a value stands for that of the case, multiplies it or is added to it."""
+    """Whether a value replaces that of the gearbox file, multiplies it or is added to it."""
     values: Annotated[list[Value], Field(min_length=1, max_length=MOST_VALUES)] | None = None
-    """A list."""
+    """List of values."""
     range: RangeSection | None = None
-    """From one value to another."""
+    """Range of values."""
     normal: NormalSection | None = None
-    """A normal distribution."""
+    """Normal distribution."""
     uniform: UniformSection | None = None
-    """A uniform distribution."""
+    """Uniform distribution."""
     iso1328: ToleranceSection | None = None
-    """A tolerance class of flank deviations."""
+    """Tolerance class of flank deviations."""
     settings: Annotated[dict[str, dict[DottedPath, Value]], Field(min_length=1, max_length=1000)] | None = None
-    """Several keys by the names of what they are together."""
+    """Several keys with their values, by the name of each combination."""
     step: Annotated[float, Field(gt=0.0)] | None = None
-    """Half the difference that a local derivative is taken over, in the unit of the values."""
+    """Step of the central difference for a local derivative, in the unit of the values."""
     correlation: Annotated[float, Field(ge=0.0, le=1.0)] = 1.0
-    """Of the draws of several paths: 1 is one draw for all, 0 are independent draws."""
+    """Correlation of the draws of several paths: 1 is one draw for all, 0 are independent draws."""
 
     @property
     def kind(self) -> str:
-        """Which of `KINDS` it has."""
+        """Key of `KINDS` that it contains."""
         return next(kind for kind in KINDS if getattr(self, kind) is not None)
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Keys of the case that it sets."""
+        """Keys of the gearbox file that it sets."""
         if self.settings is not None:
             return tuple(dict.fromkeys(path for setting in self.settings.values() for path in setting))
         if self.path is not None:
@@ -155,49 +155,49 @@ class ParameterSection(StudyPart):
 
 
 class ChoiceSection(StudyPart):
-    """What is computed of the gearbox, as on the command line."""
+    """Model settings, as on the command line."""
 
     variant: Annotated[str, AfterValidator(Variant.offered)] = Variant.bushing
-    """How bodies are held."""
+    """Support of the bodies."""
     mesh_model: str = "line_of_action"
-    """How teeth push each other."""
+    """Mesh model."""
     inertias: str | None = None
-    """Inertia set; that of the case by default."""
+    """Inertia set; by default that of the gearbox file."""
     load_case: str | None = None
     """Load case of runs; the first by default."""
 
 
 class SteadySection(StudyPart):
-    """Steady responses, for outputs that are read from them."""
+    """Settings of steady-state responses, for outputs that need them."""
 
     speeds: str
     """FIRST:LAST:COUNT in rpm of the input."""
     method: Literal["linear", "parametric", "nonlinear"] = "parametric"
-    """What varies."""
+    """Method of the response: mean mesh stiffness, time-varying stiffness, or contact loss."""
     harmonics: Annotated[int, Field(ge=1, le=100)] | None = None
-    """Harmonics of each mesh frequency; by default as many as the mesh stiffness asks for."""
+    """Number of harmonics of each mesh frequency; by default chosen from the mesh stiffness."""
     combinations: Annotated[int, Field(ge=1, le=20)] = 3
     """Largest sum of multiples of several mesh frequencies."""
     at_resonances: bool = True
-    """Whether speeds are added where lines cross modes."""
+    """Whether speeds are added at crossings of orders with modes."""
 
 
 class RunSection(StudyPart):
-    """Runs in time, for outputs that are read from them."""
+    """Settings of runs, for outputs that need them."""
 
     duration_s: Annotated[float, Field(gt=0.0)] | None = None
-    """Simulated time; that of the load case by default."""
+    """Simulated time; by default that of the load case."""
     solver: Literal["compiled", "exudyn"] | None = None
-    """The compiled one where it applies by default."""
+    """Solver; by default the compiled one where applicable."""
 
 
 class LimitSection(StudyPart):
-    """Bounds that a output is kept within by a search."""
+    """Limits of an output in an optimisation."""
 
     min: float | None = None
-    """The output is this or more."""
+    """Lower limit."""
     max: float | None = None
-    """The output is this or less."""
+    """Upper limit."""
 
     @model_validator(mode="after")
     def _order(self) -> LimitSection:
@@ -209,53 +209,53 @@ class LimitSection(StudyPart):
 
 
 class OptimisationSection(StudyPart):
-    """Search for parameters, each within its `uniform` limits, that make outputs small."""
+    """Optimisation: parameters, each within its `uniform` limits, that minimise outputs."""
 
     minimise: Annotated[list[Name], Field(min_length=1, max_length=2)]
-    """One output, or two that are weighed against each other."""
+    """One output, or two with weights."""
     limits: dict[Name, LimitSection] = {}
-    """Outputs that are kept within bounds meanwhile."""
+    """Outputs with limits."""
     percentile: Annotated[float, Field(ge=50.0, le=100.0)] | None = None
-    """Of each output over the tolerances, on its bad side; 95 by default. Of 100 it is the worst draw."""
+    """Percentile of each output over the tolerances, on its unfavourable side; by default 95. 100: the worst draw."""
     weightings: Annotated[int, Field(ge=1, le=50)] = 5
-    """Of two outputs: how many weightings, one search each, from the first alone to the second alone."""
+    """For two outputs: number of weightings, with one search each, from the first output alone to the second alone."""
     population: Annotated[int, Field(ge=5, le=1000)] = 16
-    """Points of a generation."""
+    """Number of points of a generation."""
     generations: Annotated[int, Field(ge=1, le=10000)] = 20
-    """Most generations of a search."""
+    """Maximum number of generations of a search."""
 
 
 class StudyFile(StudyPart):
-    """The whole study file."""
+    """Whole study file."""
 
     name: Annotated[Text, Field(max_length=200)]
     """Title of the study."""
     case: Annotated[str, Field(min_length=1, max_length=1000)]
-    """Gearbox file, beside the study file."""
+    """Gearbox file, with a path relative to the study file."""
     description: Text = ""
-    """Words for people."""
+    """Free description."""
     choice: ChoiceSection = ChoiceSection()
-    """What is computed."""
+    """Model settings."""
     changes: dict[DottedPath, Value] = {}
-    """Keys of the case with other values in all points."""
+    """Keys of the gearbox file with other values in all points."""
     parameters: Annotated[dict[Name, ParameterSection], Field(min_length=1, max_length=200)]
-    """What is varied, by name."""
+    """Varied parameters, by name."""
     outputs: Annotated[dict[Name, dict[str, Any]], Field(min_length=1, max_length=200)]
-    """What is kept, by name: `quantity` says which, other keys are its options."""
+    """Outputs, by name: `quantity` selects the kind, other keys are its options."""
     sampling: Literal["sobol", "latin_hypercube", "random"] = "latin_hypercube"
-    """How distributions are drawn from."""
+    """Sampling method for distributions."""
     samples: Annotated[int, Field(ge=1, le=10_000_000)] | None = None
-    """Draws, where parameters have distributions; of a search with tolerances at each point."""
+    """Number of draws if parameters have distributions; in an optimisation with tolerances, per point."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """The same seed gives the same draws."""
+    """Seed of the random numbers; the same seed gives the same draws."""
     steady: SteadySection | None = None
-    """Settings of steady responses."""
+    """Settings of steady-state responses."""
     run: RunSection = RunSection()
     """Settings of runs."""
     optimise: OptimisationSection | None = None
-    """A search instead of all combinations."""
+    """Optimisation instead of all combinations."""
     tolerances: Annotated[dict[Name, ParameterSection], Field(max_length=200)] = {}
-    """What production does not hold, by name: drawn at every point of a search."""
+    """Production scatter, by name: drawn at each point of an optimisation."""
 
     @model_validator(mode="after")
     def _fits(self) -> StudyFile:
@@ -303,7 +303,7 @@ class StudyFile(StudyPart):
             raise ValueError(f"samples = {self.samples}: a Sobol sequence requires a power of two")
 
 
-# Reading a study file: TOML to checked sections, and faults as lines that name file, key and remedy
+# Reading a study file: TOML to checked sections, and errors as lines with file, key and remedy
 
 LARGEST_STUDY = 10_000_000
 """Largest study file that is read, bytes."""
@@ -311,7 +311,7 @@ SHOWN_FAULTS = 20
 
 
 class StudyError(ValueError):
-    """A study that cannot be used; a line for each fault says file, key, value and what would be right."""
+    """Error: an invalid study; each error line has file, key, value and what is permitted."""
 
 
 def read_study_file(path: Path) -> StudyFile:
@@ -320,7 +320,7 @@ def read_study_file(path: Path) -> StudyFile:
     Raises
     ------
     StudyError
-        Anything wrong with the file.
+        The file is invalid.
 
     Examples
     --------
@@ -346,7 +346,7 @@ def parse_study(content: dict[str, Any], source: str) -> StudyFile:
     Raises
     ------
     StudyError
-        Anything wrong with it.
+        The content is invalid.
 
     Examples
     --------
@@ -379,7 +379,7 @@ _REMEDIES = {
 
 
 def _described(fault: Any) -> str:
-    """Key, value and what would be right."""
+    """Return key, value and what is permitted."""
     location = [str(part) for part in fault["loc"] if part not in ("[key]", "int", "float", "str", "bool")]
     key = ".".join(location) or "the file"
     if fault["type"] == "extra_forbidden":
@@ -400,7 +400,7 @@ def _described(fault: Any) -> str:
 
 
 def _known_keys(location: list[str]) -> list[str]:
-    """Keys of the table at a place of the file."""
+    """Return the keys of the table at a location in the file."""
     section: Any = StudyFile
     for part in location:
         fields = getattr(section, "model_fields", {})

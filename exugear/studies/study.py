@@ -1,4 +1,4 @@
-"""A study: a gearbox, the points that vary it, and the outputs that are kept, read from a file and checked."""
+"""Definition of a study (gearbox, varied points and outputs), read from a file and checked."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.versions import TABLE
 
-# What speaks against a study before any point is computed: names taken, equal points, options out of range
+# Checks of a study before any point is computed: reserved names, equal points, options out of range
 
 OF_POINTS = ("error", "doubts", "seconds", "memory")
-"""What a dataset tells of each point beside its outputs."""
+"""Variables of a dataset for each point in addition to its outputs."""
 OF_SEARCHES = ("evaluation", "on_front", "meets_limits")
 SLOPE = "slope_"
-"""Before the name of a output: its local derivative."""
+"""Prefix of the name of an output for its local derivative."""
 LIMITS: Mapping[str, tuple[float, float]] = {
     "count": (1, 10_000),
     "harmonic": (1, 1000),
@@ -75,13 +75,13 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "misalignment_um": (-1e5, 1e5),
     "speed_rpm": (-1e7, 1e7),
 }
-"""Least and most of the options of outputs."""
+"""Minimum and maximum of the options of outputs."""
 SHOWN = 3
-"""Most names of what is equal that a line has."""
+"""Maximum number of equal names listed in a line."""
 
 
 def faults_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
-    """Tell parameters and outputs whose names the dataset has for something else."""
+    """Report parameters and outputs whose names the dataset reserves for other variables."""
     taken = dict.fromkeys(OF_POINTS, "the results of each point")
     drawn = [name for name, parameter in study.parameters.items() if parameter.is_drawn]
     stepped = any(parameter.kind == "step" for parameter in study.parameters.values())
@@ -109,7 +109,7 @@ def faults_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[st
 
 
 def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
-    """Names that the dataset of a search over tolerances has for itself."""
+    """Return the names reserved in the dataset of an optimisation with tolerances."""
     if not study.tolerances:
         return {}
     taken = {
@@ -122,7 +122,7 @@ def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
 
 
 def faults_of_search(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
-    """Tell outputs of many numbers where a search needs one."""
+    """Report outputs with several numbers where an optimisation requires one."""
     if study.optimise is None:
         return
     for key, names in (("minimise", study.optimise.minimise), ("limits", list(study.optimise.limits))):
@@ -136,9 +136,9 @@ def faults_of_search(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[s
 
 
 def faults_of_paths(study: StudyFile) -> Iterator[str]:
-    """Tell paths that two parameters set, or one of them twice: only the last value would act.
+    """Report paths that two parameters set, or one of them twice, because only the last value would be effective.
 
-    A tolerance may shift or scale what a parameter sets.
+    A tolerance may shift or scale the value of a parameter.
     """
     owners: list[tuple[str, str, str]] = []
     for table, name, parameter in (
@@ -163,7 +163,7 @@ def faults_of_paths(study: StudyFile) -> Iterator[str]:
 
 
 def faults_of_values(design: Design) -> Iterator[str]:
-    """Tell values that make one point of two: listed twice, or scaled from zero."""
+    """Report values that give the same point: listed twice, or scaled from zero."""
     for dimension, changes in design.levels.items():
         seen: dict[str, int] = {}
         for number, change in enumerate(changes):
@@ -176,7 +176,7 @@ def faults_of_values(design: Design) -> Iterator[str]:
 
 
 def faults_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
-    """Tell options of the program's own outputs that no gearbox bears, or that this one does not have."""
+    """Report invalid options of the built-in outputs: out of range, or missing in this gearbox."""
     own = {id(quantity) for quantity in QUANTITIES.values()}
     known = _names(gearbox, choice)
     for name, output in kept.items():
@@ -194,7 +194,7 @@ def faults_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
 
 
 def _faults_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -> Iterator[str]:
-    """Tell options that contradict each other, or the table's positions."""
+    """Report options that contradict each other, or the positions of the table."""
     if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
         yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: must be below to_Hz = {options['to_Hz']:g}"
     most = gearbox.ste.positions // 2
@@ -206,7 +206,7 @@ def _faults_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -
 
 
 def faults_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearbox) -> Iterator[str]:
-    """Tell outputs that are read from what the study does not compute."""
+    """Report outputs that need results which the study does not compute."""
     for name, output in kept.items():
         needs = output.quantity.needs
         if needs == "steady" and study.steady is None:
@@ -219,7 +219,7 @@ def faults_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearb
 
 
 def faults_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
-    """Tell signals and lines that neither runs nor steady responses of this gearbox have."""
+    """Report signals and orders that neither runs nor steady-state responses of this gearbox have."""
     tabled = choice.mesh_model == "table"
     jointed = choice.variant.spins_only
     of_runs = [one for one in signals_of(tabled, jointed) if one.stored and one.dimensions[0] == "time"]
@@ -258,7 +258,7 @@ def _rated_bearings(gearbox: Gearbox) -> list[str]:
 
 
 def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
-    """Names that options may have."""
+    """Return the permitted values of options that are names."""
     families = list(dict.fromkeys(mesh.family for mesh in gearbox.meshes))
     law = LAWS.get(choice.mesh_model)
     elements = [mesh.name for mesh in gearbox.meshes] if law is None or law.has_force else []
@@ -268,7 +268,7 @@ def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
         elements += [mount.name for mount in mounts_at_work(gearbox)]
         elements += [f"{name}_body" for name in elastic_names(gearbox)]
     elements += [coupling.name for coupling in gearbox.couplings]
-    rated = {} if gearbox.case.rating is None else {"gear": list(gearbox.case.rating.gears)}  # else told by itself
+    rated = {} if gearbox.case.rating is None else {"gear": list(gearbox.case.rating.gears)}  # else reported
     return {
         **rated,
         "pair": list(gearbox.pairs),
@@ -282,17 +282,17 @@ def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names, as many as a line holds."""
+    """Return a list of at most twelve names as text."""
     shown = list(itertools.islice(names, 12))
     return (", ".join(shown) or "none") + (f" and {len(names) - len(shown)} more" if len(names) > len(shown) else "")
 
 
-# A study: a gearbox, the points that vary it, and the outputs that are kept, read from a file and checked
+# Study (gearbox, varied points and outputs), read from a file and checked
 
 
 @dataclass(frozen=True)
 class Study(ReprMixin):
-    """What is varied, computed and kept. Build one with `from_toml` or `from_dict`.
+    """Study of a gearbox: parameters, model settings and outputs. Build one with `from_toml` or `from_dict`.
 
     Examples
     --------
@@ -310,37 +310,37 @@ class Study(ReprMixin):
     """
 
     file: StudyFile
-    """The file as it is written."""
+    """Content of the study file."""
     source: str
-    """Its path or name."""
+    """Path or name of the study file."""
     gearbox: Gearbox
-    """The case, with the changes that all points have."""
+    """Gearbox with the changes common to all points."""
     choice: Choice
     settings: PointSettings
     outputs: Mapping[str, Output]
     """By name."""
     design: Design
-    """All points; of a search none."""
+    """All points; none for an optimisation."""
     case_digest: str
-    """Hash of the case without the changes."""
+    """Hash of the gearbox file without the changes."""
     tolerances: Tolerances | None = None
-    """Draws at each point of a search."""
+    """Draws at each point of an optimisation."""
 
     @classmethod
     def from_toml(
         cls, path: str | Path, permissions: Permissions = NOTHING_MORE, quantities: Mapping[str, Quantity] = QUANTITIES
     ) -> Study:
-        """Read and check a study file and the gearbox file that it names.
+        """Read and check a study file and its gearbox file.
 
         Parameters
         ----------
-        permissions : what the gearbox file may do
-        quantities : those that may be named
+        permissions : of the gearbox file
+        quantities : available kinds of output
 
         Raises
         ------
         StudyError, GearboxFileError
-            Anything wrong with either file.
+            Either file is invalid.
         """
         path = Path(path)
         return cls._checked(read_study_file(path), str(path), path.parent, permissions, quantities)
@@ -353,7 +353,7 @@ class Study(ReprMixin):
         permissions: Permissions = NOTHING_MORE,
         quantities: Mapping[str, Quantity] = QUANTITIES,
     ) -> Study:
-        """Check content already in memory; its case lies where it says, seen from the working directory."""
+        """Check content already in memory; the path of its gearbox file is relative to the working directory."""
         return cls._checked(parse_study(content, source), source, Path(), permissions, quantities)
 
     @classmethod
@@ -391,7 +391,7 @@ class Study(ReprMixin):
 
     @cached_property
     def case_hash(self) -> str:
-        """SHA-256 of all that every point depends on: the case with its files, choices, outputs, versions."""
+        """SHA-256 of all input common to the points: gearbox file with its files, model settings, outputs, versions."""
         of_life = _reads_life(self.outputs)
         cases = self.gearbox.content.get("load_cases", {})
         read = read_content(self.gearbox, of_life)
@@ -408,22 +408,22 @@ class Study(ReprMixin):
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def hash_of(self, changes: Mapping[str, Any]) -> str:
-        """SHA-256 of all that a point depends on, with values at paths of the case."""
+        """Return the SHA-256 of all input of a point, with values by path in the gearbox file."""
         text = json.dumps([self.case_hash, changes, self._digests(changes)], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
     def hashed_points(self) -> Iterator[tuple[str, Point]]:
-        """All points with their hashes."""
+        """Yield all points with their hashes."""
         for point in self.design.points:
             yield self.hash_of(point.changes), point
 
     def _digests(self, content: Any) -> list[str]:
-        """Checksums of the files that a content names, one by one or by a pattern."""
+        """Return checksums of the files in a content, named one by one or by a pattern."""
         folder = Path(self.gearbox.source).parent
         named = sorted({text for text in _texts(content) if 0 < len(text) < 256 and "\0" not in text})
         files = [folder / name for name in named]
         for pattern in sorted(set(_patterns(content))):
-            with suppress(ValueError, NotImplementedError, OSError):  # what is no pattern is refused where it is read
+            with suppress(ValueError, NotImplementedError, OSError):  # an invalid pattern is refused where it is read
                 files += sorted(folder.glob(pattern))
         return [file_digest(file) for file in files if file.suffix and file.is_file()]
 
@@ -440,7 +440,7 @@ def _guarded(key: str, check: Any, *arguments: Any) -> None:
 
 
 def _texts(content: Any) -> Iterator[str]:
-    """All texts in a content."""
+    """Yield all texts in a content."""
     if isinstance(content, str):
         yield content
     elif isinstance(content, Mapping):
@@ -452,7 +452,7 @@ def _texts(content: Any) -> Iterator[str]:
 
 
 def _patterns(content: Any) -> Iterator[str]:
-    """Names of many files in a content: what stands at keys `files`, also of paths that end in one."""
+    """Yield file patterns in a content: values of keys `files`, also of paths that end in this key."""
     if isinstance(content, Mapping):
         for key, value in content.items():
             if isinstance(value, str) and str(key).rpartition(".")[2] == "files":
@@ -461,12 +461,12 @@ def _patterns(content: Any) -> Iterator[str]:
 
 
 def _reads_life(outputs: Mapping[str, Output]) -> bool:
-    """Whether loads of a life are read."""
+    """Return whether load spectra are read."""
     return any(kept.quantity.needs in ("life", "bearings") for kept in outputs.values())
 
 
 def _settings(file: StudyFile) -> PointSettings:
-    """Read the settings of what points compute."""
+    """Return the settings for the results of points."""
     steady = None
     if file.steady is not None:
         own = file.steady

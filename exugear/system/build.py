@@ -21,6 +21,7 @@ from exugear.system.kernels.coordinates import InertiaArrays, SpringArrays
 from exugear.system.kernels.elastic import ElasticArrays, no_elastic
 from exugear.system.kernels.rolling import no_rolling
 from exugear.system.kernels.turning import TravellingArrays, no_travelling
+from exugear.system.modal_damping import with_modal_damping
 from exugear.system.operating_points import linearise_at_static_load
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import ContactState
@@ -118,7 +119,7 @@ def assemble(
     )
     if before_balance is not None:
         before_balance(assembly)
-    return linearise_at_static_load(assembly)
+    return with_modal_damping(linearise_at_static_load(assembly))
 
 
 def _chosen_bodies(names: tuple[str, ...], bodies: Mapping[str, ElasticBody]) -> dict[str, ElasticBody]:
@@ -330,7 +331,7 @@ def _connectors(
         point_load=np.zeros((len(supports), 6)),
         rolling=no_rolling(0),
     )
-    return with_laws(connectors, [linear_law(bearing, gearbox.case.damping.bearing_time_s) for bearing in supports])
+    return with_laws(connectors, [linear_law(bearing, gearbox.case.damping.time_of("bearing")) for bearing in supports])
 
 
 def _attached(coordinates: Mapping[str, tuple[int, ...]], body: str, item: str | None) -> str | None:

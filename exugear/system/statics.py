@@ -21,6 +21,7 @@ from exugear.system.bodies.turning_frame import TurningBody
 from exugear.system.kernels.connectors import add_connector_tangents
 from exugear.system.kernels.coordinates import SpringArrays, add_spring_forces
 from exugear.system.kernels.meshes import FORCE, OUTSIDE, MeshArrays
+from exugear.system.kernels.modal_damping import modal_matrix
 from exugear.system.kernels.table_law import GUESSED
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -46,6 +47,8 @@ class Linearised(ReprMixin, line=": {mass!n} coordinates, {stiffness!n} elements
     stiffness: Mapping[str, Floats]
     damping: Mapping[str, Floats]
     """Element name -> matrix; elements are meshes, bearings, couplings, elastic bodies."""
+    modal: Floats
+    """Modal damping, which belongs to no element."""
 
     @property
     def total_stiffness(self) -> Floats:
@@ -54,8 +57,8 @@ class Linearised(ReprMixin, line=": {mass!n} coordinates, {stiffness!n} elements
 
     @property
     def total_damping(self) -> Floats:
-        """Sum over all elements."""
-        return sum(self.damping.values(), start=np.zeros_like(self.mass))
+        """Sum over all elements, and modal damping."""
+        return sum(self.damping.values(), start=self.modal)
 
 
 def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -> Linearised:
@@ -86,7 +89,7 @@ def linearise(assembly: Assembly, q: Floats, meshes: MeshArrays | None = None) -
         matrix[of_body, of_body] = assembly.elastic_bodies[name].reduced.stiffness
         stiffness[f"{name}_body"] = matrix
         damping[f"{name}_body"] = assembly.gearbox.case.damping.body_time_s * matrix
-    return Linearised(assembly.mass_at(q), stiffness, damping)
+    return Linearised(assembly.mass_at(q), stiffness, damping, modal_matrix(q, assembly.modal))
 
 
 def tangent_stiffness(assembly: Assembly, q: Floats, meshes: MeshArrays) -> Floats:

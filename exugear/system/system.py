@@ -41,6 +41,7 @@ from exugear.system.kernels.connectors import (
 from exugear.system.kernels.coordinates import InertiaArrays, SpringArrays, accelerations, add_spring_forces
 from exugear.system.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations
 from exugear.system.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
+from exugear.system.kernels.modal_damping import ModalArrays, add_modal_damping, modal_memory
 from exugear.system.kernels.rolling import no_rolling
 from exugear.system.kernels.table_law import NOMINAL_DEFLECTION
 from exugear.system.kernels.turning import (
@@ -104,6 +105,8 @@ class Assembly(ReprMixin):
     motion."""
     contacts: StaticContacts = StaticContacts()
     """Contact of meshes at the static misalignment, where it was solved."""
+    modal: ModalArrays | None = None
+    """Modal damping, where the file states it."""
     planet_spread: float = 0.0
     """Largest change of stiffness that made bearings of equal planets equal, over that stiffness."""
 
@@ -307,6 +310,8 @@ class Assembly(ReprMixin):
         for name, body in self.turning.items():
             elastic_slice = self.elastic_slices[name]
             f[elastic_slice] += body.forces(q[elastic_slice], v[elastic_slice])
+        if self.modal is not None:
+            add_modal_damping(q, v, self.modal, modal_memory(self.modal), f)
         return f
 
     @cached_property

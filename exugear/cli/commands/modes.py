@@ -47,6 +47,7 @@ def modes(
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
+        from exugear.system.modes import unusual_damping
         from exugear.system.statics import meshes_near_unconverged
 
         project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
@@ -61,6 +62,8 @@ def modes(
                 f"Warning: unstable: disturbances grow at up to {found.growth_rate:.3g} 1/s; a run would diverge",
                 style="yellow",
             )
+        if unusual := unusual_damping(found):
+            note(f"Warning: {unusual}", style="yellow")
         if as_json:
             assembly = found.assembly
             label = {"variant": assembly.variant, "mesh_model": assembly.mesh_model, "inertias": assembly.inertias}
@@ -116,12 +119,15 @@ def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
 
 def _print_modes(found: Modes, rows: list[dict[str, Any]]) -> None:
     """Print the table of modes; damping and TE participation are omitted for rigid-body modes."""
+    from exugear.system.modal_damping import damping_in_words
+
     assembly = found.assembly
     title = f"Modes: variant {assembly.variant}, mesh model {assembly.mesh_model}, inertia set {assembly.inertias}"
     texts = ("kinetic energy\n%", "strain energy\n%")
     print_table(title, [_mode_row(row) for row in rows], texts, LEGEND)
     factor = assembly.housing_factor
-    say(f"Linearised at the static load; housing stiffness factor {factor:g}.")
+    damping = damping_in_words(assembly.gearbox.case.damping)
+    say(f"Linearised at the static load; housing stiffness factor {factor:g}; damping {damping}.")
 
 
 def _mode_row(summary: dict[str, Any]) -> dict[str, str]:

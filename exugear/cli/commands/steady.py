@@ -65,6 +65,12 @@ NOTICED_WAY = 0.3
 """Ratio of shuttling moment to transmission error excitation above which a warning is printed."""
 
 
+BAND_LEGEND = (
+    "Zero-to-peak amplitudes with the largest and with the least damping; (ranks) where the rank within the quantity "
+    "depends on the damping."
+)
+
+
 class Method(StrEnum):
     """Methods: transmission error as excitation, time-varying stiffness, or nonlinear models evaluated in time."""
 
@@ -179,6 +185,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     from exugear.gearbox.load_cases import static_load_in_words
     from exugear.gearbox.units import RPM
     from exugear.report.findings.loudness import ranking_of
+    from exugear.system.modal_damping import damping_in_words
 
     _tell_of_other_loads(project.gearbox)
     growth = float(data.attrs["growth_rate"])
@@ -212,11 +219,43 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     if ranking.resonances:
         rows = [_row(resonance) for resonance in ranking.resonances[:SHOWN_RESONANCES]]
         print_table(title, rows, ("bearing",), _legend(ranking))
+        _print_bands(project.gearbox, ranking)
     fastest = float(abs(data["speed"]).max()) / RPM
     stable = f"slowest decay rate {-growth:.3g} 1/s (stable)" if growth <= 0.0 else f"fastest growth {growth:.3g} 1/s"
-    say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}.")
+    damping = damping_in_words(project.gearbox.case.damping)
+    say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}; damping {damping}.")
     say(f"Results: {project.steady_path(settings)}")
     _fail_if_doubtful(data, growth)
+
+
+def _print_bands(gearbox: Gearbox, ranking: Ranking) -> None:
+    """Print the amplitudes at both ends of the range of damping, where they were solved."""
+    shown = [
+        resonance
+        for resonance in ranking.resonances[:SHOWN_RESONANCES]
+        if any(loudness.limits for loudness in resonance.loudness.values())
+    ]
+    if not shown:
+        return
+    band = gearbox.case.damping.modal_band_percent
+    damping = "half to twice the damping" if band is None else f"{band[0]:g} to {band[1]:g} % of critical damping"
+    print_table(f"Amplitudes with {damping}", [_band_row(resonance) for resonance in shown], legend=BAND_LEGEND)
+
+
+def _band_row(resonance: Resonance) -> dict[str, str]:
+    from exugear.gearbox.units import RPM
+
+    found = {"order": resonance.line, "speed\nrpm": significant(resonance.speed / RPM, 5, 2)}
+    for quantity, loudness in resonance.loudness.items():
+        heading, factor = COLUMNS[quantity]
+        found[heading] = "-"
+        if loudness.limits:
+            found[heading] = "–".join(significant(factor * limit.amplitude, 2, 6) for limit in loudness.limits[::-1])
+            if loudness.places is not None and loudness.places[0] != loudness.places[1]:
+                best, worst = loudness.places
+                found[heading] += f" ({best}–{worst})"
+            found[heading] = found[heading].replace(" ", HARD_SPACE)
+    return found
 
 
 def _legend(ranking: Ranking) -> str:
@@ -465,6 +504,11 @@ def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
         found[f"{quantity}_place"] = loudness.place
         if loudness.at:
             found[f"{quantity}_at"] = loudness.at
+        if loudness.limits:
+            least, largest = loudness.limits
+            found[f"{quantity}_least_damping_{KEYS[quantity]}"] = least.amplitude
+            found[f"{quantity}_largest_damping_{KEYS[quantity]}"] = largest.amplitude
+            found[f"{quantity}_places_over_damping"] = loudness.places
     return found
 
 

@@ -71,7 +71,7 @@ def check(
         assemblies = _assemblies(gearbox, variants)
         steady = _steady_lacks(assemblies)
         bearings, doubts = _bearing_summaries(gearbox, assemblies.get(Variant.bushing))
-        warnings = [*remarks(gearbox), *doubts]
+        warnings = [*remarks(gearbox), *doubts, *_damping_warnings(assemblies)]
         lives = lacks_of_life(gearbox)
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
@@ -200,6 +200,16 @@ def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[
         str(variant): str(assembly) if isinstance(assembly, FailedError) else steady_lack(assembly, variant)
         for variant, assembly in assemblies.items()
     }
+
+
+def _damping_warnings(assemblies: Mapping[Variant, Assembly | FailedError]) -> list[str]:
+    """Say which modes on bearings, with rigid bodies and teeth as stiff as ISO 6336-1 says, have unusual damping."""
+    from exugear.system.modes import modes_of, unusual_damping
+
+    assembly = assemblies.get(Variant.bushing) or assemblies.get(Variant.rigid)
+    if assembly is None or isinstance(assembly, FailedError):
+        return []
+    return list(filter(None, [unusual_damping(modes_of(assembly))]))
 
 
 def _tell_scripts(gearbox: Gearbox) -> None:

@@ -121,9 +121,23 @@ class StaticLoadSection(Section):
     """Bodies that react these torques: as many as the train has degrees of freedom."""
 
 
-class DampingSection(Section):
-    """Stiffness-proportional damping times: c = time * k."""
+DampedElement = Literal["bearing", "mesh", "coupling"]
+"""Elements with a damping time of their own."""
 
+
+class DampingSection(Section):
+    """Modal damping in percent of critical, or stiffness-proportional damping with c = time * k.
+
+    `modal_percent` replaces the times of meshes, bearings and couplings. It includes the damping of dampers with
+    specified values and of flexible bodies. Measured gearboxes have 1 to 4 % at most frequencies.
+    """
+
+    modal_percent: q.ModalDamping | None = None
+    """Damping of every mode in percent of critical: one value, or pairs of frequency (Hz) and percent."""
+    modal_modes: Annotated[tuple[q.ModalPoint, ...], Field(strict=False, max_length=MOST_ENTRIES)] = ()
+    """Damping of single modes: pairs of the mode's frequency (Hz) and percent of critical."""
+    modal_band_percent: Annotated[tuple[q.ModalPercent, q.ModalPercent], Field(strict=False)] | None = None
+    """Minimum and maximum plausible damping of all modes, for amplitude bands; by default half and twice the value."""
     bearing_time_s: q.DampingTimeS = 4e-6
     """Ratio of damping to stiffness of bearings."""
     mesh_time_s: q.DampingTimeS = 4e-6
@@ -132,6 +146,34 @@ class DampingSection(Section):
     """Ratio of damping to stiffness of couplings."""
     body_time_s: q.DampingTimeS = 1e-6
     """Ratio of damping to stiffness of flexible bodies."""
+
+    @model_validator(mode="after")
+    def _check_modal(self) -> DampingSection:
+        """Raise an error for times that modal damping replaces, and for tables and bands in the wrong order."""
+        if self.modal_percent is None:
+            for key in ("modal_modes", "modal_band_percent"):
+                if key in self.model_fields_set:
+                    raise ValueError(f"{key} requires modal_percent; add modal_percent = 2.0, or remove {key}")
+            return self
+        for key in ("bearing_time_s", "mesh_time_s"):
+            if key in self.model_fields_set:
+                raise ValueError(f"{key} has no effect where modal_percent states the damping; remove one of them")
+        if not isinstance(self.modal_percent, float):
+            frequencies = [frequency for frequency, _ in self.modal_percent]
+            if sorted(set(frequencies)) != frequencies:
+                raise ValueError("modal_percent: frequencies must increase from pair to pair")
+        if self.modal_band_percent is not None and not self.modal_band_percent[0] < self.modal_band_percent[1]:
+            raise ValueError("modal_band_percent: the first value must be smaller than the second")
+        return self
+
+    @property
+    def is_modal(self) -> bool:
+        """Whether modal damping is specified."""
+        return self.modal_percent is not None
+
+    def time_of(self, kind: DampedElement) -> float:
+        """Ratio of damping to stiffness (s) of bearings, meshes or couplings; zero with modal damping."""
+        return 0.0 if self.is_modal else float(getattr(self, f"{kind}_time_s"))
 
 
 class ElasticitySection(Section):
@@ -294,7 +336,7 @@ class GearboxFile(Section):
     pins: Entries[PinSection] = {}
     """Position errors of planet pins, by name."""
     damping: DampingSection = DampingSection()
-    """Stiffness-proportional damping."""
+    """Modal damping, or stiffness-proportional damping."""
     elasticity: ElasticitySection = ElasticitySection()
     """Modal resolution of flexible bodies."""
     housing: HousingSection = HousingSection()

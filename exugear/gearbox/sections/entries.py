@@ -118,6 +118,11 @@ CouplingDamping = Annotated[float, Range(0.0, 1e9, (0.0, 1e7), "N m s/rad")]
 DampingTimeS = Annotated[
     float, Range(0.0, 1e-2, (0.0, 1e-3), "stiffness times it is the damping: 1 ms is critical at 320 Hz")
 ]
+ModalPercent = Annotated[
+    float, Range(0.01, 20.0, (0.3, 10.0), "percent of critical damping; measured gearboxes have 1 to 4 %")
+]
+ModalPoint = Annotated[tuple[Annotated[float, Range(0.0, 1e5)], ModalPercent], Field(strict=False)]
+ModalDamping = ModalPercent | Annotated[tuple[ModalPoint, ...], Field(strict=False, min_length=1, max_length=1000)]
 ContactAngleDeg = Annotated[float, Range(0.0, 59.0, (0.0, 52.0))]
 ClearanceMm = Annotated[float, Range(-1.0, 5.0, (-0.2, 1.0), "on the diameter")]
 RollingRows = Annotated[int, Range(1, 8, (1, 6))]

@@ -1,1 +1,1 @@
-"""The loads of a gearbox over its life: sources, distributions, and how often each part meets them."""
+"""Load spectrum of a gearbox: load sources, distributions, and load cycles of each part."""

@@ -1,7 +1,7 @@
-"""The loads of a gearbox counted: by source, by bin, and as cycles of what turns through them.
+"""Counted loads of a gearbox: by source, by bin, and as load cycles of rotating parts.
 
-It follows from the rolling train alone. The two flanks of a gear are told apart: flank ``+`` faces the sense of +z
-rotation.
+Load cycles follow from the kinematics of the gear train alone. The flanks of a gear are distinguished: flank ``+``
+faces the sense of +z rotation.
 """
 
 from __future__ import annotations
@@ -35,31 +35,31 @@ from fe_ste.tools.files import write_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# How often parts turn through their load: cycles of teeth, revolutions of bearings, per revolution of a body
+# Load cycles of teeth and revolutions of bearings per revolution of a body
 
 FLANKS = {1: "+", -1: "-"}
 
 
 @dataclass(frozen=True)
 class ToothExposure:
-    """What one tooth of a gear meets in one family of meshes."""
+    """Load cycles of one tooth of a gear in one family of meshes."""
 
     gear: str
     family: str
     holder: str
-    """Gear, the family of its meshes, and the body whose teeth these are: one of equal planets."""
+    """Gear, the family of its meshes, and the body of the gear: one of equal planets."""
     member: int
-    """{0, 1}: whether it is gear 1 or gear 2 of the pair."""
+    """{0, 1}: index of the gear in the pair (gear 1, gear 2)."""
     flank: int
-    """Flank that a positive torque on the loaded body presses: +1 or -1; a negative one presses the other."""
+    """Loaded flank for a positive torque on the loaded body: +1 or -1; a negative torque loads the other."""
     meshes: tuple[int, ...]
-    """Numbers of the meshes that one tooth passes, one after the other."""
+    """Indices of the meshes that one tooth passes in succession."""
     cycles: float
-    """Contacts of one flank per revolution of the loaded body, all these meshes together."""
+    """Contacts of one flank per revolution of the loaded body, summed over these meshes."""
 
 
 def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
-    """Tell what the teeth of all gears meet per revolution of a body; of equal planets each by itself.
+    """Return the load cycles of the teeth of all gears per revolution of a body; equal planets are separate entries.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
 
 
 def distinct(teeth: Iterable[ToothExposure]) -> tuple[ToothExposure, ...]:
-    """One of equal planets for all of them: each gear in each family once."""
+    """Return one entry for equal planets: each gear in each family once."""
     found: dict[tuple[str, str], ToothExposure] = {}
     for one in teeth:
         found.setdefault((one.gear, one.family), one)
@@ -103,11 +103,11 @@ def distinct(teeth: Iterable[ToothExposure]) -> tuple[ToothExposure, ...]:
 
 
 def bearing_turns(gearbox: Gearbox, body: str) -> dict[str, float]:
-    """Revolutions of the rings of each bearing against each other per revolution of a body, without sign.
+    """Return the absolute relative revolutions of the rings of each bearing per revolution of a body.
 
     Examples
     --------
-    A planet turns on its pin by the teeth of the ring over its own per turn of the carrier:
+    Per revolution of the carrier, a planet rotates on its pin by the tooth number ratio of ring and planet:
 
     >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
     >>> round(bearing_turns(gearbox, "carrier")["pl_a_1"], 6), round(99 / 39, 6)
@@ -124,12 +124,12 @@ def _relative_revolutions(spins: Mapping[str, float], mesh: Mesh, holder: str) -
 
 
 def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
-    """Torque of 1 N m on a body, held where the static load is held.
+    """Return a torque of 1 N m on a body, with reactions where the static load has them.
 
     Raises
     ------
     GearboxFileError
-        The body is one of those that hold the static load.
+        The body is one of the supports of the static load.
     """
     if body in gearbox.case.static_load.locked:
         held = ", ".join(gearbox.case.static_load.locked)
@@ -137,47 +137,47 @@ def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
     return {body: 1.0}
 
 
-# The loads of a gearbox counted: by source, by bin, and as cycles of what turns through them
+# Counted loads of a gearbox: by source, by bin, and as load cycles of rotating parts
 
 EXPONENTS = (3.0, 10.0 / 3.0, 6.61, 8.74)
-"""Slopes of the S-N curves of steel structures, of roller bearings, and of contact and bending of gears over torque."""
+"""Slopes of S-N curves: steel structures, roller bearings, contact and bending of gears, all over torque."""
 
 
 @dataclass(frozen=True, eq=False)
 class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribution!r}"):
-    """Loads of a gearbox, counted."""
+    """Counted loads of a gearbox."""
 
     body: str
-    """Body that they act on."""
+    """Loaded body."""
     life_years: float
     sources: tuple[LoadSource, ...]
     distribution: DurationDistribution
-    """Of all sources of fatigue."""
+    """Load duration distribution of all fatigue sources."""
     points: LoadPoints
-    """Its bins, split where loads of a hub differ."""
+    """Bins of the distribution, split where rotor loads differ."""
     equivalent_ranges: Mapping[str, Mapping[float, float]]
-    """Damage-equivalent range of one cycle a second in the life, by component (torque, forces and moments of a hub)
-    and slope, N m or N; none without series."""
+    """Damage-equivalent range at one cycle per second over the life, by component (torque, rotor loads) and
+    slope, N m or N; empty without series."""
     teeth: tuple[ToothExposure, ...]
     bearings: Mapping[str, float]
     """Revolutions of bearings per revolution of the body."""
     mesh_forces: Mapping[str, float]
-    """Static force F_bt of mesh families at 1 N m on the body, N, the largest of a family."""
+    """Static force F_bt of mesh families at 1 N m on the body, N; the largest of each family."""
     bin_value: str
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was skipped and scaled, a line each."""
+        """Skipped times and scale factors, one line each."""
         return tuple(told(self.sources))
 
     def equivalents(self) -> dict[float, float]:
-        """Constant torque that does the same damage in the same revolutions, by slope, N m, of either sign."""
+        """Constant torque with the same damage in the same number of revolutions, by slope, N m, for both signs."""
         found = self.distribution
         torques = found.torques(self.bin_value)
         return {m: equivalent_load(torques, found.revolutions, m) for m in EXPONENTS}
 
     def source_rows(self) -> list[dict[str, Any]]:
-        """Figures of each source."""
+        """Return the values of each source."""
         return [
             {
                 "source": source.name,
@@ -200,7 +200,7 @@ class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribu
         ]
 
     def part_rows(self) -> list[dict[str, Any]]:
-        """Cycles of teeth by gear and flank, revolutions of bearings, and what meshes carry at the largest torque."""
+        """Return load cycles of teeth by gear and flank, revolutions of bearings, and largest mesh forces."""
         found = self.distribution
         rows = []
         for sense in (1, -1):
@@ -226,7 +226,7 @@ class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribu
         return {f"{m:.4g}": 1e-3 * value for m, value in self.equivalent_ranges.get(component, {}).items()}
 
     def summary(self) -> dict[str, Any]:
-        """Figures for programs: units in the keys."""
+        """Return the values for JSON, with units in the keys."""
         return {
             "body": self.body,
             "life_years": self.life_years,
@@ -252,12 +252,12 @@ def count_loads(gearbox: Gearbox, progress: Progress | None = None) -> CountedLo
 
     Parameters
     ----------
-    progress : called with the number of files that are read, and of all
+    progress : called with the number of files read and the total
 
     Raises
     ------
     GearboxFileError
-        A source that cannot be used: see `exugear.life.load_spectrum.sources.load_sources`.
+        An invalid source: see `exugear.life.load_spectrum.sources.load_sources`.
     """
     loads = section_of(gearbox)
     sources = load_sources(gearbox, progress)
@@ -288,7 +288,7 @@ def _weights(source: LoadSource) -> Any:
 
 
 def _equivalent_ranges(sources: tuple[LoadSource, ...]) -> dict[str, dict[float, float]]:
-    """Damage-equivalent range of each component of all series of fatigue together, one cycle a second."""
+    """Return the damage-equivalent range of each component of all fatigue series together, at one cycle per second."""
     series = [source for source in sources if source.series and source.kind == "fatigue" and source.hours.sum() > 0.0]
     hours = np.array([float(history.hours.sum()) for history in series])
     ranges: dict[str, dict[float, float]] = {}
@@ -303,7 +303,7 @@ def _equivalent_ranges(sources: tuple[LoadSource, ...]) -> dict[str, dict[float,
     return ranges
 
 
-# Load duration distributions as tables with commas, for other programs
+# Load duration distributions as CSV tables for other programs
 
 
 def write_spectra(counted: CountedLoads, folder: Path) -> list[Path]:
@@ -334,14 +334,14 @@ def write_spectra(counted: CountedLoads, folder: Path) -> list[Path]:
 
 
 def write_table(path: Path, headings: Sequence[str], rows: Iterable[Sequence[float | str]]) -> Path:
-    """Write a table with commas, whole or not at all; numbers to nine digits."""
+    """Write a CSV table as an atomic operation, with numbers to nine digits."""
     lines = [",".join(headings)]
     lines += [",".join(cell if isinstance(cell, str) else f"{cell:.9g}" for cell in row) for row in rows]
     write_file(path, ("\n".join(lines) + "\n").encode())
     return path
 
 
-# Diagrams of loads over a life: how long each torque lasts
+# Diagrams of load duration distributions
 
 
 def draw_duration(distribution: DurationDistribution, body: str, path: str | Path | None = None) -> Figure:
@@ -349,9 +349,9 @@ def draw_duration(distribution: DurationDistribution, body: str, path: str | Pat
 
     Parameters
     ----------
-    found : DurationDistribution
+    distribution : to draw
     body : for the labels
-    path : where to write the picture
+    path : file for the picture
     """
     with drawing_style():
         figure = new_figure(7.0, 3.2)

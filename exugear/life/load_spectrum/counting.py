@@ -1,9 +1,10 @@
-"""Load duration distributions: how long, and for how many revolutions, a load lies in each of its bins.
+"""Load duration distributions (hours and revolutions by load bin), and rainflow counting.
 
-For whatever turns through its load, such as teeth and roller bearings, revolutions at a load are its cycles. Loads of
-either sign have bins of their own, since they press on other flanks.
+For parts that rotate under load, such as gears and roller bearings, the revolutions at a load are its cycles. Positive
+and negative loads have separate bins, because they load opposite flanks.
 
-For what does not turn through its load: housings, arms, pins, splines, couplings.
+For parts that do not rotate under load (housings, arms, pins, splines, couplings), cycles are counted by the rainflow
+method.
 """
 
 from __future__ import annotations
@@ -20,28 +21,28 @@ from fe_ste.tools.display import ReprMixin
 
 @dataclass(frozen=True, eq=False)
 class DurationDistribution(ReprMixin):
-    """Hours and revolutions over bins of torque; empty bins are left out."""
+    """Hours and revolutions by torque bin; empty bins are omitted."""
 
     lower: Floats
     upper: Floats
-    """(bins,) edges, N m, by size: the upper one is farther from zero; both have the sign of the torque."""
+    """(bins,) edges, N m: the outer edge of each bin, farther from zero, with the sign of the torque."""
     torque: Floats
-    """(bins,) mean of what lies in the bin, each instant weighted by its revolutions, N m."""
+    """(bins,) mean torque in the bin, weighted by revolutions, N m."""
     hours: Floats
     revolutions: Floats
-    """(bins,) of the shaft whose torque it is."""
+    """(bins,) of the loaded shaft."""
 
     def _line(self) -> str:
         return f": {len(self.hours)} bins, {self.hours.sum():.6g} h"
 
     @property
     def speed(self) -> Floats:
-        """Mean speed of each bin, rad/s, without sign."""
+        """Mean absolute speed of each bin, rad/s."""
         seconds = 3600.0 * self.hours
         return np.divide(2.0 * np.pi * self.revolutions, seconds, out=np.zeros_like(seconds), where=seconds > 0.0)
 
     def torques(self, value: str) -> Floats:
-        """Torque that stands for each bin: its ``mean``, or its ``upper`` edge, which adds damage."""
+        """Return the representative torque of each bin: its ``mean``, or its ``upper`` edge, which is conservative."""
         if value == "upper":
             return self.upper
         return self.torque
@@ -50,13 +51,13 @@ class DurationDistribution(ReprMixin):
 def load_duration(
     torque: Floats, speed: Floats, hours: Floats, bins: int, largest: float | None = None
 ) -> DurationDistribution:
-    """Sort samples of torque into bins of equal width, from zero to the largest.
+    """Sort torque samples into bins of equal width, from zero to the largest torque.
 
     Parameters
     ----------
-    torque, speed, hours : (samples,) N m, rad/s, and how long each sample lasts in the whole of the life
-    bins : bins of either sign
-    largest : torque at which the last bin ends, N m, where the samples stand for larger ones; their largest by default
+    torque, speed, hours : (samples,) N m, rad/s, and duration of each sample in the whole life
+    bins : number of bins for each sign
+    largest : outer edge of the last bin, N m, if the samples represent larger torques; by default their largest torque
 
     Examples
     --------
@@ -87,24 +88,24 @@ def load_duration(
 
 @dataclass(frozen=True, eq=False)
 class LoadPoints(ReprMixin):
-    """Torques with what acts beside them: the bins of a distribution, split where other loads differ."""
+    """Torques with simultaneous rotor loads: bins of a distribution, split where these loads differ."""
 
     torque: Floats
     """(points,) N m."""
     other: Floats
-    """(points, n) loads beside it, means weighted by revolutions."""
+    """(points, n) simultaneous loads, means weighted by revolutions."""
     hours: Floats
     revolutions: Floats
     """(points,)"""
     bin: Integers
-    """(points,) bin of the distribution that each point lies in."""
+    """(points,) index of the distribution's bin."""
 
     def _line(self) -> str:
         return f": {len(self.hours)} points, {self.hours.sum():.6g} h"
 
     @property
     def speed(self) -> Floats:
-        """Mean speed of each point, rad/s, without sign."""
+        """Mean absolute speed of each point, rad/s."""
         seconds = 3600.0 * self.hours
         return np.divide(2.0 * np.pi * self.revolutions, seconds, out=np.zeros_like(seconds), where=seconds > 0.0)
 
@@ -122,12 +123,11 @@ def load_points(
 
     Parameters
     ----------
-    found : DurationDistribution
-        Of the same samples.
+    distribution : of the same samples
     value : as in `DurationDistribution.torques`
     torque, speed, hours : (samples,) as in `load_duration`
-    other : (samples, n) loads beside the torque
-    cells : cells from the least to the largest of each of them
+    other : (samples, n) simultaneous loads
+    cells : number of cells over the range of each of them
     """
     torques = distribution.torques(value)
     if not other.any():
@@ -155,11 +155,11 @@ def load_points(
 
 
 def equivalent_load(load: Floats, cycles: Floats, exponent: float) -> float:
-    """Constant load that does the same damage in as many cycles, by Miner's rule with one slope.
+    """Return the constant load with the same damage in the same number of cycles, by Miner's rule with one slope.
 
     Parameters
     ----------
-    load : taken without sign
+    load : the absolute value is taken
     exponent : slope of the S-N curve
 
     Examples
@@ -175,16 +175,16 @@ def equivalent_load(load: Floats, cycles: Floats, exponent: float) -> float:
     return float(largest * damage ** (1.0 / exponent))
 
 
-# Rainflow counting of ASTM E1049, and the constant cycle that does the same damage
+# Rainflow counting to ASTM E1049, and damage-equivalent ranges
 
 _AT_ONCE = 100_000
-"""Turning points that are Python's numbers at once."""
+"""Number of turning points processed at once as Python numbers."""
 NOISE = 1e-3
-"""Share of the largest range below which a range is that of the resolution of packed files, and left out."""
+"""Fraction of the largest range below which ranges are neglected as resolution noise of packed files."""
 
 
 def reversals(series: Floats) -> Floats:
-    """Find the turning points of a series, its ends among them.
+    """Return the turning points of a series, including its ends.
 
     Examples
     --------
@@ -200,7 +200,7 @@ def reversals(series: Floats) -> Floats:
 
 
 class Rainflow(ReprMixin):
-    """Cycles of a series that comes in pieces, counted as `rainflow` counts them; the series itself is not kept.
+    """Rainflow counter for a series in blocks, equivalent to `rainflow`; the series itself is not stored.
 
     Examples
     --------
@@ -215,25 +215,25 @@ class Rainflow(ReprMixin):
 
     def __init__(self) -> None:
         self._open: list[float] = []
-        self._closed = array("d")  # range, mean and count, one after the other
+        self._closed = array("d")  # range, mean and count in sequence
         self._tail = np.zeros(0)
 
     def _line(self) -> str:
         return f": {len(self._closed) // 3} cycles closed, {len(self._open)} turning points open"
 
     def add(self, piece: Floats) -> None:
-        """Take the next piece of the series."""
+        """Process the next block of the series."""
         if not len(piece):
             return
         points = reversals(np.concatenate([self._tail, piece]))
-        begun = len(self._tail) > 1  # its first point is a turning point that was taken
+        begun = len(self._tail) > 1  # its first point was already a turning point
         for begin in range(int(begun), len(points) - 1, _AT_ONCE):
             for point in points[begin : min(begin + _AT_ONCE, len(points) - 1)].tolist():
                 _take(point, self._open, self._closed)
         self._tail = points[-2:]
 
     def cycles(self) -> tuple[Floats, Floats, Floats]:
-        """Ranges, means and counts of all cycles, (cycles,) each; what is open counts as half cycles."""
+        """Return ranges, means and counts of all cycles, (cycles,) each; open turning points give half cycles."""
         stack = list(self._open)
         closed = array("d", self._closed)
         if len(self._tail):
@@ -245,7 +245,7 @@ class Rainflow(ReprMixin):
 
 
 def _take(point: float, stack: list[float], closed: array[float]) -> None:
-    """Put a turning point on the stack of open ones, and close the cycles that it closes."""
+    """Push a turning point on the stack of open ones, and extract the cycles that it closes."""
     stack.append(point)
     while len(stack) >= 3:
         before = abs(stack[-2] - stack[-3])
@@ -261,7 +261,7 @@ def _take(point: float, stack: list[float], closed: array[float]) -> None:
 
 
 def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
-    """Count cycles as ASTM E1049-85, 5.4.4, rainflow counting; what closes no cycle counts as half cycles.
+    """Count cycles by the rainflow method of ASTM E1049-85, 5.4.4; the residue gives half cycles.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
 
     Examples
     --------
-    The example of the standard (figure 6):
+    The example of the standard, Fig. 6:
 
     >>> ranges, _, counts = rainflow(np.array([-2.0, 1.0, -3.0, 5.0, -1.0, 3.0, -4.0, 4.0, -2.0]))
     >>> [(size, float(counts[ranges == size].sum())) for size in sorted(set(ranges.tolist()))]
@@ -285,23 +285,23 @@ def rainflow(series: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def damage_equivalent_range(series: Floats, exponent: float, cycles: float) -> float:
-    """Range of `cycles` equal cycles that do the damage of a series: see `equivalent_range`."""
+    """Return the range of `cycles` equal cycles with the damage of a series: see `equivalent_range`."""
     ranges, _, counts = rainflow(series)
     return equivalent_range(ranges, counts, exponent, cycles)
 
 
 def equivalent_range(ranges: Floats, counts: Floats, exponent: float, cycles: float) -> float:
-    """Range of `cycles` equal cycles that do the damage of counted ones, Miner's rule with one slope, means left out.
+    """Return the range of `cycles` equal cycles with the same damage, by Miner's rule with one slope, without means.
 
     Parameters
     ----------
-    ranges, counts : (n,) of `rainflow`
+    ranges, counts : (n,) from `rainflow`
     exponent : slope of the S-N curve
-    cycles : such as the length of the series in seconds, for one cycle a second
+    cycles : such as the length of the series in seconds, for one cycle per second
 
     Notes
     -----
-    Ranges below `NOISE` of the largest are left out: packed files have such steps.
+    Ranges below `NOISE` of the largest are neglected, because packed files have steps of this size.
     """
     largest = float(ranges.max(initial=0.0))
     if largest == 0.0:

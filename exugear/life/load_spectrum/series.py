@@ -1,8 +1,8 @@
-"""Series of a source taken into pools, block by block: what is skipped, scaled, and refused with its row.
+"""Reading of load series in blocks, with skipped times, scaling and checks, and their reduction to load points.
 
-A point stands for samples whose torques lie within a thousandth of each other (with loads of a hub within a
-thirty-second, and an eighth of the range of each of them). Its torque is their mean weighted by revolutions, so that
-hours, revolutions and mean of every bin of torque stay as they are. Few samples stay as they are.
+A point represents samples with torques within a thousandth of each other (with rotor loads within a thirty-second, and
+each rotor load within an eighth of its range). Its torque is their mean weighted by revolutions, so that hours,
+revolutions and mean torque of every bin are preserved. Small numbers of samples are not reduced.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ from exugear.life.load_spectrum.counting import Rainflow, equivalent_range
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin
 
-# Samples of load put together while they are read: files of any length and number become some ten thousand points
+# Reduction of load samples during reading: any number of files yields some ten thousand points
 
 HUB_LOADS = 5
-"""Loads of a hub beside its torque: force along x, y, z, moment about x and y."""
+"""Rotor loads in addition to torque: forces along x, y, z, moments about x and y."""
 COMPONENTS = ("torque", "force_x", "force_y", "force_z", "moment_x", "moment_y")
-"""Loads of which equivalent ranges are told."""
+"""Components for which equivalent ranges are listed."""
 RANGE_EXPONENTS = (3.0, 6.6, 10.0)
-"""Slopes of the S-N curves behind them."""
+"""Slopes of the S-N curves for equivalent ranges."""
 MOST_POINTS = 100_000
-"""Points that are kept as they are."""
+"""Number of points up to which samples are not reduced."""
 HUB_CELLS = 8
-"""Cells over the range of each load of a hub."""
+"""Number of cells over the range of each rotor load."""
 FINE, COARSE = 42, 47
-"""Bits of a torque that are left out to find its cell: 10 and 5 of its 52 digits stay."""
+"""Bits of a torque that are dropped to find its cell: 10 and 5 of the 52 mantissa bits remain."""
 
 
 @dataclass(frozen=True, eq=False)
 class Samples(ReprMixin):
-    """Loads that last."""
+    """Load samples with durations."""
 
     torque: Floats
     speed: Floats
     lasting: Floats
-    """(samples,) N m, rad/s, and how long each lasts, in a unit of the owner's."""
+    """(samples,) N m, rad/s, and duration in a unit defined by the owner."""
     hub: Floats
-    """(samples, 5) (samples, 0) force along x, y, z and moment about x, y, N and N m; nothing where there are none."""
+    """(samples, 5) forces along x, y, z and moments about x, y, N and N m; (samples, 0) without rotor loads."""
 
     def __len__(self) -> int:
         """Return the number of samples."""
@@ -58,22 +58,22 @@ class Samples(ReprMixin):
         return f": {len(self)}"
 
     def within(self, kept: np.ndarray) -> Samples:
-        """Return those of a mask."""
+        """Return the samples selected by a mask."""
         return Samples(self.torque[kept], self.speed[kept], self.lasting[kept], self.hub[kept])
 
 
 def together(parts: list[Samples]) -> Samples:
-    """Put samples behind each other."""
+    """Concatenate samples."""
     names = ("torque", "speed", "lasting", "hub")
     return Samples(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 def condensed(samples: Samples, extreme: bool = False) -> Samples:
-    """Put samples of one cell together.
+    """Merge the samples of each cell.
 
     Parameters
     ----------
-    extreme : whether the largest loads of a cell stand for it, instead of means weighted by revolutions
+    extreme : whether the largest loads of a cell represent it, instead of means weighted by revolutions
 
     Examples
     --------
@@ -107,7 +107,7 @@ def condensed(samples: Samples, extreme: bool = False) -> Samples:
 
 
 def _largest(samples: Samples, number: Integers) -> Samples:
-    """Largest of each load of a cell, whatever its sign."""
+    """Return the largest absolute value of each load in a cell, with its sign."""
 
     def largest(values: Floats) -> Floats:
         order = np.lexsort((np.abs(values), number))
@@ -121,25 +121,25 @@ def _largest(samples: Samples, number: Integers) -> Samples:
 
 @dataclass(eq=False)
 class Pool:
-    """Files of one kind whose samples weigh as long as they last."""
+    """Files of one kind, with samples weighted by duration."""
 
     extreme: bool = False
     seconds: float = 0.0
-    """Of all files."""
+    """Total duration of the files."""
     count: int = 0
     files: int = 0
-    """Samples and files."""
+    """Number of samples and of files."""
     least: float = np.inf
     largest: float = -np.inf
     """Torque, N m."""
     slowest: float = np.inf
     fastest: float = 0.0
-    """Speed under a torque without sign, rad/s."""
+    """Absolute speed under load, rad/s."""
     _parts: list[Samples] = field(default_factory=list)
     _powers: dict[tuple[str, float], float] = field(default_factory=dict)
 
     def add(self, samples: Samples) -> None:
-        """Take samples of a file."""
+        """Add samples of a file."""
         if not len(samples):
             return
         self._parts.append(samples)
@@ -153,7 +153,7 @@ class Pool:
             self._parts = [condensed(together(self._parts), self.extreme)]
 
     def merge(self, other: Pool) -> None:
-        """Take all that another pool has."""
+        """Add the content of another pool."""
         parts = other._parts
         count = other.count
         for samples in parts:
@@ -167,7 +167,7 @@ class Pool:
             self._powers[key] = self._powers.get(key, 0.0) + power
 
     def close(self, counts: Mapping[str, Rainflow], seconds: float) -> None:
-        """Take what was counted of a file, and how long it is."""
+        """Add the rainflow counts of a file, and its duration."""
         self.files += 1
         self.seconds += seconds
         for name, count in counts.items():
@@ -177,45 +177,45 @@ class Pool:
                 self._powers[name, exponent] = self._powers.get((name, exponent), 0.0) + power
 
     def samples(self) -> Samples:
-        """Give all samples, put together where they are many."""
+        """Return all samples, reduced if there are many."""
         found = together(self._parts)
         if len(found) > MOST_POINTS:
             return condensed(found, self.extreme)
         return found
 
     def equivalent_ranges(self) -> dict[tuple[str, float], float]:
-        """Range of one cycle a second that does the same damage in all files together, by component and slope."""
+        """Return the damage-equivalent range at one cycle per second of all files together, by component and slope."""
         return {key: (power / self.seconds) ** (1.0 / key[1]) for key, power in self._powers.items()}
 
 
-# Series of a source taken into pools, block by block: what is skipped, scaled, and refused with its row
+# Series of a source read into pools in blocks: skipped times, scaling, and errors with their row
 
 LARGEST_TORQUE = 1e9
-"""N m: no gearbox sees more, and damages beyond are no numbers."""
+"""Largest plausible torque, N m; damages of larger ones would overflow."""
 LARGEST_FORCE = 1e9
-"""N."""
+"""Largest plausible force, N."""
 LARGEST_SPEED = 1e5
-"""1/min."""
+"""Largest plausible speed, 1/min."""
 LEAST_BEFORE_DROPOUT = 0.1
-"""Share of the largest speed so far from which a shaft cannot stop within one step."""
+"""Fraction of the largest speed so far above which a shaft cannot stop within one step."""
 
 
 @dataclass(frozen=True)
 class ReadSummary:
-    """What was taken of a file."""
+    """Summary of the data read from a file."""
 
     skipped: float
     duration: float
     """s."""
     wind: float
-    """Mean wind speed, m/s; NaN where none is asked for."""
+    """Mean wind speed, m/s; NaN if none is required."""
     counts: Mapping[str, Rainflow]
     """By component."""
 
 
 @dataclass(frozen=True)
 class SeriesReader:
-    """Reads the series of one source."""
+    """Reader for the series of one source."""
 
     gearbox: Gearbox
     key: str
@@ -225,7 +225,7 @@ class SeriesReader:
 
     @property
     def has_hub(self) -> bool:
-        """Whether channels of a hub are named."""
+        """Whether channels of rotor loads are specified."""
         return self.source.hub_forces is not None or self.source.hub_moments is not None
 
     def take(self, path: Path, pool: Pool) -> ReadSummary:
@@ -234,7 +234,7 @@ class SeriesReader:
         Raises
         ------
         LoadFileError
-            A file that cannot be used.
+            An invalid file.
         GearboxFileError
             Keys that do not fit the file.
         """
@@ -271,7 +271,7 @@ class SeriesReader:
         return [True, *(name is not None for name in (*forces, *moments))]
 
     def _wanted(self, series: Channels) -> list[tuple[str, str]]:
-        """Names and quantities of the channels: torque, speed, five of the hub if any, wind if asked for."""
+        """Return names and quantities of the channels: torque, speed, rotor loads if any, wind if required."""
         if self.source.skip_s is None:
             raise self.gearbox.fault(
                 f"{self.key}.skip_s: this key is missing; set the time to skip at the start, 0 for none"
@@ -298,7 +298,7 @@ class SeriesReader:
         return forces + [(name, "torque") for name in self.source.hub_moments or ()]
 
     def _kept(self, series: Channels, wanted: list[tuple[str, str]]) -> Iterator[tuple[Floats, Floats, float]]:
-        """Blocks behind the time that is skipped, and the time at which the series begins."""
+        """Yield the blocks after the skipped time, with the start time of the series."""
         start = None
         before = 0
         top = 0.0
@@ -311,7 +311,7 @@ class SeriesReader:
                 yield time[kept], values[kept], start
 
     def _check_speed(self, path: Path, speed: Floats, time: Floats, before: int, top: float) -> float:
-        """Refuse speeds that no shaft has; return the largest so far."""
+        """Refuse implausible speeds; return the largest so far."""
         size = np.abs(speed) * abs(self.source.speed_factor)
         bad = np.flatnonzero(size > LARGEST_SPEED * RPM)
         if bad.size:
@@ -332,7 +332,7 @@ class SeriesReader:
         return float(so_far[-1])
 
     def _samples(self, path: Path, time: Floats, lasting: Floats, values: Floats) -> Samples:
-        """Give the loads of a block in the gearbox's senses and sizes."""
+        """Return the loads of a block with the signs and units of the gearbox."""
         partial = self.source.partial_factor or 1.0
         torque = values[:, 0] * self.source.torque_factor * partial
         hub = np.zeros((len(torque), HUB_LOADS if self.has_hub else 0))
@@ -357,9 +357,9 @@ class SeriesReader:
 def _lasting(
     blocks: Iterator[tuple[Floats, Floats, float]],
 ) -> Iterator[tuple[Floats, Floats, Floats, float]]:
-    """Say of each sample how long it lasts: half of the steps on its two sides, at the ends of a series one of them.
+    """Return each sample's duration: half the sum of the adjacent steps; at the ends of a series the one step.
 
-    Gives time, lasting, values and the beginning of the series, by blocks.
+    Yields time, duration, values and start of the series by blocks.
     """
     before: float | None = None
     held: tuple[Floats, Floats, float] | None = None

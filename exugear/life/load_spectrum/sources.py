@@ -1,4 +1,4 @@
-"""Sources of loads of a gearbox file: files found, read, weighed by hours of the life, and the hash of each."""
+"""Load sources of a gearbox file: files found, read and weighted by hours of the life, with the hash of each."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ from exugear.life.load_spectrum.series import (
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 
-# Hours of files by the wind that they were simulated in: a Weibull distribution over bins of wind speed
+# Hours of simulated files by wind speed: a Weibull distribution over wind speed bins
 
 
 def bin_of_wind(wind: WindSection, speed: float) -> float:
-    """Middle (m/s) of the bin of a wind speed (m/s): multiples of the width.
+    """Return the middle (m/s) of the bin of a wind speed (m/s), a multiple of the bin width.
 
     Examples
     --------
@@ -59,7 +59,7 @@ def bin_of_wind(wind: WindSection, speed: float) -> float:
 
 
 def hours_of_bins(wind: WindSection, middles: Iterable[float]) -> list[float]:
-    """Hours in a year of bins by their middles (m/s).
+    """Return the hours per year of bins given by their middles (m/s).
 
     Notes
     -----
@@ -81,20 +81,20 @@ def hours_of_bins(wind: WindSection, middles: Iterable[float]) -> list[float]:
     return [wind.hours_per_year * (above(middle - half) - above(middle + half)) for middle in middles]
 
 
-# Load cases of a REXS file as a table of loads: torque and speed of a body, and the share of the time of each
+# Load cases of a REXS file as a table of loads: torque and speed of a body, and the time fraction of each
 
 
 def rexs_load_cases(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Floats, Floats]:
-    """Torques (N m), speeds (rad/s) and shares of the time, each (load cases,), on a body of the gearbox file.
+    """Return torques (N m), speeds (rad/s) and time fractions, each (load cases,), on a body of the gearbox file.
 
     Parameters
     ----------
-    gearbox : as `exugear import` makes it of the same REXS file: it gives bodies their names
+    gearbox : as `exugear import` makes it from the same REXS file, with its body names
 
     Raises
     ------
     RexsError
-        No load cases, or one without torque on the body, a speed, or its share of the time.
+        No load cases, or one without torque on the body, speed or time fraction.
     """
     model = read_rexs(path)
     notes = Notes()
@@ -115,7 +115,7 @@ def rexs_load_cases(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Fl
 
 
 def _speed(gearbox: Gearbox, loads: Loads, body: str, where: str) -> float:
-    """Speed of the body, rad/s, from that of any body of the train."""
+    """Return the speed of the body, rad/s, from that of any body of the train."""
     for name, speed in loads.speeds.items():
         if name == body or name in gearbox.spinning:
             return gearbox.train.rolling_speeds(name, speed * RPM)[body]
@@ -123,7 +123,7 @@ def _speed(gearbox: Gearbox, loads: Loads, body: str, where: str) -> float:
 
 
 def _share(model: Model, case: LoadCase, where: str) -> float:
-    """Share of the time in percent; the old and the new name of the attribute are one here."""
+    """Return the time fraction in percent; both the old and the new name of the attribute are accepted."""
     for unit in model.of_type("gear_unit"):
         share = unit.with_attributes(case.changes.get(unit.number, {})).quantity("operating_time_fraction", "%")
         if share is not None and share >= 0.0:
@@ -131,20 +131,20 @@ def _share(model: Model, case: LoadCase, where: str) -> float:
     raise RexsError(f"{where}: no operating_time_fraction of the gear_unit")
 
 
-# Sources of loads of a gearbox file: files found, read, weighed by hours of the life, and the hash of each
+# Load sources of a gearbox file: files found, read and weighted by hours of the life, with the hash of each
 
 HOURS_PER_YEAR = 8766.0
 HUB_CELLS = 8
-"""Cells of each load of a hub into which the bins of torque are split."""
+"""Number of cells of each rotor load into which torque bins are split."""
 SPECTRUM_HEADINGS = ("torque_N_m", "speed_rpm", "hours")
-"""Headings of a table of loads that were counted elsewhere."""
+"""Headings of a table of counted loads from another program."""
 HOURS_HEADINGS = ("file", "hours_per_year")
-"""Headings of a table of hours of files."""
+"""Headings of a table with hours of files."""
 MOST_FILES = 20_000
-"""Files of one source."""
+"""Maximum number of files of one source."""
 REXS_ENDINGS = (".rexs", ".rexsj", ".rexsz")
 Progress = Callable[[int, int], None]
-"""Told the number of files that are read, and of all."""
+"""Called with the number of files read and the total."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ class LoadSource(ReprMixin):
     case: str
     """Its key, ``fatigue`` or ``extreme``, and its label."""
     file: str
-    """Name of its file, or what its files are called."""
+    """Name of its file, or the pattern of its files."""
     files: int
     count: int
     """Number of its files, and of samples in them."""
@@ -164,28 +164,28 @@ class LoadSource(ReprMixin):
     """SHA-256 of the file, or of the names and hashes of all."""
     torque: Floats
     speed: Floats
-    """(samples,) on the loaded body about +z, N m and rad/s; an extreme torque with its partial factor. Many samples
-    are put together: see `exugear.life.load_spectrum.series`."""
+    """(samples,) on the loaded body about +z, N m and rad/s; extreme torques include their partial factor. Many
+    samples are reduced: see `exugear.life.load_spectrum.series`."""
     hours: Floats
-    """(samples,) of each sample in the whole of the life; zero for extreme sources."""
+    """(samples,) duration of each sample in the whole life; zero for extreme sources."""
     hub: Floats
-    """(samples, 5) (samples, 0) force along x, y, z and moment about x, y on the loaded body, N and N m; nothing
-    where the source has none."""
+    """(samples, 5) forces along x, y, z and moments about x, y on the loaded body, N and N m; (samples, 0) without
+    rotor loads."""
     series: bool
-    """Whether the samples follow each other in time."""
+    """Whether the samples are a time series."""
     skipped: float
     duration: float
-    """Time of each series that was left out, the longest, and that was taken, of all, s; zero for tables."""
+    """Longest skipped time of a series, and total time used of all series, s; zero for tables."""
     factors: tuple[float, float]
-    """On torque and speed."""
+    """Factors on torque and speed."""
     least: float
     largest: float
     """Torque, N m."""
     slowest: float
     fastest: float
-    """Speed under a torque without sign, rad/s."""
+    """Absolute speed under load, rad/s."""
     equivalent_ranges: Mapping[tuple[str, float], float]
-    """(component, slope) range of one cycle a second that does the same damage, N m or N; none of tables."""
+    """(component, slope) damage-equivalent range at one cycle per second, N m or N; empty for tables."""
     remarks: tuple[str, ...] = ()
 
     def _line(self) -> str:
@@ -193,14 +193,14 @@ class LoadSource(ReprMixin):
 
     @property
     def hub_loads(self) -> Floats:
-        """Loads of a hub (samples, 5), zeros where there are none."""
+        """Rotor loads (samples, 5), with zeros if there are none."""
         if self.hub.shape[1]:
             return self.hub
         return np.zeros((len(self.torque), HUB_LOADS))
 
 
 LEAST_SHARE_BACKWARDS = 0.05
-"""Share of the time of a series from which on a positive torque at a negative speed is told."""
+"""Time fraction of a series above which a positive torque at a negative speed is reported."""
 
 
 def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[LoadSource, ...]:
@@ -208,12 +208,12 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
 
     Parameters
     ----------
-    progress : called with the number of files that are read, and of all
+    progress : called with the number of files read and the total
 
     Raises
     ------
     GearboxFileError
-        No section [loads], a body that does not turn, more hours than a year has, or a file that cannot be used.
+        No section [loads], a body that does not rotate, more hours than a year has, or an invalid file.
     """
     loads = section_of(gearbox)
     if loads.body not in gearbox.spinning:
@@ -242,7 +242,7 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
 
 
 def section_of(gearbox: Gearbox) -> LoadsSection:
-    """Section [loads] of a gearbox file.
+    """Return the section [loads] of a gearbox file.
 
     Raises
     ------
@@ -255,7 +255,7 @@ def section_of(gearbox: Gearbox) -> LoadsSection:
 
 
 def distribution(gearbox: Gearbox, sources: tuple[LoadSource, ...]) -> DurationDistribution:
-    """Load duration distribution of all sources of fatigue together."""
+    """Return the load duration distribution of all fatigue sources together."""
     worn = [source for source in sources if source.kind == "fatigue"]
     if not worn:
         raise gearbox.fault("loads.sources: no source of kind 'fatigue'; set one, fatigue damage requires it")
@@ -270,7 +270,7 @@ def distribution(gearbox: Gearbox, sources: tuple[LoadSource, ...]) -> DurationD
 
 
 def points_of(gearbox: Gearbox, sources: tuple[LoadSource, ...], found: DurationDistribution) -> LoadPoints:
-    """Split the bins of the distribution where loads of a hub differ."""
+    """Split the bins of the distribution where rotor loads differ."""
     worn = [source for source in sources if source.kind == "fatigue"]
     torque, speed, hours, hub = (
         np.concatenate([getattr(one, key) for one in worn]) for key in ("torque", "speed", "hours", "hub_loads")
@@ -279,7 +279,7 @@ def points_of(gearbox: Gearbox, sources: tuple[LoadSource, ...], found: Duration
 
 
 def _paths(gearbox: Gearbox, key: str, source: SourceSection) -> list[Path]:
-    """Files of a source, all below the folder of the gearbox file."""
+    """Return the files of a source, all inside the folder of the gearbox file."""
     if source.file is not None:
         path = gearbox.file(f"{key}.file", source.file, LARGEST_SERIES)
         if path.suffix.lower() not in (*SERIES_ENDINGS, *REXS_ENDINGS):
@@ -307,7 +307,7 @@ def _paths(gearbox: Gearbox, key: str, source: SourceSection) -> list[Path]:
 
 
 class _Draft:
-    """A source while its files are read: samples in pools that weigh alike."""
+    """Source during reading: samples in pools of equal weight."""
 
     def __init__(self, gearbox: Gearbox, loads: LoadsSection, name: str, source: SourceSection) -> None:
         self.gearbox, self.loads, self.name, self.section = gearbox, loads, name, source
@@ -360,7 +360,7 @@ class _Draft:
         )
 
     def _stated_hours(self) -> dict[str, float] | None:
-        """Hours a year of each file by its name, from a table."""
+        """Return the hours per year of each file by its name, from a table."""
         if self.section.hours_table is None:
             return None
         key = f"{self.key}.hours_table"
@@ -432,7 +432,7 @@ class _Draft:
             raise self.gearbox.fault(f"{self.key}.files: {path.name} is a table of counted loads; set it in `file`")
 
     def source(self, by_wind: Mapping[float, float]) -> LoadSource:
-        """All that was read, in hours of the life."""
+        """Return the source with all samples in hours of the life."""
         samples = self._table_in_hours() if self._table is not None else self._series_in_hours(by_wind)
         pools = [*self.pools.values()]
         section = self.section
@@ -468,7 +468,7 @@ class _Draft:
         return hashlib.sha256(content.encode()).hexdigest()
 
     def _table_in_hours(self) -> Samples:
-        """Give a table's hours: those of the life, or shares of what the source states."""
+        """Return the table's durations in hours of the life, or as fractions of the hours stated for the source."""
         table = self._table
         assert table is not None
         hours = table.lasting
@@ -496,7 +496,7 @@ class _Draft:
         return together(parts)
 
     def _hours_of(self, group: float, pool: Pool, by_wind: Mapping[float, float]) -> float:
-        """Hours of a pool in a year."""
+        """Return the hours of a pool per year."""
         section = self.section
         if section.kind == "extreme":
             return 0.0
@@ -509,7 +509,7 @@ class _Draft:
         return (section.hours_per_year or 0.0) * pool.seconds / sum(one.seconds for one in self.pools.values())
 
     def _ranges(self, by_wind: Mapping[float, float]) -> dict[tuple[str, float], float]:
-        """Equivalent ranges of all pools, by their hours."""
+        """Return the equivalent ranges of all pools, weighted by their hours."""
         weights = {group: self._hours_of(group, pool, by_wind) for group, pool in self.pools.items()}
         total = sum(weights.values())
         found: dict[tuple[str, float], float] = {}
@@ -520,7 +520,7 @@ class _Draft:
 
 
 def _hours_in(row: Sequence[str]) -> float | None:
-    """Hours of a line of a table of hours; None where it is none."""
+    """Return the hours in a line of a table of hours; None if invalid."""
     try:
         hours = float(row[1]) if len(row) == len(HOURS_HEADINGS) else math.nan
     except ValueError:
@@ -531,7 +531,7 @@ def _hours_in(row: Sequence[str]) -> float | None:
 
 
 def _wind_seconds(drafts: Sequence[_Draft]) -> dict[float, float]:
-    """Length of all files of each bin of wind speed, s, whatever source they are of."""
+    """Return the total length of the files of each wind speed bin over all sources, s."""
     seconds: dict[float, float] = {}
     for draft in drafts:
         for group, pool in draft.pools.items() if draft.section.wind is not None else ():
@@ -540,7 +540,7 @@ def _wind_seconds(drafts: Sequence[_Draft]) -> dict[float, float]:
 
 
 def told(sources: tuple[LoadSource, ...]) -> Iterator[str]:
-    """Say in words what was left out and scaled."""
+    """Describe skipped times and scale factors."""
     for source in sources:
         if source.skipped:
             each = " each" if source.files > 1 else ""
@@ -552,15 +552,15 @@ def told(sources: tuple[LoadSource, ...]) -> Iterator[str]:
 
 
 def _doubt_about_torque_sign(source: LoadSource, is_output: bool) -> Iterator[str]:
-    """Doubt torques against the speed of a body that drives: most often a sign that the other channel does not have.
+    """Warn of torques that oppose the speed of a driving body, most often because of a wrong sign of one channel.
 
-    A drive that brakes or coasts has some; a speed below zero under a torque above it has hardly one on purpose. At the
-    output torque and speed have other signs as a rule.
+    Braking and coasting give some such samples; a negative speed under a positive torque is rarely intended. At the
+    output, torque and speed usually have opposite signs.
     """
     if is_output:
         return
     reversed_power = source.torque * source.speed < 0.0
-    weights = source.hours + (source.hours.sum() == 0.0)  # of an extreme source each sample counts alike
+    weights = source.hours + (source.hours.sum() == 0.0)  # for an extreme source, samples have equal weight
     share = float(np.average(reversed_power, weights=weights))
     backwards = float(np.average(reversed_power & (source.speed < 0.0), weights=weights))
     if backwards > (LEAST_SHARE_BACKWARDS if source.series else 0.0) or share > 0.5:

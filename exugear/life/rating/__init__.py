@@ -1,1 +1,1 @@
-"""Gears by the standard, all factors by name, beside what the finite elements say."""
+"""Rating of gears to ISO 6336 with all factors by name, together with finite element results."""

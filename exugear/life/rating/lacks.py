@@ -1,4 +1,4 @@
-"""What a gearbox file lacks for loads, life and rating, as far as that is quick to tell."""
+"""Quick check of the input that a gearbox file lacks for load spectrum, life and rating."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from exugear.life.load_spectrum.sources import section_of
 from exugear.life.rating.sheet import rated_loads
 
 QUICK = 1 << 20
-"""Bytes of all files of loads together up to which they are read: tables of counted loads, not series of hours."""
+"""Maximum total size of load files that are read, bytes: tables of counted loads, not long series."""
 
 COMMANDS = ("loads", "life", "check --rating")
 
 
 def lacks_of_life(gearbox: Gearbox) -> dict[str, tuple[str, ...]]:
-    """Say by verb why it is not possible, all reasons at once; nothing where it is.
+    """Return by command all reasons why it cannot run; empty if it can.
 
-    Long files of loads are not read: what only they show, such as torques that reverse, is then left to the verbs.
+    Long load files are not read; errors found only in them, such as reversed torques, are left to the commands.
 
     Examples
     --------
@@ -45,13 +45,13 @@ def _faults(gearbox: Gearbox, check: Callable[[Gearbox], object]) -> tuple[str, 
 
 
 def _checked_by_keys(gearbox: Gearbox) -> None:
-    """Check what is known without the files of loads."""
+    """Check the input that does not depend on load files."""
     check_keys(gearbox)
     check_strengths(gearbox, rating_of(gearbox), tooth_exposures(gearbox, section_of(gearbox).body), False)
 
 
 def _are_quick(gearbox: Gearbox) -> bool:
-    """Tell whether all files of loads are named one by one, and are short; one that is missing is told at once."""
+    """Return whether all load files are named individually and short, or one is missing, which is reported at once."""
     if gearbox.case.loads is None:
         return True
     size = 0

@@ -1,4 +1,4 @@
-"""The rating sheet of a gearbox: each gear and flank by ISO 6336, beside the finite elements, and what is left out."""
+"""Rating sheet of a gearbox: each gear and flank to ISO 6336, with finite element results and unrated factors."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 LEAST_FORCE = 1.0
-"""Tangential force, N, below which a mesh carries nothing: there is no line load to rate."""
+"""Tangential force, N, below which a mesh counts as unloaded and is not rated."""
 FINITE_ELEMENTS = ("sigma_H", "sigma_F", "K_Hbeta", "S_H", "S_F")
-"""What stands beside the standard, from the contact of finite elements and gauges in the roots."""
+"""Results listed next to the standard's, from finite element contact and root gauges."""
 UNITS: Mapping[str, tuple[float, str]] = {
     **dict.fromkeys(("sigma_H0", "sigma_H", "sigma_HG", "sigma_F0", "sigma_F", "sigma_FG"), (1e-6, "MPa")),
     **dict.fromkeys(("sigma_Hlim", "sigma_Flim"), (1e-6, "MPa")),
@@ -54,7 +54,7 @@ UNITS: Mapping[str, tuple[float, str]] = {
     "F_betax": (1e6, "um"),
     "Z_E": (1e-3, "N^0.5/mm"),
 }
-"""Factor from SI to the unit that a sheet has, and that unit; others are plain numbers."""
+"""Factor from SI to the unit on the sheet, and that unit; other values are dimensionless."""
 _KEY_UNITS = {"N/(mm um)": "N_per_mm_um", "kN m": "kN_m", "m/s": "m_per_s", "N^0.5/mm": "root_MPa"}
 
 
@@ -68,18 +68,18 @@ class FlankSheet:
     member: int
     """{0, 1}"""
     standard: Mapping[str, float]
-    """By the field's symbols, SI; see `exugear.life.rating.standard.rate`."""
+    """By standard symbol, SI; see `exugear.life.rating.standard.rate`."""
     finite_elements: Mapping[str, float]
-    """`FINITE_ELEMENTS`, SI; nothing where none are known."""
+    """`FINITE_ELEMENTS`, SI; empty if not known."""
     lacking: Mapping[str, str]
-    """Why factors are not rated."""
+    """Reasons why factors are not rated."""
     remarks: tuple[str, ...]
-    """What lies outside the range of the standard."""
+    """Conditions outside the range of the standard."""
 
 
 @dataclass(frozen=True, eq=False)
 class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
-    """All flanks that are loaded, under what, and what is left out."""
+    """All loaded flanks, their loads, and unrated items."""
 
     edition: str
     load: str
@@ -89,7 +89,7 @@ class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
     left_out: tuple[str, ...] = LEFT_OUT
 
     def summary(self) -> dict[str, Any]:
-        """Figures for programs: units in the keys; numbers that are none are left out, infinite ones are words."""
+        """Return the values for JSON, with units in the keys; NaN is omitted, infinite values are text."""
         return {
             "edition": self.edition,
             "load": self.load,
@@ -130,14 +130,14 @@ def rating_sheet(
     finite_elements: Mapping[tuple[str, str, str], Mapping[str, float]],
     assumptions: tuple[str, ...],
 ) -> RatingSheet:
-    """Rate all flanks that loads press.
+    """Rate all loaded flanks.
 
     Parameters
     ----------
     counted : of the file, or `exugear.life.rating.sheet.nominal_loads`
     acting : of these
     balance : over their torques
-    finite_elements : (gear, family, flank) what is known beside the standard
+    finite_elements : (gear, family, flank) finite element results
     """
     flanks = []
     for tooth in distinct(counted.teeth):
@@ -165,7 +165,7 @@ def _flank(
     sense: int,
     beside: Mapping[str, float],
 ) -> FlankSheet | None:
-    """Rate one flank; None if its meshes carry nothing."""
+    """Rate one flank; None if its meshes are unloaded."""
     rules = _rules(gearbox, rating, counted, tooth)
     loads = _mesh_loads(gearbox, acting, balance, tooth, rules, sense)
     if not len(loads.force):
@@ -221,7 +221,7 @@ def _holder(mesh: Mesh, side: int) -> str:
 def _mesh_loads(
     gearbox: Gearbox, acting: ActingLoads, balance: StaticBalance, tooth: ToothExposure, rules: FlankRules, sense: int
 ) -> MeshLoads:
-    """Find what the meshes of a family carry, from the static balance."""
+    """Return the loads of the meshes of a family, from the static balance."""
     points = acting.points
     own = np.sign(points.torque) == sense
     torque = points.torque[own]
@@ -279,7 +279,7 @@ def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
         yield "K_v other than to the standard: minimum_dynamic_factor (runs and responses are not evaluated here)"
 
 
-# What the finite elements say beside the standard: of a stored life, or under the nominal load by tables
+# Finite element results next to the standard's: from a stored rating, or under the nominal load from tables
 
 _NAMES = {
     "sigma_H": "contact_stress",
@@ -288,13 +288,13 @@ _NAMES = {
     "S_H": "contact_safety",
     "S_F": "root_safety",
 }
-"""Figures of a life by the symbols of a sheet."""
+"""Variables of a stored rating by the symbols of a sheet."""
 FlankKey = tuple[str, str, str]
 """Gear, family of meshes and flank."""
 
 
 def of_life(data: xr.Dataset) -> dict[FlankKey, dict[str, float]]:
-    """Figures of all flanks of a stored life."""
+    """Return the values of all flanks of a stored rating."""
     found = {}
     for place, label in enumerate(data["flank"].to_numpy().tolist()):
         gear, flank, family = label.split(" ", 2)
@@ -310,7 +310,7 @@ def nominal_load_values(
     balance: StaticBalance,
     stresses: Mapping[str, MeshCycleStress],
 ) -> dict[FlankKey, dict[str, float]]:
-    """Figures of the flanks of pairs with stresses under the nominal load with K_A, which acts on its torque.
+    """Return the values of the flanks of pairs with stresses under the nominal load, with K_A applied to its torque.
 
     Parameters
     ----------
@@ -326,27 +326,27 @@ def nominal_load_values(
 
 
 def remarks_on(stresses: Mapping[str, MeshCycleStress]) -> list[str]:
-    """Say of which gears that stand aligned the finite elements are."""
+    """State which finite element results are for aligned gears."""
     straight = [name for name, stress in stresses.items() if len(stress.misalignment) < 2]
     if straight:
         return [f"finite element sigma and K_Hbeta of {', '.join(straight)} are for aligned gears"]
     return []
 
 
-# The nominal load of a gearbox as a spectrum of one load: that of the static load, at rated speed
+# Nominal load of a gearbox as a spectrum of one load: the static load at rated speed
 
 HUB_LOADS = 5
-"""Forces and moments of a hub beside the torque: none here."""
+"""Number of rotor loads in addition to the torque; all are zero here."""
 LONGEST = 1e10
-"""Load cycles at the last point of the standards' S-N curves: what a load without stated hours is rated for."""
+"""Load cycles at the last point of the standard's S-N curves, used for a load without stated hours."""
 
 
 def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) -> CountedLoads:
-    """Spectrum of the static load alone.
+    """Return the spectrum of the static load alone.
 
     Parameters
     ----------
-    rating : its `nominal_hours`; without them the teeth that are loaded least often are loaded `LONGEST` times
+    rating : its `nominal_hours`; without them, the teeth with the fewest cycles have `LONGEST` load cycles
     factor : on the torque
 
     Raises
@@ -422,19 +422,19 @@ def _source(torque: float, speed: float, hours: float) -> LoadSource:
     )
 
 
-# From a gearbox file to its rating sheet: the loads of the file or the nominal one, balanced on bearings
+# From a gearbox file to its rating sheet: its load spectrum or the nominal load, balanced on bearings
 
 RATED_AS = Choice(Variant.bushing, "iso6336")
-"""Forces and misalignment of the standard: shafts on their bearings, teeth as stiff as ISO 6336-1 has them."""
+"""Model settings for forces and misalignment to the standard: shafts on bearings, mesh stiffness to ISO 6336-1."""
 
 
 def rated_loads(gearbox: Gearbox) -> CountedLoads:
-    """Read the loads that gears are rated under: those of `[loads]`, or the static load at rated speed.
+    """Read the loads for the rating: those of `[loads]`, or the static load at rated speed.
 
     Raises
     ------
     GearboxFileError
-        No section `[rating]`, loads that cannot be used, or strengths that do not fit the gears.
+        No section `[rating]`, invalid loads, or strengths that do not fit the gears.
     """
     if gearbox.case.loads is not None:
         return checked_loads(gearbox)
@@ -447,12 +447,12 @@ def rated_loads(gearbox: Gearbox) -> CountedLoads:
 def balanced(
     assembly: Assembly, counted: CountedLoads, progress: Callable[[int, int], None] | None = None
 ) -> StaticBalance:
-    """Solve the static balance of a gearbox as it is rated (`RATED_AS`), over the torques of its loads.
+    """Solve the static balance of a gearbox for its rating (`RATED_AS`), over the torques of its loads.
 
     Raises
     ------
     BalanceError
-        A static state that is not held.
+        A static state without equilibrium.
     """
     acting = acting_loads(counted)
     angles = rating_of(assembly.gearbox).carrier_angles
@@ -466,13 +466,13 @@ def rated(
     finite_elements: Mapping[FlankKey, Mapping[str, float]],
     remarks: tuple[str, ...] = (),
 ) -> RatingSheet:
-    """Rating sheet of a gearbox.
+    """Return the rating sheet of a gearbox.
 
     Parameters
     ----------
-    counted : of `rated_loads`
-    balance : of `balanced`
-    finite_elements : (gear, family, flank) what stands beside the standard, see `exugear.life.rating.sheet`
-    remarks : what is to be said of that
+    counted : from `rated_loads`
+    balance : from `balanced`
+    finite_elements : (gear, family, flank) finite element results, see `exugear.life.rating.sheet`
+    remarks : on the finite element results
     """
     return rating_sheet(gearbox, rating_of(gearbox), counted, acting_loads(counted), balance, finite_elements, remarks)

@@ -1,8 +1,8 @@
-"""One flank of a gear by ISO 6336:2006, method B: all factors, stresses, what they may be, and both safeties.
+"""Rating of one flank of a gear to ISO 6336:2006, method B: factors, stresses, permissible stresses and safeties.
 
-Load sharing and misalignment are those of the static balance of the shafts; what running in leaves of misalignment and
-deviations loads the face and the teeth beside each other. Under a spectrum all factors follow each load, safeties are
-those of Miner's rule, and what is told is the load that does most damage to the flank.
+Load sharing and misalignment are those of the static balance of the shafts. Misalignment and deviations that remain
+after running-in affect the distribution over face and teeth. Under a spectrum, factors are computed for each load and
+safeties by Miner's rule; the listed load is the one with the largest damage to the flank.
 """
 
 from __future__ import annotations
@@ -53,25 +53,25 @@ FINE_CLASS = 5
 
 @dataclass(frozen=True, eq=False)
 class MeshLoads:
-    """What a family of meshes carries in each load of a spectrum."""
+    """Loads of a family of meshes for each load of a spectrum."""
 
     torque: Floats
-    """(n,) of the loaded body, N m: what the loads are told by."""
+    """(n,) of the loaded body, N m: label of the loads."""
     force: Floats
     """(n,) F_t at the reference circle, mean of the meshes over the angles of the carrier, N."""
     sharing: Floats
-    """(n,) K_gamma: the largest over that."""
+    """(n,) K_gamma: largest over mean force."""
     opening: Floats
-    """(n,) largest misalignment of the meshes as an opening over the face, m."""
+    """(n,) largest misalignment of the meshes as a gap over the face width, m."""
     speed: Floats
-    """(n,) of gear 1 against the frame in which its mates stand, rad/s."""
+    """(n,) of gear 1 relative to the frame of its mating gears' axes, rad/s."""
     turns: Floats
     """(n,) load cycles of the flank."""
 
 
 @dataclass(frozen=True, eq=False)
 class FlankRules:
-    """What one gear of a pair is rated by."""
+    """Data for the rating of one gear of a pair."""
 
     pair: GearPair
     member: int
@@ -80,29 +80,29 @@ class FlankRules:
     """Of gear 1 and gear 2."""
     application_factor: float
     stated_dynamic_factor: float
-    """K_A; K_v where the standard's is not to be had."""
+    """K_A, and K_v if the standard's is not available."""
     viscosity: float
-    """At 40 degrees Celsius, mm2/s."""
+    """At 40 °C, mm2/s."""
     meshes: tuple[int, int]
-    """Teeth in mesh at once around gear 1 and gear 2, for the mass that vibrates."""
+    """Simultaneous meshes of gear 1 and of gear 2, for the relative mass."""
     free_bore: bool
-    """Whether the gear's bore is free: that of a planet."""
+    """Whether the gear's bore is free, as for a planet."""
 
     @property
     def strength(self) -> StrengthSection | None:
-        """Of the gear itself."""
+        """Strength of the gear itself."""
         return self.strengths[self.member]
 
     @property
     def classes(self) -> tuple[int, int] | None:
-        """Tolerance classes of both gears; None without that of one."""
+        """Tolerance classes of both gears; None if either is missing."""
         found = [strength.tolerance_class for strength in self.strengths if strength is not None]
         if len(found) < 2 or None in found:
             return None
         return (found[0] or 0, found[1] or 0)
 
     def deviations(self) -> FlankDeviations | None:
-        """Tolerances of the classes, the larger of both gears, f_ma of both; None without classes."""
+        """Return the tolerances of the classes: the larger of both gears, f_ma combined; None without classes."""
         classes = self.classes
         if classes is None:
             return None
@@ -120,7 +120,7 @@ class FlankRules:
         return FlankDeviations(max(found["pitch"]), max(found["form"]), math.hypot(*found["helix"]))
 
     def lacking(self) -> dict[str, str]:
-        """Why factors are not rated, by their name."""
+        """Return the reasons why factors are not rated, by factor."""
         lines = {}
         if self.pair.gear.internal:
             lines["K_v"] = "not rated: c' and mass of ring gears are not modelled; K_v of [rating] is used"
@@ -133,11 +133,11 @@ class FlankRules:
 
 
 def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
-    """Factors, stresses and safeties of a flank and the root below it, by the field's symbols.
+    """Return factors, stresses and safeties of a flank and its root, by standard symbol.
 
     Returns
     -------
-    stresses in Pa, F_t in N, v in m/s; what is not rated is NaN
+    stresses in Pa, F_t in N, v in m/s; unrated values are NaN
     """
     factors = [_load_factors(rules, loads, place) for place in range(len(loads.force))]
     stresses = [_stresses(rules, factor) for factor in factors]
@@ -170,11 +170,11 @@ def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
 
 
 ROOT_STRENGTH = ("Y_deltarelT", "Y_RrelT", "Y_X")
-"""Relative factors of the root's strength, none where the file states their product; that is ``Y_rel``."""
+"""Relative root strength factors; omitted if the file states their product, which is ``Y_rel``."""
 
 
 def _load_factors(rules: FlankRules, loads: MeshLoads, place: int) -> dict[str, float]:
-    """F_t, v and the K factors of one load."""
+    """Return F_t, v and the K factors of one load."""
     pair = rules.pair
     force = float(loads.force[place])
     sharing = float(loads.sharing[place])
@@ -225,13 +225,13 @@ def _dynamic(
 
 
 def _running_in_relief(rules: FlankRules) -> float:
-    """C_ay that running in gives tips, m; designed relief is not looked at (ISO 6336-1:2006, 6.5.4)."""
+    """Return C_ay from running-in of the tips, m; designed tip relief is neglected (ISO 6336-1:2006, 6.5.4)."""
     limits = [strength.sigma_H_lim_MPa for strength in rules.strengths if strength is not None]
     return 1e-6 * sum(((limit / 97.0 - 18.45) ** 2 / 18.0 + 1.5) / len(limits) for limit in limits)
 
 
 def _run_in(rules: FlankRules, deviations: FlankDeviations | None, velocity: float) -> FlankDeviations | None:
-    """Tell what running in leaves of deviations."""
+    """Return the deviations that remain after running-in."""
     if deviations is None:
         return None
 
@@ -242,7 +242,7 @@ def _run_in(rules: FlankRules, deviations: FlankDeviations | None, velocity: flo
 
 
 def _mean(rules: FlankRules, taken: Callable[[Hardening, float], float]) -> float:
-    """Mean of both gears of what running in takes; nothing without their strength."""
+    """Return the mean running-in allowance of both gears; zero without their strength."""
     known = [strength for strength in rules.strengths if strength is not None]
     values = [taken(hardening_of(one), MPA * one.sigma_H_lim_MPa) for one in known]
     if values:
@@ -251,7 +251,7 @@ def _mean(rules: FlankRules, taken: Callable[[Hardening, float], float]) -> floa
 
 
 def _stresses(rules: FlankRules, of: dict[str, float]) -> dict[str, float]:
-    """Nominal and acting stresses of one load with its Z and Y factors; K_Halpha and K_Falpha that are none count 1."""
+    """Return nominal and acting stresses of one load with its Z and Y factors; NaN K_Halpha and K_Falpha count as 1."""
     pair = rules.pair
     member = rules.member
     strength = rules.strength
@@ -282,7 +282,7 @@ def _stresses(rules: FlankRules, of: dict[str, float]) -> dict[str, float]:
 
 
 def _contact_influences(rules: FlankRules, velocity: float) -> tuple[float, float, float]:
-    """Z_L, Z_v and Z_R of the softer gear at a pitch line velocity; NaN without strengths."""
+    """Return Z_L, Z_v and Z_R of the softer gear at a pitch line velocity; NaN without strengths."""
     known = [strength for strength in rules.strengths if strength is not None]
     if not known:
         return math.nan, math.nan, math.nan

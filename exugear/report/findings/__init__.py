@@ -1,1 +1,1 @@
-"""What the results of a folder say, in words and figures: the page shows it, the command line prints it."""
+"""Findings from a results folder as text and numbers, for the report page and the command line."""

@@ -1,4 +1,4 @@
-"""What all that is told of results stands on: the case of the folder, its models, and notes for the top of a page."""
+"""Shared basis of the report sections: gearbox file of the results folder, its models, and notes for the page."""
 
 from __future__ import annotations
 
@@ -37,85 +37,85 @@ from fe_ste.transmission_error.surface import SteSurface
 from fe_ste.transmission_error.table import MeshTable, TableError
 
 REFERENCE_VARIANT = Variant.rigid
-"""Variant that others are compared with."""
+"""Variant that the others are compared with."""
 VISIBLE_SHARE = 0.01
-"""Least share of the overall transmission error's mobility for a mode to be called seen by it."""
+"""Minimum TE participation (fraction) of a mode that counts as visible in the overall TE."""
 
 
 def choice_of(attributes: Mapping[str, Any]) -> Choice:
-    """Choice that a run or modes were computed of, from the attributes of the file; its load case is left out."""
+    """Return the model settings that a run or modes file was computed with, from its attributes, without load case."""
     return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
 
 
 def words_of(choice: Choice) -> str:
-    """Return a choice for headings."""
+    """Return model settings as text for headings."""
     return f"{choice.variant}, mesh model {choice.mesh_model}, inertia set {choice.inertias}"
 
 
 @dataclass(frozen=True)
 class Notes:
-    """What is told at the top of the page; each list in the order in which it was noted."""
+    """Messages for the top and the end of the page, each list in order of occurrence."""
 
     statements: list[str] = field(default_factory=list)
-    """What the page says in short."""
+    """Statements of the summary."""
     distrusted: list[str] = field(default_factory=list)
-    """Runs that are not to be trusted, with the reason."""
+    """Invalid runs, with the reason."""
     left_out: list[str] = field(default_factory=list)
-    """Files that do not belong to the case, and what could not be computed, with the reason."""
+    """Skipped files that do not belong to the gearbox file, and results that could not be computed, with the reason."""
 
 
 @dataclass(frozen=True)
 class Context:
-    """What the sections of one report share."""
+    """Data that all sections of one report share."""
 
     folder: Path
-    """The results folder."""
+    """Results folder."""
     gearbox: Gearbox
-    """The case that is kept in it."""
+    """Gearbox of the gearbox file stored in the folder."""
     target: float | None
-    """Frequency (Hz) that modes are looked for at."""
+    """Target frequency for the search for modes, Hz."""
     tell: Callable[[str], None]
-    """Called with what is being done."""
+    """Callback for progress messages."""
     notes: Notes = field(default_factory=Notes)
     assemblies: dict[Choice, Assembly] = field(default_factory=dict)
-    """Choices assembled so far."""
+    """Assembled models by model settings."""
     stiffnesses: dict[str, dict[str, Floats | MeshCurve | SteSurface]] = field(default_factory=dict)
-    """Dict of law to mesh stiffness. Mesh stiffness read so far."""
+    """Dict of mesh model to mesh stiffness. Mesh stiffness read so far."""
 
     def stiffness(self, law: str) -> dict[str, Floats | MeshCurve | SteSurface]:
-        """Mesh stiffness of a law from the tables of the folder, read once."""
+        """Return the mesh stiffness of a mesh model from the tables of the folder; it is read once."""
         if law not in self.stiffnesses:
             self.stiffnesses[law] = mesh_stiffness(self.gearbox, law, self.folder)
         return self.stiffnesses[law]
 
     def assembled(self, choice: Choice) -> Assembly:
-        """Equations of a choice, with the tables of the folder, assembled once."""
+        """Return the model for given settings, assembled once with the tables of the folder."""
         if choice not in self.assemblies:
             bodies = self.bodies_of(choice)(self.gearbox)
             self.assemblies[choice] = assemble(self.gearbox, choice, self.stiffness(choice.mesh_model), bodies)
         return self.assemblies[choice]
 
     def bodies_of(self, choice: Choice) -> Callable[[Gearbox], dict[str, ElasticBody]]:
-        """Reduced elastic bodies of a gearbox, varied or not, as a choice has them."""
+        """Return a function that computes the reduced flexible bodies of a (varied) gearbox for given settings."""
         if not choice.variant.is_elastic:
             return lambda gearbox: {}
         return lambda gearbox: reduced_bodies(gearbox, choice.inertia_set(gearbox), bodies_folder(self.folder))
 
     def name_of(self, path: Path) -> Path:
-        """Path of a file as seen from the results folder."""
+        """Return the path of a file relative to the results folder."""
         return path.relative_to(self.folder)
 
 
-# Results in the folder that belong to its case: tables, modes and runs
+# Results in the folder that belong to its gearbox file: tables, modes and runs
 
 OTHER_INPUT = "was computed from another input; recompute it"
 _UNFIT = (GearboxFileError, MeshError, VariantError, BearingError, BalanceError, KeyError)
-"""What the case of the folder may say to the choice that a file was computed of."""
+"""Errors of the gearbox file for the model settings of a stored result."""
 
 
 @dataclass(frozen=True)
 class StoredResults:
-    """What a report is made from."""
+    """Stored results that a report is made from."""
 
     tables: Mapping[str, MeshTable]
     """By pair name."""
@@ -123,20 +123,20 @@ class StoredResults:
     """As `exugear.system.modes.Modes.to_dataset` makes them."""
     runs: Sequence[VariantRun]
     steady: Sequence[xr.Dataset] = ()
-    """Steady responses as `exugear.steady.steady_file.load_response` reads them."""
+    """Steady-state responses as `exugear.steady.steady_file.load_response` reads them."""
 
     def __bool__(self) -> bool:
-        """Tell whether there is anything to report."""
+        """Return whether there is anything to report."""
         return bool(self.tables or self.modes or self.runs or self.steady)
 
 
 def stored_models(context: Context) -> StoredResults:
-    """Read the tables and modes that belong to the case of the folder, which is soon done; note what does not."""
+    """Read the tables and modes that belong to the gearbox file of the folder (fast); note the others as skipped."""
     return StoredResults(_stored_tables(context), dict(_stored_modes(context)), ())
 
 
 def with_responses(context: Context, models: StoredResults) -> StoredResults:
-    """Add the runs and steady responses that belong to the case of the folder; what does not is noted as left out."""
+    """Add the runs and steady-state responses that belong to the gearbox file; note the others as skipped."""
     runs = list(_stored_runs(context, models.modes))
     return replace(models, runs=runs, steady=list(_stored_steady(context)))
 
@@ -183,7 +183,7 @@ def _stored_modes(context: Context) -> Iterator[tuple[Choice, xr.Dataset]]:
 
 
 def _stored_runs(context: Context, modes: Mapping[Choice, xr.Dataset]) -> Iterator[VariantRun]:
-    """Read the runs that fit; those to be compared share one window, the longest, whichever is read first."""
+    """Read the matching runs; runs to be compared use the longest window of their group, whatever the reading order."""
     lines = order_lines(context.gearbox)
     groups: dict[tuple[str, ...], list[tuple[RunSignals, float]]] = {}
     for path in _run_files(context.folder):
@@ -201,7 +201,7 @@ def _stored_runs(context: Context, modes: Mapping[Choice, xr.Dataset]) -> Iterat
 
 
 def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] | None:
-    """Signals of a run that fits the case, and the window that suits it (s); None where it is left out."""
+    """Return the signals of a run that matches the gearbox file and its suitable window (s); None if it is skipped."""
     try:
         attributes = load_run(path, ()).attrs
         if not _fits(context, path, attributes):
@@ -217,19 +217,19 @@ def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] |
 
 
 def bytes_of_runs(context: Context) -> int:
-    """Size of the runs in the folder that ended."""
+    """Return the total size of the run files in the folder, bytes."""
     return sum(path.stat().st_size for path in _run_files(context.folder) if path.is_file())
 
 
 def _run_files(folder: Path) -> list[Path]:
-    """List runs that ended, and those that were stopped and not taken up again."""
+    """List completed runs, and aborted ones that were not resumed."""
     ended = set(folder.glob(f"*/*/{FINAL_NAME}"))
     stopped = {path for path in folder.glob(f"*/*/{PARTIAL_NAME}") if path.with_name(FINAL_NAME) not in ended}
     return sorted(ended | stopped)
 
 
 def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
-    """Tell whether a file was computed from the case of the folder; if not, note why it is left out."""
+    """Return whether a file was computed from the gearbox file of the folder; if not, note why it is skipped."""
     load_case = attributes.get("load_case")
     try:
         if load_case is not None and load_case not in context.gearbox.load_cases:
@@ -244,7 +244,7 @@ def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
 
 
 def _note_distrust(context: Context, path: Path, attributes: Mapping[str, Any]) -> None:
-    """Name a run that is not to be trusted, with the reason that its file gives."""
+    """Note an invalid run with the reason stored in its file."""
     verdict = verdict_of(attributes)
     if verdict:
         name = context.name_of(path)
@@ -253,14 +253,14 @@ def _note_distrust(context: Context, path: Path, attributes: Mapping[str, Any]) 
 
 
 def run_key(attributes: Mapping[str, Any]) -> tuple[str, str, str]:
-    """Load case, law and inertia set: what runs to be compared have in common."""
+    """Return load case, mesh model and inertia set, which runs to be compared have in common."""
     return str(attributes["load_case"]), str(attributes["mesh_model"]), str(attributes["inertias"])
 
 
-# What excites: the static transmission error of each pair over the mesh cycle, and its harmonics
+# Excitation: static transmission error of each pair over the mesh cycle, and its harmonics
 
 HARMONICS = 6
-"""Harmonics of the mesh frequency that are told."""
+"""Number of harmonics of the mesh frequency in the report."""
 
 
 @dataclass(frozen=True)
@@ -281,11 +281,11 @@ class PairExcitation:
     pressure: float
     """Highest contact pressure over the cycle, Pa; NaN if the table has none."""
     iso_stiffness: float
-    """By ISO 6336-1 method B, N/m."""
+    """Mesh stiffness to ISO 6336-1 method B, N/m."""
 
 
 def harmonics_of(error: Floats, count: int = HARMONICS) -> Floats:
-    """Amplitudes of the harmonics of a curve over one cycle, evenly sampled.
+    """Return the amplitudes of the harmonics of a curve that is evenly sampled over one cycle.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Three facts in plain words: where it rings loudest, what compliance does, and what would move it."""
+"""Three facts for the summary: the highest resonance, the effect of compliance, and the sensitivity of the mode."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ from exugear.report.findings.words import Labels, figure_text
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
 
-# What moves a mode: first-order shifts of its frequency from where its energy sits
+# First-order shifts of a natural frequency, from the distribution of strain and kinetic energy
 
 STEP = 0.1
-"""Relative change of a stiffness or an inertia whose effect is told."""
+"""Relative change of a stiffness or an inertia for which the frequency shift is reported."""
 LEAST_SHIFT = 5e-4
-"""Relative shift of a frequency below which a lever is left out."""
+"""Relative frequency shift below which a parameter is not listed."""
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Something that moves a mode."""
+    """First-order sensitivity of a natural frequency to a stiffness or an inertia."""
 
     what: str
-    """Element or body in words."""
+    """Label of the element or body."""
     kind: str
     """{"stiffness", "inertia"}"""
     share: float
-    """Of the mode's strain or kinetic energy."""
+    """Fraction of the strain energy (stiffness) or kinetic energy (inertia) of the mode."""
     shift: float
-    """Change of the frequency for 10 % more of it, Hz."""
+    """Frequency shift for an increase of the parameter by 10 %, Hz."""
 
 
 def shift_of(frequency: float, share: float, kind: str, step: float = STEP) -> float:
-    """Shift of a frequency (Hz) for a relative change of what holds a share of the mode's energy.
+    """Return the frequency shift (Hz) for a relative change of a parameter that has a fraction of the mode's energy.
 
-    With the shape held, f^2 goes with strain energy over kinetic energy (Rayleigh's quotient), of which the shares
-    are parts: f sqrt(1 + step share) for stiffness, f / sqrt(1 + step share) for inertia. The first order in the
-    step is exact.
+    With a fixed mode shape, Rayleigh's quotient makes f^2 proportional to strain energy over kinetic energy. With the
+    fractions of these energies, f becomes f sqrt(1 + step share) for stiffness and f / sqrt(1 + step share) for
+    inertia. The first order in the step is exact.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def shift_of(frequency: float, share: float, kind: str, step: float = STEP) -> f
 
 
 def levers_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[Sensitivity, ...]:
-    """List what moves a mode, stiffnesses first, each kind by its effect; copies of a planet set change together."""
+    """List sensitivities of a mode: stiffnesses, then inertias, each by effect; planets of a set vary together."""
     frequency = float(modes["frequency"][index])
     kinetic = modes["kinetic_energy_share"].isel(mode=index).sum("motion").to_numpy()
     bodies = words.gathered(dict(zip(map(str, modes["body"].to_numpy()), map(float, kinetic), strict=True)))
@@ -70,45 +70,45 @@ def levers_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[Sensitivity
     return tuple(lever for lever in levers if not math.isclose(lever.shift, 0.0, abs_tol=LEAST_SHIFT * frequency))
 
 
-# Three facts in plain words: where it rings loudest, what compliance does, and what would move it
+# Cards of the summary: highest resonance, effect of compliance, sensitivity
 
 DAMPING = "mesh damping"
-"""Begin of the label of the parameter that damps."""
+"""Beginning of the labels of mesh damping parameters."""
 SAME_MODE = 0.01
-"""Share of the frequency within which resonances belong to one mode."""
+"""Relative frequency difference below which resonances belong to the same mode."""
 NO_GAIN = 0.1
-"""Gain (dB) below which a change makes no difference."""
+"""Gain (dB) below which a change has no effect."""
 AROUND_RATED = 1.25
-"""Speed up to which a resonance counts as one of the rated speed, over that speed."""
+"""Ratio to the rated speed up to which a resonance counts as near the rated speed."""
 
 MOST_WORDS = 25
-"""Words of a card's sentence."""
+"""Maximum number of words in the text of a card."""
 LOUDER = 1.0
-"""dB by which a resonance that the run-up does not show is louder than those that it shows, to be told first."""
+"""Excess (dB) from which a resonance that the run-up does not resolve is reported first."""
 
 
 @dataclass(frozen=True)
 class SummaryCard:
-    """A fact for a card of the page and a line of the command line."""
+    """Finding for a card of the page and a line of the command line."""
 
     kind: str
-    """What it is about."""
+    """Heading."""
     figure: str
     beside: str
-    """The figure in large letters, and what stands beside it."""
+    """Value in large letters, and the text next to it."""
     sentence: str
-    """The rest."""
+    """Further text."""
     link: str
-    """Section of the page that has more."""
+    """Section of the page with details."""
 
     @property
     def line(self) -> str:
-        """The whole fact as one line."""
+        """Whole finding as one line."""
         return f"{self.kind}: {self.figure} {self.beside}. {self.sentence}"
 
 
 def _short(*sentences: str) -> str:
-    """Join sentences as long as a card has room for them, the first ones always.
+    """Join sentences while they fit on a card; the first is always included.
 
     Examples
     --------
@@ -124,7 +124,7 @@ def _short(*sentences: str) -> str:
 
 
 def amplitude_text(level: float) -> str:
-    """Amplitude of the overall transmission error at a level (dB re 1 µm), with its sign and unit.
+    """Return the amplitude of the overall transmission error for a level (dB re 1 µm), with sign and unit.
 
     Examples
     --------
@@ -135,25 +135,25 @@ def amplitude_text(level: float) -> str:
 
 
 def speed_text(peak_speed: float) -> str:
-    """Speed of the overall input (rad/s) in rpm."""
+    """Return a speed of the overall input (rad/s) as text in rpm."""
     return f"{figure_text(abs(peak_speed) / RPM, 4)} rpm"
 
 
 def frequency_text(frequency: float) -> str:
-    """Frequency in Hz."""
+    """Return a frequency as text in Hz."""
     return f"{frequency:.0f} Hz"
 
 
 def facts_of(
     context: Context, words: Labels, group: RunGroup, variations: Sequence[ModelVariations]
 ) -> tuple[SummaryCard, ...]:
-    """Tell the facts of a group of run-ups; those that it has nothing for are left out."""
+    """Return the findings of a result group; findings without data are omitted."""
     facts = [_loudest(context, words, group), _compliance(group), _lever(words, group, variations)]
     return tuple(fact for fact in facts if fact is not None)
 
 
 def facts_of_response(words: Labels, response: xr.Dataset) -> tuple[SummaryCard, ...]:
-    """Tell the fact of a steady response that no run-up of its choice stands beside.
+    """Return the finding of a steady-state response without a run-up of the same model settings.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | 
 
 
 def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
-    """Describe the mode of a resonance in a sentence; empty where none is known."""
+    """Describe the mode shape of a resonance in a sentence; empty if the mode is unknown."""
     modes = group.runs[group.main].modes
     if resonance.finding.mode is not None and modes is not None:
         return f"Mode: {words.moves(modes, resonance.finding.mode)}."
@@ -203,7 +203,7 @@ def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
 
 
 def _operating_resonance(words: Labels, group: RunGroup, ranking: Ranking) -> SummaryCard:
-    """Tell the resonance that comes first by any of three quantities at constant speed, where the gearbox works."""
+    """Return the first-ranked resonance at constant speed in the operating range, by any of the three quantities."""
     low, high = (speed_text(speed) for speed in ranking.speeds)
     where = f"{low} to {high}" + ("" if ranking.whole else " (operating range)")
     if not ranking.resonances:
@@ -218,7 +218,7 @@ def _operating_resonance(words: Labels, group: RunGroup, ranking: Ranking) -> Su
 
 
 def quantity_text(words: Labels, name: str, loudness: Loudness, ranking: Ranking) -> str:
-    """Amplitude of a resonance in one of the three quantities, with its place and where it is largest."""
+    """Return the amplitude of a resonance in one of the three quantities as text, with rank and location."""
     count = sum(other.loudness[name].place is not None for other in ranking.resonances)
     place = "no peak" if loudness.place is None else f"rank {loudness.place}/{count}"
     if name == "error":
@@ -230,7 +230,7 @@ def quantity_text(words: Labels, name: str, loudness: Loudness, ranking: Ranking
 
 
 def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonance) -> SummaryCard | None:
-    """Tell of a resonance that is louder at constant speed than all that the run-up tells apart, if there is one."""
+    """Return a resonance that is higher at constant speed than all that the run-up resolves; None if there is none."""
     levels = group.constant.get(group.main)
     found = None if levels is None else levels.highest(order_lines(context.gearbox))
     if found is None or found[1].level < top.loudness + LOUDER:
@@ -247,7 +247,7 @@ def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonan
 
 
 def _how(group: RunGroup, resonance: RankedResonance) -> str:
-    """Tell what a level was read from, unless it is a run-up alone."""
+    """State the source of a level, unless it is a run-up alone."""
     if group.responses:
         return ", constant speed"
     if resonance.constant is None:
@@ -256,7 +256,7 @@ def _how(group: RunGroup, resonance: RankedResonance) -> str:
 
 
 def _speed_relative_to_rated(context: Context, group: RunGroup) -> tuple[str, ...]:
-    """Compare the speed of the highest resonance with the rated speed, in sentences."""
+    """Compare the speed of the highest resonance with the rated speed, as sentences."""
     rated = context.gearbox.case.operation.rated_speed_rpm
     if rated is None or group.loudest is None:
         return ()
@@ -276,7 +276,7 @@ def _is_near_rated(resonance: RankedResonance, rated: float) -> bool:
 
 
 def _compliance(group: RunGroup) -> SummaryCard | None:
-    """Tell what compliance does, against the stiff reference."""
+    """Compare the highest resonance with that of the rigid reference variant."""
     reference = group.ranked.get(REFERENCE_VARIANT)
     top = group.loudest
     if reference is None or group.main == REFERENCE_VARIANT:
@@ -307,7 +307,7 @@ def _resonances(count: int) -> str:
 
 
 def _lever(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]) -> SummaryCard | None:
-    """Tell what moves the loudest resonance, and whether any change makes it quieter."""
+    """Report the parameters that shift the highest resonance, and whether any change reduces its amplitude."""
     top = group.loudest
     modes = group.runs[group.main].modes
     if top is None or modes is None or top.finding.mode is None:
@@ -327,7 +327,7 @@ def _lever(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]
 
 
 def shift_text(lever: Sensitivity) -> str:
-    """Shift of a lever with its sign and unit.
+    """Return the frequency shift of a sensitivity as text, with sign and unit.
 
     Examples
     --------
@@ -346,7 +346,7 @@ def _quieter(
         return ()
     frequency = float(modes["frequency"][mode])
     changes = [best_change(variation, frequency) for variation in own]
-    # More damping always helps; whether anything else does is the question.
+    # More damping always reduces the amplitude; the question is whether any other parameter does.
     others = [change for change in changes if not change.label.startswith(DAMPING)]
     best = (best_words(words, max(others, key=lambda change: change.gain)),) if others else ()
     damping = [change for change in changes if change.label.startswith(DAMPING) and change.gain > 0.0]
@@ -355,7 +355,7 @@ def _quieter(
 
 
 def best_words(words: Labels, best: BestChange) -> str:
-    """Say whether the best change of a parameter is worth it."""
+    """State whether the best change of a parameter is worthwhile."""
     change = words.change(best.label, best.value, best.default)
     if best.gain < NO_GAIN:
         return "No effect on the response within one octave."

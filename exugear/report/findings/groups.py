@@ -1,9 +1,9 @@
-"""Results of one source, mesh law and inertia set: their resonances ranked, and what only one variant shows.
+"""Result groups of one source, mesh model and inertia set, with ranked resonances and differences between variants.
 
-A source is the run-ups of a load case, or the steady responses of a level.
+A source is the run-ups of a load case, or the steady-state responses of one method.
 
-In a run-up one copy of a planet set stands for all: the one whose force swings most. In a steady response each wave
-around the carrier is a channel: mean, cosine, sine.
+In a run-up, the member of a planet set with the largest force amplitude represents the set. In a steady-state
+response, each multi-blade component (mean, cosine, sine) is a channel.
 """
 
 from __future__ import annotations
@@ -55,47 +55,47 @@ from fe_ste.tools.arrays import Floats
 
 @dataclass(frozen=True)
 class RankedResonance:
-    """A resonance of a run-up or a steady response, judged."""
+    """Resonance of a run-up or a steady-state response, with checks and comparison."""
 
     finding: Finding
     steady: bool
-    """Whether windows of other lengths show it, too. What one window alone shows is no fact about the gearbox."""
+    """Whether it is found with all window lengths. A resonance seen with one window only may be an artefact."""
     lacking: tuple[str, ...]
-    """Variants that lack it, judged at its loudest peak and with every window."""
+    """Variants without this resonance, judged at its highest peak and with every window."""
     elsewhere: Mapping[str, float]
-    """By variant, highest level (dB) of the other variants at its loudest peak; NaN where they did not go there."""
+    """By variant, highest level (dB) of the other variants at its highest peak; NaN outside their speed range."""
     constant: Highest | None
-    """Its loudest peak at constant speed; None where no steady response goes there."""
+    """Its highest peak at constant speed; None without a steady-state response there."""
 
     @property
     def peak(self) -> Pick:
-        """Its loudest peak."""
+        """Highest peak."""
         return self.finding.strongest
 
     @property
     def loudness(self) -> float:
-        """Level (dB) that it is ranked by: at constant speed where that is known, else in the run-up."""
+        """Level (dB) used for the ranking: at constant speed where available, otherwise in the run-up."""
         if self.constant is None:
             return self.peak.level
         return self.constant.level
 
     @property
     def frequency(self) -> float:
-        """Frequency where it is loudest, Hz."""
+        """Frequency of the highest peak, Hz."""
         if self.constant is None:
             return self.finding.resonance.frequency
         return self.constant.frequency
 
     @property
     def speed(self) -> float:
-        """Speed of the input where it is loudest, without sign, rad/s."""
+        """Absolute input speed at the highest peak, rad/s."""
         if self.constant is None:
             return abs(self.peak.speed)
         return self.constant.speed
 
     @property
     def missed(self) -> float:
-        """By how many dB the run-up shows it below its level at constant speed; 0 where that is not known."""
+        """Level at constant speed minus level in the run-up, dB; 0 if the former is unknown."""
         if self.constant is None:
             return 0.0
         return self.constant.level - self.peak.level
@@ -103,25 +103,25 @@ class RankedResonance:
 
 @dataclass(frozen=True)
 class RunGroup:
-    """Run-ups, or steady responses, that differ in the variant alone."""
+    """Run-ups, or steady-state responses, that differ only in the variant."""
 
     source: str
-    """Where the figures are from, in words: the run-up of a load case, or constant speed at a level."""
+    """Source of the values as text: the run-up of a load case, or constant speed with the method."""
     mesh_model: str
     inertias: str
     runs: Mapping[str, VariantRun]
     """By variant, the stiffest first."""
     ranked: Mapping[str, tuple[RankedResonance, ...]]
-    """By variant, the loudest first."""
+    """By variant, the highest first."""
     comparisons: Mapping[str, Comparison]
-    """By variant, of each other variant with the stiff reference."""
+    """By variant, comparison of each other variant with the rigid reference."""
     constant: Mapping[str, ConstantSpeed]
-    """By variant, levels at constant speed of run-ups that have a steady response."""
+    """By variant, levels at constant speed of run-ups that have a steady-state response."""
     responses: Mapping[str, xr.Dataset] = field(default_factory=dict)
-    """By variant, steady responses that the group is made of; none where it is made of run-ups."""
+    """By variant, the steady-state responses of the group; empty for run-ups."""
     in_operation: Ranking | None = None
-    """Resonances of the main variant's steady response at speeds of operation, by three quantities; None without
-    one."""
+    """Resonances of the main variant's steady-state response in the operating range, ranked by three quantities; None
+    without such a response."""
 
     @property
     def name(self) -> str:
@@ -130,21 +130,21 @@ class RunGroup:
 
     @property
     def main(self) -> str:
-        """Variant that is told of first: the one that leaves least out."""
+        """Variant that is reported first: the one with the fewest simplifications."""
         return list(self.runs)[-1]
 
     @property
     def loudest(self) -> RankedResonance | None:
-        """Loudest resonance of the main variant that every window shows."""
+        """Highest resonance of the main variant that is found with all window lengths."""
         return next((own for own in self.ranked[self.main] if own.steady), None)
 
     def choice(self, variant: str) -> Choice:
-        """Choice that a run was computed of."""
+        """Return the model settings of a run."""
         return Choice(variant, self.mesh_model, self.inertias)
 
     @property
     def title(self) -> str:
-        """What its runs have in common, in words."""
+        """Common properties of its runs as text."""
         factors = sorted({f"{float(run.attributes['housing_factor']):g}" for run in self.runs.values()})
         return (
             f"{self.source}, mesh model {self.mesh_model}, inertia set {self.inertias}, housing stiffness factor "
@@ -153,10 +153,10 @@ class RunGroup:
 
 
 def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
-    """Gather the run-ups of a folder, then its steady responses over a range of speeds.
+    """Group the run-ups of a folder, then its steady-state responses over a speed range.
 
-    Of each the default inertia set comes first. What is read out of run-ups is read out of the lines of responses: the
-    same orders, the same rules.
+    The default inertia set comes first. Steady-state responses are evaluated along the same orders and by the same
+    rules as run-ups.
     """
     runs: dict[tuple[str, str, str], list[VariantRun]] = {}
     for run in results.runs:
@@ -207,7 +207,7 @@ def _group(
     responses: Mapping[str, xr.Dataset],
     loud: xr.Dataset | None,
 ) -> RunGroup:
-    """Group of run-ups, or of steady responses taken as such; `loud` is what is ranked by three quantities."""
+    """Return a group of run-ups, or of steady-state responses; `loud` is the response to rank by three quantities."""
     ranked = {name: _ranked(runs, name, windows, constant.get(name), responses.get(name)) for name in runs}
     reference = runs.get(REFERENCE_VARIANT)
     others = {variant: run for variant, run in runs.items() if run is not reference}
@@ -217,7 +217,7 @@ def _group(
 
 
 def _spectra_of_response(context: Context, data: xr.Dataset, results: StoredResults) -> VariantRun:
-    """Take a steady response as a run-up: its lines as spectra, its peaks as picks."""
+    """Represent a steady-state response as a run-up: its orders as spectra, its peaks as picks."""
     choice = choice_of(data.attrs)
     spectra = response_spectra(data, ("overall_dte",), highest_drawn(context.gearbox, data))
     picks = pick_resonances(spectra, order_lines(context.gearbox), peaks=line_peaks)
@@ -232,7 +232,7 @@ def _ranked(
     constant: ConstantSpeed | None,
     response: xr.Dataset | None,
 ) -> tuple[RankedResonance, ...]:
-    """Resonances of a variant, judged; of a steady response there are no windows, and none is needed."""
+    """Return the resonances of a variant with checks; steady-state responses need no comparison of windows."""
     run = runs[variant]
     rule = AbsenceRule()
     others = {name: other.spectra for name, other in runs.items() if name != variant}
@@ -255,7 +255,7 @@ def _ranked(
 
 
 def _named(finding: Finding, data: xr.Dataset) -> Finding:
-    """Name the mode of a resonance by those that the response followed over speed, where no others were computed."""
+    """Add to a resonance the mode that the response tracked over speed, if modes were not computed separately."""
     diagram = campbell_from(data)
     peak = finding.strongest
     sense = 1.0 if float(data["speed"][0]) >= 0.0 else -1.0
@@ -274,56 +274,56 @@ def _level_at(spectra: Waterfall, peak: Pick) -> float:
     return float("nan")
 
 
-# Channels beside the overall transmission error: forces of bearings and joints, and of meshes, whichever source
+# Channels in addition to the overall transmission error: forces of bearings, joints and meshes, from either source
 
 OVERLAP = 0.5
-"""Share of a window that the next one repeats: enough for what is drawn coarser than the transmission error."""
+"""Overlap of successive windows, as a fraction; sufficient for waterfalls coarser than that of the TE."""
 SAMPLED = 8
-"""Every which sample tells how much a force swings."""
+"""Stride of the samples from which force amplitudes are estimated."""
 MEAN_PART = slice(1, 2)
-"""Third of the run whose mean force is told: neither the start nor the fastest."""
+"""Third of the run for mean forces: the middle one, without start-up and highest speeds."""
 AXIAL = "z"
-"""Axis of a bearing's force that is not transverse."""
+"""Axis of the axial force of a bearing."""
 
 _Signals = Mapping[str, NDArray[Any]]
-"""Variables of a run by their names."""
+"""Variables of a run by name."""
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A signal of a run-up or a steady response with its waterfall."""
+    """Signal of a run-up or a steady-state response with its waterfall."""
 
     name: str
-    """Of the bearing, joint or mesh."""
+    """Name of the bearing, joint or mesh."""
     kind: str
     """{"support", "mesh"}"""
     words: str
-    """What it is."""
+    """Label."""
     copies: int
-    """How many equal parts it stands for."""
+    """Number of equal parts that it represents."""
     mean: float
-    """Mean force over the middle third of the run, N; of bearings that go round with a carrier, of its magnitude.
-    NaN of a steady response, which has what vibrates."""
+    """Mean force over the middle third of the run, N; for bearings that revolve with a carrier, the mean magnitude.
+    NaN for a steady-state response, which has dynamic parts only."""
     axial: float
-    """Mean axial force of a bearing there, N; NaN for a mesh and of a steady response."""
+    """Mean axial force of a bearing over the same time, N; NaN for a mesh and for a steady-state response."""
     spectra: Waterfall
-    """Of a support the root of the summed squares of both transverse forces."""
+    """For a support, the root sum square of both transverse forces."""
 
 
 @dataclass(frozen=True)
 class LoudestOrder:
-    """Where a channel is loudest along the orders."""
+    """Highest peak of a channel along the orders."""
 
     line: OrderLine
     amplitude: float
-    """In the unit of the channel."""
+    """In units of the channel."""
     speed: float
     frequency: float
     """rad/s, Hz."""
 
 
 def channels_of(run: VariantRun, words: Labels, response: xr.Dataset | None) -> Iterator[Channel]:
-    """Compute the channels of a run-up, or of the steady response that it was made of, bearings and joints first."""
+    """Compute the channels of a run-up, or of the steady-state response it represents, bearings and joints first."""
     if response is not None:
         yield from _lines(response, words, float(run.spectra.frequency[-1]))
         return
@@ -342,7 +342,7 @@ def _supports(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channe
         parts = [_waterfall(own[axis], data, run) for axis in (0, 1)]
         whole = replace(parts[0], amplitude=np.hypot(parts[0].amplitude, parts[1].amplitude))
         middle = _middle(own.T.astype(np.float64))
-        # The force of a bearing that goes round has no mean in axes that stand still.
+        # The force of a revolving bearing has no mean in fixed axes.
         mean = max(math.hypot(*middle[:, :2].mean(axis=0)), 0.0)
         if copies > 1:
             mean = float(np.hypot(middle[:, 0], middle[:, 1]).mean())
@@ -379,7 +379,7 @@ def _lines(response: xr.Dataset, words: Labels, highest: float) -> Iterator[Chan
 
 
 def _standing_for(names: Sequence[str], swings: Floats, words: Labels) -> list[tuple[int, int]]:
-    """Place of the channel that stands for each family, and how many there are."""
+    """Return the index of the channel that represents each family, and the number of members."""
     families: dict[str, list[int]] = {}
     for place, name in enumerate(names):
         families.setdefault(words.family(name), []).append(place)
@@ -403,7 +403,7 @@ def _waterfall(values: Floats, data: _Signals, run: VariantRun) -> Waterfall:
 
 
 def loudest_order(spectra: Waterfall, lines: Sequence[OrderLine]) -> LoudestOrder | None:
-    """Find where a waterfall is loudest along its orders; None where no order lies in its band."""
+    """Find the maximum of a waterfall along its orders; None where no order lies in its frequency band."""
     levels = np.array([spectra.along(line) for line in lines]).reshape(len(lines), spectra.time.size)
     if not np.isfinite(levels).any():
         return None

@@ -1,7 +1,7 @@
-"""Resonances of a stored steady response, ranked by transmission error, bearing force and acceleration at bearings.
+"""Ranking of resonances of a stored steady-state response by transmission error, bearing force and acceleration.
 
-Which of the three counts depends on what is heard or breaks; none stands for the others. So they stand side by side,
-each with its place, and the order is that of the best place in any.
+The relevant quantity depends on the purpose (noise or strength), and none replaces another. All three are therefore
+listed, each with its rank, and the resonances are sorted by their best rank in any quantity.
 """
 
 from __future__ import annotations
@@ -29,65 +29,84 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ONE = 0.01
-"""Share of the speed within which peaks of one line in several quantities are one resonance."""
+"""Relative speed difference within which peaks of one order in several quantities are one resonance."""
 LEAST = 1e-9
-"""Peaks below this share of the largest of their quantity are round-off."""
+"""Peaks below this fraction of the largest peak of their quantity are round-off."""
 NOTHING = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9}
-"""Amplitudes below which nothing is excited, in the quantities' units."""
+"""Amplitudes below which nothing is excited, in the units of the quantities."""
 SHAFTS = "shafts"
 HOUSING = "housing"
 BOTH = "shafts and housing"
 
 
 @dataclass(frozen=True)
-class Loudness:
-    """How loud a resonance is in one quantity."""
+class Limit:
+    """How high a resonance is in one quantity at one end of the range of damping."""
 
     amplitude: float
-    """Peak amplitude of the line, in the quantity's unit; of planets the root of the mean square over them."""
-    at: str
-    """Bearing where it is largest, of planets their family; empty for the transmission error."""
+    """Peak amplitude, in the quantity's unit."""
     place: int | None
-    """Among the peaks of that quantity, 1 for the loudest; None where it rises to a louder one."""
+    """Among the peaks of that quantity with the same damping, 1 for the highest; None without a peak."""
+
+
+@dataclass(frozen=True)
+class Loudness:
+    """Amplitude and rank of a resonance in one quantity."""
+
+    amplitude: float
+    """Peak amplitude of the order, in units of the quantity; for planets the root mean square over them."""
+    at: str
+    """Bearing with the largest amplitude, for planets their family; empty for the transmission error."""
+    place: int | None
+    """Rank among the peaks of that quantity, 1 for the highest; None on the flank of a higher peak."""
+    limits: tuple[Limit, Limit] | None = None
+    """With the least and with the largest plausible damping; None where it was not solved again."""
+
+    @property
+    def places(self) -> tuple[int, int] | None:
+        """Best and worst place over the range of damping; None without a peak or without that range."""
+        if self.place is None or self.limits is None:
+            return None
+        known = [self.place, *(limit.place for limit in self.limits if limit.place is not None)]
+        return min(known), max(known)
 
 
 @dataclass(frozen=True)
 class Resonance:
-    """A line at a speed where at least one quantity has a peak."""
+    """Order and speed at which at least one quantity has a peak."""
 
     line: str
-    """Such as ``2 x intermediate``."""
+    """Order, such as ``2 x intermediate``."""
     order: float
-    """Periods per turn of the input."""
+    """Periods per revolution of the input."""
     speed: float
-    """Of the input, rad/s, of the peak in the quantity that places it best."""
+    """Input speed at the peak of the quantity with the best rank, rad/s."""
     frequency: float
     """Hz."""
     loudness: Mapping[str, Loudness]
-    """By quantity, of ``error`` (m), ``force`` (N) and ``acceleration`` (m/s2), the last two where there are
-    bearings."""
+    """By quantity: ``error`` (m), ``force`` (N) and ``acceleration`` (m/s2); the last two only with bearings."""
 
     @property
     def best(self) -> int:
-        """Best place in any quantity."""
+        """Best rank in any quantity."""
         return min(own.place for own in self.loudness.values() if own.place is not None)
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """Resonances of a steady response, that with the best place in any quantity first."""
+    """Resonances of a steady-state response, sorted by the best rank in any quantity."""
 
     resonances: tuple[Resonance, ...]
     speeds: tuple[float, float]
-    """Lowest and highest speed that counts, of the input without sign, rad/s."""
+    """Lowest and highest absolute input speed that is evaluated, rad/s."""
     whole: bool
-    """Whether these are all speeds of the response: its file names none of operation, or it was not computed there."""
+    """Whether these are all speeds: the file has no operating range, or the response was not computed there."""
     accelerates: str
-    """Whose acceleration it is: that of shafts where the housing is rigid."""
+    """Parts whose acceleration is given: the shafts where the housing is rigid."""
 
 
 def ranking_of(data: xr.Dataset) -> Ranking:
-    """Rank the resonances of a steady response within the range of operation.
+    """Rank the resonances of a steady-state response within the operating range.
 
     Parameters
     ----------
@@ -95,8 +114,8 @@ def ranking_of(data: xr.Dataset) -> Ranking:
 
     Notes
     -----
-    Planets' forces and accelerations are those that all share and those that go around, by the mean square over the
-    planets.
+    Forces and accelerations of planets are root mean squares over the planets, from the mean component that all planets
+    share and the cosine and sine components around the carrier.
     """
     speed = np.abs(data["speed"].to_numpy().astype(np.float64))
     low, high, whole = _range(data, speed)
@@ -120,12 +139,37 @@ def ranking_of(data: xr.Dataset) -> Ranking:
             groups.append(group)
             others.append(group)
         group[name] = place, point, line
-    found = tuple(_resonance(data, quantities, sizes, group) for group in groups)
+    limits = _limits(data, quantities, peaks)
+    found = tuple(_resonance(data, quantities, sizes, group, limits) for group in groups)
     return Ranking(found, (low, high), whole, _whose(data))
 
 
+Limits = Mapping[tuple[int, int, str], tuple[Limit, Limit]]
+"""By point, line and quantity."""
+
+
+def _limits(data: xr.Dataset, quantities: tuple[Quantity, ...], peaks: Mapping[str, list[tuple[int, int]]]) -> Limits:
+    """Amplitudes at both ends of the range of damping, and the places of those that are peaks."""
+    solved = data["band_amplitude"].to_numpy()
+    at = list(zip(data["band_point"].to_numpy().tolist(), data["band_line"].to_numpy().tolist(), strict=True))
+    names = [str(name) for name in data["quantity"].to_numpy()]
+    found: dict[tuple[int, int, str], tuple[Limit, Limit]] = {}
+    for quantity in quantities:
+        values = solved[:, names.index(quantity.name)]
+        ranked = set(peaks[quantity.name])
+        known = [n for n, (point, line) in enumerate(at) if (point, line - 1) in ranked]
+        places = [
+            {n: place for place, n in enumerate(sorted(known, key=lambda n: -values[n, end]), start=1)}
+            for end in range(2)
+        ]
+        for n, (point, line) in enumerate(at):
+            low, high = (Limit(float(values[n, end]), places[end].get(n)) for end in range(2))
+            found[point, line - 1, quantity.name] = low, high
+    return found
+
+
 def _range(data: xr.Dataset, speed: Floats) -> tuple[float, float, bool]:
-    """Speeds that count, and whether they are all."""
+    """Return the evaluated speed range, and whether it covers all speeds."""
     stated = json.loads(str(data.attrs["operating_range"]))
     if stated is not None and ((speed >= stated[0]) & (speed <= stated[1])).any():
         return float(stated[0]), float(stated[1]), False
@@ -133,7 +177,7 @@ def _range(data: xr.Dataset, speed: Floats) -> tuple[float, float, bool]:
 
 
 def _peaks(quantity: Quantity, values: Floats, inside: Booleans) -> list[tuple[int, int]]:
-    """Points and lines of the peaks of a quantity (points, lines), the loudest first."""
+    """Return point and order indices of the peaks of a quantity (points, orders), the highest first."""
     found = [(int(point), line) for line, own in enumerate(values.T) for point in standing_peaks(own) if inside[point]]
     largest = max((values[peak] for peak in found), default=0.0)
     least = max(LEAST * largest, NOTHING[quantity.name])
@@ -141,7 +185,7 @@ def _peaks(quantity: Quantity, values: Floats, inside: Booleans) -> list[tuple[i
 
 
 def _is_one(group: Mapping[str, tuple[int, int, int]], speed: Floats, point: int) -> bool:
-    """Tell whether a peak belongs to a resonance of the same line: it is at all but the same speed."""
+    """Return whether a peak belongs to a resonance of the same order: both are at practically the same speed."""
     _, first, _ = next(iter(group.values()))
     return bool(abs(speed[point] - speed[first]) <= ONE * speed[first])
 
@@ -151,13 +195,16 @@ def _resonance(
     quantities: tuple[Quantity, ...],
     sizes: Mapping[str, Floats],
     group: Mapping[str, tuple[int, int, int]],
+    limits: Limits,
 ) -> Resonance:
     _, first, line = next(iter(group.values()))
     loudness = {}
     for quantity in quantities:
         place, point, _ = group.get(quantity.name, (None, first, line))
         at = sizes[quantity.name][point, line]
-        loudness[quantity.name] = Loudness(float(at.max()), quantity.places[int(at.argmax())], place)
+        loudness[quantity.name] = Loudness(
+            float(at.max()), quantity.places[int(at.argmax())], place, limits.get((point, line, quantity.name))
+        )
     bases = tuple(str(name) for name in data["base"].to_numpy())
     order = float(data["order"][line + 1])
     speed = float(data["speed"][first])
@@ -166,7 +213,7 @@ def _resonance(
 
 
 def _whose(data: xr.Dataset) -> str:
-    """Tell whose the accelerations are, as the file has it by bearing."""
+    """Return the parts whose accelerations are given, from the seat data of the file."""
     carried = {bool(load) for load in json.loads(str(data.attrs["carried_seats"])).values()}
     if carried <= {False}:
         return SHAFTS
@@ -175,58 +222,58 @@ def _whose(data: xr.Dataset) -> str:
     return BOTH
 
 
-# Levels at constant speed: a run-up that gives a resonance no time to build up shows it too low
+# Levels at constant speed: a fast run-up underestimates resonances that have no time to build up
 
 FAINTEST = 1e-12
-"""Amplitude (m) below which a level is no lower."""
+"""Smallest amplitude (m) for the conversion to levels."""
 TOP = 1.1
-"""Highest frequency drawn over that of the fastest mesh at the highest speed."""
+"""Highest drawn frequency over the highest mesh frequency at the highest speed."""
 LEAST_SPEEDS = 3
-"""Speeds without which nothing is drawn over speed."""
+"""Minimum number of speeds for diagrams over speed."""
 
 
 @dataclass(frozen=True)
 class Highest:
-    """Where an order is loudest at constant speed."""
+    """Highest point of an order at constant speed."""
 
     level: float
     """dB re 1 µm."""
     speed: float
-    """Of the input without sign, rad/s."""
+    """Absolute input speed, rad/s."""
     frequency: float
     """Hz."""
 
 
 @dataclass(frozen=True)
 class ConstantSpeed:
-    """Overall transmission error along the orders of a steady response."""
+    """Overall transmission error along the orders of a steady-state response."""
 
     speed: Floats
-    """(n,) of the input without sign, rad/s, ascending."""
+    """(n,) absolute input speed, rad/s, ascending."""
     orders: Floats
-    """(lines,) periods per turn of the input."""
+    """(lines,) periods per revolution of the input."""
     level: Floats
     """(n, lines) dB re 1 µm."""
 
     def along(self, line: OrderLine) -> Floats | None:
-        """Level at each speed, dB re 1 µm; None if the response has no such order."""
+        """Return the level at each speed, dB re 1 µm; None if the response does not contain the order."""
         place = line.place(self.orders)
         if place is None:
             return None
         return self.level[:, place]
 
     def near(self, line: OrderLine, frequency: float, resolution: float) -> Highest | None:
-        """Return the highest peak of an order within what a run-up resolves about a frequency (both Hz).
+        """Return the highest peak of an order within the resolution of a run-up around a frequency (both Hz).
 
-        Without a peak there, the level at the frequency; None if the response does not go there. The sweep shifts a
-        peak besides, by up to a few percent.
+        Without a peak, return the level at the frequency; None outside the speed range of the response. The band also
+        allows for the shift of a peak by the sweep, up to a few percent.
         """
         along = self.along(line)
         frequencies = line.frequency(self.speed)
         there = np.flatnonzero(np.abs(frequencies - frequency) <= max(BESIDE * frequency, resolution))
         if along is None or not there.size:
             return None
-        # The end of the range may lie on the flank of a neighbour, which is no peak of this resonance.
+        # The end of the range may lie on the flank of a neighbouring peak, which does not belong to this resonance.
         beside = np.pad(along, 1, constant_values=np.inf)
         peaks = there[(along[there] > beside[there]) & (along[there] >= beside[there + 2])]
         nearest = there[np.argmin(np.abs(frequencies[there] - frequency))]
@@ -234,7 +281,7 @@ class ConstantSpeed:
         return Highest(float(along[index]), float(self.speed[index]), float(frequencies[index]))
 
     def highest(self, lines: Iterable[OrderLine]) -> tuple[OrderLine, Highest] | None:
-        """Return the order that is loudest of all, and where; None if the response has none of them."""
+        """Return the order with the highest level and its maximum; None if the response contains none of the orders."""
         found: list[tuple[OrderLine, Highest]] = []
         for line in lines:
             along = self.along(line)
@@ -246,7 +293,7 @@ class ConstantSpeed:
 
 
 def constant_speed_of(response: xr.Dataset) -> ConstantSpeed:
-    """Take the levels of the overall transmission error out of a steady response.
+    """Return the levels of the overall transmission error of a steady-state response.
 
     Parameters
     ----------
@@ -261,16 +308,16 @@ def constant_speed_of(response: xr.Dataset) -> ConstantSpeed:
 
 
 def truest_response(responses: Iterable[xr.Dataset], choice: Choice) -> xr.Dataset | None:
-    """Steady response of a choice that leaves least out; None if there is none over a range of speeds.
+    """Return the steady-state response with the most complete method for given settings; None if there is none.
 
-    Branches are no function of speed and are left to the section on steady responses.
+    Continuation results are not functions of speed; the section on steady-state responses shows them.
     """
     own = [data for data in responses if choice_of(data.attrs) == choice and not settings_of(data.attrs).branches]
     return max(own, key=lambda data: METHODS.index(data.attrs["method"]), default=None)
 
 
 def truest_of(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
-    """Levels of a choice by the response that leaves least out, as `truest_response` finds it."""
+    """Return the levels of the response that `truest_response` selects."""
     best = truest_response(responses, choice)
     if best is None:
         return None
@@ -278,12 +325,12 @@ def truest_of(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed 
 
 
 def is_over_speed(response: xr.Dataset) -> bool:
-    """Tell whether a steady response is a function of speed: no branch with folds, and speeds enough to draw."""
+    """Return whether a steady-state response is a function of speed (no continuation) with enough speeds to draw."""
     return not settings_of(response.attrs).branches and np.unique(response["speed"]).size >= LEAST_SPEEDS
 
 
 def highest_drawn(gearbox: Gearbox, response: xr.Dataset) -> float:
-    """Highest frequency (Hz) that is drawn of a steady response."""
+    """Return the highest frequency (Hz) drawn for a steady-state response."""
     fastest = float(np.abs(response["speed"]).max())
     return TOP * max(gearbox.train.mesh_frequencies(fastest).values())
 
@@ -291,18 +338,18 @@ def highest_drawn(gearbox: Gearbox, response: xr.Dataset) -> float:
 def response_spectra(
     response: xr.Dataset, signals: Sequence[str], highest: float, reference: float = 1e-6, unit: str = "m"
 ) -> LineSpectra:
-    """Lines of a steady response over speed, as a waterfall.
+    """Return the orders of a steady-state response over speed in the form of a waterfall.
 
     Parameters
     ----------
     response : as `exugear.steady.steady_file.load_response` reads it, a function of speed
     signals : the root of the summed squares of their amplitudes is taken
-    highest : highest frequency that is drawn, Hz
+    highest : highest drawn frequency, Hz
     reference, unit : amplitude of 0 dB, and the unit of the signals
     """
     speed, places = np.unique(np.abs(response["speed"].to_numpy()), return_index=True)
     names = [str(name) for name in response["signal"].to_numpy()]
-    # Line 0 is the mean, which is no vibration.
+    # Component 0 is the mean.
     parts = response["amplitude"].to_numpy()[places, 1:][..., [names.index(name) for name in signals]]
     amplitude = np.sqrt((parts.astype(np.float64) ** 2).sum(axis=-1))
     orders = response["order"].to_numpy()[1:]

@@ -1,8 +1,8 @@
-"""Can this be trusted: checks that were passed, and things to mind.
+"""Validity checks of results, and variations of assumed parameters.
 
-Modes are followed by their shapes. Where two of them come near they swap what they do: the followed one may lose its
-amplification while another one takes it over, and nothing is won. So each followed mode stands beside the loudest of
-all modes within an octave.
+Modes are tracked by their shapes. Where two modes veer, they exchange their character: the tracked mode may lose its
+amplification while the other takes it over, without any benefit. Each tracked mode is therefore compared with the
+largest amplification of all modes within an octave.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from exugear.results.run_file import read_run, verdict_of
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.steady.peaks import bearing_swings, pulls
 from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.modal_damping import damping_in_words
 from exugear.system.sensitivity import Parameter, ParameterVariation, assumed_parameters, vary_parameter
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES, energy_residual
 from exugear.system.statics import BalanceError
@@ -37,51 +38,51 @@ from fe_ste.tools.arrays import Floats
 from fe_ste.tools.threads import stop_if_asked
 
 LOUDEST = 10
-"""Loudest resonances that checks look at."""
+"""Number of highest resonances that are checked."""
 ENERGY = 1e-3
-"""Share of energy that may be unaccounted for."""
+"""Permissible relative residual of the energy balance of a run."""
 MATCHED = 0.8
-"""Least share of the loudest resonances that should match a mode."""
+"""Minimum fraction of the highest resonances that should match a mode."""
 STEADY_ENERGY = 1e-4
-"""Share of the power that damping takes by which that of the meshes may differ in a steady response."""
+"""Permissible relative difference between dissipated power and power of the meshes in a steady-state response."""
 BEYOND_RATED = 1.3
-"""Speed over the rated one from which a sweep is said to go beyond it."""
+"""Ratio to the rated speed above which the page warns of speeds beyond it."""
 
 
 @dataclass(frozen=True)
 class CheckResult:
-    """A check that was passed, or a thing to mind."""
+    """Result of a check: passed, or a warning."""
 
     passed: bool
     words: str
 
     @property
     def line(self) -> str:
-        """As a line of text."""
+        """Check as a line of text."""
         return f"{'Passed' if self.passed else 'Warning'}: {self.words}"
 
 
 @dataclass(frozen=True)
 class RunFigures:
-    """Figures that tell of one run's quality."""
+    """Values that describe the validity of a run."""
 
     residual: float
-    """Share of energy that is not accounted for."""
+    """Relative residual of the energy balance."""
     times: tuple[float, ...]
-    """Longest pull of a mesh, longest time that teeth are apart, outside a table, beside unsolved states of it, s."""
+    """Longest times of tensile mesh force, contact loss, outside a table and next to non-converged table states, s."""
     end: float
     """Simulated time, s."""
 
 
 def run_figures(run: VariantRun) -> RunFigures:
-    """Read the figures of a run."""
+    """Read the validity values of a run."""
     data, _ = read_run(run.path, ("time", *MESH_TIMES, *BALANCE_TERMS))
     times = tuple(float(np.max(data[name], initial=0.0)) for name in MESH_TIMES)
     return RunFigures(energy_residual(data), times, float(data["time"][-1]))
 
 
 def verdicts_of(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
-    """Judge the main variant of a group; what was passed comes first."""
+    """Check the main variant of a group; passed checks come first."""
     case = context.gearbox.case
     run = group.runs[group.main]
     response = group.responses.get(group.main)
@@ -90,10 +91,7 @@ def verdicts_of(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
     verdicts.append(
         CheckResult(
             False,
-            (
-                f"mesh damping is assumed (stiffness-proportional, {1e6 * case.damping.mesh_time_s:g} µs). Resonance "
-                "amplitudes depend on it directly"
-            ),
+            (f"damping is assumed ({damping_in_words(case.damping)}). Resonance amplitudes depend on it directly"),
         )
     )
     sets = context.gearbox.inertia_sets
@@ -198,17 +196,17 @@ def _check_resonances(group: RunGroup) -> list[CheckResult]:
     ]
 
 
-# How modes move with what was assumed, over whole ranges, and whether anything grows quieter by it
+# Variation of assumed parameters over their ranges, and the possible reduction of amplification
 
 OCTAVE = 2.0
-"""Reach around a frequency, as a ratio, to both sides."""
+"""Frequency ratio that limits the band around a mode, in both directions."""
 GAIN = 3.0
-"""Least gain (dB) that is called one."""
+"""Minimum gain (dB) that counts as a reduction."""
 
 Figures = tuple[Floats, Floats, Floats, Floats]
-"""Frequency, share, amplification and damping ratio of a `ParameterVariation`."""
+"""Frequency, TE participation, amplification and damping ratio of a `ParameterVariation`."""
 VariedModels = Mapping[Choice, Mapping[str, Figures | str]]
-"""By model and label of the parameter, its figures or why there are none."""
+"""By model and label of the parameter: the values of the variation, or the reason why there are none."""
 
 
 @dataclass(frozen=True)
@@ -221,35 +219,35 @@ class ModelVariations:
 
 @dataclass(frozen=True)
 class Guarded:
-    """A mode over a parameter, beside the loudest mode near it."""
+    """Mode over a parameter, with the largest amplification of the modes near it."""
 
     frequency: Floats
     amplification: Floats
-    """(n,) of the mode that is followed by its shape, Hz and m/m."""
+    """(n,) of the mode tracked by its shape, Hz and m/m."""
     loudest: Floats
-    """(n,) amplification of the loudest of all modes within an octave of its frequency at the default value."""
+    """(n,) largest amplification of all modes within an octave of its frequency at the default value."""
 
 
 @dataclass(frozen=True)
 class BestChange:
-    """The change of an assumption that makes what lies within an octave of a mode quietest."""
+    """Parameter change that minimises the largest amplification within an octave of a mode."""
 
     label: str
-    """Of the parameter."""
+    """Label of the parameter."""
     value: float
     default: float
     gain: float
-    """Of the loudest mode in the octave, dB; above zero is quieter."""
+    """Reduction of the largest amplification in the octave, dB; positive: lower."""
 
 
 def begin_variations(context: Context, modes: Mapping[Choice, xr.Dataset], executor: Executor) -> Future[VariedModels]:
-    """Have all models varied by an executor, which may be another process, while this one reads run-ups."""
+    """Start the variations of all models on an executor (possibly another process) while this process reads run-ups."""
     below = context.gearbox.permissions.below
     return executor.submit(varied_models, context.folder, below, _models_to_vary(context, modes))
 
 
 def varied_models(folder: Path, allow_dir: Path | None, models: Sequence[Choice]) -> VariedModels:
-    """Vary what was assumed in models of the case that a folder keeps: for `begin_variations`."""
+    """Vary the assumed parameters of models of the gearbox file stored in a folder; for `begin_variations`."""
     context = Context(folder, kept_case(folder, Permissions(below=allow_dir)), None, lambda what: None)
     return {
         model: {parameter.label: _figures(parameter) for parameter in _parameters(context, model)} for model in models
@@ -259,12 +257,12 @@ def varied_models(folder: Path, allow_dir: Path | None, models: Sequence[Choice]
 def model_variations(
     context: Context, modes: Mapping[Choice, xr.Dataset], begun: Future[VariedModels] | None = None
 ) -> tuple[ModelVariations, ...]:
-    """Vary what was assumed in the compliant models, or in the only one there is; the default inertia set first.
+    """Vary the assumed parameters of the compliant models, or of the only model; the default inertia set comes first.
 
     Parameters
     ----------
-    modes : of the models that there are
-    begun : what `begin_variations` gave
+    modes : by the available models
+    begun : result of `begin_variations`
     """
     models = _models_to_vary(context, modes)
     for model in models:
@@ -284,7 +282,7 @@ def _parameters(context: Context, model: Choice) -> tuple[Parameter, ...]:
 
 
 def _figures(parameter: Parameter) -> Figures | str:
-    """Vary a parameter; the reason where an assumption leaves the range in which bearings balance."""
+    """Vary a parameter; return the reason if a value leaves the range in which bearings reach equilibrium."""
     try:
         found = vary_parameter(parameter, stop_if_asked)
     except (BalanceError, BearingError) as error:
@@ -304,12 +302,12 @@ def _variations(context: Context, model: Choice, known: Mapping[str, Figures | s
 
 
 def default_place(variation: ParameterVariation) -> int:
-    """Place of the case's own value among those of a variation."""
+    """Return the index of the gearbox file's value among the values of a variation."""
     return int(np.argmin(np.abs(np.array(variation.parameter.values) - variation.parameter.default)))
 
 
 def guarded(variation: ParameterVariation, frequency: float) -> Guarded:
-    """Follow the mode of a frequency (Hz, at the default value) and set the loudest of its octave beside it."""
+    """Track the mode at a frequency (Hz, at the default value), with the largest amplification within an octave."""
     place = default_place(variation)
     mode = int(np.argmin(np.abs(variation.frequency[place] - frequency)))
     centre = float(variation.frequency[place, mode])
@@ -319,7 +317,7 @@ def guarded(variation: ParameterVariation, frequency: float) -> Guarded:
 
 
 def best_change(variation: ParameterVariation, frequency: float) -> BestChange:
-    """Find the value that makes what lies within an octave of a mode quietest."""
+    """Find the parameter value with the smallest maximum amplification within an octave of a mode."""
     loudest = guarded(variation, frequency).loudest
     index = int(np.argmin(loudest))
     gain = 20.0 * np.log10(max(loudest[default_place(variation)], 1e-300) / max(loudest[index], 1e-300))

@@ -1,4 +1,4 @@
-"""Words for the names of a case: labels of its file, orders, what moves in a mode and what gives."""
+"""Labels for names of a gearbox file, orders, mode shapes and strain energy distributions."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ MOTIONS = {
     "stretch": ("stretches", "stretch"),
     "deformation": ("deforms", "deform"),
 }
-"""Motions of bodies as verbs, of one body and of several."""
+"""Predicates for motions of bodies, singular and plural."""
 DESCRIBED_ENERGY, MIN_ENERGY = 0.8, 0.1
-"""Share of the kinetic energy that is told of a mode, and the least share of what is told."""
+"""Fraction of the kinetic energy that a mode description covers, and the minimum fraction of each listed part."""
 GIVES = 2
-"""Elements that are told to give way."""
+"""Maximum number of elements in a strain energy list."""
 _COPY = re.compile(r"^(.*)_(\d+)$")
 _OF = re.compile(r"(?<= of )\w+")
 _NAME = re.compile(r"\w+(?:-\w+)*")
 
 
 class Labels:
-    """Words for the names of one gearbox.
+    """Labels for the names of one gearbox.
 
     Examples
     --------
@@ -48,7 +48,7 @@ class Labels:
         self._labels = gearbox.case.labels
 
     def of(self, name: str) -> str:
-        """Words for a name: its label, or the name with spaces; copies of a planet set are numbered."""
+        """Return the label of a name, or the name with spaces; members of a planet set are numbered."""
         if name in self._labels:
             return self._labels[name]
         copy = _COPY.match(name)
@@ -57,7 +57,7 @@ class Labels:
         return name.replace("_", " ")
 
     def told(self, text: str) -> str:
-        """Text with words for all names of the case that stand in it, such as of a line or of what moves.
+        """Replace all names of the gearbox file in a text, such as an order or a mode shape, by their labels.
 
         Examples
         --------
@@ -69,11 +69,11 @@ class Labels:
         return named.replace(" x ", " × ")
 
     def parameter(self, label: str) -> str:
-        """Label of a parameter with words for the body that it is of."""
+        """Return the label of a parameter, with the label of its body."""
         return _OF.sub(lambda found: self.told(found[0]), label)
 
     def change(self, label: str, value: float, default: float) -> str:
-        """Say what a parameter is changed to, such as "mesh damping time 16 instead of 4 µs".
+        """Describe the change of a parameter, such as "mesh damping time 16 instead of 4 µs".
 
         Examples
         --------
@@ -89,7 +89,7 @@ class Labels:
         return f"{name} {figure_text(value)} instead of {figure_text(default)} {unit}".rstrip()
 
     def family(self, name: str) -> str:
-        """Name that the copies of a planet set share."""
+        """Return the common name of the members of a planet set."""
         copy = _COPY.match(name)
         if copy and copy[1] in self._copied:
             return copy[1]
@@ -113,14 +113,14 @@ class Labels:
 
     @property
     def labels(self) -> dict[str, str]:
-        """Words by name of all that pages draw or list."""
+        """Labels by name for everything that pages draw or list."""
         case = self._gearbox.case
         tables = (self._gearbox.named_bodies, case.gears, case.pairs, case.bodies, case.bearings, case.meshes)
         return {name: self.of(name) for table in tables for name in table}
 
     @cached_property
     def _families(self) -> dict[float, list[str]]:
-        """Families of meshes by their order."""
+        """Families of meshes by order."""
         orders = self._gearbox.train.mesh_frequencies(2.0 * np.pi)
         families: dict[float, list[str]] = {}
         for mesh in self._gearbox.meshes:
@@ -130,14 +130,14 @@ class Labels:
         return families
 
     def line(self, line: OrderLine) -> str:
-        """Order in short: its harmonic and the mesh."""
+        """Return a short label of an order: harmonic and mesh."""
         harmonic, mesh = self._split(line)
         if harmonic == 1:
             return mesh
         return f"{harmonic} × {mesh}"
 
     def line_sentence(self, line: OrderLine) -> str:
-        """Order in a sentence, such as "the 2nd harmonic of the mesh high-speed"."""
+        """Return an order as a noun phrase, such as "the 2nd harmonic of the mesh high-speed"."""
         harmonic, mesh = self._split(line)
         ordinal = {1: "mesh frequency", 2: "2nd harmonic", 3: "3rd harmonic"}.get(harmonic, f"{harmonic}th harmonic")
         return f"the {ordinal} of the mesh {mesh}"
@@ -150,7 +150,7 @@ class Labels:
         return harmonic, " and ".join(self.of(mesh) for mesh in meshes)
 
     def moves(self, modes: xr.Dataset, index: int) -> str:
-        """Say what moves in a mode, until most of its kinetic energy is told."""
+        """Describe a mode shape by its largest parts of the kinetic energy."""
         kinetic = modes["kinetic_energy_share"].isel(mode=index).to_numpy()
         carried = {body.name for body in self._gearbox.bodies() if body.carrier}
         shares: dict[tuple[str, str], float] = {}
@@ -168,12 +168,12 @@ class Labels:
         return joined(f"{name} {joined(verb)}" for name, verb in verbs.items())
 
     def gives(self, modes: xr.Dataset, index: int) -> dict[str, float]:
-        """Shares of strain energy by what gives way, copies of a planet set together, the largest first."""
+        """Return fractions of the strain energy by element label, largest first; members of a planet set are summed."""
         shares = modes["strain_energy_share"].isel(mode=index).to_numpy()
         return self.gathered(dict(zip(element_words(modes), map(float, shares), strict=True)))
 
     def gathered(self, shares: Mapping[str, float]) -> dict[str, float]:
-        """Shares by words, copies of a planet set together, the largest first."""
+        """Return fractions by label, largest first; members of a planet set are summed."""
         gathered: dict[str, float] = {}
         for name, share in shares.items():
             itself = name.removesuffix(" itself")
@@ -184,7 +184,7 @@ class Labels:
 
 
 def percentages(shares: Mapping[str, float], most: int = GIVES, least: float = 0.01) -> str:
-    """Largest shares in words.
+    """Return the largest fractions as text.
 
     Examples
     --------
@@ -210,7 +210,7 @@ def joined(parts: Iterable[str]) -> str:
 
 
 def figure_text(value: float, digits: int = 3) -> str:
-    """Write a number to significant digits, without exponents where people need none.
+    """Return a number with the given significant digits, without exponent in the usual range.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""Diagrams of runs and modes, pictures and animations of gearboxes."""
+"""Diagrams of runs and modes, and pictures and animations of gearboxes."""

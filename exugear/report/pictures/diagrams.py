@@ -1,6 +1,7 @@
-"""Diagrams of modes: where mesh orders meet them. A matplotlib figure of plain arrays that needs no display.
+"""Diagrams of modes (Campbell), of run-ups (waterfalls with order lines) and of transmission error tables.
 
-They take spectra as `exugear.results.spectra` makes them, and return a matplotlib figure that needs no display.
+Functions for modes and runs take arrays or spectra of `exugear.results.spectra` and return a matplotlib `Figure`;
+they need no display.
 """
 
 from __future__ import annotations
@@ -39,16 +40,16 @@ def plot_campbell(
     highest_frequency: float | None = None,
     title: str = "",
 ) -> Figure:
-    """Draw eigenfrequencies against order lines and mark where they cross.
+    """Draw eigenfrequencies and order lines, and mark their crossings.
 
     Parameters
     ----------
     eigenfrequencies : (n,) Hz
-    lines : orders that excite
+    lines : exciting orders
     fastest : highest speed of the carrier, rad/s
-    path : where to write the picture
+    path : file for the picture
     names : names of the modes, written on their lines
-    weights : (n,) how strongly the observed quantity sees each mode, 0 to 1: the size of its crossings
+    weights : (n,) visibility of each mode in the observed quantity, 0 to 1: size of the marks at its crossings
     highest_frequency : end of the frequency axis, Hz
     title : variant and inertia set
     """
@@ -87,10 +88,10 @@ def _repeated(count: int) -> list[str]:
     return [COLOURS[index % len(COLOURS)] for index in range(count)]
 
 
-# Diagrams of runs: waterfalls with order lines, and levels along the orders
+# Diagrams of runs: waterfalls with order lines
 
 MARK_COLOUR = "#00E5FF"
-"""Colour of circled peaks, which stands out of the colours of a waterfall."""
+"""Colour of circled peaks, which contrasts with the colours of a waterfall."""
 
 
 def plot_waterfalls(
@@ -103,21 +104,21 @@ def plot_waterfalls(
     dynamic_range: float = 110.0,
     quantity: str = "overall transmission error",
 ) -> Figure:
-    """Draw waterfalls side by side on one scale.
+    """Draw waterfalls next to each other on a common scale.
 
     Parameters
     ----------
     runs : title and spectra of each panel
-    lines : order lines to draw and name
-    path : where to write the picture
+    lines : order lines to draw and label
+    path : file for the picture
     marks : peaks to circle and number in a panel, such as those that only this run shows
     highest_frequency : end of the frequency axis, Hz
     dynamic_range : span of the colours below the highest level of all runs, dB
-    quantity : what the level is of, for the colour bar
+    quantity : quantity of the level, for the label of the colour bar
 
     Returns
     -------
-    frequency over speed of the carrier, the level in colours
+    frequency over speed of the carrier, with colours for the level
 
     Raises
     ------
@@ -162,13 +163,13 @@ def plot_waterfalls(
 def pooled_levels(
     run: Waterfall, highest_frequency: float, fastest: float, shape: tuple[int, int] = (700, 450)
 ) -> Floats:
-    """Highest level in each cell of a picture, so that no narrow line falls between its pixels.
+    """Return the highest level in each cell of a picture, so that narrow lines are not lost between its pixels.
 
     Parameters
     ----------
     run : spectra
-    highest_frequency, fastest : ends of both axes, Hz and rad/s; they begin at zero
-    shape : at most so many cells along frequency and speed
+    highest_frequency, fastest : upper ends of the axes, Hz and rad/s; the axes begin at zero
+    shape : maximum number of cells along frequency and speed
 
     Returns
     -------
@@ -183,7 +184,7 @@ def pooled_levels(
     np.maximum.at(cells, (column[:, None], row[None, :]), run.level[:, shown])
     empty = np.isneginf(cells).all(axis=1)
     if empty.any():
-        # A cell between two frames takes the nearer frame; beyond the run there is nothing.
+        # A cell between two frames takes the nearer frame; beyond the run, cells are empty.
         filled = np.flatnonzero(~empty)
         nearest = filled[np.abs(np.arange(columns)[:, None] - filled).argmin(axis=1)]
         inside = (np.arange(columns) >= filled[0]) & (np.arange(columns) <= filled[-1])
@@ -199,7 +200,7 @@ def _draw_order_lines(panel: Axes, lines: Sequence[OrderLine], fastest: float, t
         end = float(line.frequency(fastest * RPM))
         above = end > top
         speed, frequency = (fastest * top / end, top) if above else (fastest, end)
-        # Sparse dots: a full line would hide the level on it.
+        # Sparse dots, as a full line would hide the level along it.
         panel.plot([0.0, speed], [0.0, 1e-3 * frequency], color=colour, linewidth=0.8, linestyle=(0, (1, 7)))
         taken, position = (taken_above, speed / fastest) if above else (taken_right, frequency / top)
         if all(abs(position - other) > 0.04 for other in taken):
@@ -225,7 +226,7 @@ PICTURE_FOLDER = "pictures"
 
 
 def draw_curves(tables: Mapping[str, MeshTable], out: Path) -> list[Path]:
-    """Draw the transmission error of all pairs and the load share of each; return the pictures' files."""
+    """Draw the transmission error of all pairs and the load share of each; return the paths of the pictures."""
     folder = out / PICTURE_FOLDER
     curves = folder / "ste.png"
     plot_ste_curves({name: table.static_state for name, table in tables.items()}, curves)
@@ -238,12 +239,12 @@ def draw_curves(tables: Mapping[str, MeshTable], out: Path) -> list[Path]:
 
 
 def contact_picture(name: str, out: Path) -> Path:
-    """Return where the picture of a pair's teeth in contact lies."""
+    """Return the path of the picture of a pair's teeth in contact."""
     return out / PICTURE_FOLDER / f"contact_{name}.png"
 
 
 def draw_contact(request: TableRequest, table: MeshTable, out: Path) -> Path:
-    """Draw the teeth that carry load at position 0 of the mesh cycle, with the pressure between them.
+    """Draw the teeth that carry load at position 0 of the mesh cycle, with the contact pressure.
 
     Raises
     ------

@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-# Animated pictures of standing waves: half a period is rendered, the way back shows the same pictures again
+# Animated pictures of standing waves: half a period is rendered, and the same pictures are shown in reverse order
 
 
 def gif_path(path: str | Path) -> Path:
-    """Return where an animation goes.
+    """Return the path of an animation.
 
     Raises
     ------
@@ -57,13 +57,13 @@ def gif_path(path: str | Path) -> Path:
 def half_period_images(
     plotter: pyvista.Plotter, frames: int, move: Callable[[float], None]
 ) -> list[tuple[Pixels, float]]:
-    """Render half a period, from one largest deflection to the other, with one margin around all images.
+    """Render half a period, from one maximum deflection to the other, with one margin around all images.
 
     Parameters
     ----------
-    plotter : with all meshes, looking at them
+    plotter : with all meshes and the camera set
     frames : pictures per period, an even number
-    move : moves the meshes to a part of the largest deflection, from 1 to -1
+    move : moves the meshes to a fraction of the maximum deflection, from 1 to -1
 
     Returns
     -------
@@ -75,19 +75,19 @@ def half_period_images(
     for number in range(count):
         move(math.cos(math.pi * number / (count - 1)))
         images.append(rendered_image(plotter))
-    # The darkest of all frames at each pixel shows what any of them needs.
+    # The darkest value of all frames at each pixel shows the area that any frame needs.
     rows, columns = drawn_part(np.min([image for image, _ in images], axis=0))
     return [(image[rows, columns], pixel) for image, pixel in images]
 
 
 def write_animation(way_out: Sequence[Figure], target: Path, duration: float) -> Path:
-    """Write a standing wave as an animated picture from figures of half a period; `duration` of a period in s."""
+    """Write a standing wave as an animated picture from images of half a period; `duration` of a period in s."""
     from PIL import Image
 
-    # A standing wave: the way back shows the pictures of the way out.
+    # The second half of the period shows the pictures of the first half in reverse order.
     finished = [_set_picture(figure) for figure in way_out]
     pictures = finished + finished[-2:0:-1]
-    # One palette for all frames, else colours flicker.
+    # One palette for all frames, otherwise colours flicker.
     palette = _with_white(pictures[0].quantize(colors=255, method=Image.Quantize.MEDIANCUT))
     indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     pause = round(1e3 * duration / len(indexed))
@@ -99,7 +99,7 @@ def write_animation(way_out: Sequence[Figure], target: Path, duration: float) ->
 
 
 def _set_picture(figure: Figure) -> PIL.Image.Image:
-    """Turn a figure into a frame."""
+    """Convert a matplotlib image to a frame."""
     from PIL import Image
 
     finished = io.BytesIO()
@@ -108,7 +108,7 @@ def _set_picture(figure: Figure) -> PIL.Image.Image:
 
 
 def _with_white(indexed: PIL.Image.Image) -> PIL.Image.Image:
-    """Make the lightest colours of a palette white, which averaging has made light greys."""
+    """Set the lightest colours of a palette, light greys from averaging, to white."""
     colours = np.array(indexed.getpalette()).reshape(-1, 3)
     colours[colours.min(axis=1) >= 250] = 255
     indexed.putpalette(colours.ravel().tolist())
@@ -118,11 +118,11 @@ def _with_white(indexed: PIL.Image.Image) -> PIL.Image.Image:
 # Pictures and animations of a gearbox and its modes, rendered off-screen with pyvista
 
 DISPLACEMENT_COLOURS: Final = ("#E4E7EB", "#F5D67B", "#EE8A33", "#C2242E", "#5A0F3E")
-"""Colours of displacement from rest, a light grey that leaves resting bodies in the background, to the largest."""
+"""Colours of displacement from zero (light grey, which keeps bodies at rest in the background) to the maximum."""
 BODY_COLOURS: Final = (*COLOURS[:6], "#F0E442", "#999933")
-"""Colours of families of bodies that turn."""
+"""Colours of families of rotating bodies."""
 VIEW = (0.75, 0.45, -1.0)
-"""From the bodies to the eye: from the input side, from above and the side."""
+"""View direction from the bodies to the eye: from the input side, from above and from the side."""
 
 
 def draw_gearbox(
@@ -137,7 +137,7 @@ def draw_gearbox(
     Parameters
     ----------
     bodies : shapes
-    path : where to write the picture
+    path : file for the picture
     title : name of the gearbox
     size : width and height of the rendered image, pixels
 
@@ -166,12 +166,12 @@ def draw_gearbox(
 
 
 def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)) -> Figure:
-    """Draw a mode shape at its largest deflection, coloured by displacement.
+    """Draw a mode shape at its maximum deflection, coloured by displacement.
 
     Parameters
     ----------
     scene : the mode
-    path : where to write the picture
+    path : file for the picture
     size : width and height of the rendered image, pixels
 
     Raises
@@ -190,12 +190,12 @@ def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[i
 def animate_mode(
     scene: ModeScene, path: str | Path, *, frames: int = 24, duration: float = 1.6, size: tuple[int, int] = (900, 700)
 ) -> Path:
-    """Write one period of a mode as an animated picture that repeats for ever.
+    """Write one period of a mode as an animated picture that repeats endlessly.
 
     Parameters
     ----------
     scene : the mode
-    path : where to write; the suffix must be ``.gif``
+    path : output file; the suffix must be ``.gif``
     frames : pictures per period, an even number
     duration : length of a period, s
     size : width and height of the rendered image, pixels
@@ -240,7 +240,7 @@ def _add_mode(plotter: pyvista.Plotter, scene: ModeScene) -> list[pyvista.PolyDa
 
 
 def triangle_mesh(points: Floats, triangles: Integers) -> pyvista.PolyData:
-    """Surface from triangles."""
+    """Return a surface from triangles."""
     import pyvista
 
     faces = np.column_stack([np.full(len(triangles), 3), triangles])
@@ -248,7 +248,7 @@ def triangle_mesh(points: Floats, triangles: Integers) -> pyvista.PolyData:
 
 
 def quad_mesh(points: Floats, quads: Integers) -> pyvista.PolyData:
-    """Surface from faces with four corners, those with four of their own first; a triangle repeats its last."""
+    """Return a surface from four-node faces, with true quads first; a triangle repeats its last node."""
     import pyvista
 
     triangular = quads[:, 2] == quads[:, 3]
@@ -260,14 +260,14 @@ def quad_mesh(points: Floats, quads: Integers) -> pyvista.PolyData:
 
 
 def look(plotter: pyvista.Plotter, direction: tuple[float, float, float] = VIEW) -> None:
-    """Look at everything, y up, with a direction from the bodies to the eye; the input side, above and the side."""
+    """Point the camera at the whole scene with y up; by default from the input side, from above and from the side."""
     centre = np.asarray(plotter.center)
     plotter.camera_position = [centre + np.asarray(direction), centre, (0.0, 1.0, 0.0)]
     plotter.renderer.ResetCamera()
 
 
 def mode_figure(image: Pixels, pixel: float, title: str, label: str = "Displacement / largest displacement") -> Figure:
-    """Set the rendered image of a mode with its scale of length (m per pixel), and of colours from 0 to 1."""
+    """Combine the rendered image of a mode with its length scale (m per pixel) and a colour bar from 0 to 1."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
@@ -281,14 +281,14 @@ def mode_figure(image: Pixels, pixel: float, title: str, label: str = "Displacem
 
 
 def body_colours(bodies: Sequence[BodyShape]) -> dict[str, tuple[float, float, float]]:
-    """Colour of each family of bodies as red, green, blue from 0 to 1; fixed ones are grey."""
+    """Return the colour of each family of bodies as red, green, blue from 0 to 1; fixed bodies are grey."""
     families = list(dict.fromkeys(body.family for body in bodies if not body.fixed))
     colours = {family: _lightened(BODY_COLOURS[n % len(BODY_COLOURS)]) for n, family in enumerate(families)}
     return colours | {body.family: _lightened("#8A8F96") for body in bodies if body.fixed}
 
 
 def displacement_map() -> Colormap:
-    """Colour map of displacement over the largest displacement."""
+    """Return the colour map of displacement over maximum displacement."""
     from matplotlib.colors import LinearSegmentedColormap
 
     return LinearSegmentedColormap.from_list("displacement", DISPLACEMENT_COLOURS)
@@ -301,7 +301,7 @@ def _opacity(body: BodyShape) -> float:
 
 
 def channels(colour: str) -> tuple[float, float, float]:
-    """Red, green and blue from 0 to 1 of a colour like ``#E4E7EB``."""
+    """Return red, green and blue from 0 to 1 of a colour like ``#E4E7EB``."""
     red, green, blue = (int(colour[start : start + 2], 16) / 255.0 for start in (1, 3, 5))
     return red, green, blue
 
@@ -311,21 +311,21 @@ def _lightened(colour: str) -> tuple[float, float, float]:
     return 0.35 + 0.65 * red, 0.35 + 0.65 * green, 0.35 + 0.65 * blue
 
 
-# Pictures and animations of elastic bodies in a mode, deformed and coloured by strain energy
+# Pictures and animations of flexible bodies in a mode, deformed and coloured by strain energy
 
 SIDE = (1.0, 0.35, -0.4)
-"""From the bodies to the eye: mostly from the side, where bending shows."""
+"""View direction from the bodies to the eye: mostly from the side, where bending is visible."""
 LINE = 90
-"""Letters in a line of the title."""
+"""Characters per line of the title."""
 BRIGHTEST = 99.0
-"""Share of the surface (%) below the density of the last colour: at sharp shoulders it grows without bound."""
+"""Percentage of the surface below the density of the last colour; at sharp shoulders the density is singular."""
 
 
 @dataclass(frozen=True)
 class DeformedBody:
-    """A body in a mode: points (p, 3) at rest, quads (f, 4), displacement (p, 3) as drawn, energy (f,) from 0 to 1.
+    """Body in a mode: points (p, 3) at rest, quads (f, 4), displacement (p, 3) as drawn, energy (f,) from 0 to 1.
 
-    Of a housing only the half behind its axis, so that it hides nothing.
+    Of a housing, only the half behind its axis is drawn so that it does not hide the other bodies.
     """
 
     points: Floats
@@ -336,7 +336,7 @@ class DeformedBody:
 
 @dataclass(frozen=True)
 class ElasticScene:
-    """Elastic bodies in a mode, and the gears and discs on their seats, which move as rigid bodies."""
+    """Flexible bodies in a mode, and the gears and discs on their seats, which move as rigid bodies."""
 
     bodies: tuple[DeformedBody, ...]
     gears: tuple[BodyShape, ...]
@@ -346,18 +346,18 @@ class ElasticScene:
 
 
 def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitude: float = 0.06) -> ElasticScene:
-    """Arrange the elastic bodies of an assembly in a mode.
+    """Prepare the flexible bodies of an assembly in a mode for drawing.
 
     Parameters
     ----------
     assembly : of the variant `flexible`
     shape : (size,) mode shape
-    amplitude : largest displacement drawn, as a share of the longest body
+    amplitude : largest displacement drawn, as a fraction of the longest body
 
     Raises
     ------
     ValueError
-        The assembly has no elastic bodies, or the mode does not move them.
+        The assembly has no flexible bodies, or the mode does not move them.
     """
     if not assembly.elastic_bodies:
         raise ValueError(f"variant {assembly.variant} has no flexible bodies to draw; use the variant flexible")
@@ -390,27 +390,27 @@ def elastic_scene(assembly: Assembly, shape: Floats, *, title: str = "", amplitu
 
 
 def _half_behind(surface: Surface, axis: tuple[float, float]) -> Surface:
-    """Faces of a surface that lie behind an axis along z, seen from `SIDE`."""
+    """Return the faces of a surface that lie behind an axis along z, seen from `SIDE`."""
     behind = (surface.points[surface.quads].mean(axis=1)[:, :2] - axis) @ SIDE[:2] < 0.0
     return replace(surface, quads=surface.quads[behind], strain=surface.strain[behind])
 
 
 def _areas(points: Floats, quads: Integers) -> Floats:
-    """Area of each quad, m2."""
+    """Return the area of each quad, m2."""
     diagonals = points[quads[:, 2]] - points[quads[:, 0]], points[quads[:, 3]] - points[quads[:, 1]]
     areas: Floats = 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
     return areas
 
 
 def _density_below(density: Floats, area: Floats) -> float:
-    """Density that all but the brightest part of the surface stays below."""
+    """Return the density that all but the brightest part of the surface stays below."""
     order = np.argsort(density)
     share = np.cumsum(area[order]) / area.sum()
     return float(density[order][np.searchsorted(share, BRIGHTEST / 100.0)]) or 1.0
 
 
 def _gears(assembly: Assembly, shape: Floats) -> tuple[tuple[BodyShape, ...], tuple[Floats, ...]]:
-    """Gears and discs on elastic shafts, and the motion (6,) of each in a mode shape."""
+    """Return gears and discs on flexible shafts, and the motion (6,) of each in a mode shape."""
     gears = []
     motions = []
     for body in assembly.bodies:
@@ -429,11 +429,11 @@ def _gears(assembly: Assembly, shape: Floats) -> tuple[tuple[BodyShape, ...], tu
 def draw_elastic_bodies(
     scene: ElasticScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)
 ) -> Figure:
-    """Draw elastic bodies at their largest deflection, coloured by strain energy density; gears translucent.
+    """Draw flexible bodies at maximum deflection, coloured by strain energy density; gears are translucent.
 
     Parameters
     ----------
-    path : where to write the picture
+    path : file for the picture
     size : width and height of the rendered image, pixels
 
     Raises
@@ -456,11 +456,11 @@ def animate_elastic_bodies(
     duration: float = 1.6,
     size: tuple[int, int] = (900, 700),
 ) -> Path:
-    """Write one period of a mode as an animated picture that repeats for ever.
+    """Write one period of a mode as an animated picture that repeats endlessly.
 
     Parameters
     ----------
-    path : where to write; the suffix must be ``.gif``
+    path : output file; the suffix must be ``.gif``
     frames : pictures per period, an even number
     duration : length of a period, s
     size : width and height of the rendered image, pixels
@@ -501,7 +501,7 @@ def _add(plotter: pyvista.Plotter, scene: ElasticScene) -> tuple[list[pyvista.Po
             cmap=displacement_map(),
             show_scalar_bar=False,
             ambient=0.15,
-            diffuse=0.75,  # less than full: walls at rest are light, and must stand out from the page
+            diffuse=0.75,  # below 1: walls at rest are light and must contrast with the page
         )
         bodies.append(mesh)
     for gear, motion in zip(scene.gears, scene.motions, strict=True):
@@ -516,19 +516,19 @@ def _figure(image: Pixels, pixel: float, title: str) -> Figure:
     return mode_figure(image, pixel, fill(title, LINE), label)
 
 
-# Pictures of how elastic bodies vibrate by themselves, rendered off-screen with pyvista
+# Pictures of the free vibration of flexible bodies, rendered off-screen with pyvista
 
 DRAWN_DEFLECTION = 0.06
-"""Largest displacement in a picture over the length of the body."""
+"""Maximum displacement in a picture over the length of the body."""
 
 
 def draw_free_vibration(body: ReducedBody, number: int, path: str | Path | None = None) -> Figure:
-    """Draw an elastic vibration of a free body at rest, coloured by displacement.
+    """Draw an elastic mode of a free body, coloured by displacement.
 
     Parameters
     ----------
-    number : 0 for the first elastic one
-    path : where to write the picture
+    number : 0 for the first elastic mode
+    path : file for the picture
 
     Raises
     ------

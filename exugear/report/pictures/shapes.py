@@ -1,8 +1,7 @@
-"""What the bodies of a gearbox look like: gears whose teeth mesh, plain shafts and carriers.
+"""Shapes of the bodies of a gearbox for drawing: gears with meshing teeth, plain shafts and carriers.
 
-NumPy alone. Frame of the gearbox: z along the shafts, lengths in m.
-
-NumPy alone: `exugear.report.pictures.scene` draws them, `exugear.report.web.stage` writes them into a web page.
+The frame is that of the gearbox (z along the shafts), lengths are in m. The module needs only NumPy;
+`exugear.report.pictures.scene` draws the shapes and `exugear.report.web.stage` writes them into a web page.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from fe_ste.tools.arrays import Floats, Integers
 # Surfaces of gears, shafts and pins as triangles; z along the axis, lengths in m
 
 TWIST_PER_LAYER = 0.06
-"""Rotation of the section from one ring of points to the next along a helical gear, rad."""
+"""Rotation of the section between successive rings of points along a helical gear, rad."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +38,12 @@ class Surface:
     """(m, 3)"""
 
     def moved(self, shift: ArrayLike) -> Surface:
-        """Copy at another place."""
+        """Return a translated copy."""
         return Surface(self.points + np.asarray(shift, dtype=np.float64), self.triangles)
 
     @classmethod
     def joined(cls, surfaces: Sequence[Surface]) -> Surface:
-        """All surfaces as one."""
+        """Merge surfaces into one."""
         offsets = np.cumsum([0, *(len(surface.points) for surface in surfaces)])
         return cls(
             np.concatenate([surface.points for surface in surfaces]),
@@ -53,13 +52,13 @@ class Surface:
 
 
 def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = None) -> Surface:
-    """Surface of a whole gear with its teeth, about the z axis, z = 0 in the middle of the face width.
+    """Return the surface of a whole gear with its teeth, about the z axis, with z = 0 in the middle of the face width.
 
     Parameters
     ----------
     gear : the gear
     angle : polar angle of the middle of a tooth at z = 0, rad
-    rim_diameter : bore of an external, outside diameter of an internal gear, m; by default where it is held
+    rim_diameter : bore of an external, outside diameter of an internal gear, m; by default the fixed diameter
 
     Examples
     --------
@@ -76,13 +75,13 @@ def gear_surface(gear: Gear, angle: float = 0.0, rim_diameter: float | None = No
     polar = outline[:, 1] + angle
     toothed = np.stack([_circle(outline[:, 0], polar + twist * part, gear.face_width * part) for part in heights])
     plain = np.stack([_circle(rim, polar + twist * part, gear.face_width * part) for part in heights[[0, -1]]])
-    # Walls run round the axis; the caps join the teeth with the rim at the same polar angles.
+    # Walls extend around the axis; end faces join the teeth with the rim at the same polar angles.
     bands = [toothed, plain[::-1], np.stack([plain[0], toothed[0]]), np.stack([toothed[-1], plain[1]])]
     return Surface.joined([_band(band) for band in bands])
 
 
 def _gear_outline(gear: Gear) -> Floats:
-    """Radius and polar angle along the toothed circumference, shape (n, 2), counter-clockwise."""
+    """Return radius and polar angle along the toothed circumference, shape (n, 2), counter-clockwise."""
     profile = tooth_profile(gear)
     fillet = profile.fillet[np.linspace(len(profile.fillet) - 1, 0, 6).astype(np.int64)[:-1]]
     from_root = np.column_stack([np.hypot(*fillet.T), np.arctan2(fillet[:, 1], fillet[:, 0])])
@@ -99,7 +98,7 @@ def _circle(radius: Floats | float, polar: Floats, height: float) -> Floats:
 
 
 def _band(rings: Floats) -> Surface:
-    """Close bands between rings of equal numbers of points, shape (rings, points, 3)."""
+    """Return closed bands between rings of equal numbers of points, shape (rings, points, 3)."""
     count, size = rings.shape[:2]
     point = np.arange(count * size).reshape(count, size)
     following = np.roll(point, -1, axis=1)
@@ -110,7 +109,7 @@ def _band(rings: Floats) -> Surface:
 def tube_surface(
     diameter: float, start: float, end: float, bore: float = 0.0, centre: ArrayLike = (0.0, 0.0)
 ) -> Surface:
-    """Surface of a shaft, disc or pin along z.
+    """Return the surface of a shaft, disc or pin along z.
 
     Parameters
     ----------
@@ -124,37 +123,37 @@ def tube_surface(
     return _band(rings).moved([*np.asarray(centre, dtype=np.float64), 0.0])
 
 
-# What the bodies of a gearbox look like: gears whose teeth mesh, plain shafts and carriers
+# Bodies of a gearbox: gears with meshing teeth, plain shafts and carriers
 
 THINNEST_DISC = 0.02
-"""Width of a disc without width, as it is drawn, over its diameter."""
+"""Minimum drawn width of a disc, as a fraction of its diameter."""
 
 
 @dataclass(frozen=True)
 class BodyShape:
-    """What a body looks like."""
+    """Drawn shape of a body."""
 
     name: str
     family: str
-    """Name that equal bodies share, such as the planets of a set."""
+    """Common name of equal bodies, such as the planets of a set."""
     surface: Surface
     """In the frame of the gearbox, at rest."""
     reference: Floats
-    """(3,) point whose displacement describes the body's motion, its centre of mass, m."""
+    """(3,) point whose displacement describes the body's motion: the centre of mass, m."""
     fixed: bool = False
-    """Drawn translucent: a ring hides its planets."""
+    """Whether it is fixed and drawn translucent, as a ring gear hides its planets."""
 
 
 def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
-    """Shapes of all bodies of a gearbox that have wheels or a stepped shaft, or carry planets.
+    """Return the shapes of all bodies of a gearbox that have gears or a stepped shaft, or carry planets.
 
     Parameters
     ----------
-    gearbox : the gearbox; its teeth are turned so that they mesh
+    gearbox : the gearbox; its gears are rotated so that the teeth mesh
 
     Returns
     -------
-    gears as they are, shafts and carrier as plain cylinders that only show what belongs together
+    gears with true geometry; shafts and carriers as plain cylinders that only show which gears are connected
 
     Examples
     --------
@@ -181,17 +180,17 @@ def bodies_of(gearbox: Gearbox) -> tuple[BodyShape, ...]:
 
 
 def tooth_angles(meshes: Sequence[Mesh]) -> dict[tuple[str, str], float]:
-    """Turn the gears of a train so that teeth of each meet spaces of its mates.
+    """Rotate the gears of a train so that the teeth of each meet tooth spaces of its mating gears.
 
     Parameters
     ----------
-    meshes : all meshes at work
+    meshes : all active meshes
 
     Returns
     -------
     dict
         Polar angle (rad) of the middle of a tooth in the middle plane, by names of body and gear. Where a gear has
-        several mates, the assembly condition of the train makes them agree.
+        several mating gears, the assembly condition of the train makes the angles consistent.
     """
     angles: dict[tuple[str, str], float] = {}
     waiting = list(meshes)
@@ -207,13 +206,13 @@ def tooth_angles(meshes: Sequence[Mesh]) -> dict[tuple[str, str], float]:
 
 
 def _ends(mesh: Mesh) -> tuple[tuple[str, str], tuple[str, str]]:
-    """Names of body and gear at both ends of a mesh."""
+    """Return names of body and gear at both ends of a mesh."""
     return (mesh.pinion, mesh.pair.pinion.name), (mesh.gear, mesh.pair.gear.name)
 
 
 def _mating_angle(mesh: Mesh, angle: float, *, backwards: bool) -> float:
-    """Angle of the other gear's tooth when a tooth of one gear stands at `angle`."""
-    # The pitch point lies towards gear 2 between external gears, and beyond gear 1 inside a ring.
+    """Return the polar angle of a tooth of the mating gear when a tooth of the known gear is at `angle`."""
+    # The pitch point lies towards gear 2 for external gears, and beyond gear 1 for an internal pair.
     gears = (mesh.pair.pinion, mesh.pair.gear)
     facing = math.pi if gears[1].internal else 0.0
     towards = (mesh.position_angle + facing, mesh.position_angle + math.pi)
@@ -221,7 +220,7 @@ def _mating_angle(mesh: Mesh, angle: float, *, backwards: bool) -> float:
     known, mate = (1, 0) if backwards else (0, 1)
     twists = [math.tan(gear.base_helix_angle) / gear.base_radius for gear in gears]
     at_mesh = angle + twists[known] * mesh.offsets[known]
-    # In pitches, from the tooth to the pitch point; there the mate has a space, half a pitch beside its tooth.
+    # Pitches from the tooth to the pitch point, where the mating gear has a space, half a pitch off its tooth.
     pitches = (towards[known] - at_mesh) / gears[known].angular_pitch
     return towards[mate] - (sense * pitches + 0.5) * gears[mate].angular_pitch - twists[mate] * mesh.offsets[mate]
 
@@ -235,14 +234,14 @@ def _has_shaft(body: Body) -> bool:
 
 
 def _rim(gearbox: Gearbox, body: Body, gear: str) -> float | None:
-    """Wheels reach down to their shaft; planets and rings end where they are held."""
+    """Return the inner diameter of a gear on a shaft (the shaft's); None for planets and rings: the fixed diameter."""
     if _has_shaft(body) and not gearbox.gears[gear].internal:
         return _shaft_diameter(gearbox, body)
     return None
 
 
 def _shaft(gearbox: Gearbox, body: Body) -> list[Surface]:
-    """Plain cylinder through the wheels of a body; the pieces of its shape where it has none."""
+    """Return a plain cylinder through the gears of a body, or the pieces of its stepped shape if it has none."""
     if not _has_shaft(body):
         shape = gearbox.case.bodies[body.family].shape
         if shape is None or body.wheels:
@@ -256,7 +255,7 @@ def _shaft(gearbox: Gearbox, body: Body) -> list[Surface]:
 
 
 def _pieces(shape: ShapeSection, body: Body) -> list[Surface]:
-    """Pieces of a stepped shaft, a cone as the cylinder of its mean diameter."""
+    """Return the pieces of a stepped shaft, a cone as the cylinder of its mean diameter."""
     pieces = []
     start = MM * shape.start_z_mm
     for piece in shape.sections:
@@ -269,11 +268,11 @@ def _pieces(shape: ShapeSection, body: Body) -> list[Surface]:
 
 
 def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, Surface]]:
-    """Blanks on a stepped shaft other than those of its gears: place (m) and surface, by the name of the seat.
+    """Return the blanks at seats of a stepped shaft without gear: position (m) and surface, by name of the seat.
 
-    Drawn is the solid disc that has the mass and both moments of inertia of the blank, such as the inner ring of a
-    bearing. A rotor, whose disc would be wider than its shaft is long, is drawn with that diameter: it would hide all
-    else.
+    The surface is that of the solid disc with the mass and both moments of inertia of the blank, such as the inner
+    ring of a bearing. Diameter and width are limited to the length of the shaft, because the disc of a rotor would
+    otherwise hide all other parts.
     """
     shape = gearbox.case.bodies[body.family].shape
     if shape is None:
@@ -293,7 +292,7 @@ def blank_discs(gearbox: Gearbox, body: Body) -> dict[str, tuple[float, Surface]
 
 
 def _carrier(gearbox: Gearbox, body: Body, planets: Sequence[Body]) -> list[Surface]:
-    """Pins through the planets and a plate behind them, towards +z, that leaves the view on the planets free."""
+    """Return pins through the planets and a plate behind them, towards +z, that does not hide the planets."""
     parts = []
     for planet in planets:
         for name, z in planet.wheels.items():
@@ -307,11 +306,11 @@ def _carrier(gearbox: Gearbox, body: Body, planets: Sequence[Body]) -> list[Surf
     return parts
 
 
-# How the bodies of a gearbox move: rigid motions read out of a mode shape, and scaled to be seen
+# Motion of the bodies of a gearbox: rigid-body motions from a mode shape, scaled for drawing
 
 
 def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
-    """Displacement of each point of a body for a small motion of it.
+    """Return the displacement of each point of a body for a small motion.
 
     Parameters
     ----------
@@ -327,9 +326,9 @@ def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
 
 
 def placed(body: BodyShape, motion: ArrayLike) -> Floats:
-    """Points of a body after a motion that may be large: turned about the axis of its rotation, then shifted.
+    """Return the points of a body after a motion that may be large: a finite rotation, then a translation.
 
-    Linear displacements would blow a gear up when it turns by a drawn amplitude; this keeps it a gear.
+    Linear displacements would enlarge a gear that rotates by a drawn amplitude; a finite rotation keeps its size.
 
     Parameters
     ----------
@@ -346,7 +345,7 @@ def placed(body: BodyShape, motion: ArrayLike) -> Floats:
 
 
 def motion_matrix(reference: ArrayLike, motion: ArrayLike) -> Floats:
-    """Homogeneous matrix (4, 4) of a rotation about a reference point and a shift.
+    """Return the homogeneous matrix (4, 4) of a rotation about a reference point and a translation.
 
     Examples
     --------
@@ -370,13 +369,13 @@ def motion_matrix(reference: ArrayLike, motion: ArrayLike) -> Floats:
 
 @dataclass(frozen=True)
 class ModeScene:
-    """A mode shape on the bodies of a gearbox, ready to draw."""
+    """Mode shape on the bodies of a gearbox, ready to draw."""
 
     bodies: tuple[BodyShape, ...]
     motions: tuple[Floats, ...]
     """(6,) motion of each body at the drawn amplitude."""
     displacement: tuple[Floats, ...]
-    """(n,) displacement of each point over the largest of all, 0 to 1."""
+    """(n,) displacement of each point over the maximum of all points, 0 to 1."""
     title: str
 
 
@@ -389,7 +388,7 @@ def mode_scene(
     ----------
     bodies : shapes
     motions : by body name, (6,)
-        Mode shape in any normalisation, as in `displacement_of`; bodies that are not named rest.
+        Mode shape in any normalisation, as in `displacement_of`; bodies that are not listed are at rest.
     title : frequency, damping and name of the mode
     amplitude : largest displacement drawn, over the diagonal of the scene
 
@@ -417,20 +416,20 @@ def mode_scene(
 
 
 def motions_of(bodies: Iterable[Body], coordinates: Mapping[str, Sequence[int]], shape: ArrayLike) -> dict[str, Floats]:
-    """Read the motions of all bodies out of a vector of coordinates.
+    """Extract the motions of all bodies from a vector of coordinates.
 
     Parameters
     ----------
     bodies : bodies of the model
     coordinates : mapping of body name to six int
-        Indices of x, y, z and the rotations about them in the vector; -1 where there is none.
+        Indices of x, y, z and the rotations about them in the vector; -1 for a missing coordinate.
     shape : (size,) mode shape or displacement
 
     Returns
     -------
-    by body name, (6,) as in `displacement_of`. A planet that turns on an ideal pin goes where its carrier takes it.
+    by body name, (6,) as in `displacement_of`. A planet on an ideal pin moves with its carrier.
     """
-    vector = np.append(np.asarray(shape, dtype=np.float64), 0.0)  # -1 reads the zero
+    vector = np.append(np.asarray(shape, dtype=np.float64), 0.0)  # index -1 reads the appended zero
     by_name = {body.name: body for body in bodies}
     motions = {name: vector[list(coordinates[name])] for name in by_name if name in coordinates}
     for name, motion in motions.items():

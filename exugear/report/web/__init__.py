@@ -1,1 +1,1 @@
-"""Parts of web pages that stand alone: HTML, arrays, scripts, vendored libraries, bodies in three dimensions."""
+"""Self-contained web pages: HTML, arrays, scripts, vendored libraries and 3-D views of bodies."""

@@ -1,9 +1,9 @@
-"""The whole page: one file that runs its own scripts and no other, and asks nothing of any network.
+"""Whole web page in one file that runs only its own scripts and makes no network requests.
 
-`benchmarks` and tests need no node; ``web/vendor.mjs`` of the repository renews the files from npm.
+`benchmarks` and tests need no Node.js; ``web/vendor.mjs`` of the repository updates the vendored files from npm.
 
-A page that lies in a file cannot import modules. So each module becomes a function that is called once and gives what
-the module exports; an import becomes constants taken from what an earlier one gave. Nothing else is changed.
+A page opened from a file cannot import modules. Each module therefore becomes a function that is called once and
+returns its exports; imports become constants from the results of earlier modules. Nothing else is changed.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from numpy.typing import NDArray
 
 from exugear.report.web.html import text
 
-# Libraries that stand in every page: fixed versions in ``vendor``, with their licences and hashes
+# Libraries in every page: fixed versions in ``vendor``, with their licences and hashes
 
 
 @dataclass(frozen=True)
 class Library:
-    """A library of others that the pages carry."""
+    """Third-party library included in the pages."""
 
     name: str
     version: str
@@ -41,13 +41,13 @@ class Library:
 
 
 def vendored(name: str) -> str:
-    """Text of a file of the vendored libraries."""
+    """Return the text of a file of the vendored libraries."""
     return files("exugear.report.web").joinpath("vendor", name).read_text(encoding="utf-8")
 
 
 @cache
 def libraries() -> tuple[Library, ...]:
-    """All libraries, as ``vendor.json`` lists them.
+    """Return all libraries listed in ``vendor.json``.
 
     Examples
     --------
@@ -62,13 +62,13 @@ def libraries() -> tuple[Library, ...]:
 
 
 def licences() -> str:
-    """Licences of all libraries, as the pages show them."""
+    """Return the licences of all libraries as text for the pages."""
     return "\n\n".join(
         f"{library.name} {library.version}\n\n{vendored(library.licence_file)}" for library in libraries()
     )
 
 
-# Scripts of the pages: small modules, joined in the order of their imports into one that needs no address
+# Scripts of the pages: small modules, bundled in the order of their imports into one script without addresses
 
 _IMPORT = re.compile(r'^import (\{[^}]*\}) from "\./([a-z_]+)\.js";$', re.MULTILINE)
 _EXPORT = re.compile(r"^export ((?:async )?(?:function|const|class) (\w+))", re.MULTILINE)
@@ -76,12 +76,12 @@ _EXPORT = re.compile(r"^export ((?:async )?(?:function|const|class) (\w+))", re.
 
 @cache
 def script_source(name: str) -> str:
-    """Text of a module."""
+    """Return the source of a module."""
     return files("exugear.report.web").joinpath("scripts", f"{name}.js").read_text(encoding="utf-8")
 
 
 def module_order(name: str) -> tuple[str, ...]:
-    """Names of a module and all that it imports, each after those that it needs.
+    """Return the names of a module and all its imports, each after those that it needs.
 
     Examples
     --------
@@ -102,7 +102,7 @@ def module_order(name: str) -> tuple[str, ...]:
 
 
 def as_function(name: str, source: str) -> str:
-    r"""Make a module a function that is called once.
+    r"""Convert a module to a function that is called once.
 
     Examples
     --------
@@ -119,15 +119,15 @@ def as_function(name: str, source: str) -> str:
 
 
 def bundle(name: str) -> str:
-    """One script of a module and all that it imports."""
+    """Return one script with a module and all its imports."""
     parts = [as_function(one, script_source(one)) for one in module_order(name)]
     return '"use strict";\n(() => {\n' + "\n".join(parts) + "\n})();\n"
 
 
-# Arrays in a page: deflated and in base64, each in an element of its own that is unpacked when it is shown
+# Arrays in a page: deflated and base64-encoded, each in its own element, unpacked when it is shown
 
 KINDS: Final = {"u1": "u8", "u2": "u16", "i1": "i8", "i2": "i16", "u4": "u32", "f4": "f32"}
-"""Types that the scripts know, by those of NumPy."""
+"""Type names used by the scripts, by NumPy types."""
 
 
 class ArrayStore:
@@ -145,12 +145,12 @@ class ArrayStore:
         self._known: dict[bytes, str] = {}
 
     def add(self, values: NDArray[Any], *, differences: bool = False) -> dict[str, object]:
-        """Keep an array and return what the scripts find it by.
+        """Store an array and return its reference for the scripts.
 
         Parameters
         ----------
         values : of a type in `KINDS`
-        differences : whether to keep differences along the first axis, which pack better where neighbours are alike
+        differences : whether to store differences along the first axis, which compress better for similar neighbours
         """
         array = np.ascontiguousarray(values)
         kept = array
@@ -158,7 +158,7 @@ class ArrayStore:
             kept = np.diff(array, axis=0, prepend=np.zeros_like(array[:1])).astype(array.dtype)
         little = kept.astype(kept.dtype.newbyteorder("<"), copy=False)
         packed = zlib.compress(little.tobytes(), 9)
-        if packed not in self._known:  # planets look alike
+        if packed not in self._known:  # equal planets share one array
             self._known[packed] = f"a{len(self._packed)}"
             self._packed.append(base64.b64encode(packed).decode("ascii"))
         return {
@@ -169,7 +169,7 @@ class ArrayStore:
         }
 
     def elements(self) -> str:
-        """All arrays as elements of the page."""
+        """Return all arrays as elements of the page."""
         return "\n".join(
             f'<script type="text/plain" id="{name}">{data}</script>'
             for name, data in zip(self._known.values(), self._packed, strict=True)
@@ -177,7 +177,7 @@ class ArrayStore:
 
 
 def json_element(name: str, content: Mapping[str, Any]) -> str:
-    r"""Keep data as JSON in an element of the page; nothing in it ends the element or begins another.
+    r"""Return data as JSON in an element of the page, escaped so that it cannot end the element or begin another.
 
     Examples
     --------
@@ -190,7 +190,7 @@ def json_element(name: str, content: Mapping[str, Any]) -> str:
 
 
 def rounded(value: float, digits: int = 5) -> float | None:
-    """Round a number to significant digits for JSON; None for what is no number.
+    """Round a number to significant digits for JSON; None for non-finite values.
 
     Examples
     --------
@@ -203,11 +203,11 @@ def rounded(value: float, digits: int = 5) -> float | None:
 
 
 def rounded_list(values: NDArray[Any], digits: int = 5) -> list[float | None]:
-    """Round all numbers of a row."""
+    """Round all numbers of an array."""
     return [rounded(float(value), digits) for value in values]
 
 
-# The whole page: one file that runs its own scripts and no other, and asks nothing of any network
+# The whole page: one file that runs only its own scripts and makes no network requests
 
 STYLES = ("base", "parts", "narrow", "paper")
 """Style sheets of all pages, in their order."""
@@ -216,27 +216,27 @@ THEME = (
     "(matchMedia('(prefers-color-scheme: dark)').matches?'dark':'light')}"
     "catch(e){document.documentElement.dataset.theme='light'}document.documentElement.classList.add('scripted')"
 )
-"""What must run before the first paint: the colours that were chosen last, or those of the machine."""
+"""Script that runs before the first paint: it sets the colours selected last, or those of the system."""
 
 
 def whole_page(
     title: str, body: str, script: str, data: Mapping[str, Any], arrays: ArrayStore, libraries: Sequence[str]
 ) -> str:
-    """Make the page.
+    """Return the whole page.
 
     Parameters
     ----------
     body : HTML of its body
     script : name of its main module
-    data : what the scripts read as JSON
+    data : JSON data for the scripts
     arrays : arrays that the data refer to
-    libraries : files of vendored libraries that it needs
+    libraries : required files of vendored libraries
 
     Returns
     -------
     str
-        HTML. Its policy lets scripts and styles of these very bytes run and no others, whatever a name or a file of
-        a stranger brought in, and lets no request leave.
+        HTML. Its content security policy permits only scripts and styles with these hashes, whatever names or untrusted
+        files contain, and blocks all requests.
     """
     style = "\n".join([vendored("uPlot.min.css"), *map(_style, STYLES)])
     scripts = [*map(vendored, libraries), bundle(script)]
@@ -261,5 +261,5 @@ def _style(name: str) -> str:
 
 
 def _digest(content: str) -> str:
-    """Name a script or style in the policy by its hash."""
+    """Return the hash of a script or style for the content security policy."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(content.encode('utf-8')).digest()).decode('ascii')}'"

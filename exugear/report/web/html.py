@@ -1,4 +1,4 @@
-"""Pieces of a web page: text, lists, tables, cards, sections. Whatever a file holds is escaped."""
+"""Elements of a web page: text, lists, tables, cards, sections. All content of files is escaped."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from dataclasses import dataclass
 _VOID = ("img", "input")
 """Elements without content."""
 SHORT_TEXT, LONG_TEXT = 8, 40
-"""Characters up to which a column of texts needs no width kept for it, and from which it needs much."""
+"""Longest text (characters) of a column without reserved width, and shortest text of one with a large width."""
 
 
 def text(value: object) -> str:
-    """Escape a text for the page; halves of characters, which no file can hold, become question marks."""
+    """Escape a text for the page; lone surrogates, which no file can contain, become question marks."""
     return html.escape(str(value).encode("utf-8", "replace").decode("utf-8"))
 
 
 def element(tag: str, content: str = "", **attributes: object) -> str:
-    """Make an element of content that is HTML already; attributes are escaped.
+    """Return an element with content that is already HTML; attributes are escaped.
 
     Parameters
     ----------
     content : HTML
     attributes
-        By name, underscores for hyphens and one at the end to tell ``class_`` from the word of Python; True stands
-        alone, None and False are left out.
+        By name, with underscores for hyphens and a trailing one for keywords such as ``class_``. True yields an
+        attribute without value; None and False omit it.
 
     Examples
     --------
@@ -44,29 +44,29 @@ def element(tag: str, content: str = "", **attributes: object) -> str:
 
 
 def paragraph(value: str, kind: str = "") -> str:
-    """Make a paragraph of plain text; the kind ``warning`` sets it off, ``note`` makes it small."""
+    """Return a paragraph of plain text; the kind ``warning`` highlights it, ``note`` makes it small."""
     return element("p", text(value), class_=kind or None)
 
 
 def bullets(values: Iterable[str]) -> str:
-    """Make a list of plain texts."""
+    """Return a bulleted list of plain texts."""
     return f"<ul>{''.join(f'<li>{text(value)}</li>' for value in values)}</ul>"
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a table that is more than a text."""
+    """Table cell with more properties than its text."""
 
     shown: str
     """Its text."""
     order: float | None = None
-    """What rows are sorted by; the text otherwise."""
+    """Sort key of the row; by default the text."""
     choice: str = ""
-    """What clicking it chooses in the scripts of the page; empty for nothing."""
+    """Selection made in the scripts of the page by clicking the cell; empty for none."""
     tag: str = ""
     """Shown as a tag instead of plain text: ``good``, ``mind`` or ``plain``."""
     bar: float | None = None
-    """Length of a bar beside the text, 0 to 1."""
+    """Length of a bar next to the text, 0 to 1."""
 
     def __str__(self) -> str:
         """Text of the cell."""
@@ -83,17 +83,17 @@ def table(
     sortable: bool = False,
     choices: Sequence[str] = (),
 ) -> str:
-    """Make a table of rows under the keys of the first.
+    """Return a table of rows with the keys of the first row as headings.
 
     Parameters
     ----------
-    rows : None makes no table
-    texts : columns to align left; the first one always is
-    caption : what the table shows, for those who have it read aloud
-    name : identity in the page; its data can be taken away under this name
-    hidden : columns that a phone leaves out
-    sortable : whether its scripts may sort it
-    choices : what clicking each row chooses in the scripts of the page
+    rows : an empty sequence yields no table
+    texts : left-aligned columns; the first one always is
+    caption : content of the table, for screen readers
+    name : identifier in the page; its data can be exported under this name
+    hidden : columns that narrow screens omit
+    sortable : whether the scripts may sort it
+    choices : selection made in the scripts of the page by clicking each row
 
     Examples
     --------
@@ -116,12 +116,12 @@ def table(
     said = element("caption", text(caption), class_="unseen") if caption else ""
     own = f"{said}<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"
     whole = element("table", own, id=name or None, data_title=caption if name else None, data_sortable=sortable)
-    # Whoever has no mouse scrolls a wide table by the arrow keys.
+    # A focusable region can be scrolled by the arrow keys.
     return element("div", whole, class_="scroll", tabindex=0, role="region", aria_label=caption or f"Table: {keys[0]}")
 
 
 def _text_kinds(rows: Sequence[Mapping[str, object]], key: str) -> list[str]:
-    """Classes of a column of texts, by the longest of them."""
+    """Return the classes of a text column, by its longest entry."""
     shown = (row[key] for row in rows)
     longest = max(len(value.shown if isinstance(value, Cell) else str(value)) for value in shown)
     return ["text"] + ["brief"] * (longest <= SHORT_TEXT) + ["told"] * (longest > LONG_TEXT)
@@ -143,7 +143,7 @@ def _cell(value: object, kind: str | None) -> str:
 
 
 def alert(title: str, values: Iterable[str]) -> str:
-    """Make a red box that readers of the page cannot miss, also those who have it read aloud.
+    """Return a red box with an alert role, so that screen readers announce it.
 
     Examples
     --------
@@ -154,20 +154,20 @@ def alert(title: str, values: Iterable[str]) -> str:
 
 
 def folded(title: str, content: str, opened: bool = False) -> str:
-    """Hide content behind a title until it is clicked; paper shows it."""
+    """Return content that is hidden behind a title until it is clicked; print shows it."""
     if content:
         return element("details", f"<summary>{text(title)}</summary>{content}", open=opened)
     return ""
 
 
 def section(title: str, *content: str, level: int = 2, name: str = "") -> str:
-    """Put content under a heading; nothing if there is none.
+    """Return content under a heading; empty without content.
 
     Parameters
     ----------
     content : HTML
     level : of the heading
-    name : identity in the page, which links lead to; the section is a landmark then
+    name : identifier in the page and target of links; makes the section a landmark
     """
     joined = "".join(content)
     if not joined:
@@ -179,19 +179,19 @@ def section(title: str, *content: str, level: int = 2, name: str = "") -> str:
 
 
 def picture(source: str, words: str, width: int) -> str:
-    """Make a picture on white ground, as wide as given or as the window, whatever the colours of the page."""
+    """Return a picture on white ground, of given width or at most that of the window, for all colour themes."""
     return element("div", element("img", src=source, alt=words, width=width), class_="panel picture")
 
 
 def figure(name: str, title: str, hint: str, words: str, kind: str = "") -> str:
-    """Make the frame of a figure that a script draws.
+    """Return the frame of a diagram that a script draws.
 
     Parameters
     ----------
-    name : identity in the page
-    title, hint : what it shows, and what can be done with it
-    words : what it shows in words, for those who cannot see it, and where scripts are off
-    kind : what draws it: a key of the scripts
+    name : identifier in the page
+    title, hint : heading, and a note on the use of the diagram
+    words : content as text, for screen readers and pages without scripts
+    kind : key of the script that draws it
     """
     caption = element("figcaption", f"<strong>{text(title)}</strong>" + element("span", text(hint), class_="hint"))
     drawn = element("div", "", class_="plot", tabindex=0, role="img", aria_label=f"{title}. {words}")

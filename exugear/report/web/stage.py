@@ -1,4 +1,4 @@
-"""Bodies and modes as data for the stage of a page, where a mode moves in three dimensions."""
+"""Bodies and mode shapes as data for the animated 3-D view of a page."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import write_file
 
-# Frame of the stage of a page, where a mode moves, with its controls
+# Frame of the animated 3-D view with its controls
 
 HINT = "Drag: rotate. Right drag or two fingers: pan. Wheel or pinch: zoom. Arrow keys: rotate."
 
 
 def stage_figure() -> str:
-    """Make the frame; the scripts ``stage`` and ``mode_view`` fill it."""
+    """Return the frame; the scripts ``stage`` and ``mode_view`` fill it."""
     element = html.element
     canvas = element("canvas", "", id="view-3d", tabindex=0, role="img", aria_label="Mode shape, animated")
     still = element("img", id="still", alt="Mode shape at maximum deflection")
@@ -54,27 +54,27 @@ def stage_figure() -> str:
     return element("figure", caption + tools + stage + controls + chips, class_="panel", id="mode")
 
 
-# Bodies of a gearbox as a page draws them: rigid ones with their teeth, elastic ones with gears on their seats
+# Bodies of a gearbox for the page: rigid ones with their teeth, flexible ones with gears on their seats
 
 SAME_SHAPE = 1e-6
-"""Largest distance (m) between points of bodies that are drawn as one, turned."""
+"""Maximum distance (m) between points of bodies that are drawn as rotated copies of one shape."""
 
 
 @dataclass(frozen=True)
 class DrawnBody:
-    """A body that a page draws."""
+    """Body drawn in a page."""
 
     shape: BodyShape
     colour: str
     """As ``#rrggbb``."""
     owner: str
-    """Body whose seat a gear rides on; its own name otherwise."""
+    """Body that has the seat of a gear; otherwise its own name."""
     field: NDArray[np.float32] | None = None
-    """(p, 3, n) displacement of its points per coordinate of an elastic body; None for a body that moves as a whole."""
+    """(p, 3, n) displacement of its points per coordinate of a flexible body; None for a rigid-body motion."""
 
 
 def drawn_bodies(assembly: Assembly) -> tuple[DrawnBody, ...]:
-    """List all bodies of a gearbox that have a shape to draw, with the colours that they have in pictures."""
+    """List all bodies of a gearbox that have a shape to draw, with their colours from the pictures."""
     shapes = bodies_of(assembly.gearbox)
     colours = {family: _written(colour) for family, colour in body_colours(shapes).items()}
     rigid = [
@@ -92,7 +92,7 @@ def _elastic(assembly: Assembly, colours: dict[str, str]) -> list[DrawnBody]:
             continue
         surface = assembly.elastic_bodies[body.name].reduced.surface
         quads = surface.quads
-        # A triangle repeats its last corner: its second half has no area and is left out.
+        # A triangle repeats its last corner; its second half has no area and is skipped.
         whole = quads[:, 2] != quads[:, 3]
         triangles = np.concatenate([quads[:, [0, 1, 2]], quads[whole][:, [0, 2, 3]]])
         centre = np.array([*body.axis, body.centre_of_mass_z])
@@ -115,21 +115,21 @@ def _written(colour: tuple[float, float, float]) -> str:
 
 @dataclass(frozen=True)
 class DrawnMode:
-    """A mode as a page draws it; the largest displacement of any point is 1 m."""
+    """Mode for drawing in a page; the largest displacement of any point is 1 m."""
 
     motions: Floats
-    """(bodies, 6) motion of each body as a whole; of one with a field zero."""
+    """(bodies, 6) rigid-body motion of each body; zero for a body with a field."""
     fields: dict[int, Floats]
-    """Mapping of place among the bodies to (p, 3) array. Displacement of the points of elastic bodies."""
+    """Mapping of body index to (p, 3) array. Displacement of the points of flexible bodies."""
 
 
 def drawn_mode(assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats, with_fields: bool) -> DrawnMode:
-    """Read how the bodies of an assembly move in a mode shape (size,).
+    """Return the motion of the bodies of an assembly in a mode shape (size,).
 
     Parameters
     ----------
     shape : (size,)
-    with_fields : whether elastic bodies deform; else they move as their main seats do
+    with_fields : whether flexible bodies deform; otherwise they move rigidly with their main seats
     """
     moving = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(shape))
     motions = np.zeros((len(bodies), 6))
@@ -151,7 +151,7 @@ def drawn_mode(assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats,
 
 
 def _reference(assembly: Assembly, body: DrawnBody) -> Floats:
-    """Point that the motion of the owner as a whole belongs to: its centre of mass."""
+    """Return the reference point of the owner's rigid-body motion: its centre of mass."""
     own = next((one for one in assembly.gearbox.bodies(assembly.inertias) if one.name == body.owner), None)
     if own is None:
         return body.shape.reference
@@ -167,9 +167,9 @@ def _largest(bodies: tuple[DrawnBody, ...], motions: Floats, fields: dict[int, F
 
 
 def turn_between(first: BodyShape, other: BodyShape) -> float | None:
-    """Angle (rad) about z by which the points of one shape become those of another; None where no turn does.
+    """Return the rotation angle (rad) about z from one shape to another; None if they differ otherwise.
 
-    Planets of a set are drawn from the points of the first of them.
+    The planets of a set are drawn from the points of the first one.
     """
     one = first.surface.points - first.reference
     two = other.surface.points - other.reference
@@ -185,7 +185,7 @@ def turn_between(first: BodyShape, other: BodyShape) -> float | None:
     return None
 
 
-# Bodies and modes as data for the stage of a page, where a mode moves in three dimensions
+# Bodies and mode shapes as data for the animated 3-D view
 
 LARGEST = 0.035
 """Largest displacement drawn, over the diagonal of the scene, as in pictures."""
@@ -195,18 +195,18 @@ _U16 = 65535
 def stage_data(
     assembly: Assembly, shapes: Floats, labels: Mapping[str, str], arrays: ArrayStore, deformed: Collection[int]
 ) -> dict[str, Any]:
-    """Gather what the stage needs of a model.
+    """Return the data of a model for the 3-D view.
 
     Parameters
     ----------
     shapes : (size, modes) mode shapes
-    labels : mapping of name to words
-        Of bodies and gears.
-    arrays : takes the points, triangles and motions
-    deformed : modes in which elastic bodies deform; in the others they move as a whole, which takes less room
+    labels : mapping of name to label
+        For bodies and gears.
+    arrays : store for the points, triangles and motions
+    deformed : modes in which flexible bodies deform; in the others they move rigidly, which needs less memory
     """
     bodies = drawn_bodies(assembly)
-    # A rotor of stated inertias has no shape to draw: the stage is empty then.
+    # A rotor with given inertias only has no shape to draw; the view is then empty.
     points = np.concatenate([np.zeros((0, 3)), *(body.shape.surface.points for body in bodies)])
     low, high = (points.min(axis=0), points.max(axis=0)) if bodies else (np.zeros(3), np.ones(3))
     modes = [drawn_mode(assembly, bodies, shapes[:, n], n in deformed) for n in range(shapes.shape[1])]
@@ -230,7 +230,7 @@ def stage_data(
 
 
 def _bodies(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays: ArrayStore) -> list[dict[str, Any]]:
-    """Each shape once, its points in 16 bits of its box: 15 µm of a metre."""
+    """Return each shape once, with points in 16 bits of its bounding box: 15 µm per metre."""
     firsts: dict[str, DrawnBody] = {}
     listed = []
     for body in bodies:
@@ -261,12 +261,12 @@ def _bodies(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays: Ar
     return listed
 
 
-# The page of one model's modes: chosen from a list, moving in three dimensions, offline
+# Page of one model's modes: selected from a list, animated in 3-D, offline
 
 MODEL = "model"
 """Name of the only model of the page."""
 MOST_DEFORMED = 60
-"""Modes in which elastic bodies deform: the first of those that are shown."""
+"""Maximum number of modes in which flexible bodies deform: the first in the list."""
 
 
 def write_mode_page(
@@ -283,19 +283,19 @@ def write_mode_page(
 
     Parameters
     ----------
-    assembly : what vibrates
-    shapes : (size, modes) modes to choose from
-    titles : frequency (Hz) of each, and what moves
-    path : where to write the page
-    heading : gearbox, variant, mesh law and inertia set
+    assembly : vibrating system
+    shapes : (size, modes) modes for selection
+    titles : frequency (Hz) and mode shape description of each
+    path : output file
+    heading : gearbox, variant, mesh model and inertia set
     first : mode that is shown when the page opens
-    labels : mapping of name to words, optional
-        Of bodies.
+    labels : mapping of name to label, optional
+        For bodies.
 
     Raises
     ------
     ValueError
-        If there is no mode, or not a title for each.
+        If there is no mode, or the number of titles differs.
     """
     if not titles or shapes.shape[1] != len(titles):
         raise ValueError(

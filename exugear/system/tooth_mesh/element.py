@@ -326,7 +326,7 @@ def mesh_elements(
     flanks = usual if flanks is None else flanks
     phases, orientation = tooth_places(gearbox, flanks)
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
-    time = gearbox.case.damping.mesh_time_s
+    time = gearbox.case.damping.time_of("mesh")
     static = gearbox.train.static_mesh_forces()
     elements = []
     for mesh in gearbox.meshes:

@@ -17,6 +17,7 @@ import math
 
 from exugear.system.kernels.coordinates import BODY_SIZE, COSINE, PADDED, PADDED_SPIN, PADDED_TILT, SINE, SPIN, TILT
 from exugear.system.kernels.elastic import set_elastic_motion
+from exugear.system.kernels.modal_damping import add_modal_damping
 from exugear.system.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, RollingArrays, rolling_force
 from exugear.system.kernels.turning import place_travelling, set_turning_motion, share_travelling_forces
 from exugear.system.tooth_mesh.laws.mesh_forces import add_meshes
@@ -533,6 +534,7 @@ def evaluate(t: float, q: Floats, v: Floats, with_power: bool, equations: Equati
     add_springs(q, v, equations.springs, force)
     add_loads_of_places(bodies, places, work)
     share_travelling_forces(equations.travelling, work.shares, force)
+    work.damped[2] = add_modal_damping(q, v, equations.modal, work.modal, force)
     set_accelerations(v, bodies, work)
     work.damped[0] = set_elastic_motion(q, v, force, with_power, equations.elastic, work.scratch, work.rate)
     work.damped[1] = set_turning_motion(q, v, force, with_power, equations.turning, work.memory, work.rate)

@@ -29,6 +29,7 @@ from exugear.system.kernels.meshes import (
     MeshMemory,
     padded_rows,
 )
+from exugear.system.kernels.modal_damping import ModalArrays, modal_memory
 from exugear.system.kernels.products import filled_up
 from exugear.system.kernels.rolling import RollingArrays, rolling_memory
 from exugear.system.kernels.table_law import DAMPING_SIZE, NOMINAL_DEFLECTION, NOMINAL_MISALIGNMENT, scratch_memory
@@ -191,6 +192,7 @@ class Equations(NamedTuple):
     joints: Joints | None
     elastic: ElasticMotion | None
     turning: TurningArrays | None
+    modal: ModalArrays | None
 
 
 class Work(NamedTuple):
@@ -233,8 +235,10 @@ class Work(NamedTuple):
     shares: Floats
     """Memory of the travelling seats, see `exugear.system.kernels.turning`."""
     damped: Floats
-    """(2,) power that elastic bodies damp, and those in turning frames, at the last evaluation that asked for it:
-    (W)."""
+    """(3,) power that elastic bodies damp, and those in turning frames, at the last evaluation that asked for it, and
+    the power of modal damping (W)."""
+    modal: Floats
+    """Memory of modal damping."""
     scratch: Floats
     memory: Floats
     """Memory of the elastic bodies, and of those in turning frames."""
@@ -508,6 +512,7 @@ def equations_of(assembly: Assembly, loads: LoadTable) -> Equations:
         joints=joints,
         elastic=elastic_motion(assembly.elastic) if elastic else None,
         turning=assembly.turning_arrays if elastic else None,
+        modal=assembly.modal,
     )
 
 
@@ -554,7 +559,8 @@ def work_for(equations: Equations, q: Floats, v: Floats) -> Work:
         ),
         series=equations.loads.first[:-1].copy(),
         shares=np.zeros((0, 0, 0)) if equations.travelling is None else travelling_memory(equations.travelling),
-        damped=np.zeros(2),
+        damped=np.zeros(3),
+        modal=modal_memory(equations.modal),
         scratch=np.zeros((3, 0)) if equations.elastic is None else scratch_for(equations.elastic),
         memory=np.zeros((7, 0)) if equations.turning is None else turning_memory(equations.turning),
     )

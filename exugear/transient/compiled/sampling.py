@@ -314,7 +314,7 @@ def observe_elastic_bodies(
         energy[KINETIC] += kinetic
         energy[ELASTIC] += stored
     energy[OF_LOADS] += stride * turning_weight_power(q, v, equations.turning, work.memory)
-    energy[DISSIPATED] += stride * (work.damped[0] + work.damped[1])
+    energy[DISSIPATED] += stride * (work.damped[0] + work.damped[1] + work.damped[2])
 
 
 @kernel

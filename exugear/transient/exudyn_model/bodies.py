@@ -31,6 +31,7 @@ from exugear.system.bodies.turning_frame import TurningBody
 from exugear.system.kernels.connectors import add_connector_forces
 from exugear.system.kernels.coordinates import SPIN, SpringArrays, add_spring_forces
 from exugear.system.kernels.meshes import MeshArrays
+from exugear.system.kernels.modal_damping import add_modal_damping, modal_memory
 from exugear.system.system import Assembly
 from exugear.transient.exudyn_model.library import elements, exudyn, items
 from fe_ste.tools.arrays import Floats
@@ -185,11 +186,14 @@ class FloatingBodies:
         springs = SpringArrays._make(values[self.couplings] for values in assembly.springs)
         damping_time = assembly.gearbox.case.damping.body_time_s
         matrices = {name: assembly.elastic_bodies[name].reduced for name in self._coordinates}
+        memory = modal_memory(assembly.modal)
 
         def supports(t: float, q: Floats, v: Floats) -> Floats:
             f = np.where(self._is_floating, applied(t, q, v) + assembly.constant_forces, 0.0)
             add_connector_forces(q, v, connectors, f)
             add_spring_forces(q, v, springs, f)
+            if assembly.modal is not None:
+                add_modal_damping(q, v, assembly.modal, memory, f)
             for name, body in matrices.items():
                 of_body = assembly.elastic_slices[name]
                 deforming = v[of_body] - v[of_body][SPIN] * body.spin

@@ -15,6 +15,7 @@ from exugear.gearbox.parts import Joint
 from exugear.system.kernels.connectors import ConnectorArrays
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, SpringArrays
 from exugear.system.kernels.meshes import ROW_SIZE, MeshArrays
+from exugear.system.kernels.modal_damping import add_modal_damping, modal_matrix, modal_memory
 from exugear.system.kernels.rolling import CAGE_TORQUE, ELASTIC_PART, rolling_force, rolling_memory
 from exugear.system.loads import Drive, Loading
 from exugear.system.system import Assembly
@@ -189,6 +190,27 @@ def add_mesh_element(parts: Parts, meshes: MeshArrays) -> None:
     )
 
 
+def add_modal_element(parts: Parts) -> None:
+    """Add the one object for modal damping, on all nodes in the order of the assembly's coordinates."""
+    assembly = parts.assembly
+    modal = assembly.modal
+    if modal is None:
+        return
+    memory = modal_memory(modal)
+
+    def force(mbs: Any, t: float, item: int, q: Any, v: Any) -> Floats:
+        f = np.zeros(assembly.size)
+        add_modal_damping(np.array(q), np.array(v), modal, memory, f)
+        return f
+
+    def jacobian(mbs: Any, t: float, item: int, q: Any, v: Any, factor_q: float, factor_v: float) -> Floats:
+        return factor_v * modal_matrix(np.array(q), modal)
+
+    parts.mbs.AddObject(
+        items.ObjectGenericODE2(nodeNumbers=parts.all_nodes, forceUserFunction=force, jacobianUserFunction=jacobian)
+    )
+
+
 def mesh_jacobian(assembly: Assembly, meshes: MeshArrays) -> Callable[..., Floats]:
     """Exudyn's jacobian function of all meshes on the coordinates of an assembly."""
 
@@ -275,6 +297,7 @@ def add_minimal_system(
     )
     stiffness, damping = _spring_matrices(assembly.size, assembly.springs)
     steady = loading.generalized(assembly, 0.0, q, v) if loading.is_constant else None
+    memory = modal_memory(assembly.modal)
 
     def force(mbs: Any, t: float, item: int, y: Any, rate: Any) -> Floats:
         q = motions @ np.array(y)
@@ -282,6 +305,8 @@ def add_minimal_system(
         f = loading.generalized(assembly, t, q, v) if steady is None else steady.copy()
         if meshes is not None:
             f += assembly.mesh_forces(q, v, meshes)
+        if assembly.modal is not None:
+            add_modal_damping(q, v, assembly.modal, memory, f)
         return f @ motions
 
     # The drive's spring is in no jacobian, and gears that only roll have coordinates of their own.

@@ -31,6 +31,7 @@ from exugear.transient.exudyn_model.forces import (
     add_mesh_element,
     add_mesh_loads,
     add_minimal_system,
+    add_modal_element,
     add_supports,
 )
 from exugear.transient.exudyn_model.library import SolverFailure, exudyn
@@ -102,6 +103,8 @@ class ExudynSystem:
         add_bodies(parts, q, v)
         add_supports(parts)
         add_couplings(parts)
+        if parts.floating is None:
+            add_modal_element(parts)
         add_loading(parts, self.loading)
         if self.assembly.variant.is_constrained:
             for joint in self.assembly.gearbox.joints:

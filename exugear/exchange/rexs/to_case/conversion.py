@@ -554,6 +554,10 @@ def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str
             "the state that tables are computed for",
             {"torques_N_m": static, "locked": derived([ends.output], "the output balances the input")},
         ),
+        "damping": Block(
+            "assumed, percent of critical damping; measured gearboxes have 1 to 4",
+            {"modal_percent": Entry(2.0), "modal_band_percent": Entry([1.0, 4.0])},
+        ),
     }
     for unit in model.of_type("gear_unit")[:1]:
         keys = [f"direction_vector_gravity_{axis}" for axis in "uvw"]

@@ -1,0 +1,133 @@
+"""How high the peaks of a steady response are at both ends of the plausible range of damping.
+
+Damping is the most uncertain input of a gearbox model. The highest peaks are therefore solved again with the least and
+the largest plausible damping (`damping.modal_band_percent`; half and twice the damping without it), at some speeds
+about each peak, where its maximum may have moved. Methods that are linear in the deflections only: with contact loss
+another damping may lead to another state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from exugear.gearbox.load_cases import operating_range
+from exugear.steady.excitation import HarmonicBalanceModel
+from exugear.steady.harmonics.branches import standing_peaks
+from exugear.steady.mean_system.mean_system import MeanSystem
+from exugear.steady.mean_system.signals import Quantity, quantities_of
+from exugear.steady.response import linear_response, parametric_response, signals
+from exugear.steady.settings import Method
+from exugear.system.kernels.modal_damping import modal_matrix
+from exugear.system.modal_damping import with_modal_damping
+from fe_ste.tools.arrays import Booleans, Floats, Integers
+
+HALF, TWICE = 0.5, 2.0
+"""Factors on the damping where the file states no range."""
+MOST_PEAKS = 20
+"""Highest peaks of each quantity that are solved again."""
+ABOUT = (0.0, -0.006, -0.003, -0.001, 0.001, 0.003, 0.006)
+"""Speeds about a peak at which it is solved again, relative to its own, this one first."""
+
+
+@dataclass(frozen=True, eq=False)
+class DampingBand:
+    """Amplitudes of the highest peaks at both ends of the range of damping; k peaks, s quantities."""
+
+    point: Integers
+    line: Integers
+    """(k,) place of each peak among the points and the lines of the response."""
+    amplitude: Floats
+    """(k, s, 2) with the least and with the largest damping, in the quantities' units."""
+    quantities: tuple[str, ...]
+    """Names of the quantities, see `exugear.steady.mean_system.signals.Quantity`."""
+
+
+def damping_band(gearset: HarmonicBalanceModel, method: Method, speed: Floats, amplitude: Floats) -> DampingBand:
+    """Solve the highest peaks of a response again with the least and the largest plausible damping.
+
+    Parameters
+    ----------
+    gearset : with linear bearings, of a mesh model without contact loss
+    method : ``linear`` or ``parametric``
+    speed : (points,) of the overall input, rad/s, ascending
+    amplitude : (points, lines, signals) of the response, of line 0 the mean
+    """
+    quantities = quantities_of([signal.name for signal in gearset.signal_names])
+    point, line, rises = _highest_peaks(gearset, quantities, speed, amplitude)
+    found = np.zeros((len(point), len(quantities), 2))
+    respond = linear_response if method == "linear" else parametric_response
+    for end, system in enumerate(damping_limits(gearset.system)):
+        damped = gearset.with_system(system)
+        for at in np.unique(point):
+            here = np.flatnonzero(point == at)
+            for about in ABOUT:
+                response = respond(damped, damped.at(float(speed[at]) * (1.0 + about)))
+                sizes = 2.0 * np.abs(signals(damped, response)[line[here]])
+                for number, quantity in enumerate(quantities):
+                    # A quantity without a peak there counts at the peak's speed: beside it others may rise.
+                    counts = rises[here, number] | (about == 0.0)
+                    own = np.where(counts, quantity.sizes(sizes).max(axis=1), 0.0)
+                    found[here, number, end] = np.maximum(found[here, number, end], own)
+    return DampingBand(point, line, found, tuple(quantity.name for quantity in quantities))
+
+
+def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
+    """Return an averaged system with the least and with the largest plausible damping.
+
+    Gyroscopic and Coriolis terms stay as they are: they do not dissipate.
+    """
+    assembly = system.frame.assembly
+    band = assembly.gearbox.case.damping.modal_band_percent
+    present = system.at(system.damping, 0.0)
+    present = 0.5 * (present + present.T)
+    if band is None:
+        low, high = HALF * present, TWICE * present
+    else:
+        turned = system.frame.matrices(0.0)[0]
+        still = np.zeros(assembly.size)
+        low, high = (
+            turned.T
+            @ modal_matrix(still, with_modal_damping(replace(assembly, modal=None), percent=percent).modal)
+            @ turned
+            for percent in band
+        )
+        # Dampers with stated values are no less certain than the rest of the model, and stay.
+        present = turned.T @ modal_matrix(still, assembly.modal) @ turned
+    return (
+        replace(system, damping=system.damping + (low - present)),
+        replace(system, damping=system.damping + (high - present)),
+    )
+
+
+def _highest_peaks(
+    gearset: HarmonicBalanceModel, quantities: tuple[Quantity, ...], speed: Floats, amplitude: Floats
+) -> tuple[Integers, Integers, Booleans]:
+    """Points (k,) and lines (k,) of the highest peaks of any quantity, and which quantities (k, s) have one there.
+
+    Within the operating range, where the file has one and the response reaches it.
+    """
+    stated = operating_range(gearset.waves.assembly.gearbox)
+    inside = np.ones(len(speed), dtype=bool)
+    if stated is not None:
+        within = (np.abs(speed) >= stated[0]) & (np.abs(speed) <= stated[1])
+        inside = within if within.any() else inside
+    chosen: set[tuple[int, int]] = set()
+    of_quantity: list[set[tuple[int, int]]] = []
+    for quantity in quantities:
+        size = quantity.sizes(amplitude[:, 1:]).max(axis=2)
+        peaks = [(int(point), line) for line, own in enumerate(size.T, start=1) for point in standing_peaks(own)]
+        of_quantity.append(set(peaks))
+        peaks = sorted((peak for peak in peaks if inside[peak[0]]), key=lambda peak: -size[peak[0], peak[1] - 1])
+        chosen |= {peak for peak in peaks[:MOST_PEAKS] if size[peak[0], peak[1] - 1] > 0.0}
+    ordered = sorted(chosen)
+    rises = np.array([[peak in peaks for peaks in of_quantity] for peak in ordered], dtype=bool)
+    point, line = np.array(ordered, dtype=np.int64).reshape(-1, 2).T
+    return point, line, rises.reshape(len(ordered), len(quantities))
+
+
+def no_band(quantities: tuple[str, ...]) -> DampingBand:
+    """Return the band of a response that has none: with contact loss, or along a branch."""
+    none = np.zeros(0, dtype=np.int64)
+    return DampingBand(none, none, np.zeros((0, len(quantities), 2)), quantities)

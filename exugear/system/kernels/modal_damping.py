@@ -1,0 +1,152 @@
+"""Modal damping on arrays of coordinates: a share of critical damping for each mode of a gearbox.
+
+With the mass matrix M and the undamped modes phi_i of unit modal mass and angular frequency w_i at rest, the matrix
+
+    C = M Phi diag(2 zeta_i w_i) Phi^T M = B B^T
+
+gives each mode its share zeta_i of critical damping and leaves free rolling undamped. A gearbox with planets changes
+as its carriers turn by an angle: what planet j did before is then divided among all planets i, and turned along with
+them. With N equally spaced planets, a_ij the angle from planet j before to planet i now, and R a rotation in the plane,
+
+    S_ij = w_ij R(a_ij),   w_ij = (1 + 2 sum_m cos(m a_ij) [+ (-1)^(i-j) for even N]) / N,
+
+which is an orthogonal matrix: the multi-blade coordinates of Coleman and Feingold (1958), NACA report 1351, written for
+the planets themselves. Damping forces are - S B B^T S^T v.
+
+Numbers here become part of machine code: `fe_ste.tools.compilation` recompiles when this file changes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, TILT
+from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.compilation import kernel
+
+MOVED, ACTING, AMOUNTS = range(3)
+"""Rows of the memory of `add_modal_damping`."""
+
+
+class ModalArrays(NamedTuple):
+    """Modal damping of a system of c coordinates and n damped modes, with s sets of planets."""
+
+    columns: Floats
+    rows: Floats
+    """(c, n) and (n, c): the matrix B, and its transpose, sqrt(N s/m)."""
+    frame: Integers
+    """(s,) coordinate of the spin of each set's carrier, -1 for a carrier that does not turn."""
+    first: Integers
+    """(s + 1,) first planet of each set."""
+    planets: Integers
+    """(p, 6) coordinates of each planet, -1 where it has none."""
+    place: Floats
+    """(p,) angle of each planet around its carrier, rad."""
+    equal: Integers
+    """(s,) 1 for three or more equally spaced planets; other planets each take their own share along."""
+
+
+@kernel
+def share_of_planet(i: int, j: int, count: int, turned: float) -> float:
+    """Weight w_ij of planet j before in planet i now, `turned` (rad) being the angle from one to the other."""
+    total = 1.0
+    for m in range(1, (count - 1) // 2 + 1):
+        total += 2.0 * math.cos(m * turned)
+    if count % 2 == 0:
+        total += 1.0 if (i - j) % 2 == 0 else -1.0
+    return total / count
+
+
+@kernel
+def turn_planets(q: Floats, modal: ModalArrays, back: bool, given: Floats, out: Floats) -> None:
+    """Set the planets' entries of `out` to S given, or to S^T given with `back`; others are left as they are."""
+    for s in range(modal.frame.size):
+        begin = modal.first[s]
+        count = modal.first[s + 1] - begin
+        turned = 0.0 if modal.frame[s] < 0 else q[modal.frame[s]]
+        for a in range(count):
+            to = modal.planets[begin + a]
+            for axis in range(BODY_SIZE):
+                if to[axis] >= 0:
+                    out[to[axis]] = 0.0
+            for b in range(count):
+                if modal.equal[s] == 0 and a != b:
+                    continue
+                # From planet j before to planet i now; back it is the transpose.
+                i, j = (b, a) if back else (a, b)
+                angle = turned + modal.place[begin + i] - modal.place[begin + j]
+                weight = share_of_planet(i, j, count, angle) if modal.equal[s] == 1 else 1.0
+                c = weight * math.cos(angle)
+                d = weight * math.sin(angle)
+                if back:
+                    d = -d
+                of = modal.planets[begin + b]
+                if to[0] >= 0:
+                    for plane in range(0, SPIN, TILT):
+                        x = given[of[plane]]
+                        y = given[of[plane + 1]]
+                        out[to[plane]] += c * x - d * y
+                        out[to[plane + 1]] += d * x + c * y
+                    out[to[2]] += weight * given[of[2]]
+                if to[SPIN] >= 0:
+                    out[to[SPIN]] += weight * given[of[SPIN]]
+
+
+@kernel
+def add_modal_damping(q: Floats, v: Floats, modal: ModalArrays | None, memory: Floats, f: Floats) -> float:
+    """Add the damping forces of all modes to f and return the power that they dissipate (W).
+
+    `memory` is that of `modal_memory`. Without modal damping (None) nothing is added, and nothing is compiled.
+    """
+    if modal is None:
+        return 0.0
+    size, count = modal.columns.shape
+    moved, acting, amounts = memory[MOVED], memory[ACTING], memory[AMOUNTS]
+    for i in range(size):
+        moved[i] = v[i]
+    turn_planets(q, modal, True, v, moved)
+    for k in range(count):
+        amounts[k] = 0.0
+    for i in range(size):
+        rate = moved[i]
+        for k in range(count):
+            amounts[k] += modal.columns[i, k] * rate
+    power = 0.0
+    for i in range(size):
+        acting[i] = 0.0
+    for k in range(count):
+        amount = amounts[k]
+        power += amount * amount
+        for i in range(size):
+            acting[i] += modal.rows[k, i] * amount
+    for i in range(size):
+        moved[i] = acting[i]
+    turn_planets(q, modal, False, acting, moved)
+    for i in range(size):
+        f[i] -= moved[i]
+    return power
+
+
+def modal_matrix(q: Floats, modal: ModalArrays | None) -> Floats:
+    """Damping matrix (size, size) at coordinates q; zero without modal damping.
+
+    Examples
+    --------
+    >>> modal_matrix(np.zeros(2), None)
+    array([[0., 0.],
+           [0., 0.]])
+    """
+    matrix = np.zeros((q.size, q.size))
+    if modal is not None:
+        memory = modal_memory(modal)
+        for rate, column in zip(np.eye(q.size), matrix, strict=True):  # the matrix is symmetric
+            add_modal_damping(q, -rate, modal, memory, column)
+    return matrix
+
+
+def modal_memory(modal: ModalArrays | None) -> Floats:
+    """Memory for `add_modal_damping`, (3, m)."""
+    return np.zeros((3, 0 if modal is None else max(modal.columns.shape)))

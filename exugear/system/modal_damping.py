@@ -1,0 +1,163 @@
+"""Modal damping of a gearbox, stated as damping ratios of its modes: `[damping] modal_percent`.
+
+Modal damping replaces the damping times of meshes, bearings and couplings. Dampers with values in the file, and
+flexible bodies (`body_time_s`), count towards the stated ratio: modal damping adds only the difference. Each mode thus
+has the stated damping ratio, or more where these dampers alone exceed it.
+
+Modes are those at the static load, as `exugear modes` lists them; with flexible bodies, those within their frequency
+band (`elasticity.band_Hz`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.linalg
+
+from exugear.gearbox.sections.case import DampedElement, DampingSection
+from exugear.gearbox.variant import VariantError
+from exugear.system.bearings.stiffness import equally_spaced, planet_families
+from exugear.system.kernels.modal_damping import ModalArrays
+from exugear.system.statics import RIGID_BODY_LIMIT, linearise, static_state
+from exugear.system.system import Assembly
+from fe_ste.tools.arrays import Floats
+
+KINDS: tuple[DampedElement, ...] = ("bearing", "mesh", "coupling")
+TAKEN = 0.05
+"""Permissible relative distance of a mode from its frequency in `modal_modes`."""
+
+
+def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Assembly:
+    """Return an assembly with the modal damping of its gearbox file; the assembly itself if the file has none.
+
+    Parameters
+    ----------
+    percent : damping of every mode in percent of critical, in place of that of the file
+
+    Raises
+    ------
+    VariantError
+        Flexible bodies rotate with planets, or no mode is near a frequency of `modal_modes`.
+    """
+    section = assembly.gearbox.case.damping
+    if section.modal_percent is None:
+        return assembly
+    if percent is not None:
+        section = DampingSection(modal_percent=percent)
+    if assembly.turning:
+        raise VariantError(
+            f"damping.modal_percent: the flexible body {next(iter(assembly.turning))} turns with planets, so the modes "
+            "have no constant shapes; use damping times, or set its flexibility = 'none'"
+        )
+    q = static_state(assembly).q
+    linear = linearise(assembly, q)
+    frequency, shapes = real_modes(linear.mass, linear.total_stiffness, assembly.motions)
+    damped = frequency > RIGID_BODY_LIMIT
+    if assembly.elastic_bodies:
+        damped &= frequency <= assembly.gearbox.case.elasticity.band_Hz
+    frequency, shapes = frequency[damped], shapes[:, damped]
+    stated = np.einsum("im,ij,jm->m", shapes, linear.total_damping, shapes)
+    wanted = 2.0 * damping_ratios(section, frequency) * 2.0 * np.pi * frequency
+    columns = linear.mass @ shapes * np.sqrt(np.maximum(wanted - stated, 0.0))
+    # Under preload the mode without stiffness differs from rolling by 1e-5; rolling itself is to have no damping.
+    rolling = _rolling(assembly)
+    carried = linear.mass @ rolling
+    columns -= carried @ np.linalg.solve(rolling.T @ carried, rolling.T @ columns)
+    return replace(assembly, modal=_arrays(assembly, columns))
+
+
+def _rolling(assembly: Assembly) -> Floats:
+    """Velocities (size, n) of the gear train as it rolls, one column for each of its degrees of freedom."""
+    gearbox = assembly.gearbox
+    train = gearbox.train
+    still = np.zeros(assembly.size)
+    speeds = [dict(zip(train.spins, column.tolist(), strict=True)) for column in train.kinematic_modes.T]
+    return np.array([assembly.rolling_velocity(still, own) for own in speeds]).T
+
+
+def damping_in_words(section: DampingSection) -> str:
+    """Describe the damping that a file states.
+
+    Examples
+    --------
+    >>> damping_in_words(DampingSection(modal_percent=2.0))
+    '2 % of critical in every mode'
+    >>> damping_in_words(DampingSection(modal_percent=((100.0, 1.0), (3000.0, 4.0)), modal_modes=((642.0, 1.5),)))
+    '1 % at 100 Hz to 4 % at 3000 Hz, 1.5 % in the mode near 642 Hz'
+    >>> damping_in_words(DampingSection())
+    'in proportion to stiffness: bearings 4 µs, meshes 4 µs, couplings 4 µs'
+    """
+    given = section.modal_percent
+    if given is None:
+        times = ((f"{kind}s" if kind != "mesh" else "meshes", section.time_of(kind)) for kind in KINDS)
+        return f"in proportion to stiffness: {', '.join(f'{name} {1e6 * time:g} µs' for name, time in times)}"
+    if isinstance(given, float):
+        words = [f"{given:g} % of critical in every mode"]
+    else:
+        (first, low), (last, high) = given[0], given[-1]
+        words = [f"{low:g} % at {first:g} Hz to {high:g} % at {last:g} Hz"]
+    words += [f"{percent:g} % in the mode near {near:g} Hz" for near, percent in section.modal_modes]
+    return ", ".join(words)
+
+
+def damping_ratios(section: DampingSection, frequency: Floats) -> Floats:
+    """Return the damping ratios of a gearbox file for modes at frequencies (n,), Hz.
+
+    A table is interpolated linearly over frequency and constant beyond its ends.
+
+    Raises
+    ------
+    VariantError
+        No mode is near a frequency of `modal_modes`.
+
+    Examples
+    --------
+    >>> section = DampingSection(modal_percent=((100.0, 1.0), (1100.0, 3.0)), modal_modes=((610.0, 0.5),))
+    >>> damping_ratios(section, np.array([50.0, 600.0, 5000.0]))
+    array([0.01 , 0.005, 0.03 ])
+    """
+    given = section.modal_percent
+    if given is None:
+        return np.zeros(len(frequency))
+    if isinstance(given, float):
+        ratios = np.full(len(frequency), 0.01 * given)
+    else:
+        points, percent = np.array(given).T
+        ratios = 0.01 * np.interp(frequency, points, percent)
+    for near, percent_of_mode in section.modal_modes:
+        place = int(np.argmin(np.abs(frequency - near))) if len(frequency) else -1
+        if place < 0 or abs(frequency[place] - near) > TAKEN * near:
+            nearest = f"the nearest is at {frequency[place]:.4g} Hz" if place >= 0 else "there are no modes"
+            raise VariantError(
+                f"damping.modal_modes: no mode within {100 * TAKEN:g} % of {near:g} Hz; {nearest}: see exugear modes"
+            )
+        ratios[place] = 0.01 * percent_of_mode
+    return np.asarray(ratios)
+
+
+def real_modes(mass: Floats, stiffness: Floats, motions: Floats) -> tuple[Floats, Floats]:
+    """Return frequencies (n,), Hz, and mass-orthogonal shapes (size, n) of unit modal mass.
+
+    Only the symmetric part of the stiffness is used. `motions` (size, n) are the free motions.
+    """
+    root = np.linalg.cholesky(mass)
+    free = np.linalg.solve(root.T, scipy.linalg.orth(root.T @ motions))
+    values, vectors = np.linalg.eigh(free.T @ (0.5 * (stiffness + stiffness.T)) @ free)
+    return np.sqrt(np.maximum(values, 0.0)) / (2.0 * np.pi), free @ vectors
+
+
+def _arrays(assembly: Assembly, columns: Floats) -> ModalArrays:
+    """Return the arrays for the kernel, with planets grouped by carrier."""
+    sets = planet_families(assembly.bodies)
+    spins = [assembly.spin.get(str(planets[0].carrier), -1) for planets in sets]
+    planets = [planet for family in sets for planet in family]
+    return ModalArrays(
+        columns=np.ascontiguousarray(columns),
+        rows=np.ascontiguousarray(columns.T),
+        frame=np.array(spins, dtype=np.int64),
+        first=np.cumsum([0, *map(len, sets)]).astype(np.int64),
+        planets=np.array([assembly.coordinates[planet.name] for planet in planets], dtype=np.int64).reshape(-1, 6),
+        place=np.array([planet.orbit_angle for planet in planets], dtype=np.float64),
+        equal=np.array([int(equally_spaced(family)) for family in sets], dtype=np.int64),
+    )
