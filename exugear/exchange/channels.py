@@ -149,7 +149,7 @@ class Channels(ReprMixin):
         Parameters
         ----------
         name : name in upper or lower case; OpenFAST's other names of the quantity are found as well
-        quantity : required quantity: one of `exugear.exchange.channels.SI_NAMES`
+        quantity : required quantity: one of `SI_NAMES`
 
         Raises
         ------

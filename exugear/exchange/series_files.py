@@ -272,7 +272,7 @@ def table_rows(path: Path, headings: Sequence[str]) -> Floats:
     Raises
     ------
     LoadFileError
-        As in `exugear.exchange.series_files.numbers`, or there are more than `MOST_ROWS` rows.
+        As in `numbers`, or there are more than `MOST_ROWS` rows.
     """
     parts: list[Floats] = []
     for block in numbers(path, headings, 1, ","):

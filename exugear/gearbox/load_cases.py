@@ -159,7 +159,7 @@ def summarise_loads(
     inertias : inertia set; default: that of the file
     duration : simulated time, s; default: that of the load case
     series : mapping, optional
-        Result of `exugear.gearbox.load_cases.torque_series`, if the file has already been read.
+        Result of `torque_series`, if the file has already been read.
 
     Raises
     ------
@@ -436,7 +436,7 @@ def _speeds(gearbox: Gearbox, case: LoadCase, times: Floats, rates: Floats) -> F
 
 
 def _highest_mesh_frequencies(gearbox: Gearbox, spins: Floats) -> dict[str, float]:
-    """Highest mesh frequency of each mesh (Hz) for speeds (times, bodies); a body that cannot rotate has none."""
+    """Highest mesh frequency (Hz) of each mesh for speeds (times, bodies); bodies without rotation have zero speed."""
     of_body = dict(zip(gearbox.spinning, spins.T, strict=True))
     standing = np.zeros(len(spins))
     return {

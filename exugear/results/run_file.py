@@ -1,6 +1,6 @@
 """The file of a run: it is written along with the pieces of the run; complete and incomplete runs can be read.
 
-A run that is in progress or was stopped is the folder ``run.partial`` (`exugear.results.run_file`). ``run.nc`` is
+A run that is in progress or was stopped is the folder ``run.partial``. ``run.nc`` is
 written in this folder, next to the pieces, and is moved to its final place when the run is complete (`RunFile`).
 `load_run` reads both forms.
 
@@ -48,7 +48,7 @@ STATE = (
     Variable("state_judgement", ("criterion", "figure"), "value, s, index"),
     Variable("state_pending", ("pending", "signal"), "of the signals"),
 )
-"""Variables in which a `exugear.results.run_file.Checkpoint` is stored."""
+"""Variables in which a `Checkpoint` is stored."""
 VARIABLES = {variable.name: variable for variable in (*(signal for signal in SIGNALS if signal.stored), *STATE)}
 """All variables by name, in the order of the file; a run contains those of its mesh model."""
 GROWING = ("time", "balance_time")
@@ -93,7 +93,7 @@ class Piece:
     """An interval of a run."""
 
     arrays: Mapping[str, NDArray[Any]]
-    """Variables by name, see `exugear.results.run_file.VARIABLES`."""
+    """Variables by name, see `VARIABLES`."""
     attributes: Mapping[str, Any]
     """Attributes of the run, and of the state at the end of the piece."""
     names: Mapping[str, list[str]]
@@ -138,7 +138,7 @@ class RunPieces:
     Attributes
     ----------
     paths : files of the pieces
-    lengths : length so far of each dimension in `exugear.results.run_file.GROWING` and of the filter's samples
+    lengths : length so far of each dimension in `GROWING` and of the filter's samples
     attributes : attributes of the whole run
 
     Raises

@@ -203,7 +203,7 @@ def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[
 
 
 def _damping_warnings(assemblies: Mapping[Variant, Assembly | FailedError]) -> list[str]:
-    """Say which modes on bearings, with rigid bodies and teeth as stiff as ISO 6336-1 says, have unusual damping."""
+    """Return warnings about modes with unusual damping, for rigid bodies with the mesh stiffness of ISO 6336-1."""
     from exugear.system.modes import modes_of, unusual_damping
 
     assembly = assemblies.get(Variant.bushing) or assemblies.get(Variant.rigid)

@@ -12,9 +12,9 @@ carrier
 ground
     A body that does not rotate: none.
 
-In Exudyn's floating frame, all elastic normal modes of the reduced solid are retained, so that static deflections are
-those of the reduced body; mass scaling lowers the frequencies above the limit to this limit. The frame describes the
-body by the integrals int rho f_a g_b of its position and its modes f, g; rigid rings on seats (blanks) are added.
+In a floating frame, all elastic normal modes of the reduced solid are retained, so that static deflections are those
+of the reduced body; mass scaling lowers the frequencies above the limit to this limit. The body is described by the
+integrals int rho f_a g_b of its position and its modes f, g; rigid rings on seats (blanks) are added.
 
 For a body of revolution a rotation by psi transforms the modes by exp(psi S), with eigenvalues of S at whole numbers: 0
 for torsion and stretching, 1 for bending.
