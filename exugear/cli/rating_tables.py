@@ -18,12 +18,12 @@ _BLOCKS: Mapping[str, tuple[str, ...]] = {
     "broken": ("sigma_Flim", "Y_NT", "Y_deltarelT", "Y_RrelT", "Y_X", "Y_rel", "Y_M", "sigma_FG", "S_F"),
 }
 GEAR_COLUMN = 14
-"""Columns in which the heading of a gear is wrapped."""
+"""Width in characters at which the heading of a gear is wrapped."""
 _DIGITS = {"MPa": ".1f", "kN": ".4g", "kN m": ".5g", "m/s": ".3f", "um": ".1f", "N/(mm um)": ".3f", "N^0.5/mm": ".3f"}
 
 
 def tell_rating(sheet: RatingSheet) -> None:
-    """Print a sheet, its assumptions, and what it neglects."""
+    """Print a rating sheet with its assumptions and neglected effects."""
     print_text(f"Rating to {sheet.edition}, method B; {sheet.load}")
     for title, flanks in _meshes(sheet):
         print_table(f"Mesh {title}", [*_rows(flanks)])
@@ -36,7 +36,7 @@ def tell_rating(sheet: RatingSheet) -> None:
 
 
 def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
-    """Gears that mesh, under one sense of load, and a title for them."""
+    """Yield the gears of each mesh for one direction of load, with a title."""
     found: dict[tuple[str, int], list[FlankSheet]] = {}
     for flank in sheet.flanks:
         sense = 1 if flank.standard["torque"] > 0.0 else -1

@@ -1,4 +1,4 @@
-"""The command `report`: one web page of a results folder."""
+"""The command `report`: a web page on a results folder."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def report(
 
 
 def _parallel_worker() -> AbstractContextManager[Executor | None]:
-    """Another process to work beside this one, where there is a core for it; it starts when it is given work."""
+    """Return a second worker process if a core is available for it; the process starts with its first task."""
     from fe_ste.tools.threads import Workers, available_cores
 
     if available_cores() > 1:

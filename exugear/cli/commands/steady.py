@@ -58,11 +58,11 @@ COLUMNS = {
 }
 """Headings of the table and the factors from SI units."""
 NOTICED_CHANGE = 1e-2
-"""Change of the loudest peaks by more harmonics that is to be minded."""
+"""Relative change of the highest peaks with more harmonics above which a warning is printed."""
 NOTICED_VARIATION = 1e-3
-"""Change of stiffness with the carrier's angle that is told."""
+"""Relative variation of stiffness with the carrier angle above which a warning is printed."""
 NOTICED_WAY = 0.3
-"""Moment of the load's way along the face, over the transmission error's push, that is told."""
+"""Ratio of shuttling moment to transmission error excitation above which a warning is printed."""
 
 
 BAND_LEGEND = (
@@ -72,7 +72,7 @@ BAND_LEGEND = (
 
 
 class Method(StrEnum):
-    """What varies: the transmission error as excitation, the stiffness over the mesh cycle, or laws in time."""
+    """Methods: transmission error as excitation, time-varying stiffness, or nonlinear models evaluated in time."""
 
     linear = "linear"
     parametric = "parametric"
@@ -149,7 +149,7 @@ def steady(
 
 
 def _tell_of_other_loads(gearbox: Gearbox) -> None:
-    """Say which load cases load meshes otherwise than the static load does, which the response is at."""
+    """Print warnings about load cases whose mesh loads differ from the static load used for the response."""
     from exugear.gearbox.load_cases import load_in_words, other_load_warning, static_load_in_words, summarise_loads
 
     static = static_load_in_words(gearbox)
@@ -163,8 +163,8 @@ def _tell_of_other_loads(gearbox: Gearbox) -> None:
 
 
 def _refuse_what_has_none(project: Project) -> None:
-    """Refuse a variant without a steady response before tables and finite elements."""
-    with suppress(FailedError):  # which says nothing of the law that is asked for
+    """Raise an error for a variant without steady-state response before tables and finite elements are computed."""
+    with suppress(FailedError):  # such a failure does not apply to the selected mesh model
         variant = project.choice.variant
         if reason := steady_lack(assembled_by_iso(project.gearbox, variant), variant):
             raise BadInputError(reason)
@@ -322,7 +322,7 @@ def _speeds_of(ranking: Ranking) -> str:
 
 
 def _tell_of_range(ranking: Ranking) -> None:
-    """Say which speeds are ranked, where they are all, and where nothing stands out."""
+    """Print which speed range is ranked, and notes if all speeds are ranked or no resonance was found."""
     if ranking.whole:
         note(
             "Ranking over all speeds: no computed speed lies in an operating range. Set rated_speed_rpm or "
@@ -333,9 +333,9 @@ def _tell_of_range(ranking: Ranking) -> None:
 
 
 def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
-    """End with code 1 where no speed has a steady state; where each has its own stability, its file tells which.
+    """End with code 1 if the response is unstable; stability known for each speed is left to the result file.
 
-    Likewise where teeth read tables beside states that are not solved, and where a branch is not whole.
+    The command also fails if meshes use table states next to non-converged ones, or if the continuation is incomplete.
     """
     refuse_not_converged([mesh for mesh in str(data.attrs["near_unconverged_states"]).split(", ") if mesh])
     if data.attrs["branch_ended"]:
@@ -345,7 +345,7 @@ def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
 
 
 def _tell_of_pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
-    """Say which meshes would have to pull, where the law does not let their teeth part."""
+    """Print which meshes have tensile forces, if the mesh model neglects contact loss."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import pulls
     from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -369,7 +369,7 @@ def _pull_summary(pull: TensileMesh) -> dict[str, Any]:
 
 
 def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
-    """Say which speeds have no steady state, and where it does not last."""
+    """Print the speeds without a converged or stable steady state."""
     from exugear.gearbox.units import RPM
 
     for missing in json.loads(data.attrs["not_converged"]):
@@ -384,7 +384,7 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
 
 
 def _tell_of_wandering_loads(project: Project) -> tuple[Shuttling, ...]:
-    """Say where the load moves along the face so far that its moment counts, if the law leaves it out."""
+    """Print a warning if the shuttling moment is significant but neglected by the mesh model."""
     from exugear.system.tooth_mesh.laws.registry import LAWS
     from exugear.system.tooth_mesh.tables import wandering_loads
 
@@ -407,7 +407,7 @@ def _wandering_summary(load: Shuttling) -> dict[str, Any]:
 
 
 def _left_out(data: xr.Dataset) -> dict[str, float]:
-    """Share of the variation of each mesh's compliance that is above the harmonics, of planets by their family."""
+    """Neglected fraction of the compliance variation of each mesh, above the harmonics; planets by their family."""
     shares = zip(data["mesh_wave"].values, data["left_out"].values, strict=True)
     return {str(wave): float(share) for wave, share in shares if " " not in str(wave)}
 
@@ -419,7 +419,7 @@ def _known(value: float) -> float | None:
 
 
 def _tell_of_harmonics(data: xr.Dataset) -> None:
-    """Say how many harmonics there are, what they leave out, and what more of them change."""
+    """Print the number of harmonics, their truncation error, and the effect of more harmonics."""
     mesh, share = max(_left_out(data).items(), key=lambda own: own[1])
     change = _known(float(data.attrs["change_with_more"]))
     count = int(data.attrs["harmonics"])
@@ -436,7 +436,7 @@ def _tell_of_harmonics(data: xr.Dataset) -> None:
 
 
 def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
-    """Say how non-linear bearings were taken, what unequal loads of planets leave out, and which loads swing far."""
+    """Print how nonlinear bearings were modelled, effects of unequal planet loads, and large dynamic bearing loads."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import STRAINED, bearing_swings
 

@@ -1,4 +1,4 @@
-"""The command `new`: write a gearbox file to start from."""
+"""The command `new`: write a template gearbox file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from exugear.gearbox.templates.kinds import KINDS
 
 
 class Kind(StrEnum):
-    """Kinds of gearboxes that a file to start from is at hand for."""
+    """Kinds of gearboxes for which a template exists."""
 
     _ignore_ = ["members", "kind"]
     members = vars()

@@ -14,7 +14,7 @@ A function f of the mesh cycle multiplies the input of each mesh. In multi-blade
 
     sum over places of   back (waves, places)  f(position)  there (places, waves),
 
-as `exugear.steady.mean_system.mesh_places` has both. The position follows the angle of the base; of planets out of
+with both matrices from this module. The position follows the angle of the base; of planets out of
 phase, shapes rotate with the angle of the carrier. Both generate harmonics: those of the cycle are known, those of a
 revolution follow from few samples of it.
 """
