@@ -548,8 +548,10 @@ def _fill(out: SolvedPoints, n: int, gearset: HarmonicBalanceModel, response: Re
     found[1:] *= 2.0
     out.amplitude[n] = found
     taken, given = dissipated_and_given(gearset, response)
-    out.drive_torque[n], out.products[n] = response.torque, response.products
-    out.apart[n], out.free[n] = response.apart, response.free
+    out.drive_torque[n] = response.torque
+    out.products[n] = response.products
+    out.apart[n] = response.apart
+    out.free[n] = response.free
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
 
 
