@@ -18,7 +18,7 @@ from exugear.cli.case import (
     open_project,
 )
 from exugear.cli.console import exit_codes, note, print_json, refuse_not_converged, say
-from exugear.cli.tables import HARD_SPACE, print_table
+from exugear.cli.tables import HARD_SPACE, print_table, print_text
 
 if TYPE_CHECKING:
     from exugear.system.modes import Modes
@@ -127,7 +127,7 @@ def _print_modes(found: Modes, rows: list[dict[str, Any]]) -> None:
     print_table(title, [_mode_row(row) for row in rows], texts, LEGEND)
     factor = assembly.housing_factor
     damping = damping_in_words(assembly.gearbox.case.damping)
-    say(f"Linearised at the static load; housing stiffness factor {factor:g}; damping {damping}.")
+    print_text(f"Linearised at the static load; housing stiffness factor {factor:g}; damping {damping}.")
 
 
 def _mode_row(summary: dict[str, Any]) -> dict[str, str]:

@@ -33,7 +33,7 @@ from exugear.cli.console import (
     refuse_not_converged,
     say,
 )
-from exugear.cli.tables import HARD_SPACE, print_table, significant
+from exugear.cli.tables import HARD_SPACE, print_table, print_text, significant
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -223,7 +223,7 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     fastest = float(abs(data["speed"]).max()) / RPM
     stable = f"slowest decay rate {-growth:.3g} 1/s (stable)" if growth <= 0.0 else f"fastest growth {growth:.3g} 1/s"
     damping = damping_in_words(project.gearbox.case.damping)
-    say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}; damping {damping}.")
+    print_text(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}; damping {damping}.")
     say(f"Results: {project.steady_path(settings)}")
     _fail_if_doubtful(data, growth)
 

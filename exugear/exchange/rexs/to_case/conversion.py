@@ -555,8 +555,11 @@ def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str
             {"torques_N_m": static, "locked": derived([ends.output], "the output balances the input")},
         ),
         "damping": Block(
-            "assumed, percent of critical damping; measured gearboxes have 1 to 4",
-            {"modal_percent": Entry(2.0), "modal_band_percent": Entry([1.0, 4.0])},
+            "percent of critical damping; measured gearboxes have 1 to 4",
+            {
+                "modal_percent": assumed(2.0, "usual value"),
+                "modal_band_percent": assumed([1.0, 4.0], "usual range"),
+            },
         ),
     }
     for unit in model.of_type("gear_unit")[:1]:
