@@ -31,6 +31,7 @@ COMMANDS = (
     "commands.run",
     "commands.study",
     "commands.loads",
+    "commands.losses",
     "commands.life",
     "commands.view",
     "commands.report",

@@ -24,7 +24,7 @@ from exugear.system.kernels.modal_damping import modal_matrix
 from exugear.system.modal_damping import with_modal_damping
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 
-HALF, TWICE = 0.5, 2.0
+FACTORS = (0.5, 2.0)
 """Factors on the damping where the file states no range."""
 MOST_PEAKS = 20
 """Highest peaks of each quantity that are solved again."""
@@ -96,7 +96,7 @@ def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
     band = assembly.gearbox.case.damping.modal_band_percent
     present = system.at(system.damping, 0.0)
     present = 0.5 * (present + present.T)
-    changes = [(HALF - 1.0) * present, (TWICE - 1.0) * present]
+    changes = [(factor - 1.0) * present for factor in FACTORS]
     if band is not None:
         # Dampers with stated values are no less certain than the rest of the model, and stay.
         turned = system.frame.matrices(0.0)[0]

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
-from fe_ste.transmission_error.search import flank_radii
 
 
 def partial_contact_ratios(pair: GearPair) -> tuple[float, float]:
@@ -32,13 +31,12 @@ def partial_contact_ratios(pair: GearPair) -> tuple[float, float]:
     >>> [round(part, 4) for part in partial_contact_ratios(pair)], round(pair.transverse_contact_ratio, 4)
     ([0.8268, 0.8268], 1.6535)
     """
+    tangent = math.tan(pair.working_pressure_angle)
     ratios = []
     for gear in (pair.pinion, pair.gear):
-        to_pitch_point = gear.base_radius * math.tan(pair.working_pressure_angle)
-        # Contact ends at the tip: of an internal gear, at its smallest radius.
-        tip = flank_radii(gear)[0 if gear.internal else 1]
-        beyond = math.sqrt(tip**2 - gear.base_radius**2) - to_pitch_point
-        ratios.append((-beyond if gear.internal else beyond) / pair.transverse_base_pitch)
+        # Contact ends at the tip circle, or where a chamfer begins; that of an internal gear is inside the pitch point.
+        beyond = math.sqrt(gear.tip_form_radius**2 - gear.base_radius**2) - gear.base_radius * tangent
+        ratios.append(gear.outward * beyond / pair.transverse_base_pitch)
     return ratios[0], ratios[1]
 
 
@@ -72,8 +70,7 @@ def helical_loss_factor(pair: GearPair) -> float:
 
 def _sliding(pair: GearPair) -> float:
     """Sliding speed over the speed of the base circles, normal load over tangential: at half a base pitch of path."""
-    sense = -1.0 if pair.gear.internal else 1.0
-    ratios = 1.0 / pair.pinion.teeth + sense / pair.gear.teeth
+    ratios = 1.0 / pair.pinion.teeth + pair.gear.outward / pair.gear.teeth
     return math.pi * abs(ratios) / math.cos(pair.pinion.base_helix_angle)
 
 
@@ -104,8 +101,7 @@ class MeshOperation:
         """
         pinion = pair.pinion
         tangent = math.tan(pair.working_pressure_angle)
-        sense = -1.0 if pair.gear.internal else 1.0
-        curvature = (1.0 / pinion.base_radius + sense / pair.gear.base_radius) / tangent
+        curvature = (1.0 / pinion.base_radius + pair.gear.outward / pair.gear.base_radius) / tangent
         return cls(
             line_load=abs(force) / pair.face_width,
             sum_speed=2.0 * abs(speed) * pinion.base_radius * tangent,

@@ -30,8 +30,7 @@ def table_loss_factor(pair: GearPair, state: xr.Dataset) -> float:
     force at the base circles transmits. With equal load on all pairs in contact it is that of Ohlendorf.
     """
     load, along = _loads_along_path(pair, state)
-    sense = -1.0 if pair.gear.internal else 1.0
-    ratio = abs(1.0 + sense * pair.pinion.teeth / pair.gear.teeth)
+    ratio = abs(1.0 + pair.gear.outward * pair.pinion.teeth / pair.gear.teeth)
     sliding = float((load * np.abs(along)).sum()) * ratio / pair.pinion.base_radius
     return sliding / (float(load.sum()) * math.cos(pair.pinion.base_helix_angle))
 
@@ -57,8 +56,7 @@ def table_friction(pair: GearPair, state: xr.Dataset, speed: float, viscosity: f
     surface_speeds = abs(speed) * first, abs(speed) * ratio * second
     mean = 0.5 * (surface_speeds[0] + surface_speeds[1])
     slide = (surface_speeds[0] - surface_speeds[1]) / mean
-    sense = -1.0 if pair.gear.internal else 1.0
-    radius = 1.0 / ((1.0 / first + sense / second) * math.cos(pair.pinion.base_helix_angle))
+    radius = 1.0 / ((1.0 / first + pair.gear.outward / second) * math.cos(pair.pinion.base_helix_angle))
     touching = line_load > 0.0
     local = np.zeros_like(line_load)
     local[touching] = friction_xu_kahraman(
@@ -70,7 +68,7 @@ def table_friction(pair: GearPair, state: xr.Dataset, speed: float, viscosity: f
 
 def _line_load(state: xr.Dataset) -> Floats:
     """Line load (pmc, tooth, axial position), N/m; positions that have not converged count as unloaded."""
-    return np.nan_to_num(state["line_load"].transpose("pmc", "tooth", "axial_position").to_numpy())
+    return np.asarray(np.nan_to_num(state["line_load"].transpose("pmc", "tooth", "axial_position").to_numpy()))
 
 
 def _loads_along_path(pair: GearPair, state: xr.Dataset) -> tuple[Floats, Floats]:
@@ -85,5 +83,4 @@ def _loads_along_path(pair: GearPair, state: xr.Dataset) -> tuple[Floats, Floats
 def _radii_of_curvature(pair: GearPair, along: Floats) -> tuple[Floats, Floats]:
     """Radii of curvature of both flanks in the transverse section, m, at places from the pitch point."""
     tangent = math.tan(pair.working_pressure_angle)
-    sense = -1.0 if pair.gear.internal else 1.0
-    return pair.pinion.base_radius * tangent + along, pair.gear.base_radius * tangent - sense * along
+    return pair.pinion.base_radius * tangent + along, pair.gear.base_radius * tangent - pair.gear.outward * along

@@ -246,6 +246,12 @@ class LubricantSection(Section):
     """Kinematic viscosity at 100 degrees Celsius; required for modified bearing life."""
     temperature_C: q.OilTemperature | None = None
     """Temperature of the oil in service; required for modified bearing life."""
+    ambient_C: q.OilTemperature | None = None
+    """Ambient temperature: the oil temperature follows from it and the losses; instead of `temperature_C`."""
+    conductance_W_per_K: q.HeatConductance | None = None
+    """Heat flow from the oil to the surroundings per kelvin, of housing and cooler; with `ambient_C`."""
+    density_15_kg_per_m3: q.OilDensity | None = None
+    """Density of the oil at 15 degrees Celsius; 890 kg/m3 by default."""
     cleanliness: Cleanliness | None = None
     """Cleanliness according to ISO 281:2007, table 13, where `slight` to `severe` are degrees of contamination;
     required for modified bearing life.
@@ -253,6 +259,10 @@ class LubricantSection(Section):
 
     @model_validator(mode="after")
     def _viscosities(self) -> LubricantSection:
+        if (self.ambient_C is None) != (self.conductance_W_per_K is None):
+            raise ValueError("set ambient_C and conductance_W_per_K together, or neither")
+        if self.ambient_C is not None and self.temperature_C is not None:
+            raise ValueError("temperature_C and ambient_C exclude each other; remove one of them")
         hot = self.viscosity_100_mm2_per_s
         if hot is not None and hot >= self.viscosity_40_mm2_per_s:
             raise ValueError(

@@ -32,6 +32,7 @@ UNITS = {
     "kg": "kg",
     "kg_m2": "kg m²",
     "kg_per_m3": "kg/m³",
+    "W_per_K": "W/K",
     "N": "N",
     "kN": "kN",
     "N_m": "N m",
