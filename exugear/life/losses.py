@@ -295,10 +295,10 @@ def _equivalent_load(duty: BearingLoadState) -> float:
     return float(duty.ratings.dynamic * duty.basic_life ** (-1.0 / exponent))
 
 
-def operating_speed(gearbox: Gearbox) -> float:
-    """Speed of the overall input (rad/s) at which losses are computed by default.
+def operating_speed(gearbox: Gearbox, stated: float | None = None) -> float:
+    """Speed of the overall input (rad/s) at which losses are computed: a stated one (rpm), or that of the file.
 
-    It is the rated speed, or else the highest one of the first load case that turns the train.
+    The file's is the rated speed, or else the highest one of the first load case that turns the train.
 
     Raises
     ------
@@ -310,9 +310,9 @@ def operating_speed(gearbox: Gearbox) -> float:
     >>> round(operating_speed(Gearbox.from_toml("cases/grc750/gearbox.toml")) / RPM, 6)
     22.1
     """
-    rated = gearbox.case.operation.rated_speed_rpm
-    if rated is not None:
-        return rated * RPM
+    chosen = stated or gearbox.case.operation.rated_speed_rpm
+    if chosen is not None:
+        return chosen * RPM
     for case in gearbox.load_cases.values():
         loads = summarise_loads(gearbox, case)
         if loads.fastest_speed > 0.0:

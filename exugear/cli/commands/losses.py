@@ -73,7 +73,6 @@ def losses(
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
-        from exugear.gearbox.units import RPM
         from exugear.life.losses import losses_of, operating_speed
 
         project = open_project(case, Choice(Variant.rigid, "line_of_action"), out, allow_dir, scripts=False)
@@ -81,7 +80,7 @@ def losses(
             project = project.at_load_case(load_case)
         if speed is not None and not 0.0 < abs(speed) <= FASTEST:
             raise BadInputError(f"--speed {speed:g}: must be a number of rpm up to {FASTEST:g}, not 0")
-        chosen = operating_speed(project.gearbox) if speed is None else speed * RPM
+        chosen = operating_speed(project.gearbox, speed)
         tables = project.tables_at_work()
         found = losses_of(project.gearbox, _duties(project.gearbox), tables, chosen)
         mapped = []
