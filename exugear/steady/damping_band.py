@@ -58,22 +58,22 @@ class DampingBand:
         }
 
 
-def damping_band(gearset: HarmonicBalanceModel, method: Method, speed: Floats, amplitude: Floats) -> DampingBand:
+def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amplitude: Floats) -> DampingBand:
     """Solve the highest peaks of a response again with the lowest and the highest plausible damping.
 
     Parameters
     ----------
-    gearset : with linear bearings, of a mesh model without contact loss
+    model : with linear bearings, of a mesh model without contact loss
     method : ``linear`` or ``parametric``
     speed : (points,) of the overall input, rad/s, ascending
     amplitude : (points, lines, signals) of the response, of line 0 the mean
     """
-    quantities = quantities_of([signal.name for signal in gearset.signal_names])
-    point, line, rises = _highest_peaks(gearset, quantities, speed, amplitude)
+    quantities = quantities_of([signal.name for signal in model.signal_names])
+    point, line, rises = _highest_peaks(model, quantities, speed, amplitude)
     found = np.zeros((len(point), len(quantities), 2))
     respond = {"linear": linear_response, "parametric": parametric_response}[method]
-    for end, system in enumerate(damping_limits(gearset.system)):
-        damped = gearset.with_system(system)
+    for end, system in enumerate(damping_limits(model.system)):
+        damped = model.with_system(system)
         for at in np.unique(point):
             here = np.flatnonzero(point == at)
             for about in ABOUT:
@@ -112,13 +112,13 @@ def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
 
 
 def _highest_peaks(
-    gearset: HarmonicBalanceModel, quantities: tuple[Quantity, ...], speed: Floats, amplitude: Floats
+    model: HarmonicBalanceModel, quantities: tuple[Quantity, ...], speed: Floats, amplitude: Floats
 ) -> tuple[Integers, Integers, Booleans]:
     """Points (k,) and lines (k,) of the highest peaks of any quantity, and which quantities (k, s) have one there.
 
     Within the operating range, where the file has one and the response reaches it.
     """
-    stated = operating_range(gearset.waves.assembly.gearbox)
+    stated = operating_range(model.waves.assembly.gearbox)
     inside = np.ones(len(speed), dtype=bool)
     if stated is not None:
         within = (np.abs(speed) >= stated[0]) & (np.abs(speed) <= stated[1])

@@ -16,9 +16,9 @@ from exugear.steady.harmonics.lines import (
     beside,
     count_of_lines,
     joined,
-    lattice,
     line_set,
     modulated,
+    rank1_lattice,
 )
 from exugear.steady.mean_system.bearing_waves import (
     TILTS,
@@ -170,13 +170,13 @@ class HarmonicBalanceModel:
         # Shared by all that differ in their lines alone.
         self._lattices: dict[tuple[HarmonicTruncation, int, int], TorusSampling] = {}
         self._one_by_one: dict[int, HarmonicBalanceModel] = {}
-        self.parting = LAWS[waves.assembly.mesh_model].loses_contact
+        self.loses_contact = LAWS[waves.assembly.mesh_model].loses_contact
         self.bearings: BearingWaves | None = None
         self._bearing_means: tuple[BearingMean, ...] = ()
         ports = []
         rows = []
         for speed in waves.system.speeds:
-            ports.append(mesh_ports(waves, float(speed), self.parting))
+            ports.append(mesh_ports(waves, float(speed), self.loses_contact))
             rows.append(signal_rows(waves.system, float(speed)))
         self._ports = _stacked(ports)
         self._rows = {
@@ -186,14 +186,14 @@ class HarmonicBalanceModel:
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
 
     @property
-    def wander(self) -> bool:
+    def shuttles(self) -> bool:
         """Whether the load of any mesh with a model along a row shuttles."""
-        return self.waves.wander and not self.parting
+        return self.waves.shuttles and not self.loses_contact
 
     @property
-    def bent(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """Whether forces are not parabolas of the inputs of the models: teeth or rolling elements may lose contact."""
-        return self.parting or self.bearings is not None
+        return self.loses_contact or self.bearings is not None
 
     @cached_property
     def with_bearings(self) -> HarmonicBalanceModel:
@@ -249,15 +249,15 @@ class HarmonicBalanceModel:
         return places_with_bearings(found, self.bearings, len(self.waves.base_orders), speed, angles)
 
     @cached_property
-    def lattice(self) -> TorusSampling:
+    def sampling(self) -> TorusSampling:
         """Samples on which forces are evaluated in time."""
-        least = max(self._least, SAMPLES_PER_HARMONIC * self._reach.harmonics if self.bent else 0)
+        least = max(self._least, SAMPLES_PER_HARMONIC * self._reach.harmonics if self.is_nonlinear else 0)
         key = self._reach, least, self.waves.passing
         known = self._lattices.get(key)
         if self.waves.passing:
-            known = lattice(self.lines, self.larger, least, shared=True)
+            known = rank1_lattice(self.lines, self.larger, least, shared=True)
         elif known is None:
-            known = lattice(self.larger, self.larger, least)
+            known = rank1_lattice(self.larger, self.larger, least)
         self._lattices[key] = known
         return TorusSampling(self.lines, known.generator, known.samples)
 
@@ -265,7 +265,7 @@ class HarmonicBalanceModel:
     def denser(self) -> HarmonicBalanceModel:
         """The same on twice as many samples, on which other lines alias."""
         other = self._copied()
-        other._least = 2 * self.lattice.samples
+        other._least = 2 * self.sampling.samples
         return other
 
     @cached_property
@@ -339,7 +339,7 @@ class HarmonicBalanceModel:
         """
         waves = self.waves
         usual = self._usual
-        if not self.parting or self.bearings is not None:
+        if not self.loses_contact or self.bearings is not None:
             return None
         if (waves.carriers and not waves.passing) or not any(wave.wave for wave in waves.waves):
             return None
@@ -432,7 +432,7 @@ class HarmonicBalanceModel:
         deflection and misalignment.
         """
         found = {(DEFLECTION, DEFLECTION): self.cycle_coefficients}
-        if self.wander:
+        if self.shuttles:
             across, _, twice = self.cycle_moments
             found[DEFLECTION, MISALIGNMENT] = found[MISALIGNMENT, DEFLECTION] = -across
             found[MISALIGNMENT, MISALIGNMENT] = twice
@@ -469,9 +469,9 @@ class HarmonicBalanceModel:
         found = np.ones(self._ports["static"].shape[1:])
         count = len(firsts)
         found[:count, POSITION] = pitch
-        if self.wander:
+        if self.shuttles:
             found[:count, MISALIGNMENT] = pitch
-        if self.parting:
+        if self.loses_contact:
             found[:count, [TILT, BACK_TILT]] = pitch[:, None]
         if self.bearings is not None:
             found[count:, TILTS] = self.bearings.radii[:, None]
