@@ -32,7 +32,7 @@ from exugear.steady.nonlinear import (
     solve_balance,
 )
 from exugear.steady.response import Response, linear_response, parametric_response, signals, transmission_errors
-from exugear.steady.settings import SteadySettings
+from exugear.steady.settings import Method
 from exugear.steady.settling import SettlingRun, SettlingSegment, cannot_settle
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -116,22 +116,24 @@ class ContactLossState:
 
 
 class PointSolver:
-    """Solves one speed after the other; at the level `nonlinear` each starts from the one before.
+    """Solves one speed after the other; with the method `nonlinear`, each starts from the one before.
 
     Parameters
     ----------
-    model : with linear bearings; the level `nonlinear` takes them by their laws
+    model : with linear bearings; the method `nonlinear` replaces those with rolling elements by their models
+    method : as in `exugear.steady.settings.SteadySettings`
     """
 
-    def __init__(self, model: HarmonicBalanceModel, settings: SteadySettings) -> None:
-        self.linear, self._level = model, settings.method
-        self.model = model.with_bearings if settings.method == "nonlinear" else model
+    def __init__(self, model: HarmonicBalanceModel, method: Method) -> None:
+        self.linear = model
+        self.method = method
+        self.model = model.with_bearings if method == "nonlinear" else model
         self._last: Complexes | None = None
         self.state: ContactLossState | None = None
 
     @property
     def sampling(self) -> TorusSampling:
-        """Samples of the level `nonlinear`."""
+        """Samples of the method `nonlinear`."""
         return self.model.sampling
 
     def forcing(self, interface: Interface) -> Complexes:
@@ -160,9 +162,9 @@ class PointSolver:
             No steady state was found.
         """
         interface = self.model.at(speed)
-        if self._level == "linear":
+        if self.method == "linear":
             return linear_response(self.model, interface)
-        if self._level == "parametric":
+        if self.method == "parametric":
             return parametric_response(self.model, interface)
         if self.model.is_nonlinear:
             self.state = _with_passing(self._with_contact_loss(speed))

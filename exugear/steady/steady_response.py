@@ -303,7 +303,7 @@ def response_of(
     check_law(assembly.mesh_model, settings.method)
     even = settings.speeds.values
     model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations)
-    solver = PointSolver(model, settings)
+    solver = PointSolver(model, settings.method)
     told = progress or (lambda done, total: None)
     tracks = _tracks(model, even)
     operation = operating_range(assembly.gearbox)
@@ -314,7 +314,7 @@ def response_of(
     if settings.branches:
         solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, told)
     else:
-        solved = _solve(solver, settings, found, looked_for, _Work(known, told, keep, keep_every))
+        solved = _solve(solver, even, found, looked_for, _Work(known, told, keep, keep_every))
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
@@ -339,18 +339,18 @@ def response_of(
         stiffness_variation=model.system.variation,
         harmonics=model.usual_harmonics,
         left_out=model.waves.left_out(model.usual_harmonics),
-        change_with_more=_change_with_more(solver, settings, solved.part(there)),
-        band=_band(solver, settings, solved.part(there)),
+        change_with_more=math.nan if settings.branches else _change_with_more(solver, solved.part(there)),
+        band=_band(solver, solved.part(there)),
         campbell=campbell,
     )
 
 
-def _band(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints) -> DampingBand:
+def _band(solver: PointSolver, solved: SolvedPoints) -> DampingBand:
     """Find how high the highest peaks are over the range of damping, where the method is linear in the deflections."""
     model = solver.linear
-    if settings.method == "nonlinear" or model.loses_contact:
+    if solver.method == "nonlinear" or model.loses_contact:
         return no_band(tuple(quantity.name for quantity in quantities_of([s.name for s in model.signal_names])))
-    return damping_band(model, settings.method, solved.speed, np.abs(solved.amplitude).astype(np.float64))
+    return damping_band(model, solver.method, solved.speed, np.abs(solved.amplitude).astype(np.float64))
 
 
 def _evaluate_mean_system(
@@ -383,18 +383,16 @@ class _Work:
     keep_every: float
 
 
-def _solve(
-    solver: PointSolver, settings: SteadySettings, found: tuple[Crossing, ...], tops: bool, work: _Work
-) -> SolvedPoints:
+def _solve(solver: PointSolver, even: Floats, found: tuple[Crossing, ...], tops: bool, work: _Work) -> SolvedPoints:
     """Solve even speeds and those of crossings, then those of tops between them if wanted; in ascending order."""
-    speeds = with_crossings(settings.speeds.values, found)
+    speeds = with_crossings(even, found)
     solved = _continued(_empty(solver.model, speeds), 0, lambda: solver, work)
     if tops:
-        solved = _with_tops(solver, settings, solved, work)
+        solved = _with_tops(solver, solved, work)
     return solved.part(np.argsort(solved.speed, kind="stable"))
 
 
-def _with_tops(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints, work: _Work) -> SolvedPoints:
+def _with_tops(solver: PointSolver, solved: SolvedPoints, work: _Work) -> SolvedPoints:
     """Solve at speeds where neighbours indicate peaks higher than at any known speed, until none remain.
 
     Each such state starts independently of others, so that a resumed computation gives the same results.
@@ -408,7 +406,7 @@ def _with_tops(solver: PointSolver, settings: SteadySettings, solved: SolvedPoin
             break
         count = len(solved.speed)
         solved = solved.joined_with(_empty(solver.model, more))
-        solved = _continued(solved, count, lambda: PointSolver(solver.linear, settings), work)
+        solved = _continued(solved, count, lambda: PointSolver(solver.linear, solver.method), work)
         # A speed that nobody asked for and that has no state is none to tell of.
         told = np.isfinite(solved.drive_torque)
         told[:count] = True
@@ -427,14 +425,14 @@ def _missed(
     return missed_tops(known.speed, known.amplitude, smooth, quantities, operation, tops)
 
 
-def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints) -> float:
+def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
     """Return the largest relative change of the highest peaks of the transmission error with more harmonics."""
     model = solver.model
-    if model.is_nonlinear or settings.branches:
+    if model.is_nonlinear:
         return math.nan
     if not model.waves.varies:
         return 0.0
-    other = PointSolver(solver.linear.with_harmonics(math.ceil(MORE * model.usual_harmonics)), settings)
+    other = PointSolver(solver.linear.with_harmonics(math.ceil(MORE * model.usual_harmonics)), solver.method)
     values: Floats = np.abs(solved.amplitude[:, :, 0].astype(np.complex128))
     found = [(point, line) for line in range(1, values.shape[1]) for point in _tops_of(values[:, line])]
     found.sort(key=lambda peak: -values[peak])

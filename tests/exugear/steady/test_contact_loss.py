@@ -76,7 +76,7 @@ def tough_pair(variant, **changes):
     table_case.STIFFNESS.update(before)
     assembly = assemble(gearbox, Choice(variant, "table"), {"spur": surface})
     model = harmonic_balance_model(assembly, np.array([50.0, 2000.0]))
-    solver = PointSolver(model, SteadySettings(SpeedRange(50.0, 2000.0, 2), "nonlinear"))
+    solver = PointSolver(model, "nonlinear")
     return Tough(assembly, solver, float(model.system.eigenvalues(100.0).imag.max()) / TEETH)
 
 
@@ -232,7 +232,7 @@ def train_solver(content, share, mesh_time, bearing_time, combinations):
     model = harmonic_balance_model(
         assemble(gearbox, Choice("bushing", "table"), tables), np.array([50.0, 2000.0]), 10, combinations
     )
-    return PointSolver(model, SteadySettings(SpeedRange(50.0, 2000.0, 2), "nonlinear", 10, combinations))
+    return PointSolver(model, "nonlinear")
 
 
 def stays(solver, speeds, periods):

@@ -45,7 +45,7 @@ def dense_peaks(assembly, speeds, harmonics, count, most):
     """Loudest peaks of the three quantities by a dense sweep, each then searched for by itself: line, speed, height."""
     settings = SteadySettings(speeds, harmonics=harmonics)
     model = harmonic_balance_model(assembly, np.array([speeds.first, speeds.last]), harmonics)
-    solver, sense = PointSolver(model, settings), np.sign(speeds.first + speeds.last)
+    solver, sense = PointSolver(model, settings.method), np.sign(speeds.first + speeds.last)
 
     def sizes(speed):
         amplitude = 2.0 * signals(model, solver.response(sense * speed))[1:]

@@ -14,7 +14,6 @@ from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.nonlinear import HarmonicResidual, solve_balance
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import dissipated_and_given, signals, transmission_errors
-from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import follow_branch
 from exugear.system.build import assemble
 
@@ -36,7 +35,7 @@ def model(four, stiffness):
 
 
 def response_at(model, level, speed):
-    return PointSolver(model, SteadySettings(SpeedRange(*RANGE, 2), level)).response(speed)
+    return PointSolver(model, level).response(speed)
 
 
 def amplitude(model, response, line, signal="overall_dte"):
@@ -109,7 +108,7 @@ def test_levels_agree_on_small_variations(four, stiffness):
 
 
 def test_branches_of_planets_out_of_phase_are_refused_with_the_reason(model):
-    solver = PointSolver(model, SteadySettings(SpeedRange(*RANGE, 2), "nonlinear"))
+    solver = PointSolver(model, "nonlinear")
     with pytest.raises(SteadyError, match="mesh out of phase"):
         follow_branch(solver, *RANGE)
 

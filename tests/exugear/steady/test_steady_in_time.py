@@ -14,7 +14,6 @@ from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POS
 from exugear.steady.nonlinear import HarmonicResidual
 from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import dissipated_and_given, signals
-from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.modes import overall_row
@@ -31,8 +30,7 @@ SPUR = Gearbox.from_dict(tomllib.loads(SPUR_CASE))
 
 def solver_of(assembly, speeds, level, harmonics=10, combinations=3):
     model = harmonic_balance_model(assembly, np.array(speeds), harmonics, combinations)
-    settings = SteadySettings(SpeedRange(*speeds, 2), level, harmonics, combinations)
-    return PointSolver(model, settings)
+    return PointSolver(model, level)
 
 
 def spur_stiffness():
