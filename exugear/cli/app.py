@@ -61,7 +61,6 @@ app = typer.Typer(
     help="Gearbox dynamics: transmission error, modes, resonances, run-ups, loads and service life.",
     no_args_is_help=True,
     rich_markup_mode=None,
-    add_completion=False,
     pretty_exceptions_show_locals=False,
 )
 

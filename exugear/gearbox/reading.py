@@ -253,8 +253,22 @@ def _remedy(fault: Any) -> str:
         if "x7f" in fault["ctx"]["pattern"]:
             return _NO_CONTROL
         return _A_NAME
-    text = str(fault["msg"]).removeprefix("Value error, ")
+    if fault["type"] in ("literal_error", "enum"):
+        return one_of(fault["ctx"]["expected"], fault["input"])
+    text = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "must", 1)
     return text[:1].lower() + text[1:]
+
+
+def one_of(expected: str, value: Any) -> str:
+    """Return the permitted texts as the remedy of an unknown value, and suggest the most similar one.
+
+    Examples
+    --------
+    >>> one_of("'linear' or 'iso16281'", "liner")
+    "must be 'linear' or 'iso16281'; did you mean 'linear'?"
+    """
+    near = difflib.get_close_matches(str(value)[:100], re.findall("'([^']*)'", expected), n=1)
+    return "; ".join([f"must be {expected}", *(f"did you mean {word!r}?" for word in near)])
 
 
 def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:

@@ -22,12 +22,14 @@ class Kind(StrEnum):
         members[kind] = kind
 
 
+PARALLEL = Kind("parallel")
+"""Template without an option, which the tutorial uses."""
 _KINDS_TOLD = "; ".join(f"{kind}: {words}" for kind, words in KINDS.items())
 
 
 def new(
     case: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.", show_default=False)],
-    kind: Annotated[Kind, typer.Option(metavar="NAME", help=f"Template. {_KINDS_TOLD}.", show_default=False)],
+    kind: Annotated[Kind, typer.Option(metavar="NAME", help=f"Template. {_KINDS_TOLD}.")] = PARALLEL,
     as_json: JsonOption = False,
 ) -> None:
     """Write a commented gearbox file to start from. It runs without changes."""
