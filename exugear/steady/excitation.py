@@ -53,6 +53,7 @@ from exugear.steady.mean_system.signals import (
     mesh_signal_names,
     signal_rows,
 )
+from exugear.steady.mean_system.tooth_friction import FrictionResponse, tooth_friction
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
@@ -86,6 +87,17 @@ class Interface:
     """(m, f) torque of the drive per steady force, N m/N."""
     bearings: BearingMean | None
     """Nonlinear bearings in the averaged system."""
+    friction: FrictionResponse | None = None
+    """Response to the friction of the teeth, if the gearbox file requests it."""
+
+    @cached_property
+    def static(self) -> Complexes:
+        """Readings (n, m, r) without forces of the meshes beyond the averaged system: static state and friction."""
+        found = np.zeros((len(self.frequencies), *self.ports.static.shape), dtype=complex)
+        if self.friction is not None:
+            found += self.read(self.friction.motion)
+        found[0] += self.ports.static
+        return found
 
     @cached_property
     def deflection(self) -> Complexes:
@@ -519,11 +531,30 @@ class HarmonicBalanceModel:
             rows=SignalRows(self._row_names, **rows),
             torque=system.torque_at(speed),
             torque_per_force=still.reshape(shape),
-            bearings=self._bearings_at(speed) if self.bearings else None,
+            bearings=self._bearings_at(speed),
+            friction=self._friction_at(speed, ports, pencil, frequencies),
         )
 
-    def _bearings_at(self, speed: float) -> BearingMean:
-        """Bearings in the averaged system at a speed of the input, rad/s."""
+    def _friction_at(
+        self, speed: float, ports: MeshInterface, pencil: tuple[Floats, Floats], frequencies: Floats
+    ) -> FrictionResponse | None:
+        """Solve for the response to the friction of the teeth at a speed of the input, rad/s; None without friction."""
+        system = self.system
+        if system.frame.assembly.gearbox.case.damping.tooth_friction == 0.0:
+            return None
+        loads = tooth_friction(self.waves, self.lines, ports, speed, self.harmonics)
+        motion = np.zeros((len(frequencies), system.size), dtype=complex)
+        still = system.still(pencil[0], loads[0].real[:, None])[:, 0]
+        motion[0] = still[:-1]
+        for line in np.flatnonzero(loads[1:].any(axis=1)) + 1:
+            dynamic = pencil[0] - frequencies[line] ** 2 * system.mass + 1j * frequencies[line] * pencil[1]
+            motion[line] = np.linalg.solve(dynamic, loads[line])
+        return FrictionResponse(loads, motion, float(still[-1]))
+
+    def _bearings_at(self, speed: float) -> BearingMean | None:
+        """Nonlinear bearings in the averaged system at a speed of the input, rad/s; None without any."""
+        if self.bearings is None:
+            return None
         return BearingMean(*(self.system.at(np.array(own), speed) for own in zip(*self._bearing_means, strict=True)))
 
     def row_of_overall(self, speed: float) -> Floats:

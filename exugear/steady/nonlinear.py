@@ -59,10 +59,8 @@ class HarmonicResidual:
 
     @cached_property
     def static(self) -> Complexes:
-        """Readings (n, m, r) of the static state."""
-        out = np.zeros((len(self.sampling.lines.orders), *self.interface.ports.static.shape), dtype=complex)
-        out[0] = self.interface.ports.static
-        return out
+        """Readings (n, m, r) of the static state with friction."""
+        return self.interface.static
 
     @cached_property
     def places(self) -> MeshPlaces:

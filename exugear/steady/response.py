@@ -56,12 +56,18 @@ class Response:
         """Coefficients (n, size) of the motion about the static state, in the rotating frame."""
         lines, size = self.interface.motion.shape[:2]
         found = self.interface.motion.reshape(lines, size, -1) @ self.excess.reshape(lines, -1, 1)
-        return np.asarray(-found[..., 0])
+        friction = self.interface.friction
+        if friction is None:
+            return np.asarray(-found[..., 0])
+        return np.asarray(friction.motion - found[..., 0])
 
     @property
     def torque(self) -> float:
         """Mean torque of the drive that keeps the speed, N m."""
-        return self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
+        torque = self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
+        if self.interface.friction is None:
+            return torque
+        return torque + self.interface.friction.torque
 
 
 def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
@@ -70,10 +76,8 @@ def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Respon
     F = -k_mean e with e = s - mean of s, the transmission error under the static force F_0; of a curve k_mean is the
     mean of the tangent. Where the load shuttles by w, s contains w (g - g0), and F_0 w is a moment.
     """
-    static = interface.ports.static[:, DEFLECTION]
     excess = transmission_errors(model, interface.ports, interface.speed)
-    deflection = _answer(interface, excess)[..., DEFLECTION]
-    deflection[0] += static
+    deflection = interface.static[..., DEFLECTION] + _answer(interface, excess)[..., DEFLECTION]
     return _response(model, interface, deflection, excess, 0)
 
 
@@ -140,7 +144,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
 
     given = given_forces(model, interface).reshape(shape[0], -1)
     start = -(answers @ given[..., None])[..., 0]
-    start[0] += lengths * interface.ports.static[:, : shape[2]].ravel()
+    start += lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
     found, products = solve_lines(apply, start, TOLERANCE)
     excess = (given + coupling.of(scaled, found)).reshape(shape)
     return _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
@@ -238,4 +242,7 @@ def dissipated_and_given(model: HarmonicBalanceModel, response: Response) -> tup
     taken = 2.0 * float(np.sum(speeds * (speeds @ damping.T + places @ stiffness.T)))
     ports = interface.ports
     along = np.tensordot(rates, ports.forces, axes=(1, 2)) * model.weights[:, None]
-    return taken, -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))
+    given = -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))
+    if interface.friction is not None:
+        given += 2.0 * float(np.sum((interface.friction.loads[1:] * rates.conj()).real))
+    return taken, given

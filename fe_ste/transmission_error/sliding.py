@@ -66,6 +66,34 @@ def table_friction(pair: GearPair, state: xr.Dataset, speed: float, viscosity: f
     return float((local * weight).sum() / weight.sum())
 
 
+def friction_over_cycle(pair: GearPair, state: xr.Dataset) -> Floats:
+    """Force and moments of friction over the mesh cycle, per unit coefficient of friction and unit mesh force, (3, n).
+
+    The mesh force is that on the transverse line of action. The force of friction acts across the line of action in
+    the transverse plane; the moments are those about the gear axes and about the line of action, m, of this force at
+    the pitch point in the middle of the face. All are positive where gear 1 turns faster about +z than gear 2.
+
+    Parameters
+    ----------
+    state : as in `table_loss_factor`
+
+    Notes
+    -----
+    A contact line reverses its friction where it crosses the pitch point: over the width of one position here, which a
+    table does not resolve.
+    """
+    load, along = _loads_along_path(pair, state)
+    axial = state["axial_position"].to_numpy()
+    pmc = state["pmc"].to_numpy()
+    unresolved = 0.5 * pair.transverse_base_pitch / len(pmc)
+    sense = np.clip(along / unresolved, -1.0, 1.0)
+    parts = np.array([(load * part).sum(axis=(1, 2)) for part in (sense, np.abs(along), sense * axial)])
+    total = load.sum(axis=(1, 2))
+    known = total > 0.0
+    found = parts[:, known] / (total[known] * math.cos(pair.pinion.base_helix_angle))
+    return np.array([np.interp(pmc, pmc[known], row, period=1.0) for row in found])
+
+
 def _line_load(state: xr.Dataset) -> Floats:
     """Line load (pmc, tooth, axial position), N/m; positions that have not converged count as unloaded."""
     return np.asarray(np.nan_to_num(state["line_load"].transpose("pmc", "tooth", "axial_position").to_numpy()))

@@ -277,6 +277,12 @@ def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
     of_tables = other_load_warning(project.gearbox, loads, law.of_one_load)
     for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, band_warning(loads, band))):
         note(f"Warning: load_cases.{load_case.name}: {doubt}", style="yellow")
+    if friction := project.gearbox.case.damping.tooth_friction:
+        note(
+            f"Warning: damping.tooth_friction = {friction:g}: runs do not include the friction of teeth; "
+            "exugear steady does",
+            style="yellow",
+        )
 
 
 def _simulate(project: Project, resume: bool, command: str, **options: Any) -> Run:

@@ -223,6 +223,8 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     fastest = float(abs(data["speed"]).max()) / RPM
     stable = f"slowest decay rate {-growth:.3g} 1/s (stable)" if growth <= 0.0 else f"fastest growth {growth:.3g} 1/s"
     damping = damping_in_words(project.gearbox.case.damping)
+    if friction := project.gearbox.case.damping.tooth_friction:
+        damping += f"; friction of teeth included, coefficient {friction:g}"
     print_text(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}; damping {damping}.")
     say(f"Results: {project.steady_path(settings)}")
     _fail_if_doubtful(data, growth)

@@ -142,6 +142,8 @@ class DampingSection(Section):
     """Ratio of damping to stiffness of couplings."""
     body_time_s: q.DampingTimeS = 1e-6
     """Ratio of damping to stiffness of flexible bodies."""
+    tooth_friction: q.Friction = 0.0
+    """Coefficient of friction of the teeth in steady-state responses (`exugear losses` lists it); none by default."""
 
     @model_validator(mode="after")
     def _check_modal(self) -> DampingSection:

@@ -123,6 +123,7 @@ ModalPercent = Annotated[
 ]
 ModalPoint = Annotated[tuple[Annotated[float, Range(0.0, 1e5)], ModalPercent], Field(strict=False)]
 ModalDamping = ModalPercent | Annotated[tuple[ModalPoint, ...], Field(strict=False, min_length=1, max_length=1000)]
+Friction = Annotated[float, Range(0.0, 0.5, (0.0, 0.12), "lubricated gears have 0.02 to 0.1")]
 ContactAngleDeg = Annotated[float, Range(0.0, 59.0, (0.0, 52.0))]
 ClearanceMm = Annotated[float, Range(-1.0, 5.0, (-0.2, 1.0), "on the diameter")]
 RollingRows = Annotated[int, Range(1, 8, (1, 6))]

@@ -31,6 +31,7 @@ from exugear.gearbox.sections.entries import Section
 from exugear.results.folder import keep_case
 from exugear.steady.damping_band import damping_limits
 from exugear.steady.mean_system.mean_system import mean_system
+from exugear.steady.steady_response import harmonic_balance_model
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.stiffness import catalogue_stiffness, elastic_names, linear_law
 from exugear.system.bodies.of_gearbox import check_elastic_body
@@ -121,6 +122,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
             bearing_duties(assembly)
         damping_in_words(gearbox.case.damping)
         if gearbox.case.damping.modal_band_percent:
+            harmonic_balance_model(assembly, np.array([1.0, 2.0]), 1, 1).at(1.5)
             damping_limits(mean_system(assembly, np.array([1.0, 2.0])))
         for support in (*gearbox.bearings, *gearbox.mounts):
             linear_law(support, gearbox.case.damping.bearing_time_s)
