@@ -75,6 +75,7 @@ _UNITS = {
     "h": ("time", 3600.0),
     "s": ("time", 1.0),
     "mm^2 / s": ("viscosity", 1e-6),
+    "C": ("temperature", 1.0),
 }
 
 

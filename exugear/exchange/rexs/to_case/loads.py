@@ -54,6 +54,10 @@ ROUGHNESSES = (
 """Keys of the gearbox file, attributes with their values, and factors; Rz is taken as six times Ra (ISO 6336-2)."""
 ROUGHNESS_RANGE = (0.1, 100.0)
 """Range of accepted roughness of a gear, um."""
+DENSITIES = (500.0, 2000.0)
+"""Range of accepted densities of an oil, kg/m3."""
+TEMPERATURES = (-50.0, 250.0)
+"""Range of accepted temperatures of an oil, degrees Celsius."""
 TOLERANCE_CLASSES = (1, 11)
 """Flank tolerance classes of ISO 1328-1:2013."""
 HARD_FLANK = 1100.0
@@ -358,6 +362,9 @@ def life_blocks(
     if speed:
         source = "rotational_speed at the torque of the static state"
         blocks["operation"] = Block("", {"rated_speed_rpm": read(tidy(speed), source)})
+    lubricant = _lubricant(model)
+    if lubricant is not None:
+        blocks["lubricant"] = lubricant
     rows = _spectrum(model, loads, ends, ratio)
     if rows is None:
         return LifeLoads("", blocks)
@@ -367,9 +374,7 @@ def life_blocks(
     source_block = Block("", {"file": file, "hours_per_year": assumed(HOURS_PER_YEAR, "always active")})
     blocks["loads"] = Block("", of_life, {"sources.load_spectrum": source_block})
     blocks["rating"] = _rating(model, gears)
-    lubricant = _lubricant(model)
     if lubricant is not None:
-        blocks["lubricant"] = lubricant
         del blocks["rating"].entries["viscosity_40_mm2_per_s"]
     return LifeLoads("torque_N_m,speed_rpm,hours\n" + "".join(lines), blocks)
 
@@ -399,14 +404,25 @@ def _lubricant(model: Model) -> Block | None:
     for oil in model.of_type("lubricant"):
         cold, hot = (oil.quantity(f"viscosity_at_{t}_degree_celsius", "mm^2 / s") for t in (40, 100))
         if cold and hot and hot < cold:
-            oils[cold] = hot
+            oils[cold] = hot, oil.quantity("density_at_15_degree_celsius", "kg / m^3")
     if not oils:
         return None
     cold = min(oils)
+    hot, density = oils[cold]
     entries = {
         "viscosity_40_mm2_per_s": read(tidy(cold), "viscosity_at_40_degree_celsius of the lubricant"),
-        "viscosity_100_mm2_per_s": read(tidy(oils[cold]), "viscosity_at_100_degree_celsius"),
+        "viscosity_100_mm2_per_s": read(tidy(hot), "viscosity_at_100_degree_celsius"),
     }
+    if density and DENSITIES[0] <= density <= DENSITIES[1]:
+        entries["density_15_kg_per_m3"] = read(tidy(density), "density_at_15_degree_celsius")
+    casings = model.of_type("gear_casing")
+    stated = [_changed(casings, changes) for changes in ({}, *(case.changes for case in model.load_cases))]
+    temperatures = [casing.quantity("temperature_lubricant", "C") for parts in stated for casing in parts]
+    hottest = max((t for t in temperatures if t is not None), default=math.nan)
+    if TEMPERATURES[0] <= hottest <= TEMPERATURES[1]:
+        entries["temperature_C"] = read(
+            tidy(hottest), "temperature_lubricant of the casing, the hottest of all load cases"
+        )
     return Block("", entries)
 
 
