@@ -420,9 +420,7 @@ def _lubricant(model: Model) -> Block | None:
     temperatures = [casing.quantity("temperature_lubricant", "C") for parts in stated for casing in parts]
     hottest = max((t for t in temperatures if t is not None), default=math.nan)
     if TEMPERATURES[0] <= hottest <= TEMPERATURES[1]:
-        entries["temperature_C"] = read(
-            tidy(hottest), "temperature_lubricant of the casing, the hottest of all load cases"
-        )
+        entries["temperature_C"] = read(tidy(hottest), "temperature_lubricant of the casing (hottest load case)")
     return Block("", entries)
 
 
