@@ -32,7 +32,8 @@ WORDS = (
     "(ISO 281) includes lubricant and cleanliness.",
     "σ_H: largest contact stress; σ_F: largest root stress; σ_H0, σ_F0: nominal stresses of ISO 6336-2 and -3. S_H, "
     "S_F: factors on stress at which the damage is 1; static: for extreme loads. Outside the path: fraction of the "
-    "load in tip-edge contact. +: flank facing the sense of +z rotation. S_0: static rating over the largest load.",
+    "load carried by tip edges, outside the path of contact. +: flank that faces the direction of positive rotation "
+    "about z. S_0: static load safety factor of the bearing, static load rating over the largest load.",
 )
 
 LEAST_DAMAGE = 1e-6

@@ -78,9 +78,9 @@ def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
     """Return a short label that identifies a group: source, and mesh model and inertia set where these differ."""
     parts = [own.source]
     if len({group.mesh_model for group in groups}) > 1:
-        parts.append(f"law {own.mesh_model}")
+        parts.append(f"mesh model {own.mesh_model}")
     if len({group.inertias for group in groups}) > 1:
-        parts.append(f"inertias {own.inertias}")
+        parts.append(f"inertia set {own.inertias}")
     words = ", ".join(parts)
     return words[0].upper() + words[1:]
 

@@ -328,10 +328,10 @@ def _levers(material: ReportData, group: RunGroup, mode: int) -> str:
     kinds = [[lever for lever in levers if lever.kind == kind][:LEVERS] for kind in ("stiffness", "inertia")]
     rows = [
         {
-            "10 % more": lever.kind,
+            "+10 %": lever.kind,
             "of": lever.what,
-            "holds / %": Cell(f"{100.0 * lever.share:.1f}", lever.share),
-            "shift": Cell(shift_text(lever), lever.shift, bar=abs(lever.shift) / largest),
+            "energy fraction / %": Cell(f"{100.0 * lever.share:.1f}", lever.share),
+            "frequency shift": Cell(shift_text(lever), lever.shift, bar=abs(lever.shift) / largest),
         }
         for own in kinds
         for lever in own
@@ -369,7 +369,7 @@ def _variations(
             ],
             [Axis(label, parameter.logarithmic), Axis("Hz"), Axis("amplification")],
             material.arrays,
-            [(parameter.default, "used")],
+            [(parameter.default, "value used")],
         )
         figures.append(html)
         charts.update(data)

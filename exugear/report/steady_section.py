@@ -96,7 +96,7 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
         pieces.paragraph(
             f"Slowest decay rate of a disturbance: {-growth:.3g} 1/s. A run-up is too fast for a resonance if the "
             f"sweep-rate ratio f′ / (2π ζ² f²) is above {MAX_SWEEP_RATIO:g}: the peak does not build up. f: peak "
-            "frequency; f′: its rate in the run-up; ζ: damping ratio of the mode; –: no mode known.",
+            "frequency; f′: its rate of change in the run-up; ζ: damping ratio of the mode; –: no mode known.",
             "note",
         ),
     ]
@@ -106,8 +106,8 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
 def _other_load(run: VariantRun) -> str:
     """State that the run-up shown with a response has another load."""
     return (
-        f"the run-up of the load case {run.attributes['load_case']} is at another load, {run.attributes['load']}; its "
-        "levels also differ for that reason."
+        f"the run-up of the load case {run.attributes['load_case']} has another load ({run.attributes['load']}), which "
+        "also changes its levels."
     )
 
 
@@ -129,7 +129,7 @@ def _remarks(data: xr.Dataset, name: str) -> str:
     speeds = data["speed"].to_numpy()
     said = [(abs(float(speed)), str(words)) for speed, words in zip(speeds, data["remark"].to_numpy(), strict=True)]
     lost = [
-        (abs(float(load["speed"])), f"left out: {load['reason']}")
+        (abs(float(load["speed"])), f"not converged: {load['reason']}")
         for load in json.loads(str(data.attrs["not_converged"]))
     ]
     told = sorted([own for own in said if own[1]] + lost)
@@ -160,7 +160,7 @@ def _order_charts(
         figures.append(html)
         charts.update(spec)
     words = "Order cuts of the overall transmission error: at constant speed"
-    words += ", and in the run-ups, with the window that suits their sweep rate." if runs else "."
+    words += ", and in the run-ups, with a window length matched to their sweep rate." if runs else "."
     if settings_of(data.attrs).branches:
         words += " Continuation curves turn back at turning points; dashed parts are unstable."
     return pieces.paragraph(words, "note") + pieces.element("div", "".join(figures), class_="grid")
@@ -180,22 +180,22 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> s
                 "order": told(line_name(tuple(int(n) for n in index[line]), bases)),
                 "speed / rpm": f"{speed / RPM:.2f}",
                 "excited by": told(_shares(load["meshes"].items())),
-                "carried by": _shares((f"{frequency:.1f} Hz", share) for frequency, share in load["modes"]),
-                "per stiffness of": told(_slopes_of(load["supports"])),
-                "per inertia of": told(_slopes_of(load["bodies"])),
+                "responding modes": _shares((f"{frequency:.1f} Hz", share) for frequency, share in load["modes"]),
+                "sensitivity to stiffness of": told(_slopes_of(load["supports"])),
+                "sensitivity to inertia of": told(_slopes_of(load["bodies"])),
             }
         )
     if not rows:
         return ""
     said = (
-        "Contributions to resonances: fractions of the amplitude, and relative change per relative change of a "
-        "parameter"
+        "Contributions to resonances: fractions of the amplitude; sensitivity: relative change of the amplitude per "
+        "relative change of the parameter"
     )
     return pieces.folded(
         said,
         pieces.table(
             rows,
-            ("order", "excited by", "carried by", "per stiffness of", "per inertia of"),
+            ("order", "excited by", "responding modes", "sensitivity to stiffness of", "sensitivity to inertia of"),
             caption="Contributions to resonances",
             name=name,
         ),
@@ -225,11 +225,12 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
             x = np.array([abs(c["speed"]) / RPM for c in own])
             curves.append(Curve(f"{strength} crossings", x, [c["frequency"] for c in own], "points"))
     caption = (
-        f"Modes over speed in the fixed frame, {label}; dots: mesh orders and harmonics cross modes that they excite."
+        f"Natural frequencies over speed in the fixed frame, {label}; dots: crossings of modes and mesh harmonics that "
+        "excite them."
     )
     html, spec = chart(
         name,
-        "Modes over speed",
+        "Natural frequencies over speed",
         "Horizontal lines: modes, by type. Dashed: mesh orders. Dots: excited crossings.",
         caption,
         curves,
@@ -242,7 +243,7 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
         html
         + _speed_ranges(material.context)
         + pieces.folded(
-            "Modes over speed and their strongest crossing: fraction of the largest peak of a signal",
+            "Modes over speed, each with its strongest order crossing; fraction: of the largest peak of the signal",
             pieces.table(
                 rows, ("type", "strongest crossing", "mode shape"), caption=caption, name=f"{name}-modes", sortable=True
             ),
@@ -292,8 +293,8 @@ def _mode_rows(
         whirl = float(diagram.whirl[known[-1], mode])
         row: dict[str, object] = {
             "mode": mode + 1,
-            "slow / Hz": f"{slow:.1f}",
-            "fast / Hz": f"{fast:.1f}",
+            "at lowest speed / Hz": f"{slow:.1f}",
+            "at highest speed / Hz": f"{fast:.1f}",
             "damping / %": f"{100.0 * diagram.damping[known[-1], mode]:.3f}",
             "type": diagram.kinds[mode],
             "whirl": _whirl_text(whirl),
@@ -351,8 +352,8 @@ def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> st
         count = sum(mesh.family == family for mesh in gearbox.meshes)
         passage = count * abs(ratio)
         told.append(
-            f"{family}: {count} planets of {carrier} pass a point of the housing at order {passage:g}, "
-            f"{orders[family] / passage:g} times contained in the mesh order {orders[family]:g}."
+            f"{family}: {count} planets of {carrier} pass a point of the housing at order {passage:g}; the mesh order "
+            f"{orders[family]:g} is {orders[family] / passage:g} times this."
         )
     return " ".join(told)
 

@@ -193,11 +193,15 @@ def _operating_resonances(material: ReportData, group: RunGroup) -> str:
     low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
     which = "all speeds" if ranking.whole else "operating speed range"
     rows = [_loud_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
-    title = f"At constant speed, {Variant.of(group.main).label}, {which}, {low} to {high} rpm: the first {len(rows)}"
-    table = pieces.table(rows, ("Excited by", "At"), caption=title, name=f"in-operation-{group.name}", sortable=True)
+    label = Variant.of(group.main).label
+    title = f"Highest {len(rows)} resonances at constant speed, {label}, {which} ({low} to {high} rpm)"
+    table = pieces.table(
+        rows, ("Excited by", "Bearing"), caption=title, name=f"in-operation-{group.name}", sortable=True
+    )
     note = (
-        "Zero-to-peak amplitudes, (rank) within each quantity; sorted by the best rank. Accelerations: of the "
-        f"{ranking.accelerates} at bearings. Planets: root mean square over the planets."
+        "Zero-to-peak amplitudes, with the (rank) in each quantity; sorted by the best rank. Force: the bearing with "
+        f"the largest amplitude. Accelerations: of the {ranking.accelerates} at bearings. Planets: root mean square "
+        "over the planets."
     )
     return pieces.element("h3", pieces.text(title)) + table + pieces.paragraph(note, "note")
 
@@ -213,7 +217,7 @@ def _loud_row(material: ReportData, resonance: Resonance) -> dict[str, object]:
         place = "" if loudness.place is None else f" ({loudness.place})"
         row[title] = Cell(f"{figure_text(factor * loudness.amplitude)}{place}", loudness.amplitude)
         if name == "force":
-            row["At"] = material.words.of(loudness.at)
+            row["Bearing"] = material.words.of(loudness.at)
     return row
 
 
@@ -234,7 +238,7 @@ def _filters() -> str:
         + pieces.element("input", type="range", id="limit")
         + pieces.element("output", "", id="limit-shown"),
     )
-    rated = pieces.element("button", "Around rated", type="button", id="rated", hidden=True)
+    rated = pieces.element("button", "Near rated speed", type="button", id="rated", hidden=True)
     return only + text + limit + rated
 
 
@@ -242,8 +246,8 @@ def _rules() -> str:
     factors = ", ".join(f"{factor:g}" for factor in WINDOW_FACTORS)
     return (
         "A resonance is a peak with a prominence of at least 6 dB along an order; peaks of several orders at one "
-        f"frequency are one resonance. Absent, at its highest peak: {AbsenceRule().description}, with every window. "
-        f"Window-dependent (run-ups): not found with all window lengths, {factors} times the diagram length. With "
+        f"frequency are one resonance. Absent in a model: {AbsenceRule().description}, with every window length. "
+        f"Window-dependent (run-ups): not found with all window lengths, {factors} times that of the diagram. With "
         "a steady-state response, levels at constant speed are ranked: a run-up that is too fast underestimates a "
         f"resonance and is marked if {BUILT_UP:g} dB or more are missing. At constant speed ± is half the width of a "
         "peak 3 dB below its maximum."

@@ -58,8 +58,8 @@ def _headline(material: ReportData) -> str:
     shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
     line = f"Resonance report. Speed ratio output/input {gearbox.train.ratio:.6f}"
     steady = ", ".join(dict.fromkeys(str(data.attrs["variant"]) for data in material.results.steady))
-    line += f"; run-ups {shown}" if shown else ""
-    line += f"; constant speeds {steady}." if steady else "."
+    line += f"; run-ups: {shown}" if shown else ""
+    line += f"; constant speed: {steady}." if steady else "."
     return html.element("div", f"<h1>{html.text(gearbox.name)}</h1>{html.paragraph(line)}", class_="brand")
 
 

@@ -226,9 +226,9 @@ def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> Non
     kept = _keeps_limits(dataset)
     axes.plot(x[~front & kept], y[~front & kept], ".", color="#BBBBBB", label="evaluated")
     if not kept.all():
-        axes.plot(x[~kept], y[~kept], "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
+        axes.plot(x[~kept], y[~kept], "x", color="#DDBBBB", markersize=3.5, label="limits violated")
     axes.plot(x[front][order], y[front][order], "o-", color=COLOURS[0], markersize=4, label="Pareto-optimal")
-    axes.plot(x[0], y[0], "s", color=COLOURS[1], label="as it is")
+    axes.plot(x[0], y[0], "s", color=COLOURS[1], label="unchanged gearbox")
     near = [np.nanquantile(values, 0.9) for values in (x, y)]
     axes.set_xlim(0.95 * np.nanmin(x), 1.05 * max(near[0], x[0]))
     axes.set_ylim(0.95 * np.nanmin(y), 1.05 * max(near[1], y[0]))
@@ -243,7 +243,7 @@ def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
     kept = _keeps_limits(dataset)
     axes.plot(np.where(kept, values, np.nan), ".", color="#BBBBBB")
     if not kept.all():
-        axes.plot(np.where(kept, np.nan, values), "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
+        axes.plot(np.where(kept, np.nan, values), "x", color="#DDBBBB", markersize=3.5, label="limits violated")
         axes.legend()
     axes.plot(np.fmin.accumulate(np.where(kept, values, np.nan)), color=COLOURS[0])
     low = float(np.nanmin(values))

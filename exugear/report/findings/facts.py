@@ -364,4 +364,4 @@ def best_words(words: Labels, best: BestChange) -> str:
             f"No single change lowers the response within one octave by {GAIN:g} dB; best: {change}, −"
             f"{figure_text(best.gain, 2)} dB."
         )
-    return f"Best change: {change}, −{figure_text(best.gain, 2)} dB within one octave."
+    return f"Best single change: {change}, −{figure_text(best.gain, 2)} dB within one octave."

@@ -147,7 +147,8 @@ def _check_response(response: xr.Dataset) -> list[CheckResult]:
             (f"energy balance closed to {100.0 * error:.1g} % (power supplied by the meshes = power dissipated)"),
         ),
         CheckResult(
-            growth <= 0.0, f"disturbances {'decay' if growth <= 0.0 else 'grow: the steady state does not last'}"
+            growth <= 0.0,
+            "stable: disturbances decay" if growth <= 0.0 else "unstable: disturbances of the steady state grow",
         ),
     ]
     unsolved = json.loads(response.attrs["not_converged"])
@@ -192,7 +193,9 @@ def _check_resonances(group: RunGroup) -> list[CheckResult]:
     matched = sum(bool(own.finding.mode_name) for own in loudest)
     return [
         *verdicts,
-        CheckResult(matched >= MATCHED * count, (f"{matched} of the {count} highest resonances match an eigenmode")),
+        CheckResult(
+            matched >= MATCHED * count, (f"{matched} of the {count} highest resonances are at the frequency of a mode")
+        ),
     ]
 
 

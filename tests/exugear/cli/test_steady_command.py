@@ -43,7 +43,7 @@ def test_steady_writes_a_response_and_sums_it_up(case):
     report = exugear("report", case.parent / "out")
     assert report.exit_code == 0, report.stderr
     page = (case.parent / "out" / "report.html").read_text(encoding="utf-8")
-    for words in ("Steady-state response", "Modes over speed in the fixed frame,", "strongest crossing"):
+    for words in ("Steady-state response", "Natural frequencies over speed in the fixed frame,", "strongest crossing"):
         assert words in page, words
 
 

@@ -87,7 +87,7 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
     for words in (
         "Source: constant speed, method parametric",
         "On bearings, inertia set disc, constant speed, method parametric",
-        "Transverse forces on bearings, constant speed, method parametric",
+        "Radial forces on bearings, constant speed, method parametric",
         "No run-up; run `exugear run`",
         "energy balance closed to",
     ):
