@@ -247,7 +247,7 @@ def _rules() -> str:
     return (
         "A resonance is a peak with a prominence of at least 6 dB along an order; peaks of several orders at one "
         f"frequency are one resonance. Absent in a model: {AbsenceRule().description}, with every window length. "
-        f"Window-dependent (run-ups): not found with all window lengths, {factors} times that of the diagram. With "
+        f"Window-dependent (run-ups): not found with all window lengths, {factors} times the window of the diagram. With "
         "a steady-state response, levels at constant speed are ranked: a run-up that is too fast underestimates a "
         f"resonance and is marked if {BUILT_UP:g} dB or more are missing. At constant speed ± is half the width of a "
         "peak 3 dB below its maximum."

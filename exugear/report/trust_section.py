@@ -51,7 +51,7 @@ GLOSSARY = {
     "inertia set": "One of the sets of masses and inertias in the gearbox file.",
     "mesh model": "Mesh force as a function of gear motion; line_of_action: along the line of action, time-varying "
     "stiffness.",
-    "housing stiffness factor": "Bearing stiffness including the housing, over that of the bearing alone; 1: rigid "
+    "housing stiffness factor": "Stiffness of a bearing with the housing, over the stiffness of the bearing alone; 1: rigid "
     "housing.",
     "window-dependent": "Of a resonance: found with some window lengths of the analysis but not with all.",
     "steady-state response": "Vibration at constant speed, the limit of an infinitely slow run-up.",
