@@ -371,7 +371,7 @@ def files_read(row: Row) -> Callable[[int, int], None]:
 # Messages about tables of the transmission error
 
 
-def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
+def table_warnings(tables: Mapping[str, MeshTable]) -> list[str]:
     """Print warnings about missing or truncated values of tables; return the reasons why tables are invalid."""
     from exugear.system.tooth_mesh.tables import doubts_about_table, remarks_about_table
 

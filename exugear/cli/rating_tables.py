@@ -22,7 +22,7 @@ GEAR_COLUMN = 14
 _DIGITS = {"MPa": ".1f", "kN": ".4g", "kN m": ".5g", "m/s": ".3f", "um": ".1f", "N/(mm um)": ".3f", "N^0.5/mm": ".3f"}
 
 
-def tell_rating(sheet: RatingSheet) -> None:
+def print_rating(sheet: RatingSheet) -> None:
     """Print a rating sheet with its assumptions and neglected effects."""
     print_text(f"Rating to {sheet.edition}, method B; {sheet.load}")
     for title, flanks in _meshes(sheet):

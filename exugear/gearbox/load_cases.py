@@ -248,7 +248,7 @@ def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) ->
         if bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None and bearing.model == "linear"
     ]
     light = {family: share for family, share in loads.least_shares.items() if share < LEAST_SHARE}
-    if not led or not light or not Variant.of(variant).on_bearings:
+    if not led or not light or not Variant.of(variant).has_bearings:
         return ""
     turned = [family for family, share in light.items() if share < 0.0]
     least = min(light.values())
@@ -259,12 +259,12 @@ def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) ->
     )
 
 
-def other_load_warning(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool = True) -> str:
+def other_load_warning(gearbox: Gearbox, loads: LoadSummary, uses_single_load: bool = True) -> str:
     """Return a warning that names meshes with another load than the static one of their STE tables; empty if none.
 
     Parameters
     ----------
-    of_one_load : whether the mesh model evaluates tables at the static load only
+    uses_single_load : whether the mesh model evaluates tables at the static load only
 
     Examples
     --------
@@ -279,7 +279,7 @@ def other_load_warning(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool =
         if least < 1.0 - OTHER_LOAD or greatest > 1.0 + OTHER_LOAD:
             shares = dict.fromkeys(f"{100.0 * share:.0f}" for share in (least, greatest))
             told.append(f"{family} {' to '.join(shares)} %")
-    if not told or not of_one_load:
+    if not told or not uses_single_load:
         return ""
     return (
         f"other load: {', '.join(told)} of the static load ({static_load_in_words(gearbox)}), at which transmission "

@@ -417,7 +417,7 @@ class ActingLoads:
         own = torque * sense > 0.0
         return torque[own], hub[own]
 
-    def by_bin(self, values: Floats) -> Floats:
+    def sum_by_bin(self, values: Floats) -> Floats:
         """Sum values of points (points,) into the bins of the distribution, (bins,)."""
         return np.asarray(np.bincount(self.points.bin, values, self.bins), dtype=np.float64)
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import choice_of, words_of
+from exugear.report.findings.context import choice_of, model_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
 from exugear.report.material import Part, ReportData, only_for
@@ -25,19 +25,19 @@ from exugear.system.statics import BalanceError
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState
 
-LIFTS = 1.0
+CONTACT_LOSS_RATIO = 1.0
 """Dynamic over mean force above which a linear bearing model would lose contact; the page warns then."""
 NOISE = 1e-3
 """Fraction of the mean transverse force below which an axial force is shown as zero."""
 NOISE_OF_ALL = 1e-5
 """Fraction of the largest force of all bearings below which a force is shown as zero."""
-MEANS = (
+RUN_UP_NOTE = (
     "Mean radial force over the middle third of the run-up, and largest zero-to-peak amplitude along an order (root "
     "sum square of both radial directions). For planet sets, the bearing with the largest amplitude. Axial force: of "
     "the shaft on the bearing or joint, positive along +z."
 )
 """Note above the table of forces in run-ups."""
-WAVES = (
+STEADY_NOTE = (
     "Largest zero-to-peak amplitude along an order at constant speed (root sum square of both radial "
     "directions). Planet bearing forces are multi-blade components (mean, cosine, sine). Static loads are listed "
     "below."
@@ -45,7 +45,7 @@ WAVES = (
 """Note above the table of forces at constant speed."""
 SEATS = 12
 """Maximum number of seats in the table of accelerations."""
-QUIET = 1e-3
+MIN_RELATIVE_ACCELERATION = 1e-3
 """Fraction of the largest acceleration below which a seat is not listed."""
 
 
@@ -84,9 +84,9 @@ def _forces(material: ReportData, data: Mapping[str, Any], group: RunGroup, vari
         f"{figures['words']}: dynamic force amplitude {100.0 * figures['amplitude'] / figures['mean']:.0f} % of the "
         "mean force. A linear bearing model neglects loss of contact."
         for figures in loudest.values()
-        if figures["mean"] and figures["amplitude"] > LIFTS * figures["mean"]
+        if figures["mean"] and figures["amplitude"] > CONTACT_LOSS_RATIO * figures["mean"]
     ]
-    words = WAVES if group.responses else MEANS
+    words = STEADY_NOTE if group.responses else RUN_UP_NOTE
     table = pieces.table(
         rows,
         ("dominant order",),
@@ -151,7 +151,7 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
     order = np.argsort(-amplitude.max(axis=(0, 1)))[:SEATS]
     rows = []
     for seat in order:
-        if not amplitude[..., seat].max() > QUIET * amplitude.max():
+        if not amplitude[..., seat].max() > MIN_RELATIVE_ACCELERATION * amplitude.max():
             break
         point, line = np.unravel_index(int(np.argmax(amplitude[..., seat])), amplitude.shape[:2])
         speed = abs(float(data["speed"][point]))
@@ -167,7 +167,7 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
             }
         )
     title = (
-        f"Accelerations at bearings: steady-state response of {words_of(choice_of(data.attrs))}, method "
+        f"Accelerations at bearings: steady-state response of {model_label(choice_of(data.attrs))}, method "
         f"{data.attrs['method']}"
     )
     words = (
@@ -180,7 +180,7 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
 
 def _line_words(material: ReportData, data: xr.Dataset, line: int) -> str:
     bases = tuple(str(name) for name in data["base"].to_numpy())
-    return material.words.told(line_name(tuple(int(n) for n in data["index"][line].to_numpy()), bases))
+    return material.words.labelled(line_name(tuple(int(n) for n in data["index"][line].to_numpy()), bases))
 
 
 def _seat_words(material: ReportData, signal: str) -> str:
@@ -190,9 +190,9 @@ def _seat_words(material: ReportData, signal: str) -> str:
 
 
 def _duties(material: ReportData, assembly: Assembly) -> str:
-    if not assembly.variant.on_bearings or not any(support.catalogue for support in assembly.supports):
+    if not assembly.variant.has_bearings or not any(support.catalogue for support in assembly.supports):
         return ""
-    name = words_of(assembly.choice)
+    name = model_label(assembly.choice)
     try:
         duties = bearing_duties(assembly)
     except (BalanceError, BearingError) as error:
@@ -219,7 +219,7 @@ def _meshes(material: ReportData, assembly: Assembly) -> str:
     """Tabulate mesh misalignment and face load distribution under static load; empty without solved tooth contact."""
     if not assembly.contacts.contacts:
         return ""
-    name = words_of(assembly.choice)
+    name = model_label(assembly.choice)
     duties = mesh_duties(assembly)
     rows = [_mesh_row(material, duty) for duty in duties]
     words = (

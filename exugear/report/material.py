@@ -85,7 +85,7 @@ def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
     return words[0].upper() + words[1:]
 
 
-def told_groups(groups: Sequence[RunGroup]) -> list[RunGroup]:
+def summary_groups(groups: Sequence[RunGroup]) -> list[RunGroup]:
     """List the groups that the command line reports: run-ups, or steady-state responses if there are none."""
     return [group for group in groups if not group.responses] or list(groups)
 

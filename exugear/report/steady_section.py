@@ -13,7 +13,7 @@ from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import Context, choice_of, words_of
+from exugear.report.findings.context import Context, choice_of, model_label
 from exugear.report.findings.words import figure_text
 from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name
 from exugear.report.web import html as pieces
@@ -28,12 +28,12 @@ from fe_ste.tools.arrays import Floats
 
 SHOWN = 20
 """Number of peaks in the table."""
-LEAST_SHARE, MOST_TOLD = 0.05, 3
+LEAST_SHARE, SHOWN_CONTRIBUTIONS = 0.05, 3
 """Minimum listed contribution to a resonance, and maximum number of contributions."""
 STRONG = 0.1
 """Fraction of the largest peak from which a crossing counts as strong."""
-TELL_FAST = "too fast"
-EXPLAINED, BESIDE = 5, 6
+TOO_FAST = "too fast"
+SIDEBAND_PEAKS, SHOWN_SIDEBANDS = 5, 6
 """Number of peaks with listed sidebands (the highest of each order), and maximum number of sidebands of each kind."""
 OTHER_KIND = "other"
 """Legend for modes that belong to no planet set."""
@@ -60,12 +60,12 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
     choice = choice_of(data.attrs)
     level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
-    label = f"{words_of(choice)}, method {level}"
+    label = f"{model_label(choice)}, method {level}"
     context.tell(f"steady-state response, {label}")
     found = peaks(data)[:SHOWN]
     rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
     rows = [_row(material, peak, data, rates) for peak in found]
-    lost = [row for row in rows if any(value == TELL_FAST for value in row.values())]
+    lost = [row for row in rows if any(value == TOO_FAST for value in row.values())]
     note = ""
     if lost:
         told = f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
@@ -116,7 +116,7 @@ def _shared_lines(material: ReportData, data: xr.Dataset) -> str:
     shared = str(data.attrs["shared_lines"])
     if not shared:
         return ""
-    told = material.words.told(shared)
+    told = material.words.labelled(shared)
     return pieces.paragraph(
         f"Note: coinciding orders of several meshes: {told}. Each is named after the simplest of them; its level is "
         "the sum of all.",
@@ -168,7 +168,7 @@ def _order_charts(
 
 def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> str:
     """Tabulate the contributions to the strongest resonances (method `linear`)."""
-    told = material.words.told
+    labelled = material.words.labelled
     bases = tuple(str(name) for name in data["base"].to_numpy())
     index = data["index"].to_numpy()
     rows = []
@@ -177,12 +177,12 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> s
         speed = abs(float(load["speed"]))
         rows.append(
             {
-                "order": told(line_name(tuple(int(n) for n in index[line]), bases)),
+                "order": labelled(line_name(tuple(int(n) for n in index[line]), bases)),
                 "speed / rpm": f"{speed / RPM:.2f}",
-                "excited by": told(_shares(load["meshes"].items())),
+                "excited by": labelled(_shares(load["meshes"].items())),
                 "responding modes": _shares((f"{frequency:.1f} Hz", share) for frequency, share in load["modes"]),
-                "sensitivity to stiffness of": told(_slopes_of(load["supports"])),
-                "sensitivity to inertia of": told(_slopes_of(load["bodies"])),
+                "sensitivity to stiffness of": labelled(_slopes_of(load["supports"])),
+                "sensitivity to inertia of": labelled(_slopes_of(load["bodies"])),
             }
         )
     if not rows:
@@ -300,11 +300,11 @@ def _mode_rows(
             "whirl": _whirl_text(whirl),
             "strongest crossing": "",
             "fraction / %": "",
-            "mode shape": material.words.told(diagram.names[mode]),
+            "mode shape": material.words.labelled(diagram.names[mode]),
         }
         if met is not None:
             line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
-            row["strongest crossing"] = f"{material.words.told(line)} at {abs(met['speed']) / RPM:.1f} rpm"
+            row["strongest crossing"] = f"{material.words.labelled(line)} at {abs(met['speed']) / RPM:.1f} rpm"
             row["fraction / %"] = f"{100.0 * met['share']:.1f}"
         rows.append(row)
     return rows
@@ -313,25 +313,25 @@ def _mode_rows(
 def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Peak]) -> str:
     """Tabulate the sidebands of the highest peaks, each with its cause."""
     context = material.context
-    told = material.words.told
+    labelled = material.words.labelled
     carriers = _carriers(context)
     loudest: dict[str, Peak] = {}
     for peak in found:
         loudest.setdefault(peak.line, peak)
     rows = []
-    for peak in list(loudest.values())[:EXPLAINED]:
-        bands = (*sidebands(data, peak)[:BESIDE], *planet_sidebands(data, peak, carriers)[:BESIDE])
+    for peak in list(loudest.values())[:SIDEBAND_PEAKS]:
+        bands = (*sidebands(data, peak)[:SHOWN_SIDEBANDS], *planet_sidebands(data, peak, carriers)[:SHOWN_SIDEBANDS])
         for band in bands:
             rows.append(
                 {
-                    "peak": f"{told(peak.line)} at {abs(peak.speed) / RPM:.1f} rpm",
+                    "peak": f"{labelled(peak.line)} at {abs(peak.speed) / RPM:.1f} rpm",
                     "peak / Hz": f"{peak.frequency:.1f}",
-                    "sideband": told(band.line.replace("mesh_force ", "force of mesh ")),
+                    "sideband": labelled(band.line.replace("mesh_force ", "force of mesh ")),
                     "at / Hz": f"{band.frequency:.1f}",
                     "offset / Hz": f"{band.frequency - peak.frequency:+.2f}",
                     "amplitude": _amplitude(band.line, band.amplitude),
                     "fraction / %": f"{100.0 * band.share:.1f}",
-                    "cause": told(band.cause),
+                    "cause": labelled(band.cause),
                 }
             )
     if not rows:
@@ -340,7 +340,7 @@ def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Pea
         "Sidebands of the highest peaks and their causes: orders at the speed of the peak due to other meshes or the "
     )
     table = pieces.table(rows, ("sideband", "cause"))
-    return pieces.folded(f"{said}rotating planets", pieces.paragraph(told(_passages(context, carriers))) + table)
+    return pieces.folded(f"{said}rotating planets", pieces.paragraph(labelled(_passages(context, carriers))) + table)
 
 
 def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> str:
@@ -374,11 +374,11 @@ def _carriers(context: Context) -> dict[str, tuple[str, float]]:
 
 def _shares(parts: Iterable[tuple[str, float]]) -> str:
     told = [f"{name} {100.0 * share:.0f} %" for name, share in parts if abs(share) >= LEAST_SHARE]
-    return ", ".join(told[:MOST_TOLD])
+    return ", ".join(told[:SHOWN_CONTRIBUTIONS])
 
 
 def _slopes_of(slopes: Mapping[str, float]) -> str:
-    strongest = sorted(slopes.items(), key=lambda item: -abs(item[1]))[:MOST_TOLD]
+    strongest = sorted(slopes.items(), key=lambda item: -abs(item[1]))[:SHOWN_CONTRIBUTIONS]
     return ", ".join(f"{name} {slope:+.2f}" for name, slope in strongest)
 
 
@@ -453,7 +453,7 @@ def _whirl_text(whirl: float) -> str:
 def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
     damping = _damping(peak, data)
     row: dict[str, object] = {
-        "order": material.words.told(peak.line),
+        "order": material.words.labelled(peak.line),
         "speed / rpm": f"{abs(peak.speed) / RPM:.2f}",
         "frequency / Hz": f"{peak.frequency:.1f}",
         "amplitude / µm": figure_text(1e6 * peak.amplitude),
@@ -464,7 +464,7 @@ def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, fl
         if damping is None:
             row[f"run-up {load_case}"] = "–"
         elif too_fast:
-            row[f"run-up {load_case}"] = TELL_FAST
+            row[f"run-up {load_case}"] = TOO_FAST
         else:
             row[f"run-up {load_case}"] = "slow enough"
     return row

@@ -11,26 +11,26 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.facts import SummaryCard, facts_of, facts_of_response
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.loudness import Resonance
-from exugear.report.findings.verdicts import CheckResult, verdicts_of
+from exugear.report.findings.verdicts import CheckResult, validity_checks
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Part, ReportData, group_words, only_for, told_groups
+from exugear.report.material import Part, ReportData, group_words, only_for, summary_groups
 from exugear.report.web import html as pieces
 from exugear.report.web.html import Cell
 from exugear.report.web.stage import stage_figure
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun
 
 
-def short_section(material: ReportData) -> Part:
+def summary_section(material: ReportData) -> Part:
     """Show the findings of each result group as cards; the command line prints the same sentences.
 
     It prints findings of steady-state responses only if there is no run-up; otherwise those of run-ups include them.
     """
     context = material.context
-    groups = told_groups(material.groups)
+    groups = summary_groups(material.groups)
     content = []
     for group in material.groups:
         facts = facts_of(context, material.words, group, material.variations)
-        verdicts = verdicts_of(context, group)
+        verdicts = validity_checks(context, group)
         if group in groups:
             several = f"{group_words(groups, group)}: " if len(groups) > 1 else ""
             context.notes.statements.append(f"{several}Load: {_load_of(material, group)}.")
@@ -52,7 +52,7 @@ def _group(material: ReportData, group: RunGroup, facts: Sequence[SummaryCard], 
     return (
         pieces.paragraph(scope, "note")
         + pieces.element("div", "".join(map(_card, facts)), class_="cards")
-        + verdict_list(verdicts)
+        + check_list(verdicts)
     )
 
 
@@ -83,7 +83,7 @@ def _card(fact: SummaryCard) -> str:
     )
 
 
-def verdict_list(verdicts: Sequence[CheckResult]) -> str:
+def check_list(verdicts: Sequence[CheckResult]) -> str:
     """List passed checks and warnings; hidden text distinguishes them in addition to colour."""
     entries = []
     for verdict in verdicts:
@@ -102,7 +102,7 @@ def verdict_list(verdicts: Sequence[CheckResult]) -> str:
 NO_MODES = "No modes computed; run `exugear modes` to show mode shapes."
 
 
-def rings_section(material: ReportData) -> Part:
+def waterfall_section(material: ReportData) -> Part:
     """Draw the waterfalls of all run-ups and steady-state responses; the ranking has the same text."""
     if not material.groups:
         return Part("")
@@ -169,7 +169,7 @@ def ranking_section(material: ReportData) -> Part:
         for group in material.groups
         for variant in reversed(list(group.runs))
     ]
-    for group in told_groups(material.groups):
+    for group in summary_groups(material.groups):
         _note_comparisons(material, group)
     if not tables:
         return Part("")
@@ -208,7 +208,7 @@ def _operating_resonances(material: ReportData, group: RunGroup) -> str:
 
 def _loud_row(material: ReportData, resonance: Resonance) -> dict[str, object]:
     row: dict[str, object] = {
-        "Excited by": material.words.told(resonance.line),
+        "Excited by": material.words.labelled(resonance.line),
         "Speed / rpm": Cell(figure_text(abs(resonance.speed) / RPM, 4), abs(resonance.speed) / RPM),
         "Frequency / Hz": Cell(f"{resonance.frequency:.1f}", resonance.frequency),
     }
@@ -247,8 +247,8 @@ def _rules() -> str:
     return (
         "A resonance is a peak with a prominence of at least 6 dB along an order; peaks of several orders at one "
         f"frequency are one resonance. Absent in a model: {AbsenceRule().description}, with every window length. "
-        f"Window-dependent (run-ups): not found with all window lengths, {factors} times the window of the diagram. With "
-        "a steady-state response, levels at constant speed are ranked: a run-up that is too fast underestimates a "
+        f"Window-dependent (run-ups): not found with all window lengths, {factors} times the window of the diagram. "
+        "With a steady-state response, levels at constant speed are ranked: a run-up that is too fast underestimates a "
         f"resonance and is marked if {BUILT_UP:g} dB or more are missing. At constant speed ± is half the width of a "
         "peak 3 dB below its maximum."
     )
@@ -307,7 +307,7 @@ def _row(
     row["Mode / Hz"] = Cell(
         f"{finding.mode_frequency:.1f}" if matched else "–", finding.mode_frequency if matched else -1.0
     )
-    row["Mode shape; strain energy"] = _story(material, group, run, resonance)
+    row["Mode shape; strain energy"] = _mode_text(material, group, run, resonance)
     if group.responses:
         return row
     row["Windows"] = Cell(
@@ -336,19 +336,19 @@ def _constant_speed_cell(resonance: RankedResonance, loudest: float) -> Cell:
     return Cell(f"{at.level:.1f}, {at.frequency:.0f} Hz", at.level, bar=1.0 - (loudest - at.level) / SHOWN_SPAN)
 
 
-def _story(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> str:
+def _mode_text(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> str:
     mode = resonance.finding.mode
     modes = run.modes
     if resonance.finding.mode_name and modes is None:
-        return material.words.told(resonance.finding.mode_name)
+        return material.words.labelled(resonance.finding.mode_name)
     if modes is None:
         if group.responses:
             return NOT_NEAR
         return "no modes computed"
     if mode is None:
         return NOT_NEAR
-    gives = percentages(material.words.gives(modes, mode))
-    return f"{material.words.moves(modes, mode)}; {gives}"
+    energies = percentages(material.words.strain_energy(modes, mode))
+    return f"{material.words.moves(modes, mode)}; {energies}"
 
 
 def _note_comparisons(material: ReportData, group: RunGroup) -> None:

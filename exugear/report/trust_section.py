@@ -13,7 +13,7 @@ import xarray as xr
 
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import choice_of, words_of
+from exugear.report.findings.context import choice_of, model_label
 from exugear.report.findings.verdicts import run_figures
 from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name
 from exugear.report.web import html as pieces
@@ -51,8 +51,8 @@ GLOSSARY = {
     "inertia set": "One of the sets of masses and inertias in the gearbox file.",
     "mesh model": "Mesh force as a function of gear motion; line_of_action: along the line of action, time-varying "
     "stiffness.",
-    "housing stiffness factor": "Stiffness of a bearing with the housing, over the stiffness of the bearing alone; 1: rigid "
-    "housing.",
+    "housing stiffness factor": "Stiffness of a bearing with the housing, over the stiffness of the bearing alone; 1: "
+    "rigid housing.",
     "window-dependent": "Of a resonance: found with some window lengths of the analysis but not with all.",
     "steady-state response": "Vibration at constant speed, the limit of an infinitely slow run-up.",
     "Campbell diagram": "Eigenfrequencies over speed, with the orders that can excite them.",
@@ -150,7 +150,7 @@ def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, 
     own, other = (1e6 * (values - middle) for values in found.overall)
     html, data = chart(
         f"exudyn-{model_name(choice_of(run.attributes))}",
-        f"Overall transmission error by both solvers, {words_of(choice_of(run.attributes))}",
+        f"Overall transmission error by both solvers, {model_label(choice_of(run.attributes))}",
         "Deviation from the mean of the Exudyn result.",
         found.words,
         [Curve("compiled solver", found.time, own), Curve("Exudyn", found.time, other, "dashed")],
@@ -164,7 +164,7 @@ def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, 
 def _response_row(data: xr.Dataset) -> dict[str, object]:
     speed = np.abs(data["speed"].to_numpy()) / RPM
     return {
-        "steady-state response": f"{words_of(choice_of(data.attrs))}, method {data.attrs['method']}",
+        "steady-state response": f"{model_label(choice_of(data.attrs))}, method {data.attrs['method']}",
         "speeds": data.sizes["point"],
         "lowest speed / rpm": f"{speed.min():.1f}",
         "highest speed / rpm": f"{speed.max():.1f}",
@@ -218,10 +218,10 @@ def _provenance(material: ReportData) -> str:
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
     hashes |= {
-        f"steady-state response {words_of(choice_of(data.attrs))}, {data.attrs['method']}": data.attrs["input_hash"]
+        f"steady-state response {model_label(choice_of(data.attrs))}, {data.attrs['method']}": data.attrs["input_hash"]
         for data in results.steady
     }
-    hashes |= {f"modes {words_of(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
+    hashes |= {f"modes {model_label(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
     rows = [{"result": name, "SHA-256 of its input": sha256} for name, sha256 in hashes.items()]
     versions = [f"Python {platform.python_version()}", *(f"{name} {_version(name)}" for name in PACKAGES)]
     carried = [f"{library.name} {library.version}" for library in libraries()]

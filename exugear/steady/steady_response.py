@@ -269,7 +269,7 @@ class SteadyResponse(ReprMixin):
 
 CHECKED, MORE = 10, 1.5
 """Number of highest peaks that are recomputed, and the factor on the number of harmonics."""
-EXPLAINED = 20
+PEAKS_WITH_CONTRIBUTIONS = 20
 """Crossings whose peaks are taken apart."""
 ROUNDS = 5
 """Times that tops are looked for between speeds, at most."""
@@ -501,7 +501,7 @@ def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
 def _contributions(gearset: HarmonicBalanceModel, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
     """Find the contributions to the orders at the strongest crossings, each at its maximum."""
     explained = []
-    for crossing in found[:EXPLAINED]:
+    for crossing in found[:PEAKS_WITH_CONTRIBUTIONS]:
         speed = loudest_near(gearset, crossing.speed, 2.0 * crossing.damping, crossing.line)
         explained.append((crossing.line, contributions(gearset, speed, crossing.line)))
     return tuple(explained)

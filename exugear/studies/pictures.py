@@ -100,7 +100,7 @@ def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
         draw = _draw_bars
     for axes, rows, label in zip(grid.flat, stacked, labels, strict=False):
         draw(axes, values, along, rows, _combinations(values, by))
-        _tell_of_infinite(axes, rows)
+        _mark_infinite(axes, rows)
         axes.set_title(f"{', '.join(panels)} {label}" if panels else "")
     for axes in grid.flat[len(labels) :]:
         axes.set_visible(False)
@@ -109,7 +109,7 @@ def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
         figure.legend(handles, names, title=by[0], loc="outside right upper")
 
 
-def _tell_of_infinite(axes: Axes, rows: Floats) -> None:
+def _mark_infinite(axes: Axes, rows: Floats) -> None:
     """State the number of infinite values, which the scale cannot show."""
     count = int(np.isinf(rows).sum())
     if count:

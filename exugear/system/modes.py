@@ -229,7 +229,7 @@ class Modes(ReprMixin):
             "method_version": MODES,
             "housing_factor": assembly.housing_factor,
             "bearing_laws": assembly.bearing_laws,
-            "mesh_contact": assembly.contacts.in_words,
+            "mesh_contact": assembly.contacts.description,
             "growth_rate": self.growth_rate,
             "near_unconverged_states": ", ".join(meshes_near_unconverged(assembly)),
         }

@@ -60,7 +60,7 @@ def life(
         if as_json:
             print_json({"case": str(case), **summary(data), "file": str(project.life_path)})
         else:
-            _tell(data)
+            _print_result(data)
             say(f"Results: {project.life_path}; CSV tables and a picture in the same folder")
         _fail_if_short(data, project.life_path)
 
@@ -89,7 +89,7 @@ BEARING_LEGEND = (
 )
 
 
-def _tell(data: xr.Dataset) -> None:
+def _print_result(data: xr.Dataset) -> None:
     from exugear.life.life_file import limits
 
     for line in json.loads(data.attrs["failures"]):

@@ -145,10 +145,10 @@ def steady(
         _refuse_what_has_none(project)
         project.begin()
         project.prepare()
-        _tell(project, settings, project.steady(settings), as_json)
+        _print_result(project, settings, project.steady(settings), as_json)
 
 
-def _tell_of_other_loads(gearbox: Gearbox) -> None:
+def _warn_of_other_loads(gearbox: Gearbox) -> None:
     """Print warnings about load cases whose mesh loads differ from the static load used for the response."""
     from exugear.gearbox.load_cases import load_in_words, other_load_warning, static_load_in_words, summarise_loads
 
@@ -181,18 +181,18 @@ def _settings(
     return SteadySettings(asked, method.value, harmonics, branches=branches)
 
 
-def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
+def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
     from exugear.gearbox.load_cases import static_load_in_words
     from exugear.gearbox.units import RPM
     from exugear.report.findings.loudness import ranking_of
     from exugear.system.modal_damping import damping_in_words
 
-    _tell_of_other_loads(project.gearbox)
+    _warn_of_other_loads(project.gearbox)
     growth = float(data.attrs["growth_rate"])
     ranking = ranking_of(data)
-    _tell_of_stability(data, growth)
-    pulling = _tell_of_pulls(data)
-    swinging = _tell_of_bearings(data)
+    _warn_of_instability(data, growth)
+    pulling = _warn_of_tensile_forces(data)
+    swinging = _warn_of_bearing_loads(data)
     if data.attrs["shared_lines"]:
         note(f"Coinciding orders of several meshes, each named after one of them: {data.attrs['shared_lines']}")
     excited = bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
@@ -202,9 +202,9 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
             "all amplitudes are zero; use --mesh-model line_of_action"
         )
     else:
-        _tell_of_harmonics(data)
-        _tell_of_range(ranking)
-    wandering = _tell_of_wandering_loads(project) if excited else ()
+        _print_harmonics(data)
+        _print_speed_range(ranking)
+    wandering = _warn_of_shuttling(project) if excited else ()
     if as_json:
         summary = _whole_summary(project, settings, data, ranking, pulling, excited)
         remarks = {
@@ -321,7 +321,7 @@ def _speeds_of(ranking: Ranking) -> str:
     return f"{low:.4g} to {high:.4g} rpm"
 
 
-def _tell_of_range(ranking: Ranking) -> None:
+def _print_speed_range(ranking: Ranking) -> None:
     """Print which speed range is ranked, and notes if all speeds are ranked or no resonance was found."""
     if ranking.whole:
         note(
@@ -344,7 +344,7 @@ def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
         raise FailedError(f"invalid steady-state response: disturbances grow at up to {growth:.3g} 1/s (unstable)")
 
 
-def _tell_of_pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
+def _warn_of_tensile_forces(data: xr.Dataset) -> tuple[TensileMesh, ...]:
     """Print which meshes have tensile forces, if the mesh model neglects contact loss."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import pulls
@@ -368,7 +368,7 @@ def _pull_summary(pull: TensileMesh) -> dict[str, Any]:
     return {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
 
 
-def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
+def _warn_of_instability(data: xr.Dataset, growth: float) -> None:
     """Print the speeds without a converged or stable steady state."""
     from exugear.gearbox.units import RPM
 
@@ -383,18 +383,18 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
         note(f"Warning: unstable: disturbances grow at up to {growth:.3g} 1/s{where}; no steady state", style="yellow")
 
 
-def _tell_of_wandering_loads(project: Project) -> tuple[Shuttling, ...]:
+def _warn_of_shuttling(project: Project) -> tuple[Shuttling, ...]:
     """Print a warning if the shuttling moment is significant but neglected by the mesh model."""
     from exugear.system.tooth_mesh.laws.registry import LAWS
-    from exugear.system.tooth_mesh.tables import wandering_loads
+    from exugear.system.tooth_mesh.tables import shuttling_pairs
 
     law = LAWS[project.choice.mesh_model]
     if law.moves_load or not law.needs_tables or project.choice.variant.spins_only:
         return ()
-    found = wandering_loads(project.gearbox, project.folder)
+    found = shuttling_pairs(project.gearbox, project.folder)
     if found and found[0].over_error > NOTICED_WAY:
         note(
-            f"Warning: {found[0].in_words}. The shuttling moment, {found[0].over_error:.2g} times the excitation by "
+            f"Warning: {found[0].description}. The shuttling moment, {found[0].over_error:.2g} times the excitation by "
             f"the transmission error, is neglected by the mesh model {law.name}; resonances with tilting gears may be "
             "many times higher. Use --mesh-model line_of_action.",
             style="yellow",
@@ -418,7 +418,7 @@ def _known(value: float) -> float | None:
     return None
 
 
-def _tell_of_harmonics(data: xr.Dataset) -> None:
+def _print_harmonics(data: xr.Dataset) -> None:
     """Print the number of harmonics, their truncation error, and the effect of more harmonics."""
     mesh, share = max(_left_out(data).items(), key=lambda own: own[1])
     change = _known(float(data.attrs["change_with_more"]))
@@ -435,7 +435,7 @@ def _tell_of_harmonics(data: xr.Dataset) -> None:
         note(text)
 
 
-def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
+def _warn_of_bearing_loads(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
     """Print how nonlinear bearings were modelled, effects of unequal planet loads, and large dynamic bearing loads."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import STRAINED, bearing_swings

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from exugear.exchange.rexs import json_additions, xml_additions
-from exugear.exchange.rexs.additions import Addition, by_place
+from exugear.exchange.rexs.additions import Addition, group_by_place
 from exugear.exchange.rexs.parsing import is_json, parse_model
 from exugear.exchange.rexs.tree import Model, RexsError, plain
 from fe_ste.tools.files import FileError, open_regular
@@ -80,7 +80,7 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
     """
     content = _bytes_of(path)
     model = parsed(content, path)
-    placed = by_place(additions)
+    placed = group_by_place(additions)
     cases = {case.number for case in model.load_cases}
     for case, component in placed:
         if component not in model.components or not (case is None or case in cases):

@@ -12,7 +12,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
-from exugear.report.findings.loudness import Loudness, Ranking
+from exugear.report.findings.loudness import PeakAmplitude, Ranking
 from exugear.report.findings.verdicts import GAIN, BestChange, ModelVariations, best_change
 from exugear.report.findings.words import Labels, figure_text
 from exugear.results.spectra.waterfall import order_lines
@@ -56,12 +56,12 @@ def shift_of(frequency: float, share: float, kind: str, step: float = STEP) -> f
     return frequency * (math.pow(1.0 + step * share, power) - 1.0)
 
 
-def levers_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[Sensitivity, ...]:
+def sensitivities_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[Sensitivity, ...]:
     """List sensitivities of a mode: stiffnesses, then inertias, each by effect; planets of a set vary together."""
     frequency = float(modes["frequency"][index])
     kinetic = modes["kinetic_energy_share"].isel(mode=index).sum("motion").to_numpy()
     bodies = words.gathered(dict(zip(map(str, modes["body"].to_numpy()), map(float, kinetic), strict=True)))
-    parts = [("stiffness", words.gives(modes, index)), ("inertia", bodies)]
+    parts = [("stiffness", words.strain_energy(modes, index)), ("inertia", bodies)]
     levers = [
         Sensitivity(what, kind, share, shift_of(frequency, share, kind))
         for kind, shares in parts
@@ -83,7 +83,7 @@ AROUND_RATED = 1.25
 
 MOST_WORDS = 25
 """Maximum number of words in the text of a card."""
-LOUDER = 1.0
+MIN_EXCESS_DB = 1.0
 """Excess (dB) from which a resonance that the run-up does not resolve is reported first."""
 
 
@@ -163,9 +163,8 @@ def facts_of_response(words: Labels, response: xr.Dataset) -> tuple[SummaryCard,
     if top is None:
         return ()
     level = 20.0 * math.log10(top.amplitude / 1e-6)
-    said = (
-        f"Order {words.told(top.line)}. Overall TE {amplitude_text(level)} ({figure_text(level)} dB), constant speed."
-    )
+    amplitude = f"{amplitude_text(level)} ({figure_text(level)} dB)"
+    said = f"Order {words.labelled(top.line)}. Overall TE {amplitude}, constant speed."
     beside = f"at {speed_text(top.speed)}, {Variant.of(choice_of(response.attrs).variant).label}"
     return (SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "steady"),)
 
@@ -198,7 +197,7 @@ def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
     if resonance.finding.mode is not None and modes is not None:
         return f"Mode: {words.moves(modes, resonance.finding.mode)}."
     if resonance.finding.mode_name:
-        return f"Mode: {words.told(resonance.finding.mode_name)}."
+        return f"Mode: {words.labelled(resonance.finding.mode_name)}."
     return ""
 
 
@@ -212,12 +211,12 @@ def _operating_resonance(words: Labels, group: RunGroup, ranking: Ranking) -> Su
     parts = [quantity_text(words, name, own, ranking) for name, own in top.loudness.items()]
     near = (own for own in group.ranked[group.main] if abs(own.frequency / top.frequency - 1.0) < SAME_MODE)
     moves = next((told for told in (_moves(words, group, own) for own in near) if told), "")
-    said = _short(f"Order {words.told(top.line)}.", *(f"{part[:1].upper()}{part[1:]}." for part in parts), moves)
+    said = _short(f"Order {words.labelled(top.line)}.", *(f"{part[:1].upper()}{part[1:]}." for part in parts), moves)
     beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
     return SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "ranking")
 
 
-def quantity_text(words: Labels, name: str, loudness: Loudness, ranking: Ranking) -> str:
+def quantity_text(words: Labels, name: str, loudness: PeakAmplitude, ranking: Ranking) -> str:
     """Return the amplitude of a resonance in one of the three quantities as text, with rank and location."""
     count = sum(other.loudness[name].place is not None for other in ranking.resonances)
     place = "no peak" if loudness.place is None else f"rank {loudness.place}/{count}"
@@ -233,7 +232,7 @@ def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonan
     """Return a resonance that is higher at constant speed than all that the run-up resolves; None if there is none."""
     levels = group.constant.get(group.main)
     found = None if levels is None else levels.highest(order_lines(context.gearbox))
-    if found is None or found[1].level < top.loudness + LOUDER:
+    if found is None or found[1].level < top.loudness + MIN_EXCESS_DB:
         return None
     line, at = found
     said = _short(
@@ -312,7 +311,7 @@ def _lever(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]
     modes = group.runs[group.main].modes
     if top is None or modes is None or top.finding.mode is None:
         return None
-    levers = levers_of(words, modes, top.finding.mode)
+    levers = sensitivities_of(words, modes, top.finding.mode)
     stiffest = next((lever for lever in levers if lever.kind == "stiffness"), None)
     heaviest = next((lever for lever in levers if lever.kind == "inertia"), None)
     if stiffest is None:

@@ -26,10 +26,10 @@ from exugear.report.findings.loudness import (
     Ranking,
     highest_drawn,
     is_over_speed,
+    most_complete_levels,
+    most_complete_response,
     ranking_of,
     response_spectra,
-    truest_of,
-    truest_response,
 )
 from exugear.report.findings.words import Labels
 from exugear.results.run_file import read_run
@@ -182,9 +182,9 @@ def _group_runs(
     context.tell(f"other windows, {', '.join(key)}")
     by_variant = {run.variant: run for run in sorted(runs, key=lambda run: OFFERED.index(Variant.of(run.variant)))}
     windows = other_windows(list(by_variant.values()), order_lines(context.gearbox))
-    levels = {variant: truest_of(results.steady, Choice(variant, *key[1:])) for variant in by_variant}
+    levels = {variant: most_complete_levels(results.steady, Choice(variant, *key[1:])) for variant in by_variant}
     constant = {variant: level for variant, level in levels.items() if level is not None}
-    response = truest_response(results.steady, Choice(list(by_variant)[-1], *key[1:]))
+    response = most_complete_response(results.steady, Choice(list(by_variant)[-1], *key[1:]))
     loud = response if response is not None and is_over_speed(response) else None
     return _group(f"run-up {key[0]}", key, by_variant, windows, constant, {}, loud)
 
@@ -311,7 +311,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class LoudestOrder:
+class DominantOrder:
     """Highest peak of a channel along the orders."""
 
     line: OrderLine
@@ -402,14 +402,14 @@ def _waterfall(values: Floats, data: _Signals, run: VariantRun) -> Waterfall:
     )
 
 
-def loudest_order(spectra: Waterfall, lines: Sequence[OrderLine]) -> LoudestOrder | None:
+def dominant_order(spectra: Waterfall, lines: Sequence[OrderLine]) -> DominantOrder | None:
     """Find the maximum of a waterfall along its orders; None where no order lies in its frequency band."""
     levels = np.array([spectra.along(line) for line in lines]).reshape(len(lines), spectra.time.size)
     if not np.isfinite(levels).any():
         return None
     line, frame = divmod(int(np.nanargmax(levels)), levels.shape[1])
     speed = float(spectra.speed[frame])
-    return LoudestOrder(
+    return DominantOrder(
         lines[line],
         spectra.reference * 10.0 ** (float(levels[line, frame]) / 20.0),
         speed,

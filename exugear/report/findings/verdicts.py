@@ -24,7 +24,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
-from exugear.results.folder import kept_case
+from exugear.results.folder import read_stored_gearbox
 from exugear.results.run_file import read_run, verdict_of
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.steady.peaks import bearing_swings, pulls
@@ -81,7 +81,7 @@ def run_figures(run: VariantRun) -> RunFigures:
     return RunFigures(energy_residual(data), times, float(data["time"][-1]))
 
 
-def verdicts_of(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
+def validity_checks(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
     """Check the main variant of a group; passed checks come first."""
     case = context.gearbox.case
     run = group.runs[group.main]
@@ -221,7 +221,7 @@ class ModelVariations:
 
 
 @dataclass(frozen=True)
-class Guarded:
+class TrackedMode:
     """Mode over a parameter, with the largest amplification of the modes near it."""
 
     frequency: Floats
@@ -251,7 +251,7 @@ def begin_variations(context: Context, modes: Mapping[Choice, xr.Dataset], execu
 
 def varied_models(folder: Path, allow_dir: Path | None, models: Sequence[Choice]) -> VariedModels:
     """Vary the assumed parameters of models of the gearbox file stored in a folder; for `begin_variations`."""
-    context = Context(folder, kept_case(folder, Permissions(below=allow_dir)), None, lambda what: None)
+    context = Context(folder, read_stored_gearbox(folder, Permissions(below=allow_dir)), None, lambda what: None)
     return {
         model: {parameter.label: _figures(parameter) for parameter in _parameters(context, model)} for model in models
     }
@@ -309,19 +309,19 @@ def default_place(variation: ParameterVariation) -> int:
     return int(np.argmin(np.abs(np.array(variation.parameter.values) - variation.parameter.default)))
 
 
-def guarded(variation: ParameterVariation, frequency: float) -> Guarded:
+def track_mode(variation: ParameterVariation, frequency: float) -> TrackedMode:
     """Track the mode at a frequency (Hz, at the default value), with the largest amplification within an octave."""
     place = default_place(variation)
     mode = int(np.argmin(np.abs(variation.frequency[place] - frequency)))
     centre = float(variation.frequency[place, mode])
     inside = (variation.frequency > centre / OCTAVE) & (variation.frequency < centre * OCTAVE)
     loudest = np.where(inside, variation.amplification, 0.0).max(axis=1)
-    return Guarded(variation.frequency[:, mode], variation.amplification[:, mode], loudest)
+    return TrackedMode(variation.frequency[:, mode], variation.amplification[:, mode], loudest)
 
 
 def best_change(variation: ParameterVariation, frequency: float) -> BestChange:
     """Find the parameter value with the smallest maximum amplification within an octave of a mode."""
-    loudest = guarded(variation, frequency).loudest
+    loudest = track_mode(variation, frequency).loudest
     index = int(np.argmin(loudest))
     gain = 20.0 * np.log10(max(loudest[default_place(variation)], 1e-300) / max(loudest[index], 1e-300))
     parameter = variation.parameter
