@@ -273,16 +273,16 @@ def other_load_warning(gearbox: Gearbox, loads: LoadSummary, uses_single_load: b
     >>> other_load_warning(half, summarise_loads(half, half.load_cases["reference"]))
     'other load: sun_planet 50 %, ring_planet 50 %, intermediate 50 %, high_speed 50 % of the static load ...
     """
-    told = []
+    entries = []
     for family, least in loads.least_shares.items():
         greatest = loads.greatest_shares[family]
         if least < 1.0 - OTHER_LOAD or greatest > 1.0 + OTHER_LOAD:
             shares = dict.fromkeys(f"{100.0 * share:.0f}" for share in (least, greatest))
-            told.append(f"{family} {' to '.join(shares)} %")
-    if not told or not uses_single_load:
+            entries.append(f"{family} {' to '.join(shares)} %")
+    if not entries or not uses_single_load:
         return ""
     return (
-        f"other load: {', '.join(told)} of the static load ({static_load_in_words(gearbox)}), at which transmission "
+        f"other load: {', '.join(entries)} of the static load ({static_load_in_words(gearbox)}), at which transmission "
         "error and stiffness are computed; add --at-load-case to the command run, or use --mesh-model table, which "
         "covers a range of loads"
     )

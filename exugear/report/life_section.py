@@ -156,12 +156,12 @@ def _rows(
     data: xr.Dataset, name: str, first: str, columns: dict[str, tuple[str, float, str]]
 ) -> list[dict[str, object]]:
     return [
-        {first: label, **{title: _told(data, name, place, *column) for title, column in columns.items()}}
+        {first: label, **{title: _cell(data, name, place, *column) for title, column in columns.items()}}
         for place, label in enumerate(data[name].to_numpy().tolist())
     ]
 
 
-def _told(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> Cell | str:
+def _cell(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> Cell | str:
     value = factor * float(data[f"{name}_{key}"][place])
     if math.isnan(value):
         return "–"
@@ -194,9 +194,9 @@ def _study(study: StoredStudy) -> str:
         f", {count} {word}" for count, word in ((study.failed, "failed"), (study.missing, "missing")) if count
     )
     old = "" if study.fits else pieces.paragraph("The gearbox file has changed; run the study again.", "warning")
-    told = f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}"
+    text = f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}"
     shown = [_picture_of_studies(path) for path in study.pictures if path.stat().st_size <= LARGEST_PICTURE]
-    return pieces.section(study.title, pieces.paragraph(told), old, *shown, level=3)
+    return pieces.section(study.title, pieces.paragraph(text), old, *shown, level=3)
 
 
 def _picture_of_studies(path: Path) -> str:

@@ -240,13 +240,13 @@ def _matches(material: ReportData, target: float) -> Iterator[str]:
             f"No value within the varied ranges shifts a mode with TE participation to {target:.0f} Hz."
         )
         return
-    told = "; ".join(
+    entries = "; ".join(
         f"{modelmatch.assumption} instead of {modelmatch.match.parameter.default:g} ({model_label(modelmatch.model)}: "
         f"{modelmatch.match.frequency:.0f} Hz)"
         for modelmatch in modelmatchs
     )
     material.context.notes.statements.append(
-        f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {told}."
+        f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
     )
     rows = [_match_row(material, modelmatch, target) for modelmatch in modelmatchs]
     yield pieces.table(rows, ("inertia set", "assumption", "mode shape"), caption="Assumptions", name="matches")
@@ -352,13 +352,13 @@ def _variations(
     material: ReportData, group: RunGroup, variations: ModelVariations, frequency: float, charts: dict[str, Any]
 ) -> str:
     figures = []
-    told = []
+    entries = []
     for number, variation in enumerate(variations.variations):
         parameter = variation.parameter
         seen = track_mode(variation, frequency)
         best = best_change(variation, frequency)
         label = material.words.parameter(parameter.label)
-        told.append(f"{label.partition(' / ')[0]}: {best_words(material.words, best)}")
+        entries.append(f"{label.partition(' / ')[0]}: {best_words(material.words, best)}")
         values = np.array(parameter.values)
         html, data = chart(
             f"variation-{group.name}-{number}",
@@ -385,7 +385,7 @@ def _variations(
         pieces.element("h3", "Parameter variation")
         + pieces.paragraph(words, "note")
         + pieces.element("div", "".join(figures), class_="grid")
-        + pieces.bullets(told)
+        + pieces.bullets(entries)
     )
 
 

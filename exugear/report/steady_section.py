@@ -68,9 +68,9 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
     lost = [row for row in rows if any(value == TOO_FAST for value in row.values())]
     note = ""
     if lost:
-        told = f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
-        context.notes.statements.append(f"Steady-state response, {label}: {told}")
-        note = pieces.paragraph(f"Warning: {told}", "warning")
+        message = f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
+        context.notes.statements.append(f"Steady-state response, {label}: {message}")
+        note = pieces.paragraph(f"Warning: {message}", "warning")
     growth = float(data.attrs["growth_rate"])
     others = [_other_load(run) for run in runs if run.attributes.get("table_doubt")]
     context.notes.statements.extend(f"Steady-state response, {label}: {other}" for other in others)
@@ -116,9 +116,9 @@ def _shared_lines(material: ReportData, data: xr.Dataset) -> str:
     shared = str(data.attrs["shared_lines"])
     if not shared:
         return ""
-    told = material.words.labelled(shared)
+    orders = material.words.labelled(shared)
     return pieces.paragraph(
-        f"Note: coinciding orders of several meshes: {told}. Each is named after the simplest of them; its level is "
+        f"Note: coinciding orders of several meshes: {orders}. Each is named after the simplest of them; its level is "
         "the sum of all.",
         "warning",
     )
@@ -132,10 +132,10 @@ def _remarks(data: xr.Dataset, name: str) -> str:
         (abs(float(load["speed"])), f"not converged: {load['reason']}")
         for load in json.loads(str(data.attrs["not_converged"]))
     ]
-    told = sorted([own for own in said if own[1]] + lost)
-    if not told:
+    entries = sorted([own for own in said if own[1]] + lost)
+    if not entries:
         return ""
-    rows: list[dict[str, object]] = [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in told]
+    rows: list[dict[str, object]] = [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in entries]
     table = pieces.table(rows, ("remark",), caption="Warnings by speed", name=name)
     return pieces.folded(f"Warnings at {len(rows)} of {len(speeds) + len(lost)} speeds", table)
 
@@ -253,9 +253,9 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
 
 def _speed_ranges(context: Context) -> str:
     """List the speed ranges of the load cases as text."""
-    told = [f"{name}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm" for name, (slow, fast) in _ranges(context).items()]
-    if told:
-        return pieces.paragraph(f"Speeds of the load cases. {'; '.join(told)}.", "note")
+    entries = [f"{name}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm" for name, (slow, fast) in _ranges(context).items()]
+    if entries:
+        return pieces.paragraph(f"Speeds of the load cases. {'; '.join(entries)}.", "note")
     return ""
 
 
@@ -347,15 +347,15 @@ def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> st
     """State the planet passing order at the housing, and the ratio of the mesh order to it."""
     gearbox = context.gearbox
     orders = {mesh.family: gearbox.train.mesh_frequencies(2.0 * np.pi)[mesh.name] for mesh in gearbox.meshes}
-    told = []
+    entries = []
     for family, (carrier, ratio) in carriers.items():
         count = sum(mesh.family == family for mesh in gearbox.meshes)
         passage = count * abs(ratio)
-        told.append(
+        entries.append(
             f"{family}: {count} planets of {carrier} pass a point of the housing at order {passage:g}; the mesh order "
             f"{orders[family]:g} is {orders[family] / passage:g} times this."
         )
-    return " ".join(told)
+    return " ".join(entries)
 
 
 def _amplitude(line: str, amplitude: float) -> str:
@@ -373,8 +373,8 @@ def _carriers(context: Context) -> dict[str, tuple[str, float]]:
 
 
 def _shares(parts: Iterable[tuple[str, float]]) -> str:
-    told = [f"{name} {100.0 * share:.0f} %" for name, share in parts if abs(share) >= LEAST_SHARE]
-    return ", ".join(told[:SHOWN_CONTRIBUTIONS])
+    entries = [f"{name} {100.0 * share:.0f} %" for name, share in parts if abs(share) >= LEAST_SHARE]
+    return ", ".join(entries[:SHOWN_CONTRIBUTIONS])
 
 
 def _slopes_of(slopes: Mapping[str, float]) -> str:

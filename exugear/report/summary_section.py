@@ -139,8 +139,10 @@ def _without_scripts(words: str) -> str:
 def _groups_text(groups: Sequence[RunGroup]) -> str:
     group = groups[0]
     loudest = [own for own in group.ranked[group.main] if own.steady][:3]
-    told = [f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.loudness)} dB" for own in loudest]
-    return f"Highest resonances, {Variant.of(group.main).label}, {group.source}: {'; '.join(told) or 'none found'}."
+    entries = [
+        f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.ranking_level)} dB" for own in loudest
+    ]
+    return f"Highest resonances, {Variant.of(group.main).label}, {group.source}: {'; '.join(entries) or 'none found'}."
 
 
 # Section "Resonance ranking": exciting mesh, comparison of variants, and mode shape of each resonance
@@ -192,7 +194,7 @@ def _operating_resonances(material: ReportData, group: RunGroup) -> str:
         return ""
     low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
     which = "all speeds" if ranking.whole else "operating speed range"
-    rows = [_loud_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
+    rows = [_operating_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
     label = Variant.of(group.main).label
     title = f"Highest {len(rows)} resonances at constant speed, {label}, {which} ({low} to {high} rpm)"
     table = pieces.table(
@@ -206,18 +208,18 @@ def _operating_resonances(material: ReportData, group: RunGroup) -> str:
     return pieces.element("h3", pieces.text(title)) + table + pieces.paragraph(note, "note")
 
 
-def _loud_row(material: ReportData, resonance: Resonance) -> dict[str, object]:
+def _operating_row(material: ReportData, resonance: Resonance) -> dict[str, object]:
     row: dict[str, object] = {
         "Excited by": material.words.labelled(resonance.line),
         "Speed / rpm": Cell(figure_text(abs(resonance.speed) / RPM, 4), abs(resonance.speed) / RPM),
         "Frequency / Hz": Cell(f"{resonance.frequency:.1f}", resonance.frequency),
     }
-    for name, loudness in resonance.loudness.items():
+    for name, peak in resonance.amplitudes.items():
         title, factor = QUANTITIES[name]
-        place = "" if loudness.place is None else f" ({loudness.place})"
-        row[title] = Cell(f"{figure_text(factor * loudness.amplitude)}{place}", loudness.amplitude)
+        place = "" if peak.place is None else f" ({peak.place})"
+        row[title] = Cell(f"{figure_text(factor * peak.amplitude)}{place}", peak.amplitude)
         if name == "force":
-            row["Bearing"] = material.words.of(loudness.at)
+            row["Bearing"] = material.words.of(peak.at)
     return row
 
 
@@ -283,7 +285,7 @@ def _row(
 ) -> dict[str, object]:
     finding = resonance.finding
     peak = resonance.peak
-    loudest = group.ranked[run.variant][0].loudness
+    loudest = group.ranked[run.variant][0].ranking_level
     frequency = f"{finding.resonance.frequency:.0f} ± {figure_text(finding.resonance.resolution, 1)}"
     choice = f"resonance:{group.name}:{run.variant}:{number - 1}"
     matched = math.isfinite(finding.mode_frequency)
@@ -296,7 +298,7 @@ def _row(
     }
     if run.variant in group.constant:
         row[AT_CONSTANT] = _constant_speed_cell(resonance, loudest)
-    row["± µm"] = Cell(figure_text(10.0 ** (resonance.loudness / 20.0), 2), resonance.loudness)
+    row["± µm"] = Cell(figure_text(10.0 ** (resonance.ranking_level / 20.0), 2), resonance.ranking_level)
     row["Prominence / dB"] = Cell(figure_text(peak.prominence, 2), peak.prominence)
     for name, key in zip((n for n in group.runs if n != run.variant), _others(group, run.variant), strict=True):
         level = resonance.elsewhere[name]

@@ -304,7 +304,7 @@ def response_of(
     even = settings.speeds.values
     gearset = gearset_of(assembly, even, settings.harmonics, settings.combinations)
     solver = PointSolver(gearset, settings)
-    told = progress or (lambda done, total: None)
+    report = progress or (lambda done, total: None)
     tracks = _tracks(gearset, even)
     operation = operating_range(assembly.gearbox)
     looked_for = settings.at_resonances and (gearset.parting or gearset.waves.varies)
@@ -312,9 +312,9 @@ def response_of(
     folds: tuple[float, ...] = ()
     ended = ""
     if settings.branches:
-        solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, told)
+        solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, report)
     else:
-        solved = _solve(solver, settings, found, looked_for, _Work(known, told, keep, keep_every))
+        solved = _solve(solver, settings, found, looked_for, _Work(known, report, keep, keep_every))
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
@@ -410,10 +410,10 @@ def _with_tops(solver: PointSolver, settings: SteadySettings, solved: SolvedPoin
         solved = solved.joined_with(_empty(solver.gearset, more))
         solved = _continued(solved, count, lambda: PointSolver(solver.linear, settings), work)
         # A speed that nobody asked for and that has no state is none to tell of.
-        told = np.isfinite(solved.drive_torque)
-        told[:count] = True
-        if not told.all():
-            solved = solved.part(told)
+        solved_speeds = np.isfinite(solved.drive_torque)
+        solved_speeds[:count] = True
+        if not solved_speeds.all():
+            solved = solved.part(solved_speeds)
     return solved
 
 

@@ -238,11 +238,11 @@ class _Evaluated:
             self.records |= read_journals(self.task.folder, set(unknown))
         missing = [Work(name, draws[name]) for name in unknown if name not in self.records]
         if missing:
-            self.records |= compute_points(self.task, missing, self.opens, self._told)
+            self.records |= compute_points(self.task, missing, self.opens, self._report_record)
         self.computed += len(missing)
         return wanted
 
-    def _told(self, record: Record) -> None:
+    def _report_record(self, record: Record) -> None:
         if self.tell is not None:
             failed = sum(bool(own.error) for own in self.records.values()) + bool(record.error)
             self.tell(len(self.records), failed, self.expected)

@@ -233,7 +233,7 @@ def _print_bands(gearbox: Gearbox, ranking: Ranking) -> None:
     shown = [
         resonance
         for resonance in ranking.resonances[:SHOWN_RESONANCES]
-        if any(loudness.limits for loudness in resonance.loudness.values())
+        if any(peak.limits for peak in resonance.amplitudes.values())
     ]
     if not shown:
         return
@@ -248,13 +248,13 @@ def _band_row(resonance: Resonance) -> dict[str, str]:
     from exugear.gearbox.units import RPM
 
     found = {"order": resonance.line, "speed\nrpm": significant(resonance.speed / RPM, 5, 2)}
-    for quantity, loudness in resonance.loudness.items():
+    for quantity, peak in resonance.amplitudes.items():
         heading, factor = COLUMNS[quantity]
         found[heading] = "-"
-        if loudness.limits:
-            found[heading] = "–".join(significant(factor * limit.amplitude, 2, 6) for limit in loudness.limits[::-1])
-            if loudness.places is not None and loudness.places[0] != loudness.places[1]:
-                best, worst = loudness.places
+        if peak.limits:
+            found[heading] = "–".join(significant(factor * limit.amplitude, 2, 6) for limit in peak.limits[::-1])
+            if peak.places is not None and peak.places[0] != peak.places[1]:
+                best, worst = peak.places
                 found[heading] += f" ({best}–{worst})"
             found[heading] = found[heading].replace(" ", HARD_SPACE)
     return found
@@ -262,7 +262,7 @@ def _band_row(resonance: Resonance) -> dict[str, str]:
 
 def _legend(ranking: Ranking) -> str:
     text = "Zero-to-peak amplitudes, (rank) within each quantity. TE: transmission error"
-    if "force" not in ranking.resonances[0].loudness:
+    if "force" not in ranking.resonances[0].amplitudes:
         return f"{text}."
     owner = {"shafts": "shaft", "housing": "housing"}.get(ranking.accelerates, ranking.accelerates)
     return f"{text}; force: largest dynamic bearing force; accel.: {owner} at the bearing."
@@ -501,16 +501,16 @@ def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
         "frequency_Hz": resonance.frequency,
         "best_place": resonance.best,
     }
-    for quantity, loudness in resonance.loudness.items():
-        found[f"{quantity}_{KEYS[quantity]}"] = loudness.amplitude
-        found[f"{quantity}_place"] = loudness.place
-        if loudness.at:
-            found[f"{quantity}_at"] = loudness.at
-        if loudness.limits:
-            lowest, highest = loudness.limits
+    for quantity, peak in resonance.amplitudes.items():
+        found[f"{quantity}_{KEYS[quantity]}"] = peak.amplitude
+        found[f"{quantity}_place"] = peak.place
+        if peak.at:
+            found[f"{quantity}_at"] = peak.at
+        if peak.limits:
+            lowest, highest = peak.limits
             found[f"{quantity}_lowest_damping_{KEYS[quantity]}"] = lowest.amplitude
             found[f"{quantity}_highest_damping_{KEYS[quantity]}"] = highest.amplitude
-            found[f"{quantity}_places_over_damping"] = loudness.places
+            found[f"{quantity}_places_over_damping"] = peak.places
     return found
 
 
@@ -522,10 +522,10 @@ def _row(resonance: Resonance) -> dict[str, str]:
         "speed\nrpm": significant(resonance.speed / RPM, 5, 2),
         "freq.\nHz": significant(resonance.frequency, 4, 2),
     }
-    for quantity, loudness in resonance.loudness.items():
+    for quantity, peak in resonance.amplitudes.items():
         heading, factor = COLUMNS[quantity]
-        rank = "" if loudness.place is None else f" ({loudness.place})"
-        found[heading] = significant(factor * loudness.amplitude, 3, 6) + rank
+        rank = "" if peak.place is None else f" ({peak.place})"
+        found[heading] = significant(factor * peak.amplitude, 3, 6) + rank
         if quantity == "force":
-            found["bearing"] = loudness.at
+            found["bearing"] = peak.at
     return found

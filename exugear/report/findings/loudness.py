@@ -83,13 +83,13 @@ class Resonance:
     """Input speed at the peak of the quantity with the best rank, rad/s."""
     frequency: float
     """Hz."""
-    loudness: Mapping[str, PeakAmplitude]
+    amplitudes: Mapping[str, PeakAmplitude]
     """By quantity: ``error`` (m), ``force`` (N) and ``acceleration`` (m/s2); the last two only with bearings."""
 
     @property
     def best(self) -> int:
         """Best rank in any quantity."""
-        return min(own.place for own in self.loudness.values() if own.place is not None)
+        return min(own.place for own in self.amplitudes.values() if own.place is not None)
 
 
 @dataclass(frozen=True)
@@ -200,18 +200,18 @@ def _resonance(
     limits: Limits,
 ) -> Resonance:
     _, first, line = next(iter(group.values()))
-    loudness = {}
+    amplitudes = {}
     for quantity in quantities:
         place, point, _ = group.get(quantity.name, (None, first, line))
         at = sizes[quantity.name][point, line]
-        loudness[quantity.name] = PeakAmplitude(
+        amplitudes[quantity.name] = PeakAmplitude(
             float(at.max()), quantity.places[int(at.argmax())], place, limits.get((point, line, quantity.name))
         )
     bases = tuple(str(name) for name in data["base"].to_numpy())
     order = float(data["order"][line + 1])
     speed = float(data["speed"][first])
     name = line_name(tuple(int(n) for n in data["index"].to_numpy()[line + 1]), bases)
-    return Resonance(name, order, speed, order * abs(speed) / (2.0 * np.pi), loudness)
+    return Resonance(name, order, speed, order * abs(speed) / (2.0 * np.pi), amplitudes)
 
 
 def _accelerating_parts(data: xr.Dataset) -> str:

@@ -37,7 +37,7 @@ from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.threads import stop_if_asked
 
-LOUDEST = 10
+CHECKED_RESONANCES = 10
 """Number of highest resonances that are checked."""
 ENERGY = 1e-3
 """Permissible relative residual of the energy balance of a run."""
@@ -176,7 +176,7 @@ def _check_response(response: xr.Dataset) -> list[CheckResult]:
 
 
 def _check_resonances(group: RunGroup) -> list[CheckResult]:
-    loudest = group.ranked[group.main][:LOUDEST]
+    loudest = group.ranked[group.main][:CHECKED_RESONANCES]
     if not loudest:
         return []
     count = len(loudest)

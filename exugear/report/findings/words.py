@@ -158,13 +158,13 @@ class Labels:
             name = "planets" if str(body) in carried else self.of(str(body))
             for motion, share in zip(modes["motion"].to_numpy(), of_body, strict=True):
                 shares[name, str(motion)] = shares.get((name, str(motion)), 0.0) + float(share)
-        told = 0.0
+        described = 0.0
         verbs: dict[str, list[str]] = {}
         for (name, motion), share in sorted(shares.items(), key=lambda item: -item[1]):
-            if verbs and (told >= DESCRIBED_ENERGY or share < MIN_ENERGY):
+            if verbs and (described >= DESCRIBED_ENERGY or share < MIN_ENERGY):
                 break
             verbs.setdefault(name, []).append(MOTIONS[motion][name == "planets"])
-            told += share
+            described += share
         return joined(f"{name} {joined(verb)}" for name, verb in verbs.items())
 
     def strain_energy(self, modes: xr.Dataset, index: int) -> dict[str, float]:

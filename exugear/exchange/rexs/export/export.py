@@ -549,11 +549,11 @@ def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
 
 def _replaced(model: Model, results: Results) -> tuple[str, ...]:
     """Results in the file that are replaced."""
-    told = []
+    entries = []
     for addition in results.additions:
         part = model.components[addition.component]
         cases = {case.number: case.changes.get(addition.component, {}) for case in model.load_cases}
         there = part.attributes if addition.load_case is None else cases[addition.load_case]
         if tree.ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
-            told.append(f"{part}: {addition.name}")
-    return tuple(told)
+            entries.append(f"{part}: {addition.name}")
+    return tuple(entries)

@@ -485,11 +485,11 @@ class _Draft:
         """Return an error of the gearbox file with the REXS components of the named parts."""
         words = set(re.split(r"[^\w.]", fault)) | set(re.split(r"\W", fault))
         blocks = {name: block.comment for _, group in self.groups for name, block in group.items() if block.comment}
-        told = [
+        entries = [
             f"{name} is {comment}" for name, comment in blocks.items() if name in words or name.split(".")[1] in words
         ]
-        if told:
-            return f"{fault} ({'; '.join(told)})"
+        if entries:
+            return f"{fault} ({'; '.join(entries)})"
         return fault
 
     def leave_stiff(self, source: str, path: str | Path) -> None:

@@ -96,10 +96,10 @@ def test_resonances_rank_by_their_level_at_constant_speed(runs):
         peak = finding.strongest
         at = levels.near(peak.line, peak.frequency, 15.0)
         judged.append(RankedResonance(bushing.located(finding, at.frequency), True, (), {}, at))
-    loudest = max(judged, key=lambda own: own.loudness)
+    loudest = max(judged, key=lambda own: own.ranking_level)
     assert loudest.frequency == pytest.approx(790.0)
-    assert loudest.loudness == pytest.approx(20.0 * np.log10(201.0), abs=0.01)
-    assert loudest.missed == pytest.approx(loudest.loudness - loudest.peak.level)
+    assert loudest.ranking_level == pytest.approx(20.0 * np.log10(201.0), abs=0.01)
+    assert loudest.missed == pytest.approx(loudest.ranking_level - loudest.peak.level)
 
 
 def test_a_mode_is_that_of_the_exact_frequency_not_of_the_run_up_s(runs):
