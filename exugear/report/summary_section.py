@@ -184,7 +184,7 @@ def ranking_section(material: ReportData) -> Part:
         pieces.paragraph(_rules(), "note"),
         name="ranking",
     )
-    return Part(html, {}, "Ranking", "ranking")
+    return Part(html, {}, "Resonance ranking", "ranking")
 
 
 def _operating_resonances(material: ReportData, group: RunGroup) -> str:

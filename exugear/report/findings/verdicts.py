@@ -148,7 +148,7 @@ def _check_response(response: xr.Dataset) -> list[CheckResult]:
         ),
         CheckResult(
             growth <= 0.0,
-            "stable: disturbances decay" if growth <= 0.0 else "unstable: disturbances of the steady state grow",
+            "the steady state is stable" if growth <= 0.0 else "the steady state is unstable: disturbances grow",
         ),
     ]
     unsolved = json.loads(response.attrs["not_converged"])
@@ -183,20 +183,22 @@ def _check_resonances(group: RunGroup) -> list[CheckResult]:
     steady = sum(own.steady for own in loudest)
     verdicts: list[CheckResult] = []
     if not group.responses:
-        verdicts.append(
-            CheckResult(
-                steady == count, (f"{steady} of the {count} highest resonances are found with all window lengths")
-            )
-        )
+        passed = steady == count
+        found = _fraction(steady, count, passed)
+        verdicts.append(CheckResult(passed, f"{found} are found with all window lengths"))
     if group.runs[group.main].modes is None and not group.responses:
         return [*verdicts, CheckResult(False, "no modes computed; run `exugear modes` for mode shapes")]
     matched = sum(bool(own.finding.mode_name) for own in loudest)
-    return [
-        *verdicts,
-        CheckResult(
-            matched >= MATCHED * count, (f"{matched} of the {count} highest resonances are at the frequency of a mode")
-        ),
-    ]
+    passed = matched >= MATCHED * count
+    return [*verdicts, CheckResult(passed, f"{_fraction(matched, count, passed)} are at the frequency of a mode")]
+
+
+def _fraction(number: int, count: int, passed: bool) -> str:
+    """Return how many of the highest resonances a check found, as text."""
+    found = f"{number} of the {count} highest resonances"
+    if passed:
+        return found
+    return f"only {found}"
 
 
 # Variation of assumed parameters over their ranges, and the possible reduction of amplification
