@@ -148,7 +148,7 @@ class HarmonicResidual:
                 continue
             # All angles are zero at the first sample.
             own = spectra[n] * np.exp(2j * np.pi * positions[0, u] * np.arange(spectra.shape[2]))
-            out[:, :, u] = self.sampling.along_base(waves[n].base, own if forward[n] else own.conj())
+            out[:, :, u] = self.sampling.sample_along_base(waves[n].base, own if forward[n] else own.conj())
         return out
 
     def _sample(self, readings: Floats, rates: Floats, places: MeshPlaces, stiffness: Floats) -> LawSamples:

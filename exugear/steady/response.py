@@ -128,7 +128,7 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     shape = len(model.lines.index), *interface.ports.forces.shape[:2]
     functions = _slopes_beyond_mean(model, interface)
     lengths = model.lengths[: shape[1], : shape[2]].ravel()
-    answers = lengths[:, None] * interface.along_forces
+    answers = lengths[:, None] * interface.deflection_per_force
     coupling = model.coupling
     scaled = [
         function / _group_values(lengths, group) for function, group in zip(functions, coupling.groups, strict=True)
@@ -185,7 +185,7 @@ def _answer(interface: Interface, excess: Complexes) -> Complexes:
     """Find the readings -G F (n, m, f) that laws along a row push along, under their forces (n, m, f)."""
     if excess.shape[2] == 1:
         return np.asarray(-np.einsum("nij,nj->ni", interface.deflection[..., 0], excess[..., 0]))[..., None]
-    return np.asarray(-(interface.along_forces @ excess.reshape(len(excess), -1, 1))).reshape(excess.shape)
+    return np.asarray(-(interface.deflection_per_force @ excess.reshape(len(excess), -1, 1))).reshape(excess.shape)
 
 
 def _response(

@@ -269,7 +269,7 @@ class SteadyResponse(ReprMixin):
 
 CHECKED, MORE = 10, 1.5
 """Number of highest peaks that are recomputed, and the factor on the number of harmonics."""
-EXPLAINED = 20
+PEAKS_WITH_CONTRIBUTIONS = 20
 """Crossings whose peaks are taken apart."""
 ROUNDS = 5
 """Times that tops are looked for between speeds, at most."""
@@ -304,7 +304,7 @@ def response_of(
     even = settings.speeds.values
     model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations)
     solver = PointSolver(model, settings.method)
-    told = progress or (lambda done, total: None)
+    report = progress or (lambda done, total: None)
     tracks = _tracks(model, even)
     operation = operating_range(assembly.gearbox)
     looked_for = settings.at_resonances and (model.loses_contact or model.waves.varies)
@@ -312,9 +312,9 @@ def response_of(
     folds: tuple[float, ...] = ()
     ended = ""
     if settings.branches:
-        solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, told)
+        solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, report)
     else:
-        solved = _solve(solver, even, found, looked_for, _Work(known, told, keep, keep_every))
+        solved = _solve(solver, even, found, looked_for, _Work(known, report, keep, keep_every))
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
@@ -408,10 +408,10 @@ def _with_tops(solver: PointSolver, solved: SolvedPoints, work: _Work) -> Solved
         solved = solved.joined_with(_empty(solver.model, more))
         solved = _continued(solved, count, lambda: PointSolver(solver.linear, solver.method), work)
         # A speed that nobody asked for and that has no state is none to tell of.
-        told = np.isfinite(solved.drive_torque)
-        told[:count] = True
-        if not told.all():
-            solved = solved.part(told)
+        solved_speeds = np.isfinite(solved.drive_torque)
+        solved_speeds[:count] = True
+        if not solved_speeds.all():
+            solved = solved.part(solved_speeds)
     return solved
 
 
@@ -499,7 +499,7 @@ def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
 def _contributions(model: HarmonicBalanceModel, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
     """Find the contributions to the orders at the strongest crossings, each at its maximum."""
     explained = []
-    for crossing in found[:EXPLAINED]:
+    for crossing in found[:PEAKS_WITH_CONTRIBUTIONS]:
         speed = loudest_near(model, crossing.speed, 2.0 * crossing.damping, crossing.line)
         explained.append((crossing.line, contributions(model, speed, crossing.line)))
     return tuple(explained)

@@ -18,7 +18,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.life.dynamic_factors import stated_factors
 from exugear.life.gear_life import check_strengths, flank_lives
-from exugear.life.life import LEFT_OUT, checked_loads, rating_of
+from exugear.life.life import NOT_RATED, checked_loads, rating_of
 from exugear.life.load_spectrum.counted import (
     FLANKS,
     CountedLoads,
@@ -86,7 +86,7 @@ class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
     flanks: tuple[FlankSheet, ...]
     shortfalls: tuple[str, ...]
     assumptions: tuple[str, ...]
-    left_out: tuple[str, ...] = LEFT_OUT
+    left_out: tuple[str, ...] = NOT_RATED
 
     def summary(self) -> dict[str, Any]:
         """Return the values for JSON, with units in the keys; NaN is omitted, infinite values are text."""
@@ -293,7 +293,7 @@ FlankKey = tuple[str, str, str]
 """Gear, family of meshes and flank."""
 
 
-def of_life(data: xr.Dataset) -> dict[FlankKey, dict[str, float]]:
+def life_results(data: xr.Dataset) -> dict[FlankKey, dict[str, float]]:
     """Return the values of all flanks of a stored rating."""
     found = {}
     for place, label in enumerate(data["flank"].to_numpy().tolist()):
