@@ -20,7 +20,7 @@ import numpy as np
 
 from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.linear_solvers import solve_lines
-from exugear.steady.harmonics.lines import Group, add_answered, flat
+from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, MeshInterface, Spectra
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.inner_kernels import cached_struct
@@ -131,7 +131,8 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     answers = lengths[:, None] * interface.deflection_per_force
     coupling = model.coupling
     scaled = [
-        function / _group_values(lengths, group) for function, group in zip(functions, coupling.groups, strict=True)
+        function / lengths[group.begin : group.begin + group.size]
+        for function, group in zip(functions, coupling.groups, strict=True)
     ]
     parts = *flat(scaled), *flat([answers])
     memory = coupling.memory()
@@ -159,11 +160,6 @@ def _slopes_beyond_mean(model: HarmonicBalanceModel, interface: Interface) -> li
         at = np.arange(DEFLECTION, group.size, forces)
         function[mean, at, at] -= model.waves.mean_stiffness[(group.begin + at) // forces]
     return functions
-
-
-def _group_values(values: Floats, group: Group) -> Floats:
-    """Values (k,) of all signals for those of a group."""
-    return values[group.begin : group.begin + group.size]
 
 
 def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:

@@ -318,7 +318,9 @@ def response_of(
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
-    explained, growth, campbell = _evaluate_mean_system(solver, even, found, tracks)
+    linear = solver.linear
+    explained = () if linear.loses_contact else _contributions(linear, found)
+    growth = solver.growth(float(even.min()), float(even.max()))
     return SteadyResponse(
         assembly=model.waves.assembly,
         settings=settings,
@@ -341,7 +343,7 @@ def response_of(
         left_out=model.waves.left_out(model.usual_harmonics),
         change_with_more=math.nan if settings.branches else _change_with_more(solver, solved.part(there)),
         band=_band(solver, solved.part(there)),
-        campbell=campbell,
+        campbell=campbell_of(linear.system, tracks),
     )
 
 
@@ -351,15 +353,6 @@ def _band(solver: PointSolver, solved: SolvedPoints) -> DampingBand:
     if solver.method == "nonlinear" or model.loses_contact:
         return no_band(tuple(quantity.name for quantity in quantities_of([s.name for s in model.signal_names])))
     return damping_band(model, solver.method, solved.speed, np.abs(solved.amplitude).astype(np.float64))
-
-
-def _evaluate_mean_system(
-    solver: PointSolver, speeds: Floats, found: tuple[Crossing, ...], tracks: ModeTracks
-) -> tuple[tuple[tuple[int, Contributions], ...], float, Campbell]:
-    """Find what makes the lines at the strongest crossings, the fastest growth, and the Campbell diagram."""
-    model = solver.linear
-    explained = () if model.loses_contact else _contributions(model, found)
-    return explained, solver.growth(float(speeds.min()), float(speeds.max())), campbell_of(model.system, tracks)
 
 
 def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
