@@ -151,6 +151,11 @@ def steady_section(part: Results) -> str:
         [str(row["harmonics"]), str(row["combinations"]), str(row["lines"]), duration(row["processor_s"])]
         for row in part["growth"]
     ]
+    first, *_ = part["dissipation"]
+    dissipation = [
+        [row["what"], *(f"{row[key] / first[key]:.2f}" for key in ("processor_s", "run_up_s"))]
+        for row in part["dissipation"]
+    ]
     return "\n".join(
         [
             "## Steady-state response\n",
@@ -163,6 +168,9 @@ def steady_section(part: Results) -> str:
             ),
             "Lines, variant bushing, method parametric, no speeds added:\n",
             table(["harmonics", "sum of multiples of combinations", "lines", "all"], growth),
+            "Damping and friction over damping times alone, variant bushing; runs do not include the friction of teeth:"
+            "\n",
+            table(["dissipation", "response, parametric", "run-up"], dissipation),
             items(
                 [
                     "Limited by: half of a speed is the compliance of each line, a dense solution of the mean "

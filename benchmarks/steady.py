@@ -8,6 +8,7 @@ from __future__ import annotations
 import tempfile
 from typing import Any
 
+import numpy as np
 from dynamics import stiffness_of
 from elastic import SHAFTS, with_elastic
 from timing import CASE, say, timed
@@ -20,9 +21,16 @@ from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.bodies.of_gearbox import reduced_bodies
 from exugear.system.build import assemble
 from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.transient.runup import simulate
 
 SPEEDS = "0:215:400"
+DISSIPATION = {
+    "damping times": {},
+    "modal damping": {"modal_percent": 2.0},
+    "modal damping, friction of teeth": {"modal_percent": 2.0, "tooth_friction": 0.05},
+}
+"""Keys of the section on damping by what they add."""
 LINES = ((10, 3), (10, 5), (16, 4), (20, 3))
 """Harmonics, and largest sum of multiples of combinations."""
 
@@ -37,6 +45,17 @@ def cost_of(assembly: Assembly, settings: SteadySettings) -> dict[str, Any]:
         "speeds": len(found[0].solved.speed),
         "processor_s": cost.processor,
     }
+
+
+def with_dissipation(gearbox: Gearbox, keys: dict[str, Any]) -> Assembly:
+    """Variant bushing with other keys of the section on damping, and friction of the teeth of realistic size."""
+    cycle = 2.0 * np.pi * np.arange(50) / 50
+    friction = np.array([0.3 * np.cos(cycle), 0.01 + 0.002 * np.cos(cycle + 1.0), 1e-3 * np.sin(cycle)])
+    curves = {
+        name: MeshCurve(np.asarray(values), np.asarray(values), 1e5, friction=friction)
+        for name, values in stiffness_of(gearbox).items()
+    }
+    return assemble(gearbox.varied({"damping": keys}), Choice("bushing"), curves)
 
 
 def run_up_of(gearbox: Gearbox, variant: str, bodies: dict[str, ElasticBody], duration: float) -> float:
@@ -74,5 +93,12 @@ def measure(quick: bool) -> dict[str, Any]:
     ]
     duration = 1.0 if quick else 30.0
     run_ups = {variant: run_up_of(case, variant, bodies, duration) for variant, (case, bodies) in cases.items()}
+    dissipation = [
+        {"what": what, **cost_of(with_dissipation(gearbox, keys), SteadySettings(speeds, at_resonances=False))}
+        | {"run_up_s": run_up_of(gearbox.varied({"damping": keys}), "bushing", {}, duration)}
+        for what, keys in DISSIPATION.items()
+    ]
     coordinates = {variant: assembly.size for variant, assembly in assemblies.items()}
-    return {"responses": rows, "growth": growth, "run_ups": run_ups, "coordinates": coordinates}
+    return {"responses": rows, "growth": growth, "run_ups": run_ups, "dissipation": dissipation} | {
+        "coordinates": coordinates
+    }

@@ -532,23 +532,31 @@ class HarmonicBalanceModel:
             torque=system.torque_at(speed),
             torque_per_force=still.reshape(shape),
             bearings=self._bearings_at(speed),
-            friction=self._friction_at(speed, ports, pencil, frequencies),
+            friction=self._friction_at(speed, pencil, frequencies),
         )
 
-    def _friction_at(
-        self, speed: float, ports: MeshInterface, pencil: tuple[Floats, Floats], frequencies: Floats
-    ) -> FrictionResponse | None:
+    @cached_property
+    def _friction_loads(self) -> Complexes:
+        """Generalized forces (3, n, size) of the friction of the teeth at the three speeds; none without friction."""
+        if self.waves.assembly.gearbox.case.damping.tooth_friction == 0.0:
+            return np.zeros((0, 0, 0), dtype=complex)
+        speeds = (float(speed) for speed in self.system.speeds)
+        return np.array([tooth_friction(self.waves, self.lines, self.ports_at(w), w, self.harmonics) for w in speeds])
+
+    def _friction_at(self, speed: float, pencil: tuple[Floats, Floats], frequencies: Floats) -> FrictionResponse | None:
         """Solve for the response to the friction of the teeth at a speed of the input, rad/s; None without friction."""
         system = self.system
-        if system.frame.assembly.gearbox.case.damping.tooth_friction == 0.0:
+        if not self._friction_loads.size:
             return None
-        loads = tooth_friction(self.waves, self.lines, ports, speed, self.harmonics)
-        motion = np.zeros((len(frequencies), system.size), dtype=complex)
+        loads = system.at(self._friction_loads, speed)
+        motion = np.zeros(loads.shape, dtype=complex)
         still = system.still(pencil[0], loads[0].real[:, None])[:, 0]
         motion[0] = still[:-1]
-        for line in np.flatnonzero(loads[1:].any(axis=1)) + 1:
-            dynamic = pencil[0] - frequencies[line] ** 2 * system.mass + 1j * frequencies[line] * pencil[1]
-            motion[line] = np.linalg.solve(dynamic, loads[line])
+        acting = np.flatnonzero(loads[1:].any(axis=1)) + 1
+        w = frequencies[acting, None, None]
+        motion[acting] = np.linalg.solve(pencil[0] - w**2 * system.mass + 1j * w * pencil[1], loads[acting, :, None])[
+            ..., 0
+        ]
         return FrictionResponse(loads, motion, float(still[-1]))
 
     def _bearings_at(self, speed: float) -> BearingMean | None:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.linalg
@@ -28,6 +28,7 @@ from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.display import ReprMixin
 
+Values = TypeVar("Values", Floats, Complexes)
 PLACE_STEP, RATE_STEP = 1e-6, 1e-3
 """Steps of central differences by u and u'; forces are all but linear in the latter."""
 ROWS_STEP = 1e-8
@@ -99,10 +100,11 @@ class MeanSystem(ReprMixin):
         """From values at the three speeds to coefficients of 1, W, W^2."""
         return np.asarray(np.linalg.inv(np.vander(self.speeds, 3, increasing=True)))
 
-    def at(self, values: Floats, speed: float) -> Floats:
+    def at(self, values: Values, speed: float) -> Values:
         """Value (...) at a speed (rad/s) of what is known at the three, (3, ...): exact for parabolas."""
         weights = np.array([1.0, speed, speed**2]) @ self._parabola
-        return np.asarray(np.tensordot(weights, values, axes=1))
+        found: Values = np.tensordot(weights, values, axes=1)
+        return found
 
     def stiffness_at(self, speed: float) -> Floats:
         """K (size, size) at a speed of the input, rad/s."""
