@@ -178,11 +178,13 @@ def _print(gearbox: Gearbox, found: Losses, mapped: list[dict[str, float]]) -> N
     print_table(f"{title}: meshes", [_mesh_row(mesh) for mesh in found.meshes], legend=MESH_LEGEND)
     if found.bearings:
         print_table("Bearings", [_bearing_row(bearing) for bearing in found.bearings], legend=BEARING_LEGEND)
-    low, high = found.band
+    losses = f"{_kilowatts(found.total)} kW"
+    if found.band[0] < found.band[1]:
+        losses += f" (band {_band(*found.band, 4)})"
     print_text(
-        f"Input {_kilowatts(found.input_power)} kW, losses {_kilowatts(found.total)} kW ({_kilowatts(low)} to "
-        f"{_kilowatts(high)}), output {_kilowatts(found.output_power)} kW: efficiency {100.0 * found.efficiency:.2f} "
-        f"%. Oil {found.oil_temperature:.3g} °C, {significant(1e6 * found.viscosity, 3)} mm²/s."
+        f"Input {_kilowatts(found.input_power)} kW, losses {losses}, output {_kilowatts(found.output_power)} kW: "
+        f"efficiency {100.0 * found.efficiency:.2f} %. Oil {found.oil_temperature:.3g} °C, "
+        f"{significant(1e6 * found.viscosity, 3)} mm²/s."
     )
     print_text(
         "Not included: churning, windage, seals, pumps. They matter most at low torque and high speed, where the "
@@ -212,6 +214,13 @@ def _kilowatts(power: float) -> str:
     return significant(1e-3 * power, 4, 4)
 
 
+def _band(low: float, high: float, digits: int) -> str:
+    """Return the band of powers (W) in kW; a dash where one method alone is known."""
+    if low == high:
+        return "–"
+    return f"{significant(1e-3 * low, digits, 4)}–{significant(1e-3 * high, digits, 4)}"
+
+
 def _mesh_row(mesh: MeshLoss) -> dict[str, str]:
     low, high = mesh.band
     return {
@@ -220,7 +229,7 @@ def _mesh_row(mesh: MeshLoss) -> dict[str, str]:
         "H_V": f"{mesh.loss_factor:.4f}" + "*" * mesh.from_table,
         "mu_m": f"{mesh.friction:.4f}",
         "loss\nkW": _kilowatts(mesh.loss),
-        "band\nkW": f"{significant(1e-3 * low, 2, 4)}–{significant(1e-3 * high, 2, 4)}",
+        "band\nkW": _band(low, high, 2),
     }
 
 
