@@ -265,10 +265,12 @@ def one_of(expected: str, value: Any) -> str:
     Examples
     --------
     >>> one_of("'linear' or 'iso16281'", "liner")
-    "must be 'linear' or 'iso16281'; did you mean 'linear'?"
+    "did you mean 'linear'? It must be 'linear' or 'iso16281'"
     """
     near = difflib.get_close_matches(str(value)[:100], re.findall("'([^']*)'", expected), n=1)
-    return "; ".join([f"must be {expected}", *(f"did you mean {word!r}?" for word in near)])
+    if near:
+        return f"did you mean {near[0]!r}? It must be {expected}"
+    return f"must be {expected}"
 
 
 def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:

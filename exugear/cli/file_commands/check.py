@@ -146,8 +146,9 @@ def _print_availability(
         names = ", ".join(variant for variant in steady if steady[variant] == reason)
         print_text(f"Steady-state response ({names}): not available, {reason}", "  ")
     for verb, reasons in lives.items():
-        for line in [f"not available, {reason}" for reason in reasons] or ["available"]:
-            print_text(f"Command {verb}: {line}", "  ")
+        say(f"Command {verb}: {'not ' * bool(reasons)}available")
+        for reason in reasons:
+            print_text(f"- {reason}", "  ")
 
 
 def _rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -> None:
