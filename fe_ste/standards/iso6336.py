@@ -83,7 +83,7 @@ def mesh_stiffness(
 
     Parameters
     ----------
-    pair : the pair. An internal gear counts as a rack: infinitely many teeth, no profile shift.
+    pair : the pair. An internal gear counts as one of infinitely many teeth, with the profile shift that it has.
     tangential_force
         F_t at the reference circle, N. Below 100 N/mm of face width the stiffness falls with the fourth root of the
         load; without a force that correction is omitted.
@@ -138,13 +138,15 @@ def mesh_stiffness(
 
 
 def _flexibility(pair: GearPair) -> float:
-    """q', flexibility of one pair of teeth per unit of face width, mm um/N."""
+    """q', flexibility of one pair of teeth per unit of face width, mm um/N.
+
+    Only the tooth number of an internal gear is infinite. Its profile shift stays, with the sign of ISO 21771, which
+    is the opposite of that in `Gear`.
+    """
     x_1 = pair.pinion.profile_shift
-    x_2 = pair.gear.profile_shift
+    x_2 = pair.gear.profile_shift * pair.gear.outward
     per_tooth_1 = 1.0 / _virtual_teeth(pair.pinion)
-    per_tooth_2 = 1.0 / _virtual_teeth(pair.gear)
-    if pair.gear.internal:
-        x_2 = per_tooth_2 = 0.0
+    per_tooth_2 = 0.0 if pair.gear.internal else 1.0 / _virtual_teeth(pair.gear)
     return (
         0.04723
         + 0.15551 * per_tooth_1
@@ -252,34 +254,56 @@ def helix_running_in(misalignment: float, hardening: Hardening, limit: float, ve
     return min(320e6 / limit * misalignment, 1e-6 * most * 1e6 / limit, misalignment)
 
 
-def reduced_mass(pair: GearPair, meshes: tuple[int, int] = (1, 1)) -> float:
+def reduced_mass(pair: GearPair, meshes: tuple[int, int] = (1, 1), ring_held: bool = True) -> float:
     """m_red: mass of both gears that vibrates along the line of action, over the face width, kg/m.
 
     Parameters
     ----------
-    pair : external gears; solid between the held diameter and the middle of the teeth
+    pair
+        Gears that are solid between the held diameter and the middle of the teeth; of an internal gear that is its
+        rim.
     meshes : teeth in mesh at once around gear 1 and gear 2: a sun has as many as planets
+    ring_held : whether an internal gear is held by the housing: then the mass of gear 1 alone vibrates
+
+    Notes
+    -----
+    Of a sun and p planets: ``J_p J_s / (p r_bs^2 J_p + r_bp^2 J_s)``; of a planet in a held ring: ``J_p / r_bp^2``.
     """
-    masses = (_mass_on_base_circle(gear) for gear in (pair.pinion, pair.gear))
+    masses = [_mass_on_base_circle(gear) for gear in (pair.pinion, pair.gear)]
+    if pair.gear.internal and ring_held:
+        masses[1] = math.inf
     return 1.0 / sum(count / mass for count, mass in zip(meshes, masses, strict=True))
 
 
 def _mass_on_base_circle(gear: Gear) -> float:
     """Polar moment of inertia over width and squared base radius, kg/m."""
     middle = 0.5 * (gear.tip_radius + gear.root_radius)
-    inertia = 0.5 * math.pi * gear.material.density * (middle**4 - (0.5 * gear.held_diameter) ** 4)
+    inertia = 0.5 * math.pi * gear.material.density * abs(middle**4 - (0.5 * gear.held_diameter) ** 4)
     return inertia / gear.base_radius**2
 
 
-def resonance_ratio(pair: GearPair, mesh_stiffness: float, speed: float, meshes: tuple[int, int] = (1, 1)) -> float:
+def resonance_speed(pair: GearPair, mesh_stiffness: float, mass: float) -> float:
+    """n_E1: speed of gear 1 against its frame at which the mesh frequency is that of the main resonance, rad/s.
+
+    Parameters
+    ----------
+    mesh_stiffness : c_gamma_alpha, N/m per m
+    mass : m_red, kg/m, from `reduced_mass`
+    """
+    return math.sqrt(mesh_stiffness / mass) / pair.pinion.teeth
+
+
+def resonance_ratio(
+    pair: GearPair, mesh_stiffness: float, speed: float, meshes: tuple[int, int] = (1, 1), ring_held: bool = True
+) -> float:
     """N: speed of gear 1 against its frame (rad/s) over that of the main resonance.
 
     Parameters
     ----------
     mesh_stiffness : c_gamma_alpha, N/m per m
-    meshes : as in `reduced_mass`
+    meshes, ring_held : as in `reduced_mass`
     """
-    return abs(speed) * pair.pinion.teeth / math.sqrt(mesh_stiffness / reduced_mass(pair, meshes))
+    return abs(speed) / resonance_speed(pair, mesh_stiffness, reduced_mass(pair, meshes, ring_held))
 
 
 def dynamic_factor(
