@@ -14,8 +14,8 @@ MODES = 5
 #: Runs in time (`exugear.transient`, both solvers, the laws, signals and filters).
 RUN = 10
 #: Life of gears and bearings (`exugear.life`, and the root stress of `fe_ste.root_stress`).
-LIFE = 8
+LIFE = 9
 #: Steady responses (`exugear.steady`, and all that modes rest on).
 STEADY = 13
 #: Points of studies (`exugear.studies`: their outputs; what these rest on has its own version).
-STUDY = 2
+STUDY = 3

@@ -198,6 +198,9 @@ def _outside_validity(pair: GearPair, line_load: float | None) -> tuple[str, ...
 
 Hardening = Literal["case_hardened", "through_hardened"]
 """Steels that the standard has constants of."""
+Edition = Literal["ISO 6336:2019", "ISO 6336:2006"]
+"""Editions of the standard: they differ in Z_B and Z_D (`fe_ste.standards.pitting`) and in Y_F and Y_beta
+(`fe_ste.standards.tooth_root`) of helical gears. The load factors here are those of 2006 in both."""
 
 _RESONANCE, _ABOVE = 1.15, 1.5
 """Speed ratios where the main resonance ends, and where the supercritical range begins."""

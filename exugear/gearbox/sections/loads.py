@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from exugear.gearbox.sections import entries as q
 from exugear.gearbox.sections.entries import Entries, FileName, Name, Section, Text
@@ -120,7 +120,7 @@ class LoadsSection(Section):
 
 
 class StrengthSection(Section):
-    """What a gear withstands, by ISO 6336:2006; numbers of its material from ISO 6336-5 or from tests."""
+    """What a gear withstands, by ISO 6336; numbers of its material from ISO 6336-5 or from tests."""
 
     sigma_H_lim_MPa: q.StressMPa
     """Allowable stress number for contact."""
@@ -181,8 +181,12 @@ class StrengthSection(Section):
 class RatingSection(Section):
     """How gears are rated, and what they withstand."""
 
-    edition: Literal["ISO 6336:2006"] = "ISO 6336:2006"
-    """Edition of the standard, named in every output."""
+    edition: Literal["ISO 6336:2019", "ISO 6336:2006"] = "ISO 6336:2019"
+    """Edition of the standard, named in every output; its year alone is enough. The rating sheet shows what differs by
+    more than 1 % in the other edition."""
+    f_ZCa: q.AuxiliaryFactor | None = None
+    """Auxiliary factor of the contact stress of helical gears (ISO 6336-2:2019), of pairs of which a gear has a
+    `modification`: less than 1.2 where that suits load and deformation. Others have 1.2."""
     dynamic_factor: q.LoadFactorK | None = None
     """K_v of all meshes, as stated; or one of the next two keys and the least one."""
     dynamic_factor_run: Name | None = None
@@ -209,6 +213,19 @@ class RatingSection(Section):
     """Safety against breakage that is asked for, likewise."""
     minimum_S_0: q.SafetyFactor = 1.0
     """Static safety of bearings that is asked for."""
+
+    @field_validator("edition", mode="before")
+    @classmethod
+    def _edition_of_year(cls, value: Any) -> Any:
+        return f"ISO 6336:{value}" if str(value) in ("2006", "2019") else value
+
+    @model_validator(mode="after")
+    def _edition(self) -> RatingSection:
+        if self.f_ZCa is not None and self.edition == "ISO 6336:2006":
+            raise ValueError(
+                f"f_ZCa = {self.f_ZCa:g}: {self.edition} does not have this factor; remove the key, or set edition"
+            )
+        return self
 
     @model_validator(mode="after")
     def _dynamic_factor(self) -> RatingSection:

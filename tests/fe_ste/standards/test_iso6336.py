@@ -79,7 +79,7 @@ GRC_TABLE = {
     "intermediate": (12.6, 18.0, 3.07),
     "high_speed": (12.2, 17.5, 1.93),
 }
-"""c' and c_gamma in N/(mm um), mean stiffness in 1e9 N/m, as tabulated for the deep racks; the ring with its own shift."""
+"""c' and c_gamma in N/(mm um), mean stiffness in 1e9 N/m, as tabulated for the deep racks; rings with shift."""
 
 GRC_TABLE_STANDARD_RACK = {"sun_planet": 4.22, "ring_planet": 5.06, "intermediate": 3.44, "high_speed": 2.21}
 """Mean stiffness in 1e9 N/m with a dedendum of 1.25, everything else the same."""

@@ -44,12 +44,13 @@ from fe_ste.standards.pitting import (
     zone_factor,
 )
 from fe_ste.standards.tooth_root import (
+    RootStressFactors,
     notch_factor,
     root_face_load_factor,
-    root_stress_factors,
     size_factor,
     surface_factor,
 )
+from fe_ste.standards.tooth_root import root_stress_factors as root_stress_factors_of
 
 from ..cases.gears import nrel_stage_3
 
@@ -57,6 +58,13 @@ STEEL = Material(density=7830.0)
 RPM = math.pi / 30.0
 LIMIT, VISCOSITY, K_A, K_GAMMA, K_HBETA = 1500e6, 220.0, 1.25, 1.10, 1.150
 LIVES = 12255.788e6, 3096.199e6
+
+
+def root_stress_factors(pair: GearPair, member: int, *options: int, free_bore: bool = False) -> RootStressFactors:
+    """By the edition of the sheets."""
+    return root_stress_factors_of(pair, member, *options, free_bore=free_bore, edition="ISO 6336:2006")
+
+
 STAGE_3 = nrel_stage_3(STEEL)
 
 
