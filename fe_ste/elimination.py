@@ -1,16 +1,16 @@
 """Direct factorisation of sparse symmetric positive definite matrices, behind one interface.
 
-Two libraries do the work: MKL PARDISO where ``pypardiso`` is installed (extra ``fast``), else SuperLU, which
-comes with SciPy. Both give the same numbers to 1e-9; PARDISO is faster by about ten. Elastic bodies and the reference
-analysis are solved so; tooth sectors are condensed without either (`fe_ste.elimination`).
+Two libraries are supported: MKL PARDISO if ``pypardiso`` is installed (extra ``fast``), else SuperLU, which is part of
+SciPy. Both agree to 1e-9; PARDISO is faster by a factor of about ten. They are used for flexible bodies and for the
+reference analysis; tooth sectors are condensed by the elimination in this module, without either library.
 
-Cells that lie in a plane couple blocks of unknowns. A set of cells is cut in two, again and again; a block is
-eliminated as soon as all cells that couple it are in one set (George, SIAM J. Numer. Anal. 10 (1973) 345-363), from a
-dense matrix of what these cells couple (the multifrontal method: Duff and Reid, ACM Trans. Math. Softw. 9 (1983)
-302-325). Only the matrix that is left for the blocks that are kept is wanted: no factor is stored, and no right-hand
-side is solved.
+Cells that lie in a plane couple blocks of unknowns. The set of cells is bisected recursively. A block is eliminated as
+soon as all cells that couple it are in one set (George, SIAM J. Numer. Anal. 10 (1973) 345-363), from the dense matrix
+of these cells (multifrontal method: Duff and Reid, ACM Trans. Math. Softw. 9 (1983) 302-325). Only the matrix of the
+remaining blocks is needed, so that no factor is stored and no right-hand side is solved.
 
-SciPy's own functions copy what is not contiguous and hold Python's lock, so that two threads cannot work at once.
+SciPy's own functions copy arrays that are not contiguous and hold Python's lock, so that two threads cannot run
+concurrently.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 GUIDES = ROOT / "docs" / "howto"
-START = "exugear new my/gearbox.toml --kind parallel"
+START = "exugear new my/gearbox.toml"
 """First command of the tutorial, which makes the file that all guides start from."""
 BLOCK = re.compile(
     r"^( *)```(sh|python)\n(.*?)^\1```$((?:\s*<!-- (?:expect|exit): .*? -->)*)", re.MULTILINE | re.DOTALL

@@ -34,7 +34,7 @@ from one_variant import grc_project
 from exugear import Choice, Gearbox, Project, assemble
 from exugear.steady.excitation import HarmonicBalanceModel
 from exugear.steady.mean_system.mean_system import MeanSystem
-from exugear.steady.point_solver import gearset_of
+from exugear.steady.point_solver import harmonic_balance_model
 from exugear.steady.response import transmission_errors
 from exugear.system.system import input_hash
 from exugear.system.tooth_mesh.contact_state import ContactState
@@ -123,11 +123,11 @@ def varied(gearbox: Gearbox, own: Mapping[str, Any], radial: float) -> Gearbox:
     return gearbox.varied(changes)
 
 
-def gearset_with(given: Given, own: Mapping[str, Any], radial: float, variant: str) -> HarmonicBalanceModel:
+def model_with(given: Given, own: Mapping[str, Any], radial: float, variant: str) -> HarmonicBalanceModel:
     """Mean system and meshes of a variant."""
     choice = Choice(variant, inertias=own["inertias"])
     assembly = assemble(varied(given.gearbox, own, radial), choice, given.stiffness, contact=given.contact)
-    return gearset_of(assembly, np.array([0.0, FASTEST]), HARMONICS, 0)
+    return harmonic_balance_model(assembly, np.array([0.0, FASTEST]), HARMONICS, 0)
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,7 @@ class Between:
     def of(cls, given: Given, own: Mapping[str, Any]) -> Between:
         """Assemble both ends of a set."""
         low, high = RANGES[str(own["kind"])]
-        soft, stiff = (gearset_with(given, own, radial, "bushing") for radial in (low, high))
+        soft, stiff = (model_with(given, own, radial, "bushing") for radial in (low, high))
         return cls(low, high, soft.system, stiff)
 
     def at(self, radial: float) -> MeanSystem:
@@ -177,18 +177,18 @@ def tuned(between: Between) -> list[float]:
     return kept
 
 
-def amplitudes(gearset: HarmonicBalanceModel, system: MeanSystem) -> dict[str, np.ndarray]:
+def amplitudes(model: HarmonicBalanceModel, system: MeanSystem) -> dict[str, np.ndarray]:
     """Peak amplitude of the overall transmission error along `FREQUENCIES` by mesh order, m; NaN beyond the speeds."""
     speed = 0.5 * FASTEST
-    ports = gearset.ports_at(speed)
-    motion = system.responses(speed, 2.0 * np.pi * FREQUENCIES, gearset.loads(ports))
-    seen = np.einsum("fsm,s->fm", motion, gearset.row_of_overall(speed))
-    found, errors = {}, transmission_errors(gearset, ports, speed)
-    for line in range(1, len(gearset.lines.index)):
-        multiples = gearset.lines.index[line]
-        name = f"{multiples.max()} x {gearset.waves.base_names[int(np.argmax(multiples))].split(', ')[0]}"
+    ports = model.ports_at(speed)
+    motion = system.responses(speed, 2.0 * np.pi * FREQUENCIES, model.loads(ports))
+    seen = np.einsum("fsm,s->fm", motion, model.row_of_overall(speed))
+    found, errors = {}, transmission_errors(model, ports, speed)
+    for line in range(1, len(model.lines.index)):
+        multiples = model.lines.index[line]
+        name = f"{multiples.max()} x {model.waves.base_names[int(np.argmax(multiples))].split(', ')[0]}"
         amplitude = 2.0 * np.abs(seen @ errors[line].ravel())
-        reached = gearset.lines.orders[line] * FASTEST >= 2.0 * np.pi * FREQUENCIES
+        reached = model.lines.orders[line] * FASTEST >= 2.0 * np.pi * FREQUENCIES
         found[name] = np.where(reached, amplitude, np.nan)
     return found
 
@@ -206,9 +206,9 @@ def peak_of(amplitude: np.ndarray, within: float) -> dict[str, float] | None:
     return best
 
 
-def peaks_of(gearset: HarmonicBalanceModel, system: MeanSystem, within: float) -> dict[str, dict[str, float]]:
+def peaks_of(model: HarmonicBalanceModel, system: MeanSystem, within: float) -> dict[str, dict[str, float]]:
     """Peaks by mesh order."""
-    found = {name: peak_of(values, within) for name, values in amplitudes(gearset, system).items()}
+    found = {name: peak_of(values, within) for name, values in amplitudes(model, system).items()}
     return {name: peak for name, peak in found.items() if peak is not None and peak["rise_dB"] >= TOLD_FROM}
 
 
@@ -234,7 +234,7 @@ def search(project: Project) -> list[dict[str, Any]]:
     with path.open("w", encoding="utf-8") as file:
         file.writelines(json.dumps(row) + "\n" for row in (head, *done))
         for n, own in enumerate(wanted[first:], start=first + 1):
-            rigid, between = gearset_with(given, own, 1e9, "rigid"), Between.of(given, own)
+            rigid, between = model_with(given, own, 1e9, "rigid"), Between.of(given, own)
             row: dict[str, Any] = {"set": own, "rigid": peaks_of(rigid, rigid.system, AROUND)}
             row["bushing"] = [found for radial in tuned(between) for found in around(between, radial)]
             done.append(row)

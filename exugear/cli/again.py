@@ -1,4 +1,4 @@
-"""The command line that a user typed, written once more."""
+"""The typed command line, written as a command to repeat or resume it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import typer
 
 
 def resuming(context: typer.Context) -> str:
-    """Write the command that goes on with what was stopped: the same one with `--resume`.
+    """Return the command that resumes interrupted work: the typed command with `--resume`.
 
-    Options that were left out stay out, so that what they follow is asked for again.
+    Omitted options remain omitted, so that their default behaviour applies again.
     """
     words = ["exugear", str(context.info_name)]
     for parameter in context.command.params:

@@ -1,6 +1,6 @@
-"""Command line: the table of its commands, and what all of them share.
+"""The command line: the table of its commands, and their common settings.
 
-Libraries that take long to load are imported inside the verbs, so that ``--help`` answers at once.
+Libraries that load slowly are imported inside the commands, so that ``--help`` responds immediately.
 """
 
 from __future__ import annotations
@@ -31,16 +31,19 @@ COMMANDS = (
     "commands.run",
     "commands.study",
     "commands.loads",
+    "commands.losses",
     "commands.life",
     "commands.view",
     "commands.report",
     "file_commands.export",
 )
-"""Room and module of each verb, in the order of the help. The function has the name of its module; what Python reserves
-has a line after it, which the command line leaves out."""
+"""Package and module of each command, in the order of the help. The function has the name of its module; names that
+Python reserves have a trailing underscore, which the command line omits.
+"""
 
 OBJECTS_OF_A_START = 300_000
-"""New objects after which Python looks for garbage: more than a start makes, less than would be felt in memory."""
+"""Number of new objects that starts a garbage collection: more than a start creates, but without noticeable memory use.
+"""
 
 RENAMED = {
     "sweep": "study",
@@ -58,7 +61,6 @@ app = typer.Typer(
     help="Gearbox dynamics: transmission error, modes, resonances, run-ups, loads and service life.",
     no_args_is_help=True,
     rich_markup_mode=None,
-    add_completion=False,
     pretty_exceptions_show_locals=False,
 )
 
@@ -66,7 +68,7 @@ app = typer.Typer(
 def main() -> None:
     """Run the command line.
 
-    BLAS keeps to one thread: its idle threads wait actively and slow the compiled kernels beside them severalfold.
+    BLAS uses one thread: its idle threads wait actively and slow down the compiled kernels severalfold.
     """
     if message := old_name(sys.argv[1:]):
         typer.echo(f"Error: {message}", err=True)
@@ -97,10 +99,10 @@ def old_name(arguments: list[str]) -> str:
 
 @contextmanager
 def garbage_seldom_looked_for() -> Iterator[None]:
-    """Let Python look for garbage less often, and not at all at the end: a fifth of the time of a short command.
+    """Reduce the frequency of garbage collection and skip it at exit, which saves a fifth of a short command's time.
 
-    To load the libraries makes a quarter of a million objects that stay; by default Python goes through them after
-    every few hundred new ones, and twice when the process ends and all memory falls free anyway.
+    Loading the libraries creates a quarter of a million permanent objects. By default Python traverses them after every
+    few hundred new ones, and twice when the process ends, although its memory is then released in any case.
     """
     often = gc.get_threshold()
     gc.set_threshold(OBJECTS_OF_A_START, *often[1:])
@@ -125,7 +127,7 @@ def _program(
         bool, typer.Option("--version", help="Print the version.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
-    """Hold what all verbs share."""
+    """Define the options of the program without a command."""
 
 
 for place in COMMANDS:

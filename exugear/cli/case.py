@@ -1,4 +1,4 @@
-"""Arguments and options that commands share, and the checks of a gearbox file before they start."""
+"""Arguments and options that commands share, and checks of a gearbox file before they start."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = Fals
 
 
 def check_allow_dir(folder: Path | None) -> None:
-    """Refuse a further folder for the files of a case that is not there."""
+    """Raise an error if the additional permitted folder does not exist."""
     if folder is not None and not folder.is_dir():
         raise BadInputError(
             f"--allow-dir {folder}: no such folder; specify a folder that the gearbox file may read from"
@@ -58,7 +58,7 @@ def open_project(
     allow_dir: Path | None,
     scripts: bool,
 ) -> WatchedProject:
-    """Read a gearbox file and refuse choices that it does not have, or may not have; write nothing."""
+    """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files."""
     from exugear.cli.watched import WatchedProject
     from exugear.project import default_folder
 
@@ -70,12 +70,12 @@ def open_project(
 
 
 def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
-    """Assemble a variant with rigid bodies and teeth as stiff as ISO 6336-1 says, which needs no finite elements.
+    """Assemble a variant with rigid bodies and the mesh stiffness of ISO 6336-1, which requires no finite elements.
 
     Raises
     ------
     FailedError
-        The variant finds no balance so.
+        The variant has no static equilibrium with this stiffness.
     """
     from exugear.gearbox.choice import Choice
     from exugear.system.build import assemble
@@ -88,9 +88,9 @@ def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
 
 
 def steady_lack(assembly: Assembly, variant: Variant) -> str:
-    """Say why a variant has no steady response over speed, by its `assembled_by_iso`; empty where it has one.
+    """Return why a variant has no steady-state response over speed, from `assembled_by_iso`; empty if it has one.
 
-    What speaks against it does not depend on finite elements.
+    The possible reasons do not depend on finite elements.
     """
     from exugear.steady.mean_system.mean_system import unsuitable
     from exugear.system.bearings.stiffness import elastic_names
@@ -99,7 +99,7 @@ def steady_lack(assembly: Assembly, variant: Variant) -> str:
 
 
 def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
-    """Refuse what the gearbox does not have, or may not do, before anything is written into the results folder."""
+    """Raise an error for invalid or unavailable model settings before files are written into the results folder."""
     from exugear.results.folder import bodies_folder
     from exugear.system.bodies.of_gearbox import check_solids
     from exugear.system.readiness import lacking
@@ -153,7 +153,7 @@ class ShiftRule(StrEnum):
 
 
 class DistanceRule(StrEnum):
-    """Source of centre distances in an industry file: what agrees, the positions of the gears, or the file."""
+    """Source of centre distances in an industry file: consistent values, the positions of the gears, or the file."""
 
     agreeing = "agreeing"
     positions = "positions"

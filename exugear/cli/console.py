@@ -1,7 +1,7 @@
-"""What the command line says while it works and how it ends: results, progress, errors, Ctrl-C.
+"""Console output of the commands: results, progress, errors, Ctrl-C and exit codes.
 
-Names, paths and what files hold may come from a stranger. Nothing of it is taken as markup, and what would steer the
-terminal is shown, not obeyed.
+Names, paths and content of files may be untrusted. They are never interpreted as markup, and control sequences for the
+terminal are printed in escaped form.
 """
 
 from __future__ import annotations
@@ -37,20 +37,22 @@ if TYPE_CHECKING:
 
     from fe_ste.transmission_error.table import MeshTable
 
-# What the command line says: results on standard output, all else on standard error
+# Console output: results on standard output, everything else on standard error
 
 LONGEST_LINE = 400
-"""Letters of a line of a message; of a longer one the middle is left out, for file and remedy stand at its ends."""
+"""Maximum number of characters of a line of a message; longer lines are shortened in the middle, because file and
+remedy are at the ends.
+"""
 MOST_LINES = 25
-"""Lines of a message."""
+"""Maximum number of lines of a message."""
 _TURNS = frozenset("\u00ad\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
-"""Characters that turn the direction of writing, or are not seen in a name, and so show a text that is not there."""
+"""Characters that change the writing direction or are invisible in a name, and so falsify the displayed text."""
 results = Console()
 messages = Console(stderr=True)
 
 
 def plain(text: object) -> str:
-    r"""Show what would steer a terminal: control characters, turns of the writing direction, halves of characters.
+    r"""Escape characters that affect a terminal: control characters, writing direction, surrogates.
 
     Examples
     --------
@@ -68,7 +70,7 @@ def plain(text: object) -> str:
 
 
 def shortened(line: str) -> str:
-    """Leave out the middle of a line above `LONGEST_LINE`.
+    """Shorten a line longer than `LONGEST_LINE` in the middle.
 
     Examples
     --------
@@ -87,14 +89,14 @@ def say(line: str) -> None:
 
 
 class _Notes(logging.Handler):
-    """Says what the library logs."""
+    """Log handler that prints the messages of the library."""
 
     def emit(self, record: logging.LogRecord) -> None:
         note(record.getMessage(), style="yellow" if record.levelno >= logging.WARNING else "")
 
 
 def say_what_is_logged() -> None:
-    """Let the packages' own log appear on standard error."""
+    """Print the log of the packages on standard error."""
     handler = _Notes()
     for package in ("exugear", "fe_ste"):
         logger = logging.getLogger(package)
@@ -103,16 +105,16 @@ def say_what_is_logged() -> None:
 
 
 def note(message: str, style: str = "") -> None:
-    """Say something that is no result, unwrapped, so that paths in it can be copied; its lines stay lines.
+    """Print text that is not a result on standard error, unwrapped, so that paths in it can be copied.
 
-    Of more than `MOST_LINES` the rest is counted.
+    Line breaks are kept; lines beyond `MOST_LINES` are counted.
     """
     lines = [shortened(plain(line)) for line in counted(message.split("\n"))]
     messages.print(Text("\n".join(lines), style=style), soft_wrap=True)
 
 
 def counted(lines: list[str]) -> list[str]:
-    """Return what is shown of lines: all, or as many as leave one to say how many more there are.
+    """Return the lines to print: all, or the first ones and a last line with the number of the others.
 
     Examples
     --------
@@ -126,14 +128,14 @@ def counted(lines: list[str]) -> list[str]:
 
 
 class _Description(ProgressColumn):
-    """What a bar is about, as it is."""
+    """Description of a progress bar, printed without markup."""
 
     def render(self, task: Task) -> Text:
         return Text(shortened(plain(task.description)))
 
 
 def progress_bar() -> Progress:
-    """Return a bar with the time left, to be used as a context manager."""
+    """Return a progress bar with the remaining time, to be used as a context manager."""
     return Progress(
         _Description(),
         BarColumn(),
@@ -142,38 +144,38 @@ def progress_bar() -> Progress:
         TextColumn("left"),
         TimeRemainingColumn(),
         console=messages,
-        speed_estimate_period=3600.0,  # work comes in bursts: the whole of it tells the speed
+        speed_estimate_period=3600.0,  # work proceeds in bursts, so that only the whole of it indicates the speed
     )
 
 
 def print_json(summary: Mapping[str, Any]) -> None:
-    """Print one object on standard output."""
+    """Print one JSON object on standard output."""
     sys.stdout.write(json.dumps(summary, indent=2, allow_nan=False) + "\n")
 
 
-# How the command line ends: errors that a user can act on, Ctrl-C, and the exit codes of both
+# End of a command: errors that a user can correct, Ctrl-C, and their exit codes
 
 EXIT_FAILED = 1
 EXIT_BAD_INPUT = 2
 EXIT_INTERRUPTED = 130
 STOPPING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""Signals that ask the work to stop: Ctrl-C, kill, a closed terminal."""
+"""Signals that request a stop: Ctrl-C, kill, a closed terminal."""
 
 
 class BadInputError(Exception):
-    """The user's input cannot be used: nothing was written, the message says what would be right."""
+    """Unusable input: nothing was written, and the message states the remedy."""
 
 
 class FailedError(Exception):
-    """The work was begun and could not be finished; what was finished is kept."""
+    """The work was started and could not be completed; completed parts are kept."""
 
 
 class StoppedError(Exception):
-    """The user stopped the work; the message says what is kept and how to go on."""
+    """The user stopped the work; the message states which results are kept and how to resume."""
 
 
 class Interruption:
-    """Ctrl-C, remembered: Python drops the exception where it falls into a finaliser or a library's callback.
+    """A remembered Ctrl-C, because Python drops the exception inside finalisers and library callbacks.
 
     SIGTERM and SIGHUP act as Ctrl-C does. The second Ctrl-C ends the process at once.
     """
@@ -183,9 +185,9 @@ class Interruption:
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Remember Ctrl-C inside the context, besides raising it; only the main thread receives it.
+        """Remember and raise Ctrl-C inside the context; only the main thread receives it.
 
-        Whatever error a library makes of it leaves the context as KeyboardInterrupt.
+        Any error that a library raises after Ctrl-C leaves the context as KeyboardInterrupt.
         """
         if threading.current_thread() is not threading.main_thread():
             yield
@@ -193,7 +195,7 @@ class Interruption:
         self._wanted = False
         before = {number: signal.getsignal(number) for number in STOPPING}
         for number, handler in before.items():
-            if number == signal.SIGINT or handler is not signal.SIG_IGN:  # nohup has SIGHUP ignored
+            if number == signal.SIGINT or handler is not signal.SIG_IGN:  # nohup sets SIGHUP to be ignored
                 signal.signal(number, self._remember)
         complain = sys.unraisablehook
 
@@ -217,14 +219,14 @@ class Interruption:
                 signal.signal(number, handler)
 
     def _remember(self, number: int, frame: FrameType | None) -> None:
-        if self._wanted:  # what is finished is being put away
+        if self._wanted:  # completed results are being stored
             return
         self._wanted = True
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         raise KeyboardInterrupt
 
     def check(self) -> None:
-        """Raise a Ctrl-C that came and was dropped; long work calls this between its steps."""
+        """Raise a Ctrl-C that was dropped; long work calls this between its steps."""
         if self._wanted:
             raise KeyboardInterrupt
 
@@ -234,10 +236,10 @@ interruption = Interruption()
 
 @contextmanager
 def exit_codes() -> Iterator[None]:
-    """Turn errors the user can act on into one message and an exit code; others keep their traceback.
+    """Convert errors that the user can correct to one message and an exit code; others keep their traceback.
 
-    2 after `BadInputError` and what a gearbox or its choice cannot be, 1 after `FailedError`, a search without a
-    result, and whatever goes wrong in reading and writing, 130 after `StoppedError` and Ctrl-C.
+    The code is 2 after `BadInputError` and for impossible gearboxes or model settings; 1 after `FailedError`, an
+    optimisation without a result, and errors in reading and writing; 130 after `StoppedError` and Ctrl-C.
     """
     try:
         with interruption.listening(), model_errors():
@@ -257,21 +259,21 @@ def exit_codes() -> Iterator[None]:
 
 
 def _file_error_text(error: OSError) -> str:
-    """File and reason; what the program says of a file by itself names it already."""
+    """File and reason of an error; a message of the program itself already names the file."""
     if error.filename and error.strerror:
         return f"{error.filename}: {error.strerror}"
     return str(error)
 
 
 def end_with(what: str, reason: object, code: int) -> NoReturn:
-    """Say why the program ends and end it with an exit code."""
+    """Print why the program ends and end it with an exit code."""
     note(f"{what}: {reason}", style="red")
     sys.exit(code)
 
 
 @contextmanager
 def model_errors() -> Iterator[None]:
-    """Turn errors of the model's parts into those of the command line, for those who look at them themselves."""
+    """Convert errors of the model to those of the command line, for callers that handle these themselves."""
     try:
         yield
     except Exception as error:
@@ -282,10 +284,10 @@ def model_errors() -> Iterator[None]:
 
 
 def _told_to_the_user(error: Exception) -> Exception | None:
-    """Return what the command line makes of an error of the model's parts; None of another one."""
+    """Return the command-line error for an error of the model; None for any other error."""
     if not type(error).__module__.startswith("exugear."):
         return None
-    # Imported after the fact: a verb that goes well need not load them.
+    # Imported only after an error, because a successful command need not load these modules.
     from exugear.gearbox.reading import GearboxFileError
     from exugear.gearbox.variant import VariantError
     from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
@@ -301,18 +303,18 @@ def _told_to_the_user(error: Exception) -> Exception | None:
     return None
 
 
-# What long work shows on standard error: rows with the time left, all of them in one display
+# Progress of long work on standard error: rows with the remaining time, all in one display
 
 
 class Row:
-    """One kind of work: its words, how much is done, the time left. It is seen from the first call on."""
+    """Progress of one kind of work: text, completed amount, remaining time. It is visible from the first call."""
 
     def __init__(self, bars: Bars) -> None:
         self._bars = bars
         self._task: TaskID | None = None
 
     def __call__(self, words: str, done: float | None = None, total: float | None = None) -> None:
-        """Show words and, if they are known, how much is done and of how much; ends the work after Ctrl-C."""
+        """Show a text and, if known, the completed and the total amount; raise KeyboardInterrupt after Ctrl-C."""
         interruption.check()
         display = self._bars.display()
         if self._task is None:
@@ -321,7 +323,7 @@ class Row:
 
 
 class Bars:
-    """Rows of all that goes on at once: work inside of other work adds a row to the display that is there."""
+    """Rows of all current work; nested work adds a row to the existing display."""
 
     def __init__(self) -> None:
         self._outermost: ExitStack | None = None
@@ -329,7 +331,7 @@ class Bars:
 
     @contextmanager
     def row(self) -> Iterator[Row]:
-        """Give a row for work inside the context; contact that is solved there has one of its own."""
+        """Yield a row for work inside the context; tooth contact computed there has its own row."""
         from fe_ste.transmission_error.mean_contact import contacts_told
 
         contacts = Row(self)
@@ -345,7 +347,7 @@ class Bars:
             yield Row(self)
 
     def display(self) -> Progress:
-        """Return what all rows stand in; it closes with the outermost context."""
+        """Return the display of all rows; it closes with the outermost context."""
         if self._display is None:
             assert self._outermost is not None, "a row is shown inside its context"
             self._display = self._outermost.enter_context(progress_bar())
@@ -356,7 +358,7 @@ class Bars:
 
 
 def files_read(row: Row) -> Callable[[int, int], None]:
-    """Return what is told the number of files of loads that are read, and of all; one alone is not worth a row."""
+    """Return a function that shows the number of load files read and of all; a single file has no row."""
 
     def show(done: int, total: int) -> None:
         interruption.check()
@@ -366,11 +368,11 @@ def files_read(row: Row) -> Callable[[int, int], None]:
     return show
 
 
-# What is said of tables of transmission error
+# Messages about tables of the transmission error
 
 
 def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
-    """Say what is missing or cut off in tables; return why they are not to be trusted, nothing if they are."""
+    """Print warnings about missing or truncated values of tables; return the reasons why tables are invalid."""
     from exugear.system.tooth_mesh.tables import doubts_about_table, remarks_about_table
 
     for name, table in tables.items():
@@ -380,7 +382,7 @@ def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
 
 
 def refuse_not_converged(meshes: Sequence[str]) -> None:
-    """End with code 1 where meshes read their tables beside states that are not solved."""
+    """End with code 1 if meshes interpolate their tables next to non-converged states."""
     if meshes:
         raise FailedError(
             f"invalid: the static state of {', '.join(meshes)} lies next to non-converged table states, values are "
@@ -388,11 +390,11 @@ def refuse_not_converged(meshes: Sequence[str]) -> None:
         )
 
 
-# Results folders as verbs ask for them before they work
+# Results folders, which commands check before they start
 
 
 def check_results_folder(folder: Path) -> None:
-    """Refuse a folder that a verb could not write into, before it works, and make none."""
+    """Raise an error for a folder that a command could not write into, without creating it."""
     there = next(parent for parent in (folder, *folder.absolute().parents) if parent.exists())
     if not there.is_dir():
         raise BadInputError(f"--out {folder}: {there} is not a folder; specify a folder that can be created")
@@ -401,7 +403,7 @@ def check_results_folder(folder: Path) -> None:
 
 
 def make_results_folder(folder: Path) -> None:
-    """Make the folder that a verb writes into, so that a wrong one shows before the work, not after."""
+    """Create the folder of results before the work starts, so that a wrong path is reported early."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The process of the command line: standard streams that may be closed, libraries that are not wanted."""
+"""The process of the command line: standard streams that may be closed, and libraries that are not loaded."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from typing import Any, TextIO
 
 from exugear.cli.console import EXIT_FAILED, end_with
 
-# Standard streams that may be closed, full or no longer read: the work goes on, and the exit code tells
+# Standard streams that may be closed, full or no longer read: the work continues, and the exit code indicates it
 
 EXIT_UNREAD = 141
-"""As of any program whose reader, such as ``head``, has read enough."""
+"""Exit code of programs whose reader, such as ``head``, has closed the pipe."""
 
 
 class _Stream(io.TextIOWrapper):
-    """Standard stream that costs no work when it cannot be written: what follows is dropped, the failure kept."""
+    """Standard stream that drops further output after a failed write and keeps the failure, so that work continues."""
 
     failure: OSError | None = None
 
@@ -44,10 +44,10 @@ class _Stream(io.TextIOWrapper):
 
 @contextmanager
 def standard_streams() -> Iterator[None]:
-    """Finish the work though its output cannot be written, and tell by the exit code of the program inside.
+    """Complete the work although its output cannot be written, and indicate that by the exit code.
 
-    141 if the reader of standard output is gone, without a word; 1 and a sentence if it is full or closed. What was
-    to be said on standard error and cannot is dropped.
+    The code is 141, without a message, if the reader of standard output has closed the pipe, and 1 with a message if
+    the output is full or closed. Text that cannot be written to standard error is dropped.
     """
     _take_closed_numbers()
     sys.stdout, sys.stderr = output, _ = _lasting(sys.stdout, 1), _lasting(sys.stderr, 2)
@@ -64,16 +64,16 @@ def standard_streams() -> Iterator[None]:
 
 
 def _take_closed_numbers() -> None:
-    """Put something in the place of closed streams, so that no file gets their numbers and what goes to them."""
+    """Replace closed streams, so that no other file receives their descriptors and the output sent to them."""
     for number, mode in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):  # writing to standard output fails
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, mode)  # takes the lowest number, which is this one
+            os.open(os.devnull, mode)  # uses the lowest free descriptor, which is this one
 
 
 def _lasting(stream: TextIO | None, number: int) -> TextIO:
-    """Stream in place of Python's own, which is None if it was closed."""
+    """Return a stream that replaces Python's own one, or the missing one if that was closed."""
     if stream is None:
         return _Stream(open(number, "wb", closefd=False), encoding="utf-8", line_buffering=True)
     if not isinstance(stream, io.TextIOWrapper):
@@ -81,17 +81,17 @@ def _lasting(stream: TextIO | None, number: int) -> TextIO:
     return _Stream(stream.buffer, stream.encoding, stream.errors, None, stream.line_buffering, stream.write_through)
 
 
-# Libraries that are installed and not wanted: Dask, which xarray loads with the first data set if it is there
+# Optional libraries that commands do not need: Dask, which xarray loads with the first dataset if it is installed
 
 _modules: dict[str, Any] = sys.modules
 
 
 def leave_out_dask() -> None:
-    """Let Dask look as if it were not installed: half a second of each verb, none of which has an array of it."""
+    """Hide Dask from imports, which saves half a second per command; no command uses its arrays."""
     _modules.setdefault("dask", None)
 
 
 def let_in_dask() -> None:
-    """Let Dask be found again, by what sends work to its clusters."""
+    """Make Dask importable again, for work on its clusters."""
     if _modules.get("dask", ...) is None:
         del _modules["dask"]

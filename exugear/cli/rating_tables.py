@@ -21,7 +21,7 @@ _WORDS = {"torque": "torque of the gear", "load_torque": "torque of the load"}
 _OF_2019 = ("f_ZCa", "f_eps")
 """Factors that only helical gears have, by the edition of 2019: no rows of dashes without them."""
 GEAR_COLUMN = 14
-"""Columns in which the heading of a gear is wrapped."""
+"""Width in characters at which the heading of a gear is wrapped."""
 _DIGITS = {
     "MPa": ".1f",
     "kN": ".4g",
@@ -36,7 +36,7 @@ _DIGITS = {
 
 
 def tell_rating(sheet: RatingSheet) -> None:
-    """Print a sheet, its assumptions, and what it neglects."""
+    """Print a rating sheet with its assumptions and neglected effects."""
     print_text(f"Rating to {sheet.edition}, method B; {sheet.load}")
     for title, flanks in _meshes(sheet):
         print_table(f"Mesh {title}", [*_rows(flanks, sheet.other_edition)])
@@ -49,7 +49,7 @@ def tell_rating(sheet: RatingSheet) -> None:
 
 
 def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
-    """Gears that mesh, under one sense of load, and a title for them."""
+    """Yield the gears of each mesh for one direction of load, with a title."""
     found: dict[tuple[str, int], list[FlankSheet]] = {}
     for flank in sheet.flanks:
         found.setdefault((flank.family, flank.sense), []).append(flank)

@@ -1,4 +1,4 @@
-"""Tables on the console: whole numbers and whole headings in 79 columns; only names and texts are wrapped."""
+"""Tables on the console: complete numbers and headings in 79 columns; only names and texts are wrapped."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from rich.text import Text
 from exugear.cli.console import plain, results
 
 NARROWEST = 79
-"""Columns that a table may always take: a terminal of 80 has them."""
+"""Minimum width of a table in characters, which fits a terminal of 80."""
 GAP = 2
 HARD_SPACE = "\u00a0"
-"""Space in texts at which lines are broken only where nothing else helps; printed as a space."""
+"""Space in texts at which lines are broken only if necessary; it is printed as a space."""
 SMALLEST_NAME = 10
-"""Columns that wrapped names and texts keep; a table without room for them is printed in parts below each other."""
+"""Minimum width of wrapped names and texts; a table without space for it is printed in parts below each other."""
 
 Row = Mapping[str, str]
 
@@ -38,7 +38,7 @@ class Column:
 
     @property
     def smallest(self) -> int:
-        """Width below which the heading, or a number, would be cut."""
+        """Width below which the heading or a number would be truncated."""
         if not self.is_text:
             return self.natural
         return max(_width(self.heading), min(self.natural, SMALLEST_NAME))
@@ -47,7 +47,7 @@ class Column:
 def print_table(title: str, rows: Sequence[Row], texts: tuple[str, ...] = (), legend: str = "") -> None:
     """Print rows under the keys of the first one, and a legend below them.
 
-    The first column is text, and so are those in `texts`; the others are numbers, which are never wrapped or cut.
+    The first column is text, and so are those in `texts`; the others are numbers, which are never wrapped or truncated.
     """
     limit = max(NARROWEST, results.width - 1)
     results.print(Text("\n".join(["", *wrapped(plain(title), limit)]), style="bold"), soft_wrap=True)
@@ -69,7 +69,7 @@ def print_text(text: str, indent: str = "") -> None:
 
 
 def significant(value: float, digits: int = 4, decimals: int = 3) -> str:
-    """Write a number with some significant digits, without an exponent and with at most some decimals.
+    """Format a number with some significant digits, without an exponent and with at most some decimals.
 
     Large numbers keep all digits before the point; above nine of them, or where decimals would show a zero, the number
     has an exponent.
@@ -110,7 +110,7 @@ def wrapped(text: str, width: int) -> list[str]:
 
 
 def _pieces(paragraph: str, width: int) -> Iterator[str]:
-    """Parts of a line between which it may be broken, none of them wider than a column."""
+    """Yield parts of a line between which it may be broken, none of them wider than a column."""
     for word in re.findall(r" *[^ ]+ ?| +", paragraph):
         if cell_len(word.strip()) <= width:
             yield word
@@ -134,7 +134,7 @@ def _width(text: str) -> int:
 
 
 def _parts(columns: list[Column], limit: int) -> Iterator[list[Column]]:
-    """Columns that fit beside each other; what does not fit follows below, under the first column again."""
+    """Yield groups of columns that fit in one line; further groups are printed below and repeat the first column."""
     part = columns[:1]
     for column in columns[1:]:
         if len(part) > 1 and _total([one.smallest for one in (*part, column)]) > limit:
@@ -150,7 +150,7 @@ def _total(widths: Sequence[int]) -> int:
 
 
 def _widths(columns: Sequence[Column], limit: int) -> list[int]:
-    """Widths of columns: the widest texts give way first."""
+    """Widths of columns; the widest texts are narrowed first."""
     widths = [column.natural for column in columns]
     while _total(widths) > limit:
         able = [place for place, column in enumerate(columns) if widths[place] > column.smallest]
@@ -161,7 +161,7 @@ def _widths(columns: Sequence[Column], limit: int) -> list[int]:
 
 
 def _lines(columns: Sequence[Column], widths: Sequence[int]) -> Iterator[str]:
-    """Lines of a table: headings, a rule, rows."""
+    """Yield the lines of a table: headings, a rule, rows."""
     yield from _row([column.heading.split("\n") for column in columns], columns, widths, bottom=True)
     yield " " + "─" * (_total(widths) - 1)
     for number in range(len(columns[0].cells)):
@@ -177,7 +177,7 @@ def _lines(columns: Sequence[Column], widths: Sequence[int]) -> Iterator[str]:
 def _row(
     cells: Sequence[list[str]], columns: Sequence[Column], widths: Sequence[int], *, bottom: bool = False
 ) -> Iterator[str]:
-    """Lines of one row: texts begin at the left, numbers end at the right; headings end at the bottom."""
+    """Yield the lines of one row: texts are left-aligned, numbers right-aligned, headings aligned at the bottom."""
     height = max(map(len, cells))
     if bottom:
         cells = [[*[""] * (height - len(lines)), *lines] for lines in cells]

@@ -1,4 +1,4 @@
-"""A project whose long work is seen while it goes on, for the verbs; loaded inside them."""
+"""A project that shows the progress of long work, for the commands; imported inside them."""
 
 from __future__ import annotations
 
@@ -44,31 +44,31 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False)
 class WatchedProject(Project):
-    """A project that shows what takes long in rows of one display, and ends with Ctrl-C between its steps."""
+    """A project that shows long work in rows of one display and stops between its steps after Ctrl-C."""
 
     bars: Bars = field(default_factory=Bars, compare=False)
 
     def begin(self) -> None:
-        """Make the folder, after the last refusal: that of tables whose axes ask for what the gears cannot do."""
+        """Create the folder after the last check, which is that of table axes the gears cannot reach."""
         self.missing_tables()
         make_results_folder(self.folder)
 
     def prepare(self) -> None:
-        """Compute the tables that the mesh law needs and that are not there or belong to another input."""
+        """Compute the tables that the mesh model needs if they are missing or belong to other input."""
         requests = self.missing_tables()
         self.keep_case()
         for request in requests:
             note(request.replaces or f"{request.name}: no table in {self.folder}; computing it first")
         with time_noted(self.folder, "tables, computed before dynamics") if requests else nullcontext():
             self.computed(requests)
-        # What a law cannot do with it refuses itself.
+        # Mesh models themselves refuse tables that they cannot use.
         for doubt in tell_of_tables(self.tables_at_work()):
             note(f"Warning: {doubt}", style="yellow")
 
     def computed(
         self, requests: Sequence[TableRequest], progress: Callable[[int, int], None] | None = None
     ) -> dict[str, MeshTable]:
-        """Table of each request; those that are missing share one row."""
+        """Table of each request; the missing ones share one row."""
         total = sum(request.work for request in requests if not request.stored)
         before = 0
         tables = {}
@@ -79,7 +79,7 @@ class WatchedProject(Project):
         return tables
 
     def bodies(self, begin: Callable[[str], None] | None = None) -> dict[str, ElasticBody]:
-        """Reduced elastic bodies of the variant, or those that are kept."""
+        """Reduced flexible bodies of the variant, computed or stored."""
         names = elastic_names(self.gearbox)
         with self.bars.row() as row:
 
@@ -88,7 +88,7 @@ class WatchedProject(Project):
 
             try:
                 return super().bodies(show)
-            except GearboxFileError as error:  # a mesh that only reading shows to be none: the work has begun
+            except GearboxFileError as error:  # an invalid mesh detected only on reading: the work has already started
                 raise FailedError(error) from error
 
     def assembly(self) -> Assembly:
@@ -97,7 +97,7 @@ class WatchedProject(Project):
             return super().assembly()
 
     def modes(self) -> Modes:
-        """Eigenmodes; tells how elastic bodies were reduced."""
+        """Eigenmodes; prints how flexible bodies were reduced."""
         with self.bars.row():
             modes = super().modes()
         for name, body in modes.assembly.elastic_bodies.items():
@@ -108,14 +108,14 @@ class WatchedProject(Project):
         return modes
 
     def duties(self) -> tuple[tuple[BearingLoadState, ...], tuple[MeshLoadState, ...]]:
-        """Find what catalogue bearings and meshes bear."""
+        """Compute the loads of catalogue bearings and meshes."""
         with self.bars.row():
             return super().duties()
 
     def steady(
         self, settings: SteadySettings | None = None, progress: Callable[[int, int], None] | None = None
     ) -> xr.Dataset:
-        """Steady response over speed."""
+        """Steady-state response over speed."""
         words = f"{self.choice.variant}: steady state"
         with self.bars.row() as row:
             row(words)
@@ -143,7 +143,7 @@ class WatchedProject(Project):
             return super().compare_with_exudyn(duration, progress=show, **options)
 
     def checked_loads(self, progress: Callable[[int, int], None] | None = None) -> CountedLoads:
-        """Read the loads of a life."""
+        """Read the loads over the life."""
         with self.bars.row() as row:
             return super().checked_loads(files_read(row))
 
@@ -161,14 +161,14 @@ class WatchedProject(Project):
     def rating(
         self, begin: Callable[[str], None] | None = None, progress: Callable[[int, int], None] | None = None
     ) -> RatingSheet:
-        """Rating of all gears by the standard."""
+        """Rating of all gears according to the standard."""
         with self.bars.row() as row:
             row("static balance")
             return super().rating(*_of_life(row))
 
 
 def _of_life(row: Row) -> tuple[Callable[[str], None], Callable[[int, int], None]]:
-    """Return what is told of pairs whose root stress begins, and of static states that are solved."""
+    """Return functions that show the pair whose root stress is computed, and the number of computed static states."""
     return (
         lambda pair: row(f"{pair}: root stress by finite elements"),
         lambda done, total: row("static balance", done, total),
@@ -176,7 +176,7 @@ def _of_life(row: Row) -> tuple[Callable[[str], None], Callable[[int, int], None
 
 
 def _computed(request: TableRequest, row: Row, before: int, total: int) -> MeshTable:
-    """Compute a table; its row counts the work of all that are missing, of which some is done before."""
+    """Compute a table; its row counts the work of all missing tables, part of which is already done."""
     row(f"{request.name}: finite elements", before, total)
     what = "position" if request.states == request.wanted.positions else "state"
 

@@ -1,1 +1,1 @@
-"""Files of other programs: gearboxes and loads, in and out."""
+"""Import and export of files of other programs: gearboxes and loads."""

@@ -1,4 +1,4 @@
-"""Channels over time as a file holds them: names and units at once, values in blocks when they are asked for."""
+"""Channels of a load file over time: names and units are read at once, values in blocks on demand."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 
-# Units as load files write them, and what they are worth in SI
+# Units in load files, and their factors to SI
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Unit:
     """A unit of a load file."""
 
     quantity: str
-    """What it measures: torque, force, speed, time, angle, velocity, or another."""
+    """Physical quantity: torque, force, speed, time, angle, velocity, or another."""
     factor: float
-    """Its worth in SI."""
+    """Factor to SI."""
 
 
 _RPM = math.pi / 30.0
@@ -58,14 +58,14 @@ UNITS: dict[str, Unit] = {
     "deg": Unit("angle", _TURN / 360.0),
     "rad": Unit("angle", 1.0),
 }
-"""Units that are understood, as `plain_unit` writes them, without capitals."""
+"""Supported units, in lower case and in the form of `plain_unit`."""
 SI_NAMES = {"torque": "N m", "force": "N", "speed": "rad/s", "time": "s", "angle": "rad", "velocity": "m/s"}
 USUAL_NAMES = {"torque": "kN-m", "force": "kN", "speed": "rpm", "time": "s", "angle": "deg", "velocity": "m/s"}
-"""Units that a message names as examples."""
+"""Units that a message states as examples."""
 
 
 def plain_unit(text: str) -> str:
-    """Write a unit without brackets and blanks, multiplication as a hyphen or nothing.
+    """Return a unit in lower case, without brackets and blanks; multiplication is a hyphen or nothing.
 
     Examples
     --------
@@ -77,7 +77,7 @@ def plain_unit(text: str) -> str:
 
 
 def unit_of(text: str) -> Unit | None:
-    """Look up a unit; None for one that is not understood, millinewtons among them: they are not meganewtons.
+    """Look up a unit; None for an unknown one, including mN, which must not be confused with MN.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def unit_of(text: str) -> Unit | None:
     return UNITS.get(plain_unit(text))
 
 
-# Channels over time as a file holds them: names and units at once, values in blocks when they are asked for
+# Channels over time: names and units are read at once, values in blocks on demand
 
 ALIASES: tuple[tuple[str, ...], ...] = (
     ("rottorq", "lsshfttq", "lsshftmxa", "lsshftmxs", "lssgagmxa", "lssgagmxs"),
@@ -99,20 +99,22 @@ ALIASES: tuple[tuple[str, ...], ...] = (
 )
 """Channels of OpenFAST that are the same quantity under several names (its list of outputs, ElastoDyn)."""
 SHOWN_NAMES = 12
-"""Most names that a message lists."""
+"""Maximum number of names that a message lists."""
 LEAST_LINES = 3
-"""Fewer lines than these are no series."""
+"""Minimum number of rows of a time series."""
 GAP = 50.0
-"""Usual steps of time within which a longer series must go on: what is missing between would count as its ends do."""
+"""Largest permitted gap of a long series, in usual time steps; values would be interpolated across a gap."""
 LONG_SERIES = 200
-"""Steps from which a series is one of a program or a recorder, whose steps are even."""
+"""Number of steps from which a series is assumed to come from a program or recorder with uniform steps."""
 
 Read = Callable[[tuple[int, ...]], Iterator[tuple[Floats, Floats]]]
-"""Blocks of a file for some of its columns: time (n,) and values (n, columns), in the units of the file."""
+"""Function that yields blocks of a file for some of its columns: time (n,) and values (n, columns), in the units of the
+file.
+"""
 
 
 class LoadFileError(ValueError):
-    """A file of loads that cannot be used: one sentence says file, place and what would be right."""
+    """An unusable load file; the message states file, position and remedy in one sentence."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,11 +124,11 @@ class Channels(ReprMixin):
     path: Path
     names: tuple[str, ...]
     units: tuple[str, ...]
-    """As the file writes them, time left out."""
+    """Units as written in the file, without that of time."""
     time_unit: str
-    """As the file writes it; seconds where it writes none."""
+    """Unit of time as written in the file; seconds if there is none."""
     read: Read
-    """Callable. Reads blocks of the file for some of its columns."""
+    """Function that reads blocks of the file for some of its columns."""
 
     def _line(self) -> str:
         return f" of {self.path.name}: {', '.join(self.names[:SHOWN_NAMES])}"
@@ -146,28 +148,28 @@ class Channels(ReprMixin):
 
         Parameters
         ----------
-        name : capitals do not matter; other names of OpenFAST for the same are found, too
-        quantity : what it must measure: one of `exugear.exchange.channels.SI_NAMES`
+        name : name in upper or lower case; OpenFAST's other names of the quantity are found as well
+        quantity : required quantity: one of `SI_NAMES`
 
         Raises
         ------
         LoadFileError
-            As `blocks`.
+            As in `blocks`.
         """
         return np.concatenate([values[:, 0] for _, values in self.blocks([(name, quantity)])])
 
     def blocks(self, wanted: Sequence[tuple[str, str]]) -> Iterator[tuple[Floats, Floats]]:
-        """Give time (s) and some channels (SI) block by block, (n,) and (n, channels): no file is in memory as a whole.
+        """Yield time (s) and some channels (SI) in blocks, (n,) and (n, channels), so that no whole file is in memory.
 
         Parameters
         ----------
-        wanted : name and quantity of each channel, as of `channel`
+        wanted : name and quantity of each channel, as in `channel`
 
         Raises
         ------
         LoadFileError
-            No such channel, a unit that is not understood or measures something else, values that are no numbers,
-            times that do not grow, or a gap in them.
+            A channel does not exist, its unit is unknown or of another quantity, values are not numbers, or times do
+            not increase or have a gap.
         """
         places = tuple(self._place(name) for name, _ in wanted)
         units = [self._unit(place, quantity) for place, (_, quantity) in zip(places, wanted, strict=True)]
@@ -223,7 +225,7 @@ class Channels(ReprMixin):
 
 @dataclass
 class _Steps:
-    """Steps of time, looked at block by block."""
+    """Check of the time steps, block by block."""
 
     path: Path
     count: int = 0

@@ -1,10 +1,11 @@
-"""Files of loads over time, read by their ending: OpenFAST's binary and text output, tables with commas.
+"""Load files over time, by their extension: binary and text output of OpenFAST, and comma-separated tables.
 
 Little endian: format (int16); in format 4 the length of names (int16), 10 otherwise; numbers of channels and of steps
 (int32 each); two float64: in format 1 scale and offset of packed times, else first time and step. Formats 1, 2 and 4
-pack values as int16 with a scale and an offset (float32) for each channel, format 3 holds them as float64. Then the
-description with its length, the names and units of time and of all channels; in format 1 the packed times (int32); the
-values step by step. Packed are ``value * scale + offset`` (OpenFAST documentation, "Output files"; module NWTC_IO).
+pack values as int16 with a scale and an offset (float32) for each channel, format 3 stores them as float64. The
+description with its length, and the names and units of time and of all channels follow; then in format 1 the packed
+times (int32); then the values step by step. Packed numbers are ``value * scale + offset`` (OpenFAST documentation,
+"Output files"; module NWTC_IO).
 """
 
 from __future__ import annotations
@@ -25,28 +26,28 @@ from exugear.exchange.channels import Channels, LoadFileError, Read
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import FileError, open_regular
 
-# Lines of a text of any length, in blocks: no file is in memory as a whole
+# Lines of a text of any length, in blocks, so that no whole file is in memory
 
 BLOCK = 1_000_000
-"""Bytes that are read at once."""
+"""Number of bytes read at once."""
 LONGEST_LINE = 10_000_000
-"""Bytes of a line beyond which a file is no table."""
+"""Maximum number of bytes of a line of a table."""
 
 
 def blocks_of_lines(path: Path) -> Iterator[list[bytes]]:
-    """Lines of a file, some at a time, without their ends.
+    """Yield the lines of a file in blocks, without line ends.
 
     Raises
     ------
     LoadFileError
-        It cannot be read, or has a line of more than `LONGEST_LINE` bytes.
+        The file cannot be read, or has a line of more than `LONGEST_LINE` bytes.
     """
     try:
         with open_regular(path) as file:
             rest = b""
             while block := file.read(BLOCK):
                 lines = (rest + block).splitlines(keepends=True)
-                # A carriage return at the end may belong to a line feed that comes next.
+                # A carriage return at the end may belong to a line feed in the next block.
                 rest = lines.pop() if not lines[-1].endswith(b"\n") else b""
                 if len(rest) > LONGEST_LINE:
                     raise LoadFileError(f"{path}: a line of more than {LONGEST_LINE:g} bytes; expected a table")
@@ -58,12 +59,12 @@ def blocks_of_lines(path: Path) -> Iterator[list[bytes]]:
 
 
 def first_lines(path: Path, count: int) -> list[str]:
-    """First lines of a file as text of UTF-8, or of what older programs write; an empty one has none.
+    """First lines of a file, decoded as UTF-8 or an older encoding; empty for an empty file.
 
     Raises
     ------
     LoadFileError
-        As `blocks_of_lines`.
+        As in `blocks_of_lines`.
     """
     found: list[bytes] = []
     for lines in blocks_of_lines(path):
@@ -74,7 +75,7 @@ def first_lines(path: Path, count: int) -> list[str]:
 
 
 def decoded(content: bytes) -> str:
-    """Text of UTF-8, or of what older programs write."""
+    """Text decoded as UTF-8, or as the encoding of older programs."""
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -84,22 +85,22 @@ def decoded(content: bytes) -> str:
 def numbers(
     path: Path, headings: Sequence[str], skipped: int, separator: str | None, wanted: Collection[int] | None = None
 ) -> Iterator[Floats]:
-    """Rows of numbers behind some lines, in blocks (n, columns).
+    """Yield rows of numbers after the heading lines, in blocks (n, columns).
 
-    Words for missing numbers become NaN, so that a channel that is asked for tells; so does whatever stands in columns
-    that nobody asks for.
+    Texts for missing numbers become NaN, so that reading such a channel raises an error; so does any text in unused
+    columns.
 
     Parameters
     ----------
     headings : names of the columns
-    skipped : lines of headings
-    separator : between numbers; blanks where it is None
-    wanted : places of the columns that are asked for; all by default
+    skipped : number of heading lines
+    separator : separator of numbers; None for blanks
+    wanted : indices of the required columns; all by default
 
     Raises
     ------
     LoadFileError
-        A line with another number of columns, or with words in a column that is asked for; no line at all.
+        A line has another number of columns or text in a required column, or the file has no rows.
     """
     table = _Table(path, tuple(headings), separator, tuple(sorted(wanted or range(len(headings)))))
     number = 0
@@ -117,16 +118,16 @@ def numbers(
 
 
 FORTRAN_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[dDqQ]?)([+-]\d{1,3})")
-"""A number as Fortran writes it where its exponent has three digits, without E, or with D for E."""
+"""A number in Fortran notation, with a three-digit exponent without E, or with D for E."""
 
 
 def fortran_number(word: str) -> float:
-    """Return the number of a word, also as Fortran writes it.
+    """Return the number in a word, including Fortran notation.
 
     Raises
     ------
     ValueError
-        It is none.
+        The word is not a number.
 
     Examples
     --------
@@ -141,7 +142,7 @@ def fortran_number(word: str) -> float:
 
 @dataclass(frozen=True)
 class _Table:
-    """Lines of numbers under headings."""
+    """Rows of numbers under headings."""
 
     path: Path
     headings: tuple[str, ...]
@@ -149,7 +150,7 @@ class _Table:
     wanted: tuple[int, ...]
 
     def parsed(self, texts: list[str], first: int) -> Floats:
-        """Numbers of lines, the first of them of a number; NaN in columns that nobody asks for and that hold words."""
+        """Numbers of lines beginning with line number `first`; NaN for text in unused columns."""
         kept = [text for text in texts if text.strip()]
         if not kept:
             return np.zeros((0, len(self.headings)))
@@ -162,7 +163,7 @@ class _Table:
         return self._line_by_line(texts, first)
 
     def _line_by_line(self, texts: list[str], first: int) -> Floats:
-        """Read slowly, to tell which line and column is wrong."""
+        """Read line by line, which is slower, to find the line and column of an error."""
         rows = []
         for number, text in enumerate(texts, start=first):
             if not text.strip():
@@ -185,25 +186,25 @@ class _Table:
         return np.array(rows)
 
 
-# Tables of numbers as text: OpenFAST's text output, and tables with commas whose headings carry units
+# Tables of numbers as text: OpenFAST's text output, and comma-separated tables whose headings contain units
 
 ENDINGS = {
     "_N_m": "N-m", "_kN_m": "kN-m", "_MN_m": "MN-m", "_N": "N", "_kN": "kN", "_MN": "MN", "_rpm": "rpm",
     "_rad_per_s": "rad/s", "_m_per_s": "m/s", "_s": "s", "_ms": "ms", "_min": "min", "_h": "h",
 }  # fmt: skip
-"""Units at the end of headings of tables with commas; longer ones first where one ends another."""
+"""Units at the end of headings of comma-separated tables; longer ones first if one ends with another."""
 _MOST_HEADER_LINES = 40
 MOST_ROWS = 1_000_000
-"""Lines of a table of counted loads."""
+"""Maximum number of rows of a table of counted loads."""
 
 
 def open_openfast_text(path: Path) -> Channels:
-    """Channels of OpenFAST's text output (``.out``): a line of names from Time on, one of units, one for each step.
+    """Channels of OpenFAST's text output (``.out``): a line of names beginning with Time, one of units, one per step.
 
     Raises
     ------
     LoadFileError
-        No such lines.
+        The file has no such lines.
     """
     lines = first_lines(path, _MOST_HEADER_LINES + 1)
     heads = (place for place, line in enumerate(lines[:_MOST_HEADER_LINES]) if line.lower().split()[:1] == ["time"])
@@ -221,12 +222,12 @@ def open_openfast_text(path: Path) -> Channels:
 
 
 def open_headed_series(path: Path) -> Channels:
-    """Channels of a table with commas: ``time_s``, and channels whose heading ends in its unit, ``hss_rpm``, ``a_N_m``.
+    """Channels of a comma-separated table: ``time_s``, and channels with units, such as ``hss_rpm``, ``a_N_m``.
 
     Raises
     ------
     LoadFileError
-        As `headings_of`; no time first, or a heading without a unit.
+        As in `headings_of`; or time is not the first column, or a heading has no unit.
     """
     headings = headings_of(path)
     if not is_series(headings):
@@ -236,17 +237,17 @@ def open_headed_series(path: Path) -> Channels:
 
 
 def is_series(headings: tuple[str, ...]) -> bool:
-    """Tell whether a table with commas is one over time."""
+    """Return whether a comma-separated table is a time series."""
     return headings[0] in ("time_s", "time_ms", "time_min", "time_h")
 
 
 def headings_of(path: Path) -> tuple[str, ...]:
-    """Headings of a table with commas.
+    """Headings of a comma-separated table.
 
     Raises
     ------
     LoadFileError
-        Nothing under the headings, no commas, or a heading twice.
+        The table has no rows under its headings or no commas, or a heading occurs twice.
     """
     lines = [line for line in first_lines(path, 100) if line.strip()]
     if len(lines) < 2:
@@ -266,12 +267,12 @@ def headings_of(path: Path) -> tuple[str, ...]:
 
 
 def table_rows(path: Path, headings: Sequence[str]) -> Floats:
-    """Numbers under the headings of a table with commas that is no series, (lines, columns).
+    """Numbers under the headings of a comma-separated table that is not a time series, (rows, columns).
 
     Raises
     ------
     LoadFileError
-        As `exugear.exchange.series_files.numbers`, or more than `MOST_ROWS` lines.
+        As in `numbers`, or there are more than `MOST_ROWS` rows.
     """
     parts: list[Floats] = []
     for block in numbers(path, headings, 1, ","):
@@ -297,10 +298,10 @@ def _unit_of_heading(path: Path, heading: str) -> str:
     raise LoadFileError(f"{path}: heading {heading!r} ends in no unit; endings are {', '.join(ENDINGS)}")
 
 
-# Binary output of OpenFAST (``.outb``), all four formats of it
+# Binary output of OpenFAST (``.outb``), all four formats
 
 WITH_TIME, WITHOUT_TIME, NOT_COMPRESSED, LONG_NAMES = 1, 2, 3, 4
-"""Formats of the file, by its first number."""
+"""Formats of the file, identified by its first number."""
 BINARY_BLOCK = 4_000_000
 """Bytes of values that are in memory at once."""
 _NAME_LENGTH = 10
@@ -310,7 +311,7 @@ _MOST_CHANNELS = 100_000
 
 @dataclass
 class _Reader:
-    """A file, taken from the front; nothing is taken that it does not hold."""
+    """Sequential reader of a file that never reads beyond its end."""
 
     path: Path
     file: IO[bytes]
@@ -341,36 +342,36 @@ class _Reader:
 
 @dataclass(frozen=True, eq=False)
 class _Layout:
-    """What the head of a file says of its values."""
+    """Layout of the values, from the header of a file."""
 
     kind: int
     steps: int
     first: float
     second: float
-    """Scale and offset of packed times, or first time and step."""
+    """Scale and offset of packed times, or first time and time step."""
     scales: Floats
     offsets: Floats
-    """(channels,)"""
+    """(channels,) scale and offset of packed values."""
     names: tuple[str, ...]
     units: tuple[str, ...]
-    """Time first."""
+    """Names and units, time first."""
     times: int
     rows: int
-    """Places of packed times and of the first row, bytes."""
+    """Positions of packed times and of the first row, bytes."""
 
     @property
     def value(self) -> np.dtype:
-        """Type of a value."""
+        """Data type of a value."""
         return np.dtype("<f8" if self.kind == NOT_COMPRESSED else "<i2")
 
 
 def open_openfast_binary(path: Path) -> Channels:
-    """Channels of an OpenFAST binary file; bytes behind its declared steps are left alone, as some files have them.
+    """Channels of an OpenFAST binary file; bytes after its declared steps, which some files have, are ignored.
 
     Raises
     ------
     LoadFileError
-        Another format, or a file that ends before its data; its length is looked at before anything is allocated.
+        The format is unknown, or the file ends before its data; its length is checked before memory is allocated.
     """
     try:
         with open_regular(path) as file:
@@ -412,7 +413,7 @@ def _layout(reader: _Reader) -> _Layout:
 
 
 def _blocks(path: Path, layout: _Layout, places: tuple[int, ...]) -> Iterator[tuple[Floats, Floats]]:
-    """Give time and the values of some channels, in the units of the file, by blocks of steps."""
+    """Yield time and the values of some channels, in the units of the file, by blocks of steps."""
     chosen = list(places)
     for place in chosen:
         if layout.scales[place] == 0.0:
@@ -432,10 +433,10 @@ def _blocks(path: Path, layout: _Layout, places: tuple[int, ...]) -> Iterator[tu
             yield time, (rows.astype(np.float64) - layout.offsets[chosen]) / layout.scales[chosen]
 
 
-# A file of loads over time, read by its ending
+# Load files over time, read according to their extension
 
 LARGEST_SERIES = 2_000_000_000
-"""Largest file that is read, bytes."""
+"""Maximum size of a file, bytes."""
 _BLOCK = 1_000_000
 SERIES_ENDINGS = (".outb", ".out", ".csv")
 
@@ -444,14 +445,14 @@ _OPENED = {".outb": open_openfast_binary, ".out": open_openfast_text, ".csv": op
 
 
 def read_channels(path: str | Path) -> Channels:
-    """Channels over time of OpenFAST's binary (``.outb``) or text (``.out``) output, or of a table with commas.
+    """Channels over time of OpenFAST's binary (``.outb``) or text (``.out``) output, or of a comma-separated table.
 
-    Values are read in blocks when they are asked for.
+    Values are read in blocks on demand.
 
     Raises
     ------
     LoadFileError
-        Another ending, a file that cannot be read, is damaged or holds none.
+        The extension is unknown, or the file cannot be read, is damaged or has no channels.
 
     Examples
     --------
@@ -474,7 +475,7 @@ def file_digest(path: Path) -> str:
     Raises
     ------
     LoadFileError
-        It cannot be read.
+        The file cannot be read.
     """
     try:
         with open_regular(path) as file:

@@ -1,1 +1,1 @@
-"""The gearbox as data: file, sections, parts, checks. Nothing here computes dynamics."""
+"""Gearbox data: input file, sections, parts and checks. This package contains no dynamics."""

@@ -1,4 +1,4 @@
-"""Bodies and what holds them from their sections: joints, bearings, mounts, couplings, load cases."""
+"""Bodies and their supports, built from the gearbox file: joints, bearings, mounts, couplings, load cases."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from exugear.gearbox.named_files import LARGEST_TABLE
-from exugear.gearbox.parts import Bearing, Body, Coupling, Joint, LoadCase, PointForce
+from exugear.gearbox.parts import Bearing, Body, Coupling, DampingTimes, Joint, LoadCase, PointForce
 from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.bodies import BodySection, InertiaSection, ShaftSectionSection
-from exugear.gearbox.sections.case import ForceSection, GearboxFile, LoadCaseSection
+from exugear.gearbox.sections.case import DampingSection, ForceSection, GearboxFile, LoadCaseSection
 from exugear.gearbox.sections.connections import (
     BearingSection,
     ConnectorDampingSection,
@@ -23,13 +23,26 @@ from exugear.gearbox.sections.gears import GearSection, PinSection
 from exugear.gearbox.units import MM, RPM, UM
 from fe_ste.geometry.cylinders import MassProperties, Tube, mass_properties, together
 
-# Bodies from their sections, position errors of planets' pins, and load cases
+# Bodies, position errors of planet pins, and load cases
+
+
+def damping_times(section: DampingSection) -> DampingTimes:
+    """Return damping over stiffness; zero where the file states the damping of modes.
+
+    Examples
+    --------
+    >>> damping_times(DampingSection()).mesh, damping_times(DampingSection(modal_percent=2.0)).mesh
+    (4e-06, 0.0)
+    """
+    if section.modal_percent is not None:
+        return DampingTimes(0.0, 0.0, 0.0)
+    return DampingTimes(section.bearing_time_s, section.mesh_time_s, section.coupling_time_s)
 
 
 def inertia_sets(origin: Origin) -> tuple[str, ...]:
-    """Names of the inertia sets; every moving body has each of them, or none where its inertia follows from its shape.
+    """Names of the inertia sets; a moving body has all of them, or none if its inertia follows from its shape.
 
-    Where that of all bodies does, the default set is the only one.
+    If the inertia of all bodies follows from their shapes, the default set is the only one.
     """
     moving = [section for section in origin.enabled.values() if not section.fixed]
     named = next((section.inertia for section in moving if section.inertia), None)
@@ -39,16 +52,16 @@ def inertia_sets(origin: Origin) -> tuple[str, ...]:
 
 
 def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
-    """All enabled bodies, planets one by one.
+    """All enabled bodies, with one body per planet.
 
     Parameters
     ----------
-    inertias : inertia set
+    inertias : name of the inertia set
 
     Raises
     ------
     GearboxFileError
-        A body lacks the inertia set, or has no place.
+        A body lacks the inertia set or has no position.
     """
     return tuple(
         body for family, section in origin.enabled.items() for body in _family(origin, family, section, inertias)
@@ -56,7 +69,7 @@ def bodies(origin: Origin, inertias: str) -> tuple[Body, ...]:
 
 
 def _family(origin: Origin, family: str, section: BodySection, inertias: str) -> Iterator[Body]:
-    """One body, or the planets of a set."""
+    """Yield one body, or the planets of a set."""
     inertia = section.inertia.get(inertias)
     if not section.inertia and not section.fixed:
         inertia = _computed_inertia(origin, family, section)
@@ -98,10 +111,10 @@ def _body(
 
 
 def _computed_inertia(origin: Origin, family: str, section: BodySection) -> InertiaSection:
-    """Inertia of the pieces of a body's shape, of all its blanks, and of gears without one.
+    """Inertia of the pieces of a body's shape, of all its blanks, and of gears without a blank.
 
-    Such a gear is a tube up to its reference circle that begins at the diameter at which the gear is held, or at the
-    shaft where that is thicker.
+    A gear without a blank is a tube up to its reference circle. The tube begins at the diameter at which the gear is
+    held, or at the shaft surface if the shaft is thicker there.
     """
     tubes: list[Tube] = []
     rings: list[MassProperties] = []
@@ -113,7 +126,7 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
             start += tubes[-1].length
         places = blank_places(origin.case, family)
         for name, blank in shape.blanks.items():
-            if name in places:  # others are refused
+            if name in places:  # faults_of_blanks reports the others
                 ring = MassProperties(blank.mass_kg, blank.axial_kg_m2, blank.transverse_kg_m2, MM * places[name])
                 rings.append(ring)
     for name, z in section.gears_z_mm.items():
@@ -123,17 +136,17 @@ def _computed_inertia(origin: Origin, family: str, section: BodySection) -> Iner
     return InertiaSection.model_construct(
         mass_kg=total.mass,
         axial_kg_m2=total.axial,
-        # Of a thin disc it is half the axial one: rounding must not make it less.
+        # The transverse inertia of a thin disc is half of the axial one; rounding must not make it smaller.
         transverse_kg_m2=max(total.transverse, 0.5 * total.axial),
         centre_of_mass_z_mm=1e3 * total.centre,
     )
 
 
 def blank_places(case: GearboxFile, family: str) -> dict[str, float]:
-    """Where a blank may sit on the shape of a body, by the name of what holds it, mm along the axis.
+    """Axial positions (mm) at which a blank may be placed on the shape of a body, by the name of the supported element.
 
-    These are the gears, bearings, mounts and forces of the body and the place where torques act, as far as they stand
-    on its axis: the seats of an elastic shaft, whether or not the body is elastic.
+    These are the gears, bearings, mounts and forces of the body, and the position at which torques act, if they lie on
+    the axis of the body. They are the seats of a flexible shaft, whether or not the body is flexible.
     """
     section = case.bodies[family]
     places = dict(section.gears_z_mm)
@@ -165,7 +178,7 @@ def _tube(piece: ShaftSectionSection, start: float, density: float) -> Tube:
 
 
 def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
-    """Body of a gear in the middle of its face at z (m) on a shaft: a tube up to its reference circle."""
+    """Gear body on a shaft: a tube up to the reference circle, centred on the face width at z (m)."""
     reference = MM * gear.teeth * gear.normal_module_mm / math.cos(math.radians(gear.helix_angle_deg))
     width = MM * gear.face_width_mm
     held = MM * gear.held_diameter_mm
@@ -176,7 +189,7 @@ def gear_tube(gear: GearSection, z: float, shaft: Sequence[Tube]) -> Tube:
 
 
 def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
-    """Position (x, y) of a body's axis, m; of a planet at its angle on the carrier, rad."""
+    """Position (x, y) of a body's axis, m; for a planet, at its angle on the carrier (rad)."""
     section = origin.case.bodies[family]
     if section.axis_position_mm is not None:
         x, y = section.axis_position_mm
@@ -197,7 +210,7 @@ def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
 
 
 def _axis_of_neighbour(origin: Origin, family: str) -> tuple[float, float]:
-    """Place where a body without one is shown: that of a body that a coupling joins it to, else the origin."""
+    """Position at which to show a body without one of its own: that of a coupled body, or else the origin."""
     for coupling in origin.case.couplings.values():
         for other in coupling.bodies:
             section = origin.case.bodies.get(other)
@@ -213,7 +226,7 @@ def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[f
     Raises
     ------
     GearboxFileError
-        Errors of what is no planet.
+        Errors are specified for a body that is not a planet.
     """
 
     def offset(name: str, section: PinSection) -> tuple[str, tuple[float, float]]:
@@ -229,12 +242,16 @@ def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[f
 
 
 def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
-    """Load cases by name; `spinning` are the bodies that can turn.
+    """Load cases by name.
+
+    Parameters
+    ----------
+    spinning : names of the bodies that can rotate
 
     Raises
     ------
     GearboxFileError
-        Loads on a body that does not turn, a torque series that is not there or may not be read.
+        A torque acts on a body that does not rotate, or a torque series does not exist or may not be read.
     """
 
     def load_case(name: str, section: LoadCaseSection) -> LoadCase:
@@ -267,18 +284,18 @@ def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
     return part_of_each(load_case, origin.case.load_cases)
 
 
-# What holds bodies and ties their spins, from its sections: joints, bearings, mounts, couplings
+# Supports of bodies and connections of their rotations: joints, bearings, mounts, couplings
 
 
 def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
     """Ideal joints of the variant `rigid`, one for each planet of a set.
 
-    A file without any gets one for each body that turns: in the middle of its bearings, or else of its gears.
+    If the file has no joints, each rotating body gets one: in the middle of its bearings, or else of its gears.
 
     Raises
     ------
     GearboxFileError
-        A joint of the ground, of unknown bodies, or between sets of different size.
+        A joint supports the ground or an unknown body, or connects sets of different size.
     """
 
     def of_section(name: str, section: JointSection) -> tuple[Joint, ...]:
@@ -309,12 +326,12 @@ def _usual_joints(origin: Origin) -> Iterator[tuple[str, JointSection]]:
 def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
     """Compliant supports of the variants `bushing` and `flexible`, one for each planet of a set.
 
-    A bearing of which only the designation is known is none yet: see `unknown_bearings`.
+    Bearings of which only the designation is known are omitted: see `unknown_bearings`.
 
     Raises
     ------
     GearboxFileError
-        A bearing of the ground, of unknown bodies, or between sets of different size.
+        A bearing supports the ground or an unknown body, or connects sets of different size.
     """
 
     def of_section(name: str, section: BearingSection) -> tuple[Bearing, ...]:
@@ -336,7 +353,8 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
                 catalogue=section.catalogue,
                 damping=section.damping,
                 factor=origin.case.housing.factor if section.housing_factor_applies else 1.0,
-                # A planet turns about its bearing, all other bodies in theirs, unless the file says otherwise.
+                # By default the outer ring is mounted in the planet for a bearing of a planet, and in the support for
+                # all others.
                 carries_outer_ring=bodies[body].planet_of == on
                 if section.outer_ring is None
                 else section.outer_ring == "body",
@@ -350,13 +368,13 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
 
 
 def _holds_on_a_fixed_body(origin: Origin, section: CouplingSection) -> bool:
-    """Tell whether one of the two bodies of a coupling stands still: it then holds the other against turning."""
+    """Return whether one of the two bodies of a coupling is fixed, so that it restrains the rotation of the other."""
     known = [origin.case.bodies[name] for name in section.bodies if name in origin.case.bodies]
     return len(known) == 2 and [body.fixed for body in known].count(True) == 1
 
 
 def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> Iterator[Bearing]:
-    """Give couplings to fixed bodies as what they are: supports that hold nothing but the spin."""
+    """Yield couplings to fixed bodies as supports that act in torsion only."""
     for name, section in origin.case.couplings.items():
         key = f"couplings.{name}"
         if _stands_aside(origin, key, section) or not origin.are_enabled(key, *section.bodies):
@@ -370,7 +388,7 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
             place = MM * seat.z_mm
         damping = section.damping_N_m_s_per_rad
         if damping is None:
-            damping = origin.case.damping.time_of("coupling") * section.stiffness_N_m_per_rad
+            damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
         yield Bearing(
             name=name,
             family=name,
@@ -385,7 +403,7 @@ def _couplings_on_fixed_bodies(origin: Origin, bodies: Mapping[str, Body]) -> It
 
 
 def unknown_bearings(origin: Origin) -> dict[str, str]:
-    """Designations of the bearings at work of which nothing else is known, by name."""
+    """Designations of enabled bearings of which no other data are known, by name."""
     return {
         name: section.designation
         for name, section in origin.case.bearings.items()
@@ -394,12 +412,12 @@ def unknown_bearings(origin: Origin) -> dict[str, str]:
 
 
 def mounts(origin: Origin) -> tuple[Bearing, ...]:
-    """Supports of the gearbox on the ground, at work where a fixed body is elastic.
+    """Supports of the gearbox on the ground, which are active if a fixed body is flexible.
 
     Raises
     ------
     GearboxFileError
-        A mount of what is no enabled body with a place of its own.
+        The supported body is not an enabled body with a position of its own.
     """
 
     def of_section(name: str, section: MountSection) -> tuple[Bearing, ...]:
@@ -429,12 +447,12 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
 
 
 def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce, ...]:
-    """Constant forces and moments on bodies that are enabled.
+    """Constant forces and moments on enabled bodies.
 
     Raises
     ------
     GearboxFileError
-        A force on the ground, a planet, a body without a place, or one that is not there.
+        A force acts on the ground, on a planet, on a body without a position, or on an unknown body.
     """
 
     def of_section(name: str, section: ForceSection) -> tuple[PointForce, ...]:
@@ -456,12 +474,17 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
 
 
 def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[str]) -> tuple[Coupling, ...]:
-    """Torsional springs between spins; `spinning` are the bodies that can turn.
+    """Torsional springs between rotating bodies.
+
+    Parameters
+    ----------
+    spinning : names of the bodies that can rotate
+    bearing_names : names of all bearings, which a coupling may refer to as its seat
 
     Raises
     ------
     GearboxFileError
-        A coupling of bodies that do not turn, or at a seat that is no bearing.
+        A coupled body does not rotate, or the seat of a coupling is not a bearing.
     """
 
     def of_section(name: str, section: CouplingSection) -> tuple[Coupling, ...]:
@@ -481,14 +504,14 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
             raise origin.fault(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
         damping = section.damping_N_m_s_per_rad
         if damping is None:
-            damping = origin.case.damping.time_of("coupling") * section.stiffness_N_m_per_rad
+            damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
         return (Coupling(name, *section.bodies, section.seat, section.stiffness_N_m_per_rad, damping),)
 
     return parts_of_each(of_section, origin.case.couplings)
 
 
 def _stands_aside(origin: Origin, key: str, section: MountSection | CouplingSection) -> bool:
-    """Tell whether the body that a section stands for is enabled."""
+    """Return whether the body that a section replaces is enabled, so that the section is ignored."""
     return section.instead_of is not None and origin.are_enabled(f"{key}.instead_of", section.instead_of)
 
 

@@ -1,6 +1,6 @@
-"""The parts of a gearbox checked against each other: masses, places, assembly of planets, what holds what.
+"""Consistency checks between the parts of a gearbox: masses, positions, assembly of planets, supports.
 
-Each function takes the parts that it compares and yields faults as texts: key, value and what would be right.
+Each function compares the parts passed to it and yields error texts with the key, its value and the remedy.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from fe_ste.geometry.gears import Gear
 CENTRE_DISTANCE_TOLERANCE = 2e-5
 """Allowed difference between a pair's centre distance and the positions of its bodies, m."""
 AXIS_TOLERANCE = 1e-6
-"""Allowed distance of a central wheel from the axis of the carrier whose planets it meets, m."""
+"""Allowed distance of a central gear from the axis of the carrier whose planets it meshes with, m."""
 ASSEMBLY_TOLERANCE = 2e-3
-"""Allowed departure from the assembly condition, in teeth: angles in a file are rounded."""
+"""Allowed deviation from the assembly condition, in teeth; it covers the rounding of angles in a file."""
 MATRIX_TOLERANCE = 1e-4
-"""Rounding allowed in a stiffness matrix, against its diagonal: as printed with five digits."""
+"""Allowed rounding of a stiffness matrix relative to its diagonal, for matrices printed with five digits."""
 LARGEST_MATRICES = 2e9
-"""Largest memory of all matrices of the elements together, bytes: each is over the coordinates of all bodies."""
+"""Memory limit for the matrices of all elements together, bytes; each matrix covers the coordinates of all bodies."""
 
 
 @dataclass(frozen=True)
@@ -38,18 +38,18 @@ class Check:
 
     name: str
     run: Callable[[], object]
-    """Raises `GearboxFileError` where something is wrong."""
+    """Function that raises `GearboxFileError` if the check fails."""
     needs: tuple[str, ...] = ()
-    """Checks without which this one makes no sense."""
+    """Names of the checks that must succeed before this one is run."""
 
 
 def check(checks: Iterable[Check]) -> None:
-    """Run all checks as `faults_of` does.
+    """Run all checks and raise their errors together; `faults_of` states which checks are skipped.
 
     Raises
     ------
     GearboxFileError
-        All faults that are found.
+        All errors that were found.
 
     Examples
     --------
@@ -61,7 +61,7 @@ def check(checks: Iterable[Check]) -> None:
 
 
 def faults_of(checks: Iterable[Check]) -> list[str]:
-    """Faults of all checks in their order, but those that need one which failed, or which could not be run."""
+    """Return the errors of all checks in order, skipping checks whose prerequisites failed or were skipped."""
     faults: list[str] = []
     failed: set[str] = set()
     for one in checks:
@@ -77,7 +77,7 @@ def faults_of(checks: Iterable[Check]) -> list[str]:
 
 
 def faults_of_bodies(case: GearboxFile) -> Iterator[str]:
-    """Tell names that are taken, carriers that cannot be, wheels that are no gears."""
+    """Yield errors for names that are already used, impossible carriers, and unknown gears of bodies."""
     if GROUND in case.bodies:
         yield f"bodies.{GROUND}: {GROUND} is the name of the fixed frame; choose another name"
     families: dict[str, str] = {}
@@ -98,9 +98,10 @@ def faults_of_bodies(case: GearboxFile) -> Iterator[str]:
 
 
 def faults_of_blanks(case: GearboxFile) -> Iterator[str]:
-    """Tell blanks of stepped shafts that sit nowhere, where the inertia follows from the shape and would lack them.
+    """Yield errors for blanks of stepped shafts without a seat, if the inertia follows from the shape.
 
-    Beside an inertia that is stated they matter to the elastic shaft alone, which refuses them.
+    The computed inertia would lack these blanks. If it is specified, they affect only a flexible shaft, which refuses
+    them.
     """
     for family, section in case.bodies.items():
         if section.shape is None or section.inertia:
@@ -125,7 +126,7 @@ def _faults_of_carrier(case: GearboxFile, key: str, name: str) -> Iterator[str]:
 
 
 def faults_of_inertia_sets(default: str, inertia_sets: Sequence[str]) -> Iterator[str]:
-    """Tell that no body moves, or that the default set is none of those that bodies have."""
+    """Yield an error if no body moves, or if no body has the default inertia set."""
     if not inertia_sets:
         yield "bodies: all bodies are fixed; a gearbox needs at least one body without fixed = true"
     elif default not in inertia_sets:
@@ -133,11 +134,12 @@ def faults_of_inertia_sets(default: str, inertia_sets: Sequence[str]) -> Iterato
 
 
 def faults_of_size(bodies: int, elements: int) -> Iterator[str]:
-    """Tell what no memory holds: each element has a stiffness and a damping over all coordinates.
+    """Yield an error if the matrices exceed the memory: each element has stiffness and damping over all coordinates.
 
     Parameters
     ----------
-    bodies, elements : numbers of bodies, and of meshes, bearings, mounts and couplings together
+    bodies : number of bodies
+    elements : number of meshes, bearings, mounts and couplings together
     """
     coordinates = 6 * bodies
     if 16.0 * elements * coordinates**2 > LARGEST_MATRICES:
@@ -148,7 +150,7 @@ def faults_of_size(bodies: int, elements: int) -> Iterator[str]:
 
 
 def faults_of_overall(overall: OverallSection, spinning: Sequence[str], gears: Collection[str]) -> Iterator[str]:
-    """Tell an overall input or output that does not turn, or that both are one where there are gears."""
+    """Yield errors for an overall input or output that cannot rotate, or that is the same body although gears exist."""
     for key in ("input", "output"):
         if getattr(overall, key) not in spinning:
             yield (
@@ -162,10 +164,10 @@ def faults_of_overall(overall: OverallSection, spinning: Sequence[str], gears: C
 def faults_of_output_gear(
     overall: OverallSection, gears: Collection[str], bodies: Iterable[Body], couplings: Sequence[Coupling]
 ) -> Iterator[str]:
-    """Tell an output gear that does not turn with the output.
+    """Yield an error if the output gear does not rotate with the output.
 
-    The overall transmission error is a length on it. A carrier has no gear, and so any serves; a rotor without gears
-    needs none.
+    The overall transmission error is expressed as a length at this gear. If the output has no gear, as with a carrier,
+    every gear is accepted. A rotor without gears needs no output gear.
     """
     if overall.output_gear is None:
         if gears:
@@ -187,7 +189,7 @@ def faults_of_output_gear(
 
 
 def _coupled(couplings: Sequence[Coupling], body: str) -> set[str]:
-    """Bodies that couplings tie to one, and itself: all turn at one speed."""
+    """Names of the body and of all bodies that couplings connect to it; they rotate at one speed."""
     reached = {body}
     for _ in couplings:
         reached |= {name for c in couplings if {c.first, c.second} & reached for name in (c.first, c.second)}
@@ -197,7 +199,7 @@ def _coupled(couplings: Sequence[Coupling], body: str) -> set[str]:
 def faults_of_repetition(
     case: GearboxFile, deviations: Collection[tuple[str, str]], pin_offsets: Collection[str]
 ) -> Iterator[str]:
-    """Tell errors of a wheel or a pin that are given twice: a second section would replace the first."""
+    """Yield errors for deviations of a gear or pin that are specified twice; the second would replace the first."""
     if len(deviations) < len(case.deviations):
         yield "deviations: two tables for the same gear; combine them in one"
     elif len(pin_offsets) < len(case.pins):
@@ -205,7 +207,7 @@ def faults_of_repetition(
 
 
 def faults_of_mass_properties(case: GearboxFile) -> Iterator[str]:
-    """Tell mass properties that are missing."""
+    """Yield errors for missing mass properties."""
     for family, section in case.bodies.items():
         for inertias, values in section.inertia.items():
             if section.spin_only:
@@ -219,7 +221,7 @@ def faults_of_mass_properties(case: GearboxFile) -> Iterator[str]:
 
 
 def faults_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body]) -> Iterator[str]:
-    """Tell bodies whose positions contradict the centre distance of their pair, or the axis of their carrier."""
+    """Yield errors for body positions that contradict the centre distance of a pair or the axis of a carrier."""
     for mesh in meshes:
         difference = mesh.centre_distance - mesh.pair.centre_distance
         if abs(difference) > CENTRE_DISTANCE_TOLERANCE:
@@ -241,7 +243,7 @@ def faults_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body
 def faults_of_planets(
     case: GearboxFile, bodies: Iterable[Body], gears: Mapping[str, Gear], meshes: Sequence[Mesh]
 ) -> Iterator[str]:
-    """Tell planets that run into each other, of one set or of several on a carrier, and such as cannot be assembled."""
+    """Yield errors for planets of one carrier that collide, in a set or between sets, and for impossible assembly."""
     planets = [body for body in bodies if body.planet_of is not None]
     told = set()
     for planet, other in itertools.combinations(planets, 2):
@@ -259,7 +261,7 @@ def faults_of_planets(
 
 
 def _collisions(case: GearboxFile, planet: Body, other: Body, gears: Mapping[str, Gear]) -> Iterator[str]:
-    """Tell wheels of two planets that share a place along the axis and overlap."""
+    """Yield errors for gears of two planets that share an axial position and overlap."""
     gap = math.dist(planet.axis, other.axis)
     for wheel, other_wheel in itertools.product(planet.wheels, other.wheels):
         reach = 0.5 * (gears[wheel].face_width + gears[other_wheel].face_width)
@@ -275,13 +277,14 @@ def _collisions(case: GearboxFile, planet: Body, other: Body, gears: Mapping[str
 def _faults_of_assembly(
     family: str, planets: Sequence[Body], others: Collection[str], meshes: Sequence[Mesh]
 ) -> Iterator[str]:
-    """Compare every planet with the first: going round two meshes with central wheels must close on whole teeth.
+    """Yield errors for planets that violate the assembly condition relative to the first planet of the set.
 
-    Planets that mesh with planets of another set close chains that only the places of all teeth tell.
+    The path through two meshes with central gears must close on an integer number of teeth. Meshes with planets of
+    another set are excluded: their closed chains depend on the positions of all teeth.
 
-    With tooth numbers zp of the planet wheel and zc of the central wheel (negative for an external one),
-    (zc_b zp_a - zc_a zp_b) angle / 2 pi must be a multiple of gcd(zp_a, zp_b); for one planet wheel
-    between sun and ring this is the familiar (z_sun + z_ring) angle / 2 pi = integer.
+    With tooth numbers zp of the planet gear and zc of the central gear (negative for an external one), (zc_b zp_a -
+    zc_a zp_b) angle / 2 pi must be a multiple of gcd(zp_a, zp_b); for one planet gear between sun and ring this is the
+    familiar (z_sun + z_ring) angle / 2 pi = integer.
     """
     for planet in planets[1:]:
         teeth = [
@@ -303,7 +306,7 @@ def _faults_of_assembly(
 
 
 def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
-    """(teeth of the planet's wheel, teeth of its mate, the latter negative unless internal)."""
+    """Tooth numbers of the planet gear and of its mating gear; the latter is negative unless that gear is internal."""
     pinion = mesh.pair.pinion
     gear = mesh.pair.gear
     if mesh.pinion == planet:
@@ -318,11 +321,11 @@ def faults_of_connection(
     couplings: Iterable[Coupling],
     held: Collection[str],
 ) -> Iterator[str]:
-    """Tell bodies that no mesh, coupling or carrier joins to the overall input, nor torsion holds on what stands.
+    """Yield errors for bodies without torsional support that no mesh, coupling or carrier connects to the input.
 
     Parameters
     ----------
-    held : bodies that bearings or mounts hold against turning, such as a bearing pedestal
+    held : bodies whose rotation is restrained by bearings or mounts, such as a bearing pedestal
     """
     lost = [name for name in bodies_apart(case, bodies, meshes, couplings) if name not in held]
     if lost:
@@ -341,7 +344,7 @@ def faults_of_connection(
 def bodies_apart(
     case: GearboxFile, bodies: Iterable[Body], meshes: Iterable[Mesh], couplings: Iterable[Coupling]
 ) -> tuple[str, ...]:
-    """Bodies that can move and that no mesh, coupling or carrier joins to the overall input."""
+    """Movable bodies that no mesh, coupling or carrier connects to the overall input."""
     bodies = tuple(bodies)
     links = [(mesh.pinion, mesh.gear) for mesh in meshes]
     links += [(coupling.first, coupling.second) for coupling in couplings]
@@ -358,7 +361,7 @@ def bodies_apart(
 def faults_of_torsion(
     spinning: Sequence[str], couplings: Iterable[Coupling], bearings: Iterable[Bearing]
 ) -> Iterator[str]:
-    """Tell torsion that takes two paths: couplings in a loop, and bearings between bodies that both turn."""
+    """Yield errors for ambiguous torsional load paths: loops of couplings, or bearings between two rotating bodies."""
     paths: dict[str, dict[str, list[str]]] = {name: {name: []} for name in spinning}
     for coupling in couplings:
         from_first = paths[coupling.first]
@@ -384,7 +387,7 @@ def faults_of_torsion(
 
 
 def faults_of_supports(case: GearboxFile) -> Iterator[str]:
-    """Tell stiffness and damping that no support has: unsymmetric, indefinite, or none at all."""
+    """Yield errors for stiffness and damping that are not symmetric, indefinite or zero throughout."""
     for table, sections in (("bearings", case.bearings), ("mounts", case.mounts)):
         for name, section in sections.items():
             key = f"{table}.{name}"
@@ -401,7 +404,7 @@ def faults_of_supports(case: GearboxFile) -> Iterator[str]:
 
 
 def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[str]:
-    """Tell rolling bearings of the same bodies that stand in each other by half of their width or more."""
+    """Yield errors for rolling bearings between the same bodies that overlap by half of their width or more."""
     names = [name for name, bearing in bearings.items() if bearing.catalogue is not None]
     for place, first in enumerate(names):
         for second in names[place + 1 :]:
@@ -418,7 +421,7 @@ def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[s
 
 
 def _faults_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSection) -> Iterator[str]:
-    """Compare each entry with the diagonal entries of its row and column: units differ by row."""
+    """Yield an error for an unsymmetric or indefinite matrix, scaled by its diagonal since units differ by row."""
     if section.matrix is None:
         return
     matrix = connector_matrix(section)
@@ -436,9 +439,11 @@ def _faults_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSect
 
 
 def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | PointForce]]) -> Iterator[str]:
-    """Tell a name that stands twice among meshes, supports and couplings: they share one list in the results.
+    """Yield an error for a name used twice among meshes, supports and couplings: these share one list in the results.
 
-    `parts` are by their table in the file.
+    Parameters
+    ----------
+    parts : parts by their table in the gearbox file
     """
     tables: dict[str, str] = {}
     for table, members in parts.items():
@@ -450,7 +455,7 @@ def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | Poi
 
 
 def faults_of_joints(joints: Iterable[Joint], bodies: Mapping[str, Body]) -> Iterator[str]:
-    """Tell the first joint that its body cannot have: fixed, joined twice, or a planet's away from its carrier."""
+    """Yield an error for the first invalid joint: on a fixed body, a second joint, or a planet off its carrier."""
     joined: dict[str, str] = {}
     for joint in joints:
         body = bodies[joint.body]

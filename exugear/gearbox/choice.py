@@ -1,4 +1,4 @@
-"""What a user chooses of a gearbox: variant, mesh law, inertia set, load case."""
+"""Model settings that a user chooses for a gearbox: variant, mesh model, inertia set, load case."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from exugear.gearbox.variant import Variant
 
 @dataclass(frozen=True, init=False)
 class Choice:
-    """One way to compute a gearbox; what is None is chosen by the gearbox file.
+    """Model settings of one computation; values of None are taken from the gearbox file.
 
     Raises
     ------
     VariantError
-        No variant has this name.
+        No such variant exists.
 
     Examples
     --------
@@ -25,9 +25,11 @@ class Choice:
     """
 
     variant: Variant
-    """How bodies are held; chosen by its name."""
+    """Variant, which defines how bodies are supported; selected by its name."""
     mesh_model: str
-    """How teeth in mesh push each other; `exugear.system.tooth_mesh.laws.registry` lists the laws."""
+    """Name of the mesh model, which computes the mesh forces; `exugear.system.tooth_mesh.laws.registry` lists the
+    models.
+    """
     inertias: str | None
     """Inertia set."""
     load_case: str | None
@@ -40,7 +42,7 @@ class Choice:
         inertias: str | None = None,
         load_case: str | None = None,
     ) -> None:
-        """Take the variant by its name."""
+        """Look up the variant by its name and store the settings."""
         values = {
             "variant": Variant.of(variant),
             "mesh_model": mesh_model,
@@ -51,10 +53,10 @@ class Choice:
             object.__setattr__(self, name, value)
 
     def of(self, gearbox: Gearbox) -> Choice:
-        """Return the same choice with what it leaves open filled in: default inertia set, first load case."""
+        """Return the settings with open values filled in: default inertia set, first load case."""
         load_case = self.load_case or next(iter(gearbox.load_cases), None)
         return replace(self, inertias=self.inertia_set(gearbox), load_case=load_case)
 
     def inertia_set(self, gearbox: Gearbox) -> str:
-        """Name of the inertia set, the default one of the gearbox file if none was chosen."""
+        """Name of the chosen inertia set, or else of the default set of the gearbox file."""
         return self.inertias or gearbox.case.default_inertias

@@ -1,4 +1,4 @@
-"""Gears, their modifications and errors, pairs and meshes, from their sections."""
+"""Gears, their modifications and deviations, pairs and meshes, built from the sections of a gearbox file."""
 
 from __future__ import annotations
 
@@ -48,11 +48,11 @@ from fe_ste.geometry.pair_relations import (
 from fe_ste.tools.arrays import Floats
 
 DEEPEST_REMOVAL = 0.5
-"""Most that a modification or an error may take off a flank, in normal modules: a tooth is 1.6 thick."""
+"""Largest material removal of a modification or deviation in normal modules; a tooth is about 1.6 modules thick."""
 SAMPLES_PER_WAVE = 64
-"""Values in each wave of a stated stiffness: cubics between them are off by 1e-5 of its amplitude."""
+"""Samples per period of a specified stiffness harmonic: cubic interpolation errs by 1e-5 of the amplitude."""
 ANGLE_TOLERANCE = 1e-4
-"""Allowed difference between a stated angle of the line of centres and the positions of the bodies, rad."""
+"""Allowed difference between a specified angle of the line of centres and the positions of the bodies, rad."""
 
 
 def gears(origin: Origin) -> dict[str, Gear]:
@@ -61,7 +61,7 @@ def gears(origin: Origin) -> dict[str, Gear]:
     Raises
     ------
     GearboxFileError
-        A gear that cannot be made, with its key.
+        A gear cannot be built; the message names its key.
     """
     plain = {name: _unchecked(name, section) for name, section in origin.case.gears.items()}
     shifted = {**plain, **part_of_each(partial(_with_shift, origin, plain), _flagged(origin, "shift"))}
@@ -83,14 +83,14 @@ def gears(origin: Origin) -> dict[str, Gear]:
 
 
 def with_usual_rounding(section: GearSection, gear: GearInputs) -> GearInputs:
-    """Gear with no larger radius at the tip of its tool than fits, where the file leaves the radius to the default.
+    """Gear with the tool tip radius limited to the largest possible one, if the file leaves the radius to the default.
 
-    At 25 degrees and a dedendum of 1.25 that is 0.318 normal modules; one that the file gives is refused instead.
+    At 25 degrees and a dedendum of 1.25 the limit is 0.318 normal modules. A larger radius in the file is refused.
     """
     if "tip_radius" in section.rack.model_fields_set or gear.cutter is not None:
         return gear
     fits = gear.largest_rack_rounding
-    if gear.internal:  # an arc that leaves half of the tooth's height to the flank
+    if gear.internal:  # an arc that leaves half of the tooth depth to the flank
         fits = 0.5 * (gear.root_radius - gear.tip_radius) / gear.normal_module
         if 2.0 * fits > gear.rack.tip_radius:
             return gear
@@ -101,7 +101,7 @@ def with_usual_rounding(section: GearSection, gear: GearInputs) -> GearInputs:
 
 
 def smaller_roundings(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str]:
-    """Tell which radii at the tip of a tool are smaller than the usual default, since that does not fit."""
+    """Yield notes on tool tip radii that were reduced below the usual default because it does not fit."""
     for name, section in origin.case.gears.items():
         usual = section.rack.tip_radius
         taken = gears[name].rack.tip_radius
@@ -114,13 +114,13 @@ def smaller_roundings(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str
 
 
 def _flagged(origin: Origin, what: Literal["shift", "tip"]) -> dict[str, GearSection]:
-    """Sections of gears whose shift or tip follows from their mates."""
+    """Sections of gears whose profile shift or tip diameter follows from their mating gears."""
     key = {"shift": "profile_shift_from_centre_distance", "tip": "fitted_tip"}[what]
     return {name: section for name, section in origin.case.gears.items() if getattr(section, key)}
 
 
 def _pairs_of(origin: Origin, gears: Mapping[str, GearInputs], name: str) -> Iterator[tuple[str, UncheckedPair]]:
-    """Pairs of a gear by name, gear 1 being the external or smaller one."""
+    """Yield the pairs of a gear with their names; gear 1 is the external or smaller gear."""
     for pair, section in origin.case.pairs.items():
         both = [gears[one] for one in (section.pinion, section.gear) if one in gears]
         if name in (section.pinion, section.gear) and len(both) == 2:
@@ -130,7 +130,7 @@ def _pairs_of(origin: Origin, gears: Mapping[str, GearInputs], name: str) -> Ite
 
 
 def _with_shift(origin: Origin, gears: Mapping[str, GearInputs], name: str, section: GearSection) -> GearInputs:
-    """Gear with the profile shift that leaves no backlash at the centre distance of its first pair."""
+    """Gear with the profile shift that results in zero backlash at the centre distance of its first pair."""
     key = f"gears.{name}.profile_shift_from_centre_distance"
     for pair_name, pair in _pairs_of(origin, gears, name):
         mate = pair.gear if pair.pinion.name == name else pair.pinion
@@ -147,13 +147,13 @@ def _with_shift(origin: Origin, gears: Mapping[str, GearInputs], name: str, sect
 
 
 LEAST_PLAY = 1e-12
-"""Backlash that is left where teeth are thinned to have none, m."""
+"""Backlash that remains where teeth are thinned to zero backlash, m."""
 FEWEST_DECIMALS = 3
-"""Decimals that profile shifts and centre distances (mm) have at least, as tables print them: 0.5 stands for 0.500."""
+"""Minimum number of decimals assumed for profile shifts and centre distances (mm) in tables: 0.5 is read as 0.500."""
 
 
 def _rounding(value: float) -> float:
-    """Half a unit of the last digit of a value of the file.
+    """Half a unit of the last digit of a value in the file.
 
     Examples
     --------
@@ -165,10 +165,10 @@ def _rounding(value: float) -> float:
 
 
 def _without_rounded_overlaps(origin: Origin, gears: Mapping[str, GearInputs]) -> dict[str, GearInputs]:
-    """Gears whose teeth are thinned by what profile shifts and centre distances as printed let flanks overlap.
+    """Gears with teeth thinned where rounded profile shifts and centre distances result in negative backlash.
 
-    Published values are rounded in their last digit: two that leave no backlash may then overlap by some nanometres.
-    The pair gets a backlash of zero; a larger overlap is left for the checks.
+    Published values are rounded in their last digit. Gears designed for zero backlash may therefore overlap by some
+    nanometres. Such a pair gets zero backlash; larger overlaps are left to the checks.
     """
     changed = dict(gears)
     for pair_name, section in origin.case.pairs.items():
@@ -179,11 +179,11 @@ def _without_rounded_overlaps(origin: Origin, gears: Mapping[str, GearInputs]) -
                 overlap = -pair.circumferential_backlash
                 across = math.cos(pair.working_pressure_angle) / math.cos(pair.gear.transverse_pressure_angle)
             except ValueError:
-                continue  # what makes the pair impossible is told when it is built
+                continue  # an impossible pair is reported when it is built
             shifts = sum(_rounding(origin.case.gears[gear.name].profile_shift) for gear in (pair.pinion, pair.gear))
             shifts *= 2.0 * math.tan(pair.gear.normal_pressure_angle) * pair.gear.normal_module
             distance = 2.0 * math.tan(pair.working_pressure_angle) * MM * _rounding(section.centre_distance_mm)
-            least = ROUNDING * pair.gear.normal_module  # what the checks allow for
+            least = ROUNDING * pair.gear.normal_module  # tolerance of the checks
             if least < overlap <= shifts / (math.cos(pair.gear.helix_angle) * across) + distance:
                 thinning = pair.gear.tooth_thinning + overlap * across + LEAST_PLAY
                 changed[pair.gear.name] = replace(changed[pair.gear.name], tooth_thinning=thinning)
@@ -191,7 +191,7 @@ def _without_rounded_overlaps(origin: Origin, gears: Mapping[str, GearInputs]) -
 
 
 def rounded_overlaps(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str]:
-    """Tell which teeth were thinned since published values are rounded."""
+    """Yield notes on teeth that were thinned because published values are rounded."""
     for name, section in origin.case.gears.items():
         thinned = gears[name].tooth_thinning - sum(thinning_range(section)) / 2.0
         if thinned > LEAST_PLAY / 2.0:
@@ -203,7 +203,7 @@ def rounded_overlaps(origin: Origin, gears: Mapping[str, Gear]) -> Iterator[str]
 
 
 def _with_fitted_tip(origin: Origin, gears: Mapping[str, GearInputs], name: str, section: GearSection) -> GearInputs:
-    """Gear with its tip shortened as far as all of its mates ask for."""
+    """Gear with its tip shortened as far as all of its mating gears require."""
     gear = gears[name]
     try:
         tips = [
@@ -211,14 +211,14 @@ def _with_fitted_tip(origin: Origin, gears: Mapping[str, GearInputs], name: str,
             for _, pair in _pairs_of(origin, gears, name)
         ]
     except ValueError:
-        return gear  # what makes the pair impossible is told when it is built
+        return gear  # an impossible pair is reported when it is built
     if not tips:
         raise origin.fault(f"gears.{name}.fitted_tip: the gear is in no pair; remove the key")
     return replace(gear, tip_diameter=max(tips) if gear.internal else min(tips))
 
 
 def _unchecked(name: str, section: GearSection) -> GearInputs:
-    """Gear from its section: millimetres to metres, degrees to radians."""
+    """Unchecked gear from its section, converted from millimetres to metres and from degrees to radians."""
     return GearInputs(
         name=name,
         teeth=section.teeth,
@@ -245,7 +245,7 @@ def _unchecked(name: str, section: GearSection) -> GearInputs:
 
 
 def _cutter(section: GearSection) -> PinionCutter | None:
-    """Cutter of a ring; from an addendum d_a0 = m_n (z_0 / cos(beta) + 2 (x_0 + h_a0*))."""
+    """Pinion-type cutter of a ring gear; its addendum follows from d_a0 = m_n (z_0 / cos(beta) + 2 (x_0 + h_a0*))."""
     cutter = section.cutter
     if cutter is None:
         return None
@@ -257,7 +257,7 @@ def _cutter(section: GearSection) -> PinionCutter | None:
 
 
 def thinning_range(section: GearSection) -> tuple[float, float]:
-    """Least and greatest thinning of a gear's teeth, transverse section, m; both are the same without allowances."""
+    """Minimum and maximum tooth thinning in the transverse section, m; both are equal without allowances."""
     allowances = section.tooth_thickness
     if allowances is None:
         return section.tooth_thinning_mm * MM, section.tooth_thinning_mm * MM
@@ -270,7 +270,7 @@ def thinning_range(section: GearSection) -> tuple[float, float]:
 
 
 def margins_of_roots(pairs: Iterable[GearPair]) -> Iterator[str]:
-    """Tell tips that come so near to their mate's fillet that contact under load reaches it, and what would not."""
+    """Yield warnings for tips too close to the fillet of the mating gear for contact under load, with the remedy."""
     for pair in pairs:
         for tip, mate in ((pair.pinion, pair.gear), (pair.gear, pair.pinion)):
             margin = root_margin(pair, tip)
@@ -289,7 +289,7 @@ def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankM
     Raises
     ------
     GearboxFileError
-        A modification that does not fit its gear, or a topography that cannot be read.
+        A modification does not fit its gear, or a topography cannot be read.
     """
 
     def of_section(name: str, section: GearSection) -> FlankModification:
@@ -307,7 +307,7 @@ def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankM
 
 
 def _modification(gear: Gear, section: GearSection, find: Callable[[str], Path]) -> FlankModification:
-    """Modification of a gear from its section, tried on the gear; `find` gives the path of the topography it names."""
+    """Modification of a gear from its section, checked on the gear; `find` returns the path of the topography file."""
     given = section.modification
     if given is None:
         return FlankModification()
@@ -341,7 +341,7 @@ def _relief(
 
 
 def _check_depth(origin: Origin, key: str, amounts: Mapping[str, Any], module_mm: float) -> None:
-    """Refuse removal that leaves nothing of the teeth."""
+    """Raise an error if the removal exceeds the limit `DEEPEST_REMOVAL`."""
     deepest = 1e3 * DEEPEST_REMOVAL * module_mm
     for name, amount in amounts.items():
         if name.endswith("_um") and abs(amount) > deepest:
@@ -354,7 +354,7 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
     Raises
     ------
     GearboxFileError
-        A pair of unknown gears, or of such as cannot run together.
+        A pair has an unknown gear, or its gears cannot run together.
     """
 
     def of_section(name: str, section: PairSection) -> GearPair:
@@ -381,7 +381,7 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
 
 
 def _is_turned_over(pinion: Gear, gear: Gear) -> bool:
-    """Tell whether a file calls the larger gear or the ring the pinion: gear 1 is the other one all the same."""
+    """Return whether a file calls the larger gear or the ring gear the pinion; gear 1 is then the other gear."""
     return pinion.internal > gear.internal or (pinion.internal == gear.internal and pinion.teeth > gear.teeth)
 
 
@@ -392,14 +392,14 @@ def pair_specs(
     mesh_forces: Mapping[str, list[float]],
     stated: Mapping[str, tuple[float, ...]],
 ) -> dict[str, PairSpec]:
-    """Gather what the tables of pairs need.
+    """Specifications of pairs from which STE tables are computed, by pair name.
 
     Parameters
     ----------
     sections, pairs : mappings of pair name
     modifications : by gear name
     mesh_forces : by pair name
-        Static force F_bt of each of the pair's meshes at work, N; the pair's own is the mean of their amounts.
+        Static force F_bt of each enabled mesh, N; the force of the pair is the mean of their absolute values.
     stated : by pair name, mesh stiffness of pairs that need no table
     """
     specs = {}
@@ -420,12 +420,12 @@ def pair_specs(
 
 
 def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
-    """Mesh stiffness of the pairs of which the file states it, N/m at equal distances over the mesh cycle, by name.
+    """Mesh stiffness specified in the file, N/m at equal distances over the mesh cycle, by pair name.
 
     Raises
     ------
     GearboxFileError
-        A stiffness that is not above zero somewhere in the cycle.
+        A stiffness is zero or negative somewhere in the cycle.
     """
 
     def of_section(name: str, section: PairSection) -> tuple[float, ...]:
@@ -444,7 +444,7 @@ def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
 
 
 def _stiffness_over_cycle(section: MeshStiffnessSection) -> Floats:
-    """Values over the mesh cycle, N/m: those of the file, or the sum of its waves, dense enough for cubics between."""
+    """Sample the stiffness over the mesh cycle, N/m: from the file, or a sum of harmonics for cubic interpolation."""
     if section.over_cycle_N_per_m is not None:
         return np.array(section.over_cycle_N_per_m)
     highest = max(len(section.cosine_N_per_m), len(section.sine_N_per_m))
@@ -457,12 +457,12 @@ def _stiffness_over_cycle(section: MeshStiffnessSection) -> Floats:
 
 
 def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, Body]) -> tuple[Mesh, ...]:
-    """All meshes at work, one per planet.
+    """All enabled meshes, one per planet.
 
     Raises
     ------
     GearboxFileError
-        Unknown pairs or bodies, a body without the gear, faces that do not overlap, angles that contradict positions.
+        A pair or body is unknown, a body lacks the gear, faces do not overlap, or angles contradict positions.
     """
 
     def of_section(name: str, section: MeshSection) -> tuple[Mesh, ...]:
@@ -521,7 +521,7 @@ def _meshes_of_section(
 
 
 def _check_angle(origin: Origin, key: str, stated_deg: float | None, angle: float) -> None:
-    """Refuse a stated angle of the line of centres that is not the one of the bodies' positions, rad."""
+    """Raise an error if a specified angle of the line of centres differs from that of the body positions (rad)."""
     if stated_deg is not None and abs(math.remainder(angle - math.radians(stated_deg), 2 * math.pi)) > ANGLE_TOLERANCE:
         raise origin.fault(
             f"{key}.position_angle_deg = {stated_deg}: the positions of the bodies result in {math.degrees(angle):.4f}"
@@ -530,7 +530,7 @@ def _check_angle(origin: Origin, key: str, stated_deg: float | None, angle: floa
 
 
 def _middle_of_faces(origin: Origin, key: str, pair: GearPair, pinion_body: Body, gear_body: Body) -> float:
-    """Middle of the overlap of the two faces, m."""
+    """Axial middle of the overlap of the two faces, m."""
     low = -math.inf
     high = math.inf
     for body, gear in ((pinion_body, pair.pinion), (gear_body, pair.gear)):
@@ -549,12 +549,12 @@ def _middle_of_faces(origin: Origin, key: str, pair: GearPair, pinion_body: Body
 def deviations(
     origin: Origin, gears: Mapping[str, Gear], bodies: Mapping[str, Body]
 ) -> dict[tuple[str, str], WheelDeviation]:
-    """Errors of wheels by body and gear; a pitch deviation is cumulative, positive into the tooth (ISO 1328-1).
+    """Deviations of gears by body and gear; pitch deviations are cumulative, positive into the tooth (ISO 1328-1).
 
     Raises
     ------
     GearboxFileError
-        Errors of an unknown body or gear, not one for each tooth, or deeper than teeth are.
+        A body or gear is unknown, the number of values differs from the teeth, or values exceed the tooth depth.
     """
 
     def of_section(name: str, section: DeviationSection) -> tuple[tuple[str, str], WheelDeviation]:

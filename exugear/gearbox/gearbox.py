@@ -1,8 +1,8 @@
-"""The gearbox as data: bodies, supports, meshes and load cases in SI, read from TOML and checked.
+"""The gearbox as data: bodies, supports, meshes and load cases in SI units, read from TOML and checked.
 
-Axes: +z along the shafts towards the output, lengths in m, angles in rad, rotation positive about +z.
-Planet sets are written once in the file and appear here as one body, support and mesh per planet,
-numbered from 1 (`planet_1`, `sun_planet_1`).
+Axes: +z along the shafts towards the output, lengths in m, angles in rad, rotation positive about +z. A planet set is
+written once in the file. Here it appears as one body, support and mesh per planet, numbered from 1 (`planet_1`,
+`sun_planet_1`).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from exugear.gearbox.parts import (
     Bearing,
     Body,
     Coupling,
+    DampingTimes,
     Joint,
     LoadCase,
     Mesh,
@@ -40,14 +41,15 @@ from fe_ste.standards import iso6336
 from fe_ste.tools.display import ReprMixin, TitledRows
 
 BESIDE_EQUATIONS = ("labels", "load_cases", "loads", "lubricant", "operation", "rating", "report", "ste")
-"""Tables of the file that change nothing in the equations: words and speeds for pages, what acts over a life, how parts
-are rated, settings of reports and of tables, whose content goes into hashes by itself, and load cases: a run adds its
-own."""
+"""Tables of the file that do not affect the equations of motion: labels, load cases, life loads, lubricant,
+operation, rating, and settings of reports and STE tables. STE settings enter the hashes separately; a run adds its own
+load case.
+"""
 
 
 @dataclass(frozen=True)
 class Gearbox(ReprMixin):
-    """A checked gearbox. Build one with :meth:`from_toml` or :meth:`from_dict`.
+    """A checked gearbox, built by :meth:`from_toml` or :meth:`from_dict`.
 
     Examples
     --------
@@ -59,13 +61,13 @@ class Gearbox(ReprMixin):
     """
 
     case: GearboxFile
-    """The file as it is written."""
+    """Validated content of the gearbox file."""
     source: str
-    """Its path or name."""
+    """Path or name of the file."""
     content: Mapping[str, Any]
-    """What was read from it, before it was checked."""
+    """Raw content of the file before validation."""
     permissions: Permissions = NOTHING_MORE
-    """What the file may do."""
+    """Permissions of the file."""
 
     @classmethod
     def from_toml(cls, path: str | Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
@@ -73,12 +75,12 @@ class Gearbox(ReprMixin):
 
         Parameters
         ----------
-        permissions : whether scripts that it names may run, and where else files that it names may lie
+        permissions : whether scripts named in the file may run, and in which other folder its files may lie
 
         Raises
         ------
         GearboxFileError
-            Anything wrong with the file: one message with file, key, value and what would be right.
+            The file has errors; one message lists them with file, key, value and remedy.
         """
         return cls.from_dict(read_toml(path), str(path), permissions)
 
@@ -86,12 +88,12 @@ class Gearbox(ReprMixin):
     def from_dict(
         cls, content: Mapping[str, Any], source: str = "gearbox", permissions: Permissions = NOTHING_MORE
     ) -> Gearbox:
-        """Check content already in memory, such as a varied case; files that it names lie beside `source`.
+        """Check content in memory, such as a varied gearbox; the files that it names are in the folder of `source`.
 
         Raises
         ------
         GearboxFileError
-            Anything wrong with the content, as in :meth:`from_toml`.
+            The content has errors, as in :meth:`from_toml`.
         """
         try:
             case = parse_case(dict(content), source)
@@ -103,15 +105,15 @@ class Gearbox(ReprMixin):
         return gearbox
 
     def varied(self, changes: Mapping[str, Any]) -> Gearbox:
-        """Build a new, checked gearbox with some keys replaced; keys are dotted paths of the file.
+        """Build a new, checked gearbox with some keys replaced, which are dotted paths of the file.
 
-        Labels of entries that are gone go with them.
+        Labels of removed entries are removed as well.
 
         Raises
         ------
         GearboxFileError
-            A path through what is no section, or anything wrong with the new gearbox; where a path made an entry that
-            the file does not have, the nearest path that it has.
+            A path leads through a key that is not a section, or the new gearbox has errors. If a path created a new
+            entry, the message names the nearest existing path.
 
         Examples
         --------
@@ -141,16 +143,16 @@ class Gearbox(ReprMixin):
             ) from error
 
     def fault(self, text: str) -> GearboxFileError:
-        """Error that names the file before `text` (key, value and what would be right)."""
+        """Error whose message is the file name followed by `text` (key, value and remedy)."""
         return self._origin.fault(text)
 
     def file(self, key: str, name: str, largest: int) -> Path:
-        """Path of a file of at most `largest` bytes that the gearbox file names under a key.
+        """Path of a file that the gearbox file names under a key, with at most `largest` bytes.
 
         Raises
         ------
         GearboxFileError
-            The file is not there or may not be read, as `exugear.gearbox.named_files.named_file` says.
+            The file does not exist or may not be read, see `exugear.gearbox.named_files.named_file`.
         """
         return self._origin.file(key, name, largest)
 
@@ -170,7 +172,7 @@ class Gearbox(ReprMixin):
         Raises
         ------
         GearboxFileError
-            None is given, or two.
+            No viscosity is specified, or two are.
         """
         sections = (self.case.lubricant, self.case.rating)
         found = [section.viscosity_40_mm2_per_s for section in sections if section is not None]
@@ -187,12 +189,12 @@ class Gearbox(ReprMixin):
 
     @property
     def computed_content(self) -> dict[str, Any]:
-        """What was read from the file less `BESIDE_EQUATIONS`: what the equations depend on."""
+        """Content of the file without `BESIDE_EQUATIONS`, which is the part that the equations depend on."""
         return {key: value for key, value in self.content.items() if key not in BESIDE_EQUATIONS}
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is possible and unusual about the file, a line each."""
+        """Warnings about valid but unusual content of the file, one line each."""
         lines = [f"{key} = {value:g}: {warning}" for key, value, warning in unusual_values(self.case)]
         for bearing in self.bearings:
             torsion = connector_matrix(bearing.stiffness)[5, 5]
@@ -235,12 +237,12 @@ class Gearbox(ReprMixin):
         return body_parts.inertia_sets(self._origin)
 
     def bodies(self, inertias: str | None = None) -> tuple[Body, ...]:
-        """All enabled bodies, planets one by one, with the mass properties of an inertia set.
+        """All enabled bodies, one per planet, with the mass properties of an inertia set.
 
         Raises
         ------
         GearboxFileError
-            No such inertia set.
+            No such inertia set exists.
         """
         inertias = inertias or self.case.default_inertias
         if inertias not in self.inertia_sets:
@@ -253,7 +255,7 @@ class Gearbox(ReprMixin):
         Raises
         ------
         GearboxFileError
-            No such body or inertia set.
+            No such body or inertia set exists.
         """
         bodies = {body.name: body for body in self.bodies(inertias)}
         if name not in bodies:
@@ -267,13 +269,18 @@ class Gearbox(ReprMixin):
 
     @cached_property
     def spinning(self) -> tuple[str, ...]:
-        """Names of the bodies that can turn, in the order of the spin vector."""
+        """Names of the bodies that can rotate, in the order of the vector of rotational speeds."""
         return tuple(body.name for body in self.named_bodies.values() if not body.fixed)
 
     @cached_property
     def pin_offsets(self) -> dict[str, tuple[float, float]]:
-        """Position error of planets in their carrier at zero angles, x and y, m."""
+        """Position errors of planets in their carrier at zero angles, x and y, m."""
         return body_parts.pin_offsets(self._origin, self.named_bodies)
+
+    @property
+    def damping_times(self) -> DampingTimes:
+        """Damping over stiffness of bearings, meshes and couplings; zero where the file states the damping of modes."""
+        return body_parts.damping_times(self.case.damping)
 
     @cached_property
     def load_cases(self) -> dict[str, LoadCase]:
@@ -294,12 +301,12 @@ class Gearbox(ReprMixin):
 
     @cached_property
     def unknown_bearings(self) -> dict[str, str]:
-        """Designations of bearings of which nothing else is known, by name; variants on bearings wait for the rest."""
+        """Designations of bearings without other data, by name; variants with bearings require these data."""
         return support_parts.unknown_bearings(self._origin)
 
     @cached_property
     def mounts(self) -> tuple[Bearing, ...]:
-        """Supports of the gearbox on the ground, at work where a fixed body is elastic."""
+        """Supports of the gearbox on the ground, which are active if a fixed body is flexible."""
         return support_parts.mounts(self._origin)
 
     @cached_property
@@ -309,7 +316,7 @@ class Gearbox(ReprMixin):
 
     @cached_property
     def couplings(self) -> tuple[Coupling, ...]:
-        """Torsional springs between spins."""
+        """Torsional springs between rotating bodies."""
         return support_parts.couplings(self._origin, self.spinning, [bearing.name for bearing in self.bearings])
 
     # -- gears -------------------------------------------------------------------------------------------
@@ -326,7 +333,7 @@ class Gearbox(ReprMixin):
 
     @cached_property
     def deviations(self) -> dict[tuple[str, str], WheelDeviation]:
-        """Errors of wheels by body and gear; a pitch deviation is cumulative, positive into the tooth (ISO 1328-1)."""
+        """Deviations of gears by body and gear; pitch deviation cumulative, positive into the tooth (ISO 1328-1)."""
         return gear_parts.deviations(self._origin, self.gears, self.named_bodies)
 
     @cached_property
@@ -336,12 +343,12 @@ class Gearbox(ReprMixin):
 
     @cached_property
     def meshes(self) -> tuple[Mesh, ...]:
-        """All meshes at work, one per planet."""
+        """All enabled meshes, one per planet."""
         return gear_parts.meshes(self._origin, self.gear_pairs, self.named_bodies)
 
     @cached_property
     def train(self) -> Train:
-        """The gear train: how it rolls, and what its meshes carry in the static state.
+        """The gear train: its rigid kinematics and the static mesh forces.
 
         Examples
         --------
@@ -362,9 +369,10 @@ class Gearbox(ReprMixin):
 
     @cached_property
     def held_by_torsion(self) -> dict[str, SpinConstraint]:
-        """What holds bodies that can turn by torsion on what stands, such as a ring on a torque arm, by their names.
+        """Constraints by name of rotating bodies with torsional support, such as a ring gear on a torque arm.
 
-        The train rolls without them. One that holds the input or the output of the train is no part of how it rolls.
+        The kinematics of the train treat these bodies as fixed. Torsional supports of the overall input and output are
+        excluded, because they do not affect the kinematics.
         """
         ends = (self.case.overall.input, self.case.overall.output)
         mounts = tuple(mount for mount in self.mounts if mount.body in self.apart)
@@ -379,12 +387,12 @@ class Gearbox(ReprMixin):
 
     @cached_property
     def apart(self) -> tuple[str, ...]:
-        """Bodies that can move and belong to no train, such as a pedestal between a bearing and the ground."""
+        """Movable bodies that do not belong to the train, such as a pedestal between a bearing and the ground."""
         return checks.bodies_apart(self.case, self.named_bodies.values(), self.meshes, self.couplings)
 
     @property
     def locked(self) -> tuple[str, ...]:
-        """Bodies that hold the static load, less those that torsion holds."""
+        """Bodies that react the static load, without those that torsional supports restrain."""
         return tuple(name for name in self.case.static_load.locked if name not in self.held_by_torsion)
 
     @property
@@ -396,18 +404,18 @@ class Gearbox(ReprMixin):
         return self.gears[name].base_radius
 
     def start_speeds(self, case: LoadCase) -> dict[str, float]:
-        """Spins of all bodies at the start of a load case, rad/s.
+        """Rotational speeds of all bodies at the start of a load case, rad/s.
 
         Raises
         ------
         GearboxFileError
-            Its speeds contradict each other.
+            The speeds of the load case contradict each other.
         """
         return self.train.rolling({self.case.overall.input: case.start_speed, **case.start_speeds})
 
     @cached_property
     def pairs(self) -> dict[str, PairSpec]:
-        """Gear pairs with the static torque on gear 1 that the train's statics give."""
+        """Gear pairs with the static torque on gear 1 from the statics of the train."""
         static_forces = self.train.static_mesh_forces()
         forces: dict[str, list[float]] = {}
         for mesh in self.meshes:
@@ -418,7 +426,7 @@ class Gearbox(ReprMixin):
 
     @cached_property
     def idle_pairs(self) -> tuple[str, ...]:
-        """Pairs at work that carry no torque in the static state, and whose stiffness the file does not state."""
+        """Pairs of enabled meshes without static torque whose stiffness the file does not specify."""
         forces = self.train.static_mesh_forces()
         loaded = {mesh.pair.name for mesh in self.meshes if forces[mesh.name] != 0.0}
         at_work = dict.fromkeys(mesh.pair.name for mesh in self.meshes)
@@ -428,19 +436,19 @@ class Gearbox(ReprMixin):
     def stated_stiffness(self) -> dict[str, tuple[float, ...]]:
         """Mesh stiffness of the pairs that need no table, N/m at equal distances over the mesh cycle.
 
-        It is what the file states. A pair that carries no torque has no table, since it has no loaded flank: its teeth
-        are as stiff as ISO 6336-1 says of loaded ones, and excite nothing.
+        The stiffness of the file has priority. A pair without torque has no loaded flank and therefore no table: it
+        gets the mesh stiffness of loaded teeth according to ISO 6336-1, which is constant and causes no excitation.
         """
         stated = gear_parts.stated_stiffness(self._origin)
         return stated | {name: (iso6336.mesh_stiffness(self.gear_pairs[name]).stiffness,) for name in self.idle_pairs}
 
     def table_distances(self, pair: str) -> tuple[float, ...]:
-        """Centre distances (m) that the file asks for in a pair's table with axes; none if they follow from the state.
+        """Centre distances (m) specified for the table of a pair with axes; none if they follow from the state.
 
         Raises
         ------
         GearboxFileError
-            The gears cannot run at one of them.
+            The gears cannot run at one of the centre distances.
         """
         static = self.gear_pairs[pair]
         offsets = self.ste.centre_distance_offsets_um or ()
@@ -452,16 +460,16 @@ class Gearbox(ReprMixin):
 
 
 ALONE = ("bodies", "masses", "gears", "stiffness", "supports", "modifications", "pairs")
-"""Checks of entries that make sense where others of the file cannot be read."""
+"""Checks that remain meaningful if other entries of the file cannot be read."""
 
 
 def _checks_of_entries(gearbox: Gearbox) -> tuple[checks.Check, ...]:
-    """List the checks of what could be read of a file with faults of writing."""
+    """List the checks for the readable entries of a file with syntax or validation errors."""
     return tuple(check for check in _checks_of_parts(gearbox) if check.name in ALONE)
 
 
 def _checks_of(gearbox: Gearbox) -> tuple[checks.Check, ...]:
-    """List all checks, each after those it needs; building parts checks their sections."""
+    """List all checks, each after its prerequisites; building a part checks its section."""
     return (*_checks_of_parts(gearbox), *_checks_of_the_whole(gearbox))
 
 
@@ -543,7 +551,7 @@ def _refuse_found(gearbox: Gearbox, find: Callable[[], Iterable[str]]) -> None:
 
 
 def _refuse(gearbox: Gearbox, faults: Iterable[str]) -> None:
-    """Raise all faults together, a line each."""
+    """Raise all errors together, one per line."""
     lines = [line for text in faults for line in gearbox.fault(text).faults]
     if lines:
         raise GearboxFileError(*lines)
@@ -556,7 +564,7 @@ def _check_inertia_sets(gearbox: Gearbox) -> None:
 
 
 def _check_train(gearbox: Gearbox) -> None:
-    """Let the static load be held, and the train roll from input to output."""
+    """Check that the static load can be reacted and that the train has consistent kinematics from input to output."""
     gearbox.train.static_mesh_forces()
     if gearbox.gears and not gearbox.meshes:
         raise gearbox.fault("meshes: none is enabled; a gearbox with gears needs at least one")
@@ -581,13 +589,13 @@ def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling 
 
 
 def _makes_entry(content: Mapping[str, Any], dotted: str) -> bool:
-    """Tell whether a key at a dotted path would stand in a named entry that is not there, such as a gear."""
+    """Return whether a key at a dotted path would create a named entry that does not exist, such as a gear."""
     keys = dotted.split(".")
     return len(keys) > 2 and keys[0] in NAMED_TABLES and keys[1] not in content.get(keys[0], {})
 
 
 def _paths(content: Mapping[str, Any], before: str = "") -> Iterator[str]:
-    """Dotted paths of all keys that hold no section."""
+    """Yield the dotted paths of all keys whose value is not a section."""
     for key, value in content.items():
         if isinstance(value, Mapping):
             yield from _paths(value, f"{before}{key}.")

@@ -1,9 +1,9 @@
-"""What a load case does to the train as it rolls: net torque, speeds, and the flanks that its meshes load.
+"""Effect of a load case on the kinematic gear train: net torque, speeds, and loaded flanks of the meshes.
 
-Gears and couplings count as rigid and all axes as fixed, so that the speed of the overall input tells all others, and
-in a train of several degrees of freedom a few more speeds. To it torques are referred by their power and inertias by
-their kinetic energy, planets' orbits included. This costs nothing beside a run, and shows the wrong sign of a torque
-before one is begun.
+Gears and couplings are treated as rigid and all axes as fixed. The speed of the overall input, plus a few others in a
+train of several degrees of freedom, then determines all speeds. Torques are referred to the input by their power, and
+inertias by their kinetic energy, including the orbital motion of planets. The computation takes negligible time
+compared with a run and reveals torques of the wrong sign beforehand.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from exugear.gearbox.variant import Variant
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
-# Torques over time of a load case, from a CSV file beside the gearbox file
+# Torques of a load case over time, from a CSV file in the folder of the gearbox file
 
 
 def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, Floats]]:
-    """Read times (s) and torques (N m) by body from the case's CSV file.
+    """Read times (s) and torques (N m) by body from the CSV file of the load case.
 
-    The header is ``time_s`` and one ``<body>_N_m`` per loaded body; between lines torques are linear.
+    The header is ``time_s`` and one ``<body>_N_m`` per loaded body. Torques are interpolated linearly between rows.
 
     Returns
     -------
-    mapping of body name to (times, torques), each (lines,); empty without a file.
+    mapping of body name to (times, torques), each (rows,); empty without a file.
 
     Raises
     ------
     GearboxFileError
-        A file that cannot be read, unknown columns, text where numbers belong, times that do not grow.
+        The file cannot be read, has unknown columns or text instead of numbers, or its times do not increase.
     """
     if case.torque_series is None:
         return {}
@@ -72,59 +72,61 @@ def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, F
     return series
 
 
-# What a load case does to the train as it rolls: net torque, speeds, and the flanks that its meshes load
+# Effect of a load case on the kinematic gear train: net torque, speeds, and loaded flanks of the meshes
 
 Series = Mapping[str, tuple[Floats, Floats]]
 BURSTING_RIM_SPEED = 300.0
-"""Rim speed that no wheel of steel survives, m/s: density times its square is 0.7 GPa, the yield strength
-of gear steels. The fastest turbo gears run at two thirds of it.
+"""Circumferential speed that no steel gear survives, m/s: density times its square is 0.7 GPa, the yield strength of
+gear steels. The fastest turbo gears run at two thirds of it.
 """
 LEAST_SHARE = 0.25
-"""Share of the static load below which the straight line of a linear bearing leads a quarter off its rows."""
+"""Fraction of the static load below which displacements of linear bearings are over 25 % off the nonlinear rows."""
 OTHER_LOAD = 0.3
-"""Difference from the static load from which a mesh counts as one under another load than its table is of."""
+"""Relative difference from the static load above which a mesh is reported as loaded differently from its table."""
 BEYOND_BAND = 1.05
-"""Mesh frequencies above this part of the band are told: steps of a run are chosen for the band, and end softly."""
+"""Ratio of mesh frequency to band above which a warning is given; the band of a run has a soft edge."""
 BAND_STEP = 100.0
-"""What a band that is proposed is rounded up to, Hz."""
+"""Step to which a proposed band is rounded up, Hz."""
 SHOWN_MESHES = 3
-"""Meshes beyond the band that are named."""
+"""Maximum number of meshes above the band that a message lists."""
 INSTANTS = 2001
-"""Instants at which a torque that changes is looked at, beside those of its own lines."""
+"""Number of evaluated instants for a torque that changes with time, in addition to those of its own rows."""
 
 
 @dataclass(frozen=True)
 class LoadSummary(ReprMixin, line=" {name!r}: net torque {net_torque:g} N m, {start_speed:g} to {end_speed:g} rad/s"):
-    """A load case in figures, of the rolling train."""
+    """Summary of a load case on the kinematic gear train."""
 
     name: str
-    """Of the load case."""
+    """Name of the load case."""
     inertia: float
-    """Of the whole train at the overall input, kg m2."""
+    """Inertia of the whole train at the overall input, kg m2."""
     net_torque: float
-    """Of all torques at the overall input, at the start and without a drive's, N m."""
+    """Sum of all torques referred to the overall input, at the start and without that of a drive, N m."""
     driven: bool
-    """Whether a machine prescribes the speed, and holds what the torques do not."""
+    """Whether a machine prescribes the speed and supplies the remaining torque."""
     start_speed: float
     end_speed: float
     fastest_speed: float
     """Of the overall input, rad/s; the last without sign."""
     rim_speeds: Mapping[str, float]
-    """By body name, speed of the fastest gear's rim on each body with gears at `fastest_speed`, m/s."""
+    """By body name, tip speed of the largest gear of each body with gears at `fastest_speed`, m/s."""
     mesh_frequencies: Mapping[str, float]
-    """By mesh name, highest mesh frequency of each, Hz."""
+    """By mesh name, highest mesh frequency, Hz."""
     mesh_forces: Mapping[str, float]
-    """By mesh name, F_bt at the start, N; its sign says which flank of gear 1 carries, as in
-    `Train.static_mesh_forces`."""
+    """By mesh name, F_bt at the start, N; its sign indicates the loaded flank of gear 1, as in
+    `Train.static_mesh_forces`.
+    """
     flanks: Mapping[str, str]
-    """By mesh family, loaded flanks in the course of the load case: ``+``, ``-``, ``+-`` for both, ``0`` for none."""
+    """By mesh family, loaded flanks during the load case: ``+``, ``-``, ``+-`` for both, ``0`` for none."""
     reversed_flanks: tuple[str, ...]
-    """Mesh families with a loaded flank that is not the one of the static load, which their tables are of."""
+    """Mesh families with a loaded flank other than that of the static load, for which their tables are computed."""
     least_shares: Mapping[str, float]
-    """By mesh family, smallest mesh force in the course of the load case over that of the static load; negative
-    where it reverses."""
+    """By mesh family, minimum mesh force during the load case divided by that of the static load; negative if it
+    reverses.
+    """
     greatest_shares: Mapping[str, float]
-    """By mesh family, largest mesh force in the course of the load case over that of the static load."""
+    """By mesh family, maximum mesh force during the load case divided by that of the static load."""
 
     def _table(self) -> TitledRows:
         speeds = (self.start_speed, self.end_speed, self.fastest_speed)
@@ -139,7 +141,7 @@ class LoadSummary(ReprMixin, line=" {name!r}: net torque {net_torque:g} N m, {st
 
     @property
     def fastest_rim(self) -> tuple[str, float]:
-        """Body with the fastest rim and its speed, m/s; no body and standstill of a rotor without gears."""
+        """Body with the highest tip speed, and this speed, m/s; an empty name and zero for a rotor without gears."""
         return max(self.rim_speeds.items(), key=lambda item: item[1], default=("", 0.0))
 
 
@@ -150,19 +152,19 @@ def summarise_loads(
     duration: float | None = None,
     series: Series | None = None,
 ) -> LoadSummary:
-    """Sum up what a load case does to the rolling train.
+    """Summarise the effect of a load case on the kinematic gear train.
 
     Parameters
     ----------
-    inertias : inertia set; the file's default otherwise
-    duration : simulated time, s; the load case's by default
+    inertias : inertia set; default: that of the file
+    duration : simulated time, s; default: that of the load case
     series : mapping, optional
-        As `exugear.gearbox.load_cases.torque_series` reads it, where it has been read.
+        Result of `torque_series`, if the file has already been read.
 
     Raises
     ------
     GearboxFileError
-        The torque series cannot be used, or the train is not fixed by the speed of its input.
+        The torque series cannot be used, or the speed of the input does not determine the speeds of the train.
 
     Examples
     --------
@@ -207,14 +209,14 @@ def summarise_loads(
 
 
 def _without_round_off(total: float, parts: Floats) -> float:
-    """Return a sum, or zero where it is the round-off of its parts."""
+    """Return a sum, or zero if it is only round-off of its parts."""
     if abs(total) > UNLOADED * float(np.abs(parts).max(initial=0.0)):
         return total
     return 0.0
 
 
 def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
-    """Say in words what looks like the wrong sign of a torque, nothing if all is well."""
+    """Return warnings that indicate a wrong sign of a torque; empty if none."""
     doubts = []
     if loads.reversed_flanks:
         doubts.append(
@@ -231,7 +233,7 @@ def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
 
 
 def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) -> str:
-    """Say where linear bearings are led far from the static load that their law is of, and the remedy; empty if not.
+    """Return a warning if linear bearings leave the load range around their linearisation point; empty otherwise.
 
     Examples
     --------
@@ -258,11 +260,11 @@ def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) ->
 
 
 def other_load_warning(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool = True) -> str:
-    """Say which meshes carry another load than the static one, which tables over the mesh cycle are of; empty if none.
+    """Return a warning that names meshes with another load than the static one of their STE tables; empty if none.
 
     Parameters
     ----------
-    of_one_load : whether the mesh law reads tables at the static load alone
+    of_one_load : whether the mesh model evaluates tables at the static load only
 
     Examples
     --------
@@ -287,7 +289,7 @@ def other_load_warning(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool =
 
 
 def band_warning(loads: LoadSummary, band: float) -> str:
-    """Say which mesh frequencies a run does not keep, and which band (Hz) does; empty if all are kept.
+    """Return a warning about mesh frequencies above the stored band, with a sufficient band (Hz); empty if none.
 
     Examples
     --------
@@ -310,7 +312,7 @@ def band_warning(loads: LoadSummary, band: float) -> str:
 
 
 def load_in_words(case: LoadCase) -> str:
-    """Name the torques of a load case, and what a machine drives.
+    """Return the torques of a load case and the driven body as text.
 
     Examples
     --------
@@ -327,7 +329,7 @@ def load_in_words(case: LoadCase) -> str:
 
 
 def static_load_in_words(gearbox: Gearbox) -> str:
-    """Name the torques of the static load.
+    """Return the torques of the static load as text.
 
     Examples
     --------
@@ -339,12 +341,12 @@ def static_load_in_words(gearbox: Gearbox) -> str:
 
 
 def gearbox_at_load(gearbox: Gearbox, case: LoadCase) -> Gearbox:
-    """Return the gearbox with the torques at the start of a load case as its static load; what holds it stays.
+    """Return the gearbox with the initial torques of a load case as its static load; locked bodies are unchanged.
 
     Raises
     ------
     GearboxFileError
-        The load case has no torque but on bodies that hold the static load, or the torques are none to be held.
+        The load case has no torque except on bodies that react the static load, or its torques cannot be reacted.
 
     Examples
     --------
@@ -364,7 +366,7 @@ def gearbox_at_load(gearbox: Gearbox, case: LoadCase) -> Gearbox:
 
 
 def rim_radii(gearbox: Gearbox) -> dict[str, float]:
-    """Radius (m) of the largest gear on each turning body that has gears; of an internal gear that of its teeth."""
+    """Radius (m) of the largest gear on each rotating body with gears; for an internal gear the radius at its teeth."""
     return {
         body.name: max(gearbox.gears[gear].tip_radius for gear in body.wheels)
         for body in gearbox.bodies()
@@ -373,7 +375,7 @@ def rim_radii(gearbox: Gearbox) -> dict[str, float]:
 
 
 def _axial_inertias(gearbox: Gearbox, inertias: str | None) -> Floats:
-    """Inertia of each spin, kg m2, with planets' orbits in their carrier's."""
+    """Moment of inertia of each rotation, kg m2; the orbital motion of planets is included in the carrier."""
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
     axial = {name: bodies[name].axial for name in gearbox.spinning}
     for body in bodies.values():
@@ -383,7 +385,7 @@ def _axial_inertias(gearbox: Gearbox, inertias: str | None) -> Floats:
 
 
 def _instants(series: Series, total: float) -> Floats:
-    """Instants (s) from 0 to the end that tell all of a load case: with torques that change, their lines too."""
+    """Instants (s) from 0 to the end that resolve a load case, including the rows of torque series."""
     if not series:
         return np.array([0.0, total])
     lines = np.concatenate([times for times, _ in series.values()])
@@ -392,7 +394,7 @@ def _instants(series: Series, total: float) -> Floats:
 
 
 def _torques(names: tuple[str, ...], case: LoadCase, series: Series, times: Floats) -> Floats:
-    """Torques (times, bodies) on the spins, N m."""
+    """Torques (times, bodies) on the rotating bodies, N m."""
     torques = np.zeros((len(times), len(names)))
     for name, torque in case.torques.items():
         torques[:, names.index(name)] += torque
@@ -402,10 +404,10 @@ def _torques(names: tuple[str, ...], case: LoadCase, series: Series, times: Floa
 
 
 def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> tuple[Floats, Floats]:
-    """Spin rates (rad/s2) and what a machine adds to the torques (N m), both (times, bodies), of the rolling train.
+    """Angular accelerations (rad/s2) of the kinematic gear train and added machine torques (N m), both (times, bodies).
 
-    Equations of motion in the ways to roll; a machine prescribes the rate of its body, and its torque is one unknown
-    more.
+    The equations of motion are formulated in the kinematic modes. A machine prescribes the acceleration of its body;
+    its torque is one additional unknown.
     """
     modes = gearbox.train.kinematic_modes
     matrix = modes.T @ (axial[:, None] * modes)
@@ -415,7 +417,7 @@ def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> 
         return (modes @ np.linalg.solve(matrix, loads)).T, added
     driven = gearbox.spinning.index(case.driven_body)
     row = modes[driven]
-    # The machine's torque in units that make the row as large as the inertias.
+    # Scaling the machine torque makes the row as large as the inertias.
     scale = float(np.abs(matrix).max())
     bordered = np.block([[matrix, -scale * row[:, None]], [scale * row[None, :], np.zeros((1, 1))]])
     rate = np.full((1, loads.shape[1]), scale * drive_rate(gearbox, case))
@@ -425,16 +427,16 @@ def _rates(gearbox: Gearbox, case: LoadCase, axial: Floats, torques: Floats) -> 
 
 
 def _speeds(gearbox: Gearbox, case: LoadCase, times: Floats, rates: Floats) -> Floats:
-    """Spins (times, bodies), rad/s, from the start of a load case on."""
+    """Rotational speeds (times, bodies), rad/s, from the start of a load case."""
     start = gearbox.start_speeds(case)
-    # Between the instants torques are linear: the trapezoidal rule is exact at them.
+    # Torques are linear between the instants, so the trapezoidal rule is exact.
     gained = np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)[:, None], axis=0)
     gained = np.concatenate([np.zeros((1, rates.shape[1])), gained])
     return np.asarray(np.array([start[name] for name in gearbox.spinning]) + gained)
 
 
 def _highest_mesh_frequencies(gearbox: Gearbox, spins: Floats) -> dict[str, float]:
-    """Highest mesh frequency of each mesh (Hz), of spins (times, bodies); a body that is no spin stands."""
+    """Highest mesh frequency (Hz) of each mesh for speeds (times, bodies); bodies without rotation have zero speed."""
     of_body = dict(zip(gearbox.spinning, spins.T, strict=True))
     standing = np.zeros(len(spins))
     return {
@@ -446,24 +448,24 @@ def _highest_mesh_frequencies(gearbox: Gearbox, spins: Floats) -> dict[str, floa
 
 
 def drive_rate(gearbox: Gearbox, case: LoadCase) -> float:
-    """Spin rate (rad/s2) of the driven body: from its speed at the start to its end speed."""
+    """Angular acceleration (rad/s2) of the driven body from its speed at the start to its end speed."""
     end = case.end_speed if case.end_speed is not None else 0.0
     return (end - driven_start_speed(gearbox, case)) / case.duration
 
 
 def driven_start_speed(gearbox: Gearbox, case: LoadCase) -> float:
-    """Speed of the driven body at the start, rad/s; the case states it at the overall input."""
+    """Speed of the driven body at the start, rad/s; the load case specifies it at the overall input."""
     return gearbox.start_speeds(case)[str(case.driven_body)]
 
 
 def _mesh_forces(gearbox: Gearbox, applied: Floats) -> Floats:
-    """F_bt (times, meshes) that torques in balance (times, bodies) load meshes with; least-norm where they share."""
+    """Mesh forces F_bt (times, meshes) for balanced torques (times, bodies); of minimum norm if meshes share."""
     forces = np.linalg.lstsq(gearbox.train.spin_rows.T, applied.T, rcond=1e-12)[0]
     return np.asarray(forces[: len(gearbox.meshes)].T)
 
 
 def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str, ...]]:
-    """Find loaded flanks by mesh family, and the families that load another than the static load does."""
+    """Find the loaded flanks by mesh family, and the families whose loaded flank differs from the static load."""
     static = gearbox.train.static_mesh_forces()
     least = UNLOADED * float(np.abs(forces).max(initial=0.0))
     flanks: dict[str, str] = {}
@@ -478,9 +480,9 @@ def _flanks(gearbox: Gearbox, forces: Floats) -> tuple[dict[str, str], tuple[str
 
 
 def _shares(gearbox: Gearbox, forces: Floats, extreme: Callable[..., float]) -> dict[str, float]:
-    """Find an extreme of the forces (times, meshes) of each family over that of the static load.
+    """Extreme mesh force (times, meshes) of each family divided by that of the static load.
 
-    Families that the static load leaves unloaded have none.
+    Families without static load are omitted.
     """
     static = gearbox.train.static_mesh_forces()
     largest = max(map(abs, static.values()), default=0.0)
@@ -492,16 +494,16 @@ def _shares(gearbox: Gearbox, forces: Floats, extreme: Callable[..., float]) -> 
     return shares
 
 
-# The speeds that a gearbox works at: which resonances count
+# Operating speed range, which decides which resonances count
 
 OF_RATED = (0.5, 1.25)
-"""Speeds of a gearbox whose file names none, over the rated one."""
+"""Default operating range as a fraction of the rated speed, if the file specifies no range."""
 
 
 def operating_range(gearbox: Gearbox) -> tuple[float, float] | None:
-    """Lowest and highest speed of the overall input in service, rad/s, without sign.
+    """Operating range of the overall input: minimum and maximum speed, rad/s, without sign.
 
-    None where the file names neither a range nor a rated speed: all speeds count then.
+    None if the file specifies neither a range nor a rated speed; all speeds then count.
 
     Examples
     --------

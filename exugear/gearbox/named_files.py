@@ -1,7 +1,7 @@
-"""Files that a gearbox file names, which may come from a stranger: where they may lie, how large, and what may run.
+"""Files named in a gearbox file, which may be untrusted: permitted folders, size, and permission to run.
 
-A gearbox file names solids, measured flanks and torque series. Reading one must not hang, fill the memory or reach
-for files that have nothing to do with the gearbox; and what is in it must not run.
+A gearbox file names solids, measured flanks and torque series. Reading one must not hang, exhaust the memory or access
+files unrelated to the gearbox, and its content must not be executed.
 """
 
 from __future__ import annotations
@@ -10,38 +10,38 @@ from dataclasses import dataclass
 from pathlib import Path
 
 LARGEST_CASE = 10_000_000
-"""Largest gearbox file that is read, bytes."""
+"""Maximum size of a gearbox file, bytes."""
 LARGEST_TABLE = 100_000_000
-"""Largest table of numbers (measured flank, torque series) that is read, bytes."""
+"""Maximum size of a table of numbers (measured flank, torque series), bytes."""
 LARGEST_SOLID = 1_000_000_000
-"""Largest solid that is read, bytes."""
+"""Maximum size of a solid, bytes."""
 
 
 class NamedFileError(ValueError):
-    """A file that is not read; the message says why and what would be right."""
+    """A file that is refused; the message states the reason and the remedy."""
 
 
 @dataclass(frozen=True)
 class Permissions:
-    """What a gearbox file may do beyond reading files below its own folder."""
+    """Permissions of a gearbox file beyond reading files below its own folder."""
 
     scripts: bool = False
-    """Whether gmsh scripts that it names may run; they can do all that the user can."""
+    """Whether gmsh scripts that it names may run; they have all rights of the user."""
     below: Path | None = None
-    """A further folder whose files it may name."""
+    """Another folder whose files it may name."""
 
 
 NOTHING_MORE = Permissions()
-"""What a gearbox file may do unless the user permits more."""
+"""Permissions of a gearbox file unless the user grants more."""
 
 
 def check_regular(path: Path, largest: int) -> None:
-    """Refuse what is no regular file or has more than `largest` bytes; nothing is read.
+    """Raise an error unless a path is a regular file of at most `largest` bytes; the file is not read.
 
     Raises
     ------
     NamedFileError
-        Nothing there, a folder, a pipe or a device, or more than `largest` bytes.
+        The path does not exist, is a folder, a pipe or a device, or has more than `largest` bytes.
 
     Examples
     --------
@@ -65,18 +65,18 @@ def check_regular(path: Path, largest: int) -> None:
 def named_file(name: str, folder: Path, permissions: Permissions, largest: int) -> Path:
     """Path of a file that a gearbox file in `folder` names, if it may be read.
 
-    Symbolic links count as what they lead to.
+    Symbolic links are resolved first.
 
     Parameters
     ----------
-    name : as the gearbox file gives it
+    name : name in the gearbox file
     folder : folder of the gearbox file
-    largest : bytes of the largest file that is read
+    largest : maximum size of the file, bytes
 
     Raises
     ------
     NamedFileError
-        The file lies elsewhere, or as `check_regular`.
+        The file is outside the permitted folders, or `check_regular` refuses it.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def named_file(name: str, folder: Path, permissions: Permissions, largest: int) 
     try:
         permitted = [parent.resolve() for parent in (folder, permissions.below) if parent is not None]
         real_path = path.resolve()
-    except (OSError, RuntimeError, ValueError):  # a name too long, links that go in circles, a name with a zero byte
+    except (OSError, RuntimeError, ValueError):  # a name too long, circular links, a name with a zero byte
         raise NamedFileError("no such file") from None
     if not any(real_path.is_relative_to(parent) for parent in permitted):
         raise NamedFileError(

@@ -1,4 +1,4 @@
-"""The parts of a gearbox as data in SI: bodies, supports, meshes, load cases."""
+"""The parts of a gearbox as data in SI units: bodies, supports, meshes, load cases."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -20,31 +20,30 @@ from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
 @dataclass(frozen=True)
 class Body(ReprMixin, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 about its axis"):
-    """A rigid body, its place at zero angles and its mass properties (about the centre of mass)."""
+    """A rigid body with its position at zero angles and its mass properties about the centre of mass."""
 
     name: str
     family: str
-    """Its name, and that of its section, which planets share."""
+    """Name of the body, and name of its section, which the planets of a set share."""
     axis: tuple[float, float]
-    """(2,) position x, y of its axis at zero angles, m."""
+    """(2,) position x, y of the axis at zero angles, m."""
     centre_of_mass_z: float
-    """m."""
+    """Axial position of the centre of mass, m."""
     mass: float
     axial: float
     transverse: float
-    """Mass, and inertia about its axis and across it, kg, kg m2, kg m2; a spin-only body has inertia about its axis
-    alone."""
+    """Mass (kg) and moments of inertia about and across the axis (kg m2); a spin-only body has the axial one alone."""
     carrier: str | None
-    """Carrier that a planet rides on; none while it is held: then its planets turn on axes that stand still."""
+    """Carrier of a planet; None while the carrier is fixed, so that its planets rotate about stationary axes."""
     orbit_angle: float
-    """Its angle there, rad."""
+    """Angular position of the planet on the carrier, rad."""
     spin_only: bool
     fixed: bool
-    """Whether it has no place in space, or does not turn."""
+    """Whether the body has only rotational inertia and no position, and whether it does not rotate."""
     wheels: Mapping[str, float]
-    """By gear name, middle of the gear's face width, z, m."""
+    """By gear name, axial position of the middle of the face width, m."""
     planet_of: str | None = None
-    """Carrier of the set that a planet belongs to, held or not."""
+    """Carrier of the planet set that the body belongs to, fixed or not."""
 
     def _table(self) -> TitledRows:
         return f"body {self.name}", {
@@ -70,16 +69,24 @@ class Body(ReprMixin, line=" {name!r}: {_kind}, {mass:g} kg, {axial:g} kg m2 abo
         return "turning"
 
 
+class DampingTimes(NamedTuple):
+    """Damping over stiffness of elements without a damper of their own, s."""
+
+    bearing: float
+    mesh: float
+    coupling: float
+
+
 @dataclass(frozen=True)
 class Joint:
-    """Ideal joint between `on` and `body` that leaves only the spin about z."""
+    """Ideal joint between `on` and `body` that permits only rotation about z."""
 
     name: str
     body: str
     on: str
-    """Bodies that it joins."""
+    """Connected bodies."""
     position: tuple[float, float, float]
-    """(3,) at zero angles, m."""
+    """(3,) position at zero angles, m."""
 
 
 @dataclass(frozen=True)
@@ -88,26 +95,26 @@ class Bearing(ReprMixin):
 
     name: str
     family: str
-    """Its name, and that of its section, which planets share."""
+    """Name of the bearing, and name of its section, which the bearings of planets share."""
     body: str
     on: str
-    """Body that is held, and what it sits on."""
+    """Supported body, and the body that supports it."""
     position: tuple[float, float, float]
-    """(3,) at zero angles, m."""
+    """(3,) position at zero angles, m."""
     stiffness: StiffnessSection | None
-    """As the file gives it; beside a catalogue the least stiffness of each direction."""
+    """Stiffness of the gearbox file; with catalogue data, the minimum stiffness in each direction."""
     catalogue: CatalogueSection | None
-    """Dimensions and loads from which its stiffness follows."""
+    """Dimensions and loads from which the stiffness is computed."""
     damping: ConnectorDampingSection | None
-    """As the file gives it; in proportion to the stiffness otherwise."""
+    """Damping of the gearbox file; proportional to the stiffness if None."""
     factor: float
-    """Factor of the housing on its stiffness, not yet multiplied in."""
+    """Housing stiffness factor, which is not yet multiplied in."""
     carries_outer_ring: bool = False
-    """Whether the outer ring sits in the body, as in planets; else the inner ring does."""
+    """Whether the body carries the outer ring, as planets do; otherwise it carries the inner ring."""
     model: Literal["linear", "iso16281"] = "linear"
-    """Linear, or the law of the rolling elements themselves."""
+    """Linear model, or nonlinear model of the individual rolling elements."""
     cage: Literal["averaged", "turning"] = "averaged"
-    """Of a non-linear bearing: whether rolling elements move on as its rings turn."""
+    """For a nonlinear bearing, whether its rolling elements orbit as the rings rotate."""
 
     def _line(self) -> str:
         return f" {self.name!r}: {self.body} on {self.on} at {_point(self.position)}, {self._source}"
@@ -124,7 +131,7 @@ class Bearing(ReprMixin):
 
     @property
     def _source(self) -> str:
-        """Where its stiffness comes from."""
+        """Source of the stiffness as text."""
         if self.catalogue is None:
             return "specified stiffness"
         if self.stiffness is None:
@@ -139,49 +146,49 @@ class PointForce:
     name: str
     body: str
     position: tuple[float, float, float]
-    """(3,) at zero angles, m."""
+    """(3,) position at zero angles, m."""
     wrench: tuple[float, float, float, float, float]
     """Force along x, y, z (N), moment about x, y (N m)."""
 
 
 @dataclass(frozen=True)
 class Coupling:
-    """Torsional spring and damper between two spins."""
+    """Torsional spring and damper between two rotating bodies."""
 
     name: str
     first: str
     second: str
-    """Bodies that it joins."""
+    """Connected bodies."""
     seat: str | None
-    """Bearing at whose seat it acts on elastic bodies."""
+    """Bearing at whose seat the coupling acts on flexible bodies."""
     stiffness: float
     damping: float
-    """N m/rad, N m s/rad."""
+    """Torsional stiffness (N m/rad) and damping (N m s/rad)."""
 
 
 @dataclass(frozen=True)
 class Mesh(ReprMixin):
-    """A gear pair at work."""
+    """A mesh of a gear pair between two bodies."""
 
     name: str
     family: str
-    """Its name, and that of its section, which meshes of planets share."""
+    """Name of the mesh, and name of its section, which the meshes of planets share."""
     pair: GearPair
     pinion: str
     gear: str
     """Bodies that carry gear 1 and gear 2."""
     frame: str
-    """Body whose spin carries the line of centres, or "ground"."""
+    """Body with which the line of centres rotates, or "ground"."""
     z: float
-    """Middle of the common face width, m."""
+    """Axial position of the middle of the common face width, m."""
     offsets: tuple[float, float]
-    """(2,) z of that middle from the middle of gear 1 and of gear 2, m."""
+    """(2,) axial distance of that middle from the middle of gear 1 and of gear 2, m."""
     position_angle: float
     """Polar angle of the line from gear 1's axis to gear 2's axis at zero angles, rad."""
     centre_distance: float
-    """From the bodies' positions, m; the pair's own value agrees within 20 um."""
+    """Centre distance from the positions of the bodies, m; it agrees with that of the pair within 20 um."""
     phase: float | None
-    """Position in the mesh cycle at zero angles, where the file overrides what geometry gives."""
+    """Position in the mesh cycle at zero angles if the file overrides the value from geometry."""
 
     def _line(self) -> str:
         pinion = self.pair.pinion
@@ -205,16 +212,18 @@ class Mesh(ReprMixin):
 
 @dataclass(frozen=True)
 class WheelDeviation(ReprMixin):
-    """Errors of one wheel that return with each of its revolutions."""
+    """Deviations of one gear that repeat with each revolution."""
 
     teeth: int
     pitch: Floats
-    """(teeth,) by which each loaded flank stands back on the transverse line of action, m. Tooth 0 is the first at a
-    positive polar angle at zero body angle, the others follow in the positive sense."""
+    """(teeth,) distance by which each loaded flank lies below its nominal position, along the transverse line of
+    action, m. Tooth 0 is the first at a positive polar angle at zero body angle; the others follow in the positive
+    sense.
+    """
     eccentricity: float
-    """Distance of the teeth's axis from the body's, m."""
+    """Distance between the axis of the teeth and the axis of the body, m."""
     eccentricity_angle: float
-    """Its polar angle at zero body angle, rad."""
+    """Polar angle of the eccentricity at zero body angle, rad."""
 
     def _line(self) -> str:
         runout = value_range(2.0 * self.eccentricity, "um", 1e6)
@@ -235,21 +244,21 @@ class LoadCase(ReprMixin, line=" {name!r}: {duration:g} s, {_drive}, torques on 
 
     name: str
     torques: Mapping[str, float]
-    """By body name, N m."""
+    """Torques by body name, N m."""
     torque_series: Path | None
     """File of torques over time."""
     duration: float
-    """s."""
+    """Simulated time, s."""
     start_speed: float
-    """Of the overall input, rad/s."""
+    """Initial speed of the overall input, rad/s."""
     start_speeds: Mapping[str, float]
-    """By body name, of further bodies, in a train of several degrees of freedom, rad/s."""
+    """By body name, initial speeds of further bodies in a train of several degrees of freedom, rad/s."""
     driven_body: str | None
     """Body whose speed a machine prescribes."""
     end_speed: float | None
-    """Its speed at the end, rad/s."""
+    """Final speed of the driven body, rad/s."""
     drive_stiffness: float | None
-    """Of the spring between it and the machine, N m/rad."""
+    """Torsional stiffness of the spring between the driven body and the machine, N m/rad."""
     description: str
 
     def _table(self) -> TitledRows:
@@ -271,21 +280,23 @@ class LoadCase(ReprMixin, line=" {name!r}: {duration:g} s, {_drive}, torques on 
 
 @dataclass(frozen=True)
 class PairSpec(ReprMixin):
-    """What the STE table of a pair needs."""
+    """Input data for the STE table of a pair."""
 
     name: str
     pair: GearPair
     static_torque: float
-    """On gear 1, N m, positive."""
+    """Static torque on gear 1, N m, positive."""
     table: bool
-    """Whether the file wants a table of it."""
+    """Whether the file requests a table of the pair."""
     flank: int
-    """Loaded flank of gear 1 in the static state: +1 if it faces the sense of +z rotation, else -1. A table is that
-    of flank +1; turned about the line of centres it is that of flank -1, with the ends of the face exchanged."""
+    """Loaded flank of gear 1 in the static state: +1 if it faces the sense of +z rotation, else -1. Tables are computed
+    for flank +1; rotated about the line of centres, a table applies to flank -1, with the ends of the face exchanged.
+    """
     modifications: tuple[FlankModification, FlankModification]
-    """Gear 1, gear 2, in the axes of the gearbox."""
+    """Modifications of gear 1 and gear 2, in the axes of the gearbox."""
     stiffness: tuple[float, ...] = ()
-    """Mesh stiffness of a pair that needs no table, at equal distances over the mesh cycle, N/m; empty of others."""
+    """Mesh stiffness of a pair that needs no table, at equal distances over the mesh cycle, N/m; empty for all others.
+    """
 
     def _line(self) -> str:
         pinion = self.pair.pinion
@@ -311,7 +322,7 @@ def _point(coordinates: tuple[float, ...]) -> str:
 
 
 def connector_matrix(section: StiffnessSection | ConnectorDampingSection | None) -> Floats:
-    """Return the stiffness or damping matrix (6, 6) of a section; zeros without one."""
+    """Return the stiffness or damping matrix (6, 6) of a section; zeros without a section."""
     if section is None:
         return np.zeros((6, 6))
     if section.matrix is not None:
@@ -326,7 +337,7 @@ def connector_matrix(section: StiffnessSection | ConnectorDampingSection | None)
 
 
 def seat_key(body: str, item: str) -> str:
-    """Name of the seat of a gear or bearing on an elastic body.
+    """Name of the seat of a gear or bearing on a flexible body.
 
     Examples
     --------
@@ -337,5 +348,5 @@ def seat_key(body: str, item: str) -> str:
 
 
 def node_position(body: Body) -> Floats:
-    """Position of a body's node, its centre of mass, at zero angles, m."""
+    """Position of the node of a body at zero angles, which is its centre of mass, m."""
     return np.array([*body.axis, body.centre_of_mass_z])

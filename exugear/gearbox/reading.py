@@ -1,4 +1,4 @@
-"""Reading the gearbox file: TOML to checked sections, and faults as lines that name file, key and remedy."""
+"""Reading of the gearbox file: TOML to checked sections, and errors as lines with file, key and remedy."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ from fe_ste.geometry.checks import GeometryError
 from fe_ste.tools.display import ReprMixin
 
 SHOWN_FAULTS = 24
-"""Most faults that one message shows; the error has all."""
+"""Maximum number of errors that a message shows; the exception holds all of them."""
 LONGEST_FAULT = 280
-"""Characters of a fault after the name of the file."""
+"""Maximum number of characters of an error after the name of the file."""
 
 
 class GearboxFileError(ValueError):
-    """A gearbox file that cannot be used: a line for each fault says file, key, value and what would be right.
+    """A gearbox file that cannot be used; the message has one line per error with file, key, value and remedy.
 
     Attributes
     ----------
     faults : tuple of str
-        All of them; the message shows the first `SHOWN_FAULTS`.
+        All errors; the message shows the first `SHOWN_FAULTS`.
     """
 
     def __init__(self, *faults: str) -> None:
@@ -46,7 +46,7 @@ class GearboxFileError(ValueError):
 
 
 def fault_line(source: str, text: str) -> str:
-    """One line that names the file before a fault; of a long one the middle is left out, not key and remedy."""
+    """Return the file name and an error as one line; long errors are shortened in the middle to keep key and remedy."""
     text = " ".join(text.split())
     half = (LONGEST_FAULT - 1) // 2
     return f"{' '.join(source.splitlines())}: {text if len(text) <= LONGEST_FAULT else f'{text[:half]}…{text[-half:]}'}"
@@ -58,19 +58,19 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     Raises
     ------
     GearboxFileError
-        No regular file, nothing in it, far too much in it, or not TOML (with line and column).
+        The file is not a regular file, is empty or too large, or is not TOML (with line and column).
     """
     text = read_text(path).replace("\r\n", "\n").replace("\r", "\n")
     return parsed(lambda: tomllib.loads(text), str(path), "TOML")
 
 
 def read_text(path: str | Path) -> str:
-    """Read the text of a gearbox or study file with its line ends; other files are refused before they are read.
+    """Read the text of a gearbox or study file with its line ends; unsuitable files are refused before they are read.
 
     Raises
     ------
     GearboxFileError
-        No regular file, nothing in it, far too much in it, or not UTF-8.
+        The file is not a regular file, is empty or too large, or is not UTF-8.
     """
     path = Path(path)
     try:
@@ -89,19 +89,19 @@ def read_text(path: str | Path) -> str:
 
 
 def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[str, Any]:
-    """Run a parser of TOML or JSON; whatever it refuses is one fault.
+    """Run a parser of TOML or JSON and convert its exceptions to an error of the file.
 
-    Python's parsers raise ValueError for numbers of thousands of digits, and run out of stack in deep nesting.
+    Python's parsers raise ValueError for numbers of thousands of digits and exhaust the stack for deep nesting.
 
     Parameters
     ----------
-    parse : gives the content
+    parse : function that returns the content
     source, form : name of the file and "TOML" or "JSON", for the message
 
     Raises
     ------
     GearboxFileError
-        The text is not of this form.
+        The text is not valid in this form.
     """
     try:
         return parse()
@@ -115,7 +115,7 @@ def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[
 
 
 def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
-    """Validate raw content; each fault becomes a line of the message.
+    """Validate raw content; each error becomes a line of the message.
 
     Examples
     --------
@@ -134,14 +134,14 @@ def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
 
 
 def readable(content: Mapping[str, Any]) -> GearboxFile:
-    """Entries of faulty content that can be judged all the same: valid by themselves, and so is what they rest on.
+    """Readable entries of content with errors: entries that are valid and depend only on valid entries.
 
-    A gear whose shift or tip follows from its pairs rests on these; a pair on its gears, a body on its gears and its
-    carrier. What an entry names and nobody wrote is a fault of it where all of that table can be read.
+    A gear whose profile shift or tip follows from its pairs depends on these, a pair on its gears, and a body on its
+    gears and its carrier. A reference to an entry that does not exist is reported if its whole table is readable.
 
     Returns
     -------
-    with the tables of gears, pairs, bodies, bearings and mounts alone; other keys that are needed are not there
+    with the tables of gears, pairs, bodies, bearings and mounts only; other required keys are missing
 
     Examples
     --------
@@ -157,7 +157,7 @@ def readable(content: Mapping[str, Any]) -> GearboxFile:
         lost = {table: set(written[table]) - set(entries) for table, entries in found.items()}
         for table in set(_JUDGED) & set(content):
             if not isinstance(content[table], Mapping):
-                lost[table].add("")  # whatever was meant there
+                lost[table].add("")  # marks the whole table as unreadable
         pairs = found["pairs"].items()
         known = set(found["gears"])
         carriers = set(found["bodies"])
@@ -181,11 +181,11 @@ def readable(content: Mapping[str, Any]) -> GearboxFile:
 
 
 _JUDGED = ("gears", "pairs", "bodies", "bearings", "mounts")
-"""Tables whose entries are judged one by one."""
+"""Tables whose entries are validated one by one."""
 
 
 def _valid_entries(content: Mapping[str, Any], table: str) -> dict[str, Any]:
-    """Entries of a table that are valid by themselves."""
+    """Entries of a table that are individually valid."""
     model = _inner(_inner(GearboxFile, table), "")
     entries = content.get(table, {})
     found = {}
@@ -196,7 +196,7 @@ def _valid_entries(content: Mapping[str, Any], table: str) -> dict[str, Any]:
 
 
 def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:
-    """Key, value and what would be right of each fault; a misspelt key is not told as missing besides."""
+    """Yield key, value and remedy of each error; a key that was misspelt is not reported as missing in addition."""
     meant = set()
     locations = {fault["loc"] for fault in faults}
     for fault in faults:
@@ -207,7 +207,7 @@ def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:
         path = _path(fault["loc"], content)
         key = ".".join(_key(part) for part in path)
         if fault["type"] == "too_short" and any(loc[:-1][: len(fault["loc"])] == fault["loc"] for loc in locations):
-            continue  # only because entries of it are wrong
+            continue  # the array is too short only because its entries are invalid
         if fault["type"] == "missing":
             if path not in meant:
                 yield f"{key}: this key is missing"
@@ -231,11 +231,11 @@ _TYPES = {
     "model_type": "must be a table",
     "tuple_type": "must be an array in brackets",
 }
-"""What would be right where a value has the wrong type; numbers and words of a file are not converted."""
+"""Remedies for values of a wrong type; numbers and texts of a file are not converted."""
 
 
 def _remedy(fault: Any) -> str:
-    """Say what would be right."""
+    """Return the remedy of an error."""
     if fault["type"] == "extra_forbidden":
         if hint := renamed_hint([str(part) for part in fault["loc"]], GEARBOX_RENAMES):
             return hint
@@ -253,12 +253,26 @@ def _remedy(fault: Any) -> str:
         if "x7f" in fault["ctx"]["pattern"]:
             return _NO_CONTROL
         return _A_NAME
-    text = str(fault["msg"]).removeprefix("Value error, ")
+    if fault["type"] in ("literal_error", "enum"):
+        return one_of(fault["ctx"]["expected"], fault["input"])
+    text = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "must", 1)
     return text[:1].lower() + text[1:]
 
 
+def one_of(expected: str, value: Any) -> str:
+    """Return the permitted texts as the remedy of an unknown value, and suggest the most similar one.
+
+    Examples
+    --------
+    >>> one_of("'linear' or 'iso16281'", "liner")
+    "must be 'linear' or 'iso16281'; did you mean 'linear'?"
+    """
+    near = difflib.get_close_matches(str(value)[:100], re.findall("'([^']*)'", expected), n=1)
+    return "; ".join([f"must be {expected}", *(f"did you mean {word!r}?" for word in near)])
+
+
 def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...]:
-    """Path of a fault in the content: without the words that pydantic adds for the branches of a type."""
+    """Path of an error in the content, without the names that pydantic adds for the branches of a union type."""
     path: list[int | str] = []
     for number, part in enumerate(location):
         inside = (isinstance(content, Mapping) and part in content) or (
@@ -272,14 +286,14 @@ def _path(location: tuple[int | str, ...], content: Any) -> tuple[int | str, ...
 
 
 def _key(part: int | str) -> str:
-    """Part of a dotted key, in quotes where TOML wants them."""
+    """Part of a dotted key, in quotes if TOML requires them."""
     if re.fullmatch(r"[A-Za-z0-9_-]{1,60}", str(part)):
         return str(part)
     return shortened(part)
 
 
 def shortened(value: Any, longest: int = 60) -> str:
-    """Show a value as a message does: on one line and not longer than anybody reads.
+    """Return a value as text on one line, shortened for messages.
 
     Examples
     --------
@@ -300,7 +314,7 @@ def shortened(value: Any, longest: int = 60) -> str:
 
 
 def _nearest(location: tuple[int | str, ...]) -> str:
-    """Known key that an unknown one resembles; empty for none."""
+    """Known key with a name similar to an unknown one; empty for none."""
     near = difflib.get_close_matches(str(location[-1])[:100], _known_keys(location), n=1)
     if near:
         return near[0]
@@ -308,7 +322,7 @@ def _nearest(location: tuple[int | str, ...]) -> str:
 
 
 def _known_keys(location: tuple[int | str, ...]) -> list[str]:
-    """Keys of the section that holds an unknown one."""
+    """Known keys of the section that contains an unknown one."""
     section: Any = GearboxFile
     for part in location[:-1]:
         section = _inner(section, part)
@@ -331,7 +345,7 @@ def _inner(section: Any, part: int | str) -> Any:
     return next((kind for kind in reversed(arguments) if kind is not Ellipsis), None)
 
 
-# Where parts come from: sections of a gearbox file, its name and permissions, and what all builders of parts share
+# Source of parts: sections of a gearbox file with its name and permissions, and functions that all builders share
 
 Entry = TypeVar("Entry")
 Part = TypeVar("Part")
@@ -339,27 +353,27 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True)
 class Origin(ReprMixin):
-    """A gearbox file as the builders of parts see it."""
+    """A gearbox file with its source and permissions, as used by the builders of parts."""
 
     case: GearboxFile
     source: str
-    """Path or name of the file; files that it names lie beside it."""
+    """Path or name of the file; the files that it names are in the same folder."""
     permissions: Permissions
 
     def _line(self) -> str:
         return f" {shortened(self.source)}"
 
     def fault(self, text: str) -> GearboxFileError:
-        """Error that names the file before `text` (key, value and what would be right)."""
+        """Error whose message is the file name followed by `text` (key, value and remedy)."""
         return GearboxFileError(fault_line(self.source, text))
 
     def file(self, key: str, name: str, largest: int) -> Path:
-        """Path of a file of at most `largest` bytes that the gearbox file names under a key.
+        """Path of a file that the gearbox file names under a key, with at most `largest` bytes.
 
         Raises
         ------
         GearboxFileError
-            The file is not there or may not be read, as `exugear.gearbox.named_files.named_file` says.
+            The file does not exist or may not be read, see `exugear.gearbox.named_files.named_file`.
         """
         try:
             return named_file(name, Path(self.source).parent, self.permissions, largest)
@@ -367,7 +381,7 @@ class Origin(ReprMixin):
             raise self.fault(f"{key} = {name!r}: {error}") from None
 
     def guarded(self, key: str, build: Callable[..., Part], *arguments: Any, **named: Any) -> Part:
-        """Build a part of gears; what their geometry forbids is a fault of the key."""
+        """Build a part of gears; geometric errors are reported as errors of the key."""
         try:
             return build(*arguments, **named)
         except GeometryError as error:
@@ -375,23 +389,23 @@ class Origin(ReprMixin):
 
     @cached_property
     def enabled(self) -> dict[str, BodySection]:
-        """Sections of the bodies that are there, by name."""
+        """Sections of the enabled bodies, by name."""
         return {name: section for name, section in self.case.bodies.items() if section.enabled}
 
     def are_enabled(self, key: str, *names: str) -> bool:
-        """Tell whether all bodies are enabled; an unknown name is an error, a disabled one is not."""
+        """Return whether all bodies are enabled; an unknown name raises an error, a disabled body does not."""
         for name in names:
             if name != GROUND and name not in self.case.bodies:
                 raise self.fault(f"{key}: no body {name!r}; bodies are {', '.join(self.case.bodies)} and ground")
         return all(name == GROUND or name in self.enabled for name in names)
 
     def suffixes(self, family: str) -> list[str]:
-        """List the endings of the names of a family's bodies: `_1`, `_2`, ... for planets, else one that is empty."""
+        """List the suffixes of the names of a family's bodies: `_1`, `_2`, ... for planets, else a single empty one."""
         count = len(self.enabled[family].planet_angles_deg) if family in self.enabled else 0
         return [f"_{number}" for number in range(1, count + 1)] or [""]
 
     def instances(self, key: str, family: str, other_family: str) -> list[tuple[str, str, str]]:
-        """(suffix, body, other body) for each planet; sets meet single bodies or equal sets."""
+        """(suffix, body, other body) for each planet; the other bodies are a single one or a set of equal size."""
         suffixes = self.suffixes(family)
         other_suffixes = self.suffixes(other_family)
         single = suffixes == [""]
@@ -410,7 +424,7 @@ def part_of_each(build: Callable[[str, Entry], Part], sections: Mapping[str, Ent
     Raises
     ------
     GearboxFileError
-        The faults of all sections together.
+        Some sections have errors; the exception holds all of them.
     """
     parts: dict[str, Part] = {}
     faults: list[str] = []
@@ -425,5 +439,5 @@ def part_of_each(build: Callable[[str, Entry], Part], sections: Mapping[str, Ent
 
 
 def parts_of_each(build: Callable[[str, Entry], tuple[Part, ...]], sections: Mapping[str, Entry]) -> tuple[Part, ...]:
-    """Build the parts of each section, such as one bearing for each planet, likewise."""
+    """Build the parts of each section, such as one bearing for each planet, as `part_of_each` does."""
     return tuple(part for parts in part_of_each(build, sections).values() for part in parts)

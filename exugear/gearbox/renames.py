@@ -1,7 +1,7 @@
-"""Keys of gearbox and study files that had another name in earlier versions, and how an old file is rewritten.
+"""Renamed keys of gearbox and study files, and the conversion of old files.
 
-Old names are refused with the new ones. `migrated` replaces them in the text of a file and keeps everything else as it
-is: comments, order, spacing.
+Old names are refused with a message that states the new ones. `migrated` replaces them in the text of a file and keeps
+comments, order and spacing.
 """
 
 from __future__ import annotations
@@ -16,23 +16,23 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Rename:
-    """A key with its old and its new name, or values of a key that are called otherwise now."""
+    """Old and new name of a key, or old and new values of a key."""
 
     table: str
-    """Table of the key with its old names, such as ``bearings.*.damping``; empty at the top."""
+    """Table of the key with its old names, such as ``bearings.*.damping``; empty at the top level."""
     old: str
     new: str
     values: Mapping[str, str] = field(default_factory=dict)
     """Old and new values."""
 
     def fits(self, path: Sequence[str]) -> bool:
-        """Return whether this is the key at a path of old names."""
+        """Return whether a path of old names leads to this key."""
         own = [part for part in self.table.split(".") if part] + [self.old]
         return len(path) == len(own) and all(map(fnmatchcase, path, own))
 
 
 def _damping(connectors: str) -> tuple[Rename, ...]:
-    """Keys of viscous damping, whose unit was stated as that of a stiffness."""
+    """Keys of viscous damping, whose names had the unit of a stiffness."""
     names = {"N_per_m": ("radial", "axial"), "N_m_per_rad": ("tilt", "torsion")}
     true_units = {"N_per_m": "N_s_per_m", "N_m_per_rad": "N_m_s_per_rad"}
     return tuple(
@@ -70,7 +70,7 @@ STUDY_RENAMES: tuple[Rename, ...] = (
 
 
 def new_name(path: Sequence[str], renames: Sequence[Rename]) -> str | None:
-    """Return the new name of the key at a path, None if its name is not an old one.
+    """Return the new name of the key at a path, or None if its name is not an old one.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def new_name(path: Sequence[str], renames: Sequence[Rename]) -> str | None:
 
 
 def renamed_hint(path: Sequence[str], renames: Sequence[Rename]) -> str:
-    """Return what a message says of a key with an old name; empty for other keys."""
+    """Return the text that messages add for a key with an old name; empty for other keys."""
     new = new_name(path, renames)
     if new is None:
         return ""
@@ -103,7 +103,7 @@ def migrated(text: str) -> tuple[str, list[str]]:
     Raises
     ------
     MigrationError
-        The text is not valid TOML, or an old and a new name are next to each other.
+        The text is not valid TOML, or has both the old and the new name of a key.
 
     Examples
     --------
@@ -140,7 +140,7 @@ def migrated(text: str) -> tuple[str, list[str]]:
 
 
 def _replacement(token: _Token, renames: Sequence[Rename]) -> str | None:
-    """Return what replaces a key or a string, None where nothing does."""
+    """Return the replacement of a key or string, or None if it is kept."""
     varied = token.value
     if token.is_key:
         new = new_name(token.path, renames)
@@ -168,7 +168,7 @@ def _count(content: Any) -> int:
     return 1
 
 
-# Where keys and strings are in the text of a valid TOML file
+# Positions of keys and strings in the text of a valid TOML file
 
 
 @dataclass(frozen=True)
@@ -176,10 +176,10 @@ class _Token:
     """A part of a key, or a string that is a value."""
 
     path: tuple[str, ...]
-    """Names down to this key, or to that of the value."""
+    """Names of the tables and of this key, or of the key of the value."""
     start: int
     end: int
-    """Place in the text, quotes included."""
+    """Position in the text, including quotes."""
     value: str = ""
     is_key: bool = True
 
@@ -191,7 +191,7 @@ _OTHER = re.compile(r"[^,\]}\n#]+")
 
 
 class _Scanner:
-    """Finds keys and strings of a text that is known to be valid."""
+    """Finds keys and strings in a text that is valid TOML."""
 
     def __init__(self, text: str) -> None:
         self.text = text

@@ -1,4 +1,4 @@
-"""A gear train: its spins, what ties them, how it rolls from input to output, and what it carries at rest."""
+"""A gear train: its rotations, kinematic constraints, rigid kinematics from input to output, and static mesh forces."""
 
 from __future__ import annotations
 
@@ -14,14 +14,16 @@ from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
 
-# How a gear train rolls: rows that say how meshes close and couplings twist, and the motions that do neither
+# Kinematics of a gear train: rows for mesh closure and coupling twist, and the motions for which both are zero
 
 RANK_TOLERANCE = 1e-9
-"""Singular values below this part of the largest count as zero: rows are scaled to 1, and round-off is 1e-16."""
+"""Threshold relative to the largest singular value below which others count as zero; rows are scaled to 1, round-off is
+1e-16.
+"""
 
 
 class MeshedBodies(Protocol):
-    """What a mesh joins: bodies with gear 1 and gear 2, and the body whose spin carries the line of centres."""
+    """Bodies of a mesh: those with gear 1 and gear 2, and the body with which the line of centres rotates."""
 
     @property
     def name(self) -> str:
@@ -41,11 +43,11 @@ class MeshedBodies(Protocol):
 
     @property
     def frame(self) -> str:
-        """Body whose spin carries the line of centres; a name that is no spin stands still."""
+        """Body with which the line of centres rotates; the frame is stationary if this body cannot rotate."""
 
 
 class CoupledBodies(Protocol):
-    """What a coupling joins: two bodies that roll at one speed."""
+    """Two coupled bodies, which rotate at one speed."""
 
     @property
     def first(self) -> str:
@@ -58,20 +60,20 @@ class CoupledBodies(Protocol):
 
 @dataclass(frozen=True)
 class SpinConstraint:
-    """Two bodies that roll at one speed; a name that is no spin stands still."""
+    """Two bodies constrained to one speed; a name that is not among the rotating bodies has zero speed."""
 
     first: str
     second: str
 
 
 def mesh_row(spins: Sequence[str], mesh: MeshedBodies) -> Floats:
-    """Return how a mesh closes per unit spins: r_b1 (t1 - tf) +- r_b2 (t2 - tf), flank s = +1.
+    """Return the mesh closure per unit rotation: r_b1 (t1 - tf) +- r_b2 (t2 - tf), flank s = +1.
 
-    Plus for an external pair, minus for an internal one; tf is the spin of the frame.
+    Plus for an external pair, minus for an internal one; tf is the rotation of the frame.
 
     Parameters
     ----------
-    spins : bodies that can turn; all others stand still
+    spins : names of the bodies that can rotate; all others are stationary
 
     Returns
     -------
@@ -88,12 +90,12 @@ def mesh_row(spins: Sequence[str], mesh: MeshedBodies) -> Floats:
 
 
 def coupling_row(spins: Sequence[str], coupling: CoupledBodies) -> Floats:
-    """Return how a coupling twists per unit spins, (spins,): 1 at its first body, -1 at its second."""
+    """Return the coupling twist per unit rotation, (spins,): 1 for its first body, -1 for its second."""
     return np.array([float(name == coupling.first) - float(name == coupling.second) for name in spins])
 
 
 def kinematic_modes(rows: Floats) -> Floats:
-    """Orthonormal basis of the spins that no row sees.
+    """Orthonormal basis of the rotations that satisfy all constraint rows (null space).
 
     Parameters
     ----------
@@ -105,7 +107,7 @@ def kinematic_modes(rows: Floats) -> Floats:
 
     Examples
     --------
-    Two wheels of 1 m and 2 m in mesh: the larger one turns half as fast, the other way round.
+    For two meshing gears of 1 m and 2 m, the larger one rotates at half the speed in the opposite sense:
 
     >>> kinematic_modes(np.array([[1.0, 2.0]])).T * np.sqrt(5.0)
     array([[-2.,  1.]])
@@ -118,21 +120,21 @@ def kinematic_modes(rows: Floats) -> Floats:
 
 
 def turn_together(motions: Floats, other_motions: Floats) -> bool:
-    """Tell whether two bodies' rows of the rolling motions are one up to a factor: each fixes the other."""
+    """Return whether the kinematic motions of two bodies are proportional, so that each speed determines the other."""
     lengths = np.linalg.norm(motions) * np.linalg.norm(other_motions)
     return bool(abs(motions @ other_motions) > (1.0 - RANK_TOLERANCE) * lengths)
 
 
-# What a gear train carries at rest: forces of meshes and torques of couplings that balance outer torques
+# Static forces of a gear train: forces of meshes and torques of couplings in equilibrium with external torques
 
 UNLOADED = 1e-9
-"""Part of the largest load below which a mesh counts as unloaded: round-off of the balance."""
+"""Fraction of the largest load below which a mesh counts as unloaded; it covers round-off of the equilibrium."""
 BALANCE_TOLERANCE = 1e-9
-"""Part of the largest torque that may be left over where torques count as held."""
+"""Residual torque as a fraction of the largest torque below which torques count as balanced."""
 
 
 def holding_forces(rows: Floats, torques: Floats) -> Floats | None:
-    """Return the forces of rows that hold torques on the spins; of all that do, those of least norm.
+    """Return the constraint forces in equilibrium with torques; if not unique, those of minimum norm.
 
     Parameters
     ----------
@@ -141,11 +143,11 @@ def holding_forces(rows: Floats, torques: Floats) -> Floats | None:
 
     Returns
     -------
-    array (constraints,), or None where no forces hold the torques.
+    array (constraints,), or None if no forces balance the torques.
 
     Examples
     --------
-    Wheels of 1 m and 2 m in mesh, in balance and out of it:
+    Two meshing gears of 1 m and 2 m, with torques in equilibrium and not in equilibrium:
 
     >>> holding_forces(np.array([[1.0, 2.0]]), np.array([10.0, 20.0]))
     array([10.])
@@ -160,27 +162,27 @@ def holding_forces(rows: Floats, torques: Floats) -> Floats | None:
 
 
 def without_round_off(forces: Floats, largest_torque: float, smallest_radius: float) -> Floats:
-    """Mesh forces with those set to zero that are round-off of the balance.
+    """Mesh forces in which round-off of the equilibrium is set to zero.
 
     Parameters
     ----------
     forces : (meshes,) N
-    largest_torque : of the torques that they balance, N m
-    smallest_radius : of the base circles on which they act, m
+    largest_torque : largest of the balanced torques, N m
+    smallest_radius : smallest base radius, m
     """
     return np.where(np.abs(forces) > UNLOADED * largest_torque / smallest_radius, forces, 0.0)
 
 
-# A gear train: its spins, what ties them, how it rolls from input to output, and what it carries at rest
+# A gear train: its rotations, kinematic constraints, rigid kinematics from input to output, and static mesh forces
 
 
 @dataclass(frozen=True, eq=False)
 class Train(
     ReprMixin, line=" from {input!r} to {output!r}: {spins!n} spins, {meshes!n} meshes, {couplings!n} couplings"
 ):
-    """Bodies that turn about fixed or orbiting axes, tied by rigid meshes and couplings.
+    """Bodies that rotate about fixed or orbiting axes and are connected by rigid meshes and couplings.
 
-    It knows no gearbox: what it cannot do it tells through `fault`, which names the file.
+    The class is independent of the gearbox file; it raises errors through `fault`, which adds the name of the file.
 
     Examples
     --------
@@ -195,18 +197,18 @@ class Train(
     """
 
     spins: tuple[str, ...]
-    """Bodies that can turn, in the order of the spin vector."""
+    """Bodies that can rotate, in the order of the vector of rotations."""
     meshes: tuple[MeshedBodies, ...]
     couplings: tuple[CoupledBodies, ...]
     input: str
     output: str
-    """Bodies at the ends of the train."""
+    """Bodies at the two ends of the train."""
     torques: Mapping[str, float]
-    """By body name, static torques, N m."""
+    """Static torques by body name, N m."""
     locked: tuple[str, ...]
-    """Bodies that hold them."""
+    """Bodies that react the static torques."""
     fault: Callable[[str], Exception]
-    """Makes the error to raise from what is wrong."""
+    """Function that returns the exception for an error text."""
 
     def _table(self) -> TitledRows:
         return f"train from {self.input} to {self.output}", {
@@ -219,45 +221,46 @@ class Train(
 
     @cached_property
     def spin_rows(self) -> Floats:
-        """How meshes close and couplings twist per unit spins, (meshes and couplings, spins); m/rad, and 1."""
+        """Mesh closure and coupling twist per unit rotation, (meshes and couplings, spins); m/rad, and 1."""
         rows = [mesh_row(self.spins, mesh) for mesh in self.meshes]
         rows += [coupling_row(self.spins, coupling) for coupling in self.couplings]
         return np.array(rows).reshape(-1, len(self.spins))
 
     @cached_property
     def kinematic_modes(self) -> Floats:
-        """Basis of rolling motions, (spins, degrees of freedom): no mesh closes, no coupling twists."""
+        """Basis of the kinematic motions, (spins, degrees of freedom), without mesh closure and coupling twist."""
         return kinematic_modes(self.spin_rows)
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Degrees of freedom in which the train rolls."""
+        """Number of kinematic degrees of freedom."""
         return int(self.kinematic_modes.shape[1])
 
     @cached_property
     def ratio(self) -> float:
-        """Spin of the output per spin of the input."""
+        """Speed ratio output / input."""
         return self.rolling_speeds(self.input, 1.0)[self.output]
 
     @cached_property
     def independent(self) -> tuple[str, ...]:
-        """Bodies whose speeds tell all others: the input, and those that stand while it alone turns."""
+        """Bodies whose speeds determine all others: the input, and those that are stationary if only it rotates."""
         return self._prescribed({self.input: 1.0})
 
     @cached_property
     def shares(self) -> dict[str, float]:
-        """Spin of the output per spin of each of the `independent` bodies; of the input it is the ratio."""
+        """Speed of the output per unit speed of each `independent` body; for the input it is the speed ratio."""
         return {body: self.rolling({self.input: 0.0, body: 1.0})[self.output] for body in self.independent}
 
     def rolling_speeds(self, body: str, speed: float) -> dict[str, float]:
-        """Spins of all bodies (rad/s) in rolling motion when `body` turns at `speed`: see `rolling`."""
+        """Speeds of all bodies (rad/s) of the kinematic gear train if `body` rotates at `speed`: see `rolling`."""
         return self.rolling({body: speed})
 
     def rolling(self, speeds: Mapping[str, float]) -> dict[str, float]:
-        """Spins of all bodies (rad/s) in rolling motion when some turn at given speeds.
+        """Speeds of all bodies (rad/s) of the kinematic gear train for given speeds of some bodies.
 
-        In a train of several degrees of freedom, locked bodies stand: not those that turn with the first one given,
-        with input or output, nor such as cannot stand beside those given.
+        In a train of several degrees of freedom, locked bodies are stationary. Exceptions are bodies that rotate with
+        the first one given, with the input or with the output, and bodies that cannot be stationary at the given
+        speeds.
 
         Parameters
         ----------
@@ -266,7 +269,7 @@ class Train(
         Raises
         ------
         Exception
-            As `fault` makes it: the train is not fixed by that, the bodies do not turn so, or one does not turn.
+            Made by `fault`: the speeds are undetermined or contradict each other, or a body cannot rotate.
 
         Examples
         --------
@@ -297,7 +300,7 @@ class Train(
         return dict(zip(self.spins, (self.kinematic_modes @ weights).tolist(), strict=True))
 
     def _prescribed(self, speeds: Mapping[str, float]) -> tuple[str, ...]:
-        """Bodies with given speeds, and of those that stand the ones that these leave free."""
+        """Bodies with given speeds, and those stationary bodies whose speed the given ones leave undetermined."""
         chosen = list(speeds)
         for name in self._standing(chosen[0]):
             rank = np.linalg.matrix_rank(self._modes_of(tuple(chosen)))
@@ -306,7 +309,10 @@ class Train(
         return tuple(chosen)
 
     def mesh_frequencies(self, speed: float) -> dict[str, float]:
-        """Mesh frequency (Hz) of each mesh when the input turns at `speed` rad/s; a frame that is no spin stands."""
+        """Mesh frequency (Hz) of each mesh if the input rotates at `speed` rad/s.
+
+        A frame that cannot rotate is stationary.
+        """
         spins = self.rolling_speeds(self.input, speed)
         return {
             mesh.name: abs(spins.get(mesh.pinion, 0.0) - spins.get(mesh.frame, 0.0))
@@ -316,18 +322,18 @@ class Train(
         }
 
     def static_mesh_forces(self, torques: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Line-of-action force F_bt of each mesh (N) in the static state, least-norm where planets share.
+        """Line-of-action force F_bt of each mesh (N) in the static state, of minimum norm if planets share the load.
 
-        The sign says which flank of gear 1 carries: positive = the one that faces the sense of +z rotation.
+        The sign indicates the loaded flank of gear 1: positive is the flank that faces the sense of +z rotation.
 
         Parameters
         ----------
-        torques : by body name, N m, those of the static load by default; the same bodies are locked
+        torques : by body name, N m; default: those of the static load. The same bodies are locked.
 
         Raises
         ------
         Exception
-            As `fault` makes it: a body is no spin, too many bodies are locked, or they do not hold the torques.
+            Made by `fault`: a body cannot rotate, too many bodies are locked, or they do not balance the torques.
         """
         torques = self.torques if torques is None else torques
         self._check_load(torques)
@@ -344,11 +350,11 @@ class Train(
         return {mesh.name: float(force) for mesh, force in zip(self.meshes, loaded, strict=True)}
 
     def dragging_forces(self) -> dict[str, float]:
-        """Line-of-action force of each mesh (N) where a drag of 1 N m holds each body back, at the static locks.
+        """Line-of-action force of each mesh (N) for a drag torque of 1 N m on each body, at the static locks.
 
-        It says by its sign which flank touches where the static load leaves none pressed. The train rolls as the static
-        torques drive it, or against them where the input is locked and they are the load; nothing where that leaves
-        open how it rolls.
+        Its sign indicates the contacting flank of meshes that the static load leaves unloaded. The sense of rotation is
+        that in which the static torques drive the train, or the opposite one if the input is locked and they are the
+        load. The result is empty if the locks do not determine the forces.
         """
         speeds = self.rolling_speeds(self.input, 1.0)
         power = sum(torque * speeds[name] for name, torque in self.torques.items())
@@ -361,7 +367,7 @@ class Train(
         return dict(zip((mesh.name for mesh in self.meshes), forces.tolist(), strict=False))
 
     def _check_load(self, torques: Mapping[str, float]) -> None:
-        """Refuse loads and locks on bodies that do not turn, and more locks than degrees of freedom."""
+        """Raise an error for loads and locks on bodies that cannot rotate, or more locks than degrees of freedom."""
         for key, names in (("torques_N_m", tuple(torques)), ("locked", self.locked)):
             for name in names:
                 if name not in self.spins:
@@ -375,9 +381,9 @@ class Train(
             )
 
     def _standing(self, body: str) -> tuple[str, ...]:
-        """Bodies that stand while `body` turns in a train of several degrees of freedom: the locked ones.
+        """Bodies that are stationary while `body` rotates in a train of several degrees of freedom: the locked ones.
 
-        Not those that turn with it, with the input or with the output, such as a brake behind the output.
+        Bodies that rotate with it, with the input or with the output are excluded, such as a brake behind the output.
         """
         if self.degrees_of_freedom == 1:
             return ()
@@ -389,5 +395,5 @@ class Train(
         )
 
     def _modes_of(self, bodies: tuple[str, ...]) -> Floats:
-        """Rows of the rolling motions that belong to bodies, (bodies, degrees of freedom)."""
+        """Rows of the kinematic modes that belong to bodies, (bodies, degrees of freedom)."""
         return self.kinematic_modes[[self.spins.index(name) for name in bodies]]

@@ -1,4 +1,4 @@
-"""Units that people write, in SI: a number times its unit, `MM * length_mm`. Keys name their unit at their end."""
+"""Units of the input files in SI units: a number times its unit, `MM * length_mm`. Keys end with their unit."""
 
 from __future__ import annotations
 
@@ -18,4 +18,4 @@ GPA: Final = 1e9
 
 
 RPM = math.pi / 30.0
-"""One revolution a minute, rad/s."""
+"""One revolution per minute, rad/s."""

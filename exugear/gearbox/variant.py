@@ -1,4 +1,4 @@
-"""Variants of a gearbox: how its bodies are held, and what follows from that."""
+"""Variants of a gearbox, which define how its bodies are supported."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from enum import Flag, StrEnum, auto
 
 
 class VariantError(ValueError):
-    """A variant that is unknown, or that a gearbox cannot have."""
+    """An unknown variant, or one that is not available for a gearbox."""
 
 
 class Trait(Flag):
-    """What holds for a variant."""
+    """Properties of a variant."""
 
     none = 0
     spins_only = auto()
@@ -21,7 +21,7 @@ class Trait(Flag):
 
 
 class Variant(StrEnum):
-    """How bodies are held, from stiff to soft; files and the command line have its name.
+    """Support of the bodies, from stiff to compliant; files and the command line use its name.
 
     Examples
     --------
@@ -32,11 +32,11 @@ class Variant(StrEnum):
     """
 
     label: str
-    """Reads on behind a noun: "resonances on bearings"."""
+    """Text that follows a noun, as in "resonances on bearings"."""
     traits: Trait
 
     def __new__(cls, name: str, label: str = "", traits: Trait = Trait.none) -> Variant:
-        """Make a variant of a row of the list below."""
+        """Make a variant from a row of the list below."""
         member = str.__new__(cls, name)
         member._value_ = name
         member.label, member.traits = label, traits
@@ -48,37 +48,37 @@ class Variant(StrEnum):
     flexible = "flexible", "with flexible bodies", Trait.on_bearings | Trait.elastic
 
     def __repr__(self) -> str:
-        """Show the name as files have it."""
+        """Return the name as files have it."""
         return repr(self.value)
 
     @property
     def spins_only(self) -> bool:
-        """Whether bodies turn about their axes and do nothing else: minimal coordinates on ideal joints."""
+        """Whether bodies only rotate about their axes: minimal coordinates with ideal joints."""
         return Trait.spins_only in self.traits
 
     @property
     def on_bearings(self) -> bool:
-        """Whether bearings hold the shafts, which then move sideways and tilt."""
+        """Whether bearings support the shafts, which then also translate and tilt."""
         return Trait.on_bearings in self.traits
 
     @property
     def is_elastic(self) -> bool:
-        """Whether bodies deform."""
+        """Whether bodies are flexible."""
         return Trait.elastic in self.traits
 
     @property
     def is_constrained(self) -> bool:
-        """Whether ideal joints are constraints: what minimal coordinates are checked against."""
+        """Whether ideal joints are modelled as constraints, as a reference for the minimal coordinates."""
         return Trait.constrained in self.traits
 
     @classmethod
     def of(cls, name: str) -> Variant:
-        """Return the variant of a name.
+        """Return the variant with a name.
 
         Raises
         ------
         VariantError
-            No variant has it; the message names the one that is meant.
+            No variant has this name; the message suggests a similar one.
         """
         if name in cls.__members__:
             return cls[name]
@@ -88,12 +88,12 @@ class Variant(StrEnum):
 
     @classmethod
     def offered(cls, name: str) -> Variant:
-        """Return the variant of a name if users choose from it.
+        """Return the variant with a name if it is offered to users.
 
         Raises
         ------
         VariantError
-            It is unknown, or only there to check others.
+            The variant is unknown, or exists only to verify others.
         """
         variant = cls.of(name)
         if variant not in OFFERED:
@@ -102,4 +102,4 @@ class Variant(StrEnum):
 
 
 OFFERED: tuple[Variant, ...] = tuple(variant for variant in Variant if not variant.is_constrained)
-"""Those that users choose from."""
+"""Variants that are offered to users."""

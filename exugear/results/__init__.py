@@ -1,1 +1,1 @@
-"""Files of results: the folder, runs in pieces and whole."""
+"""Files of results: the results folder, and complete and incomplete runs."""

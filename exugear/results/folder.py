@@ -1,4 +1,4 @@
-"""The results folder: its case, whether a file fits it, its studies, what its bearings and meshes bear."""
+"""The results folder: its gearbox file, validity of stored files, studies, and loads of bearings and meshes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from exugear.system.tooth_mesh.contact_state import MeshLoadState
 from fe_ste.tools.files import FileError, append_line, read_text, write_file
 from fe_ste.tools.stores import Layout, open_dataset
 
-# The results folder: the case it belongs to, whether a file fits that case, and where the time went
+# The results folder: its gearbox file, whether a file belongs to it, and run times
 
 CASE_FILE = "case.json"
 TIMES_FILE = "times.jsonl"
@@ -33,28 +33,28 @@ _log = logging.getLogger(__name__)
 
 
 def keep_case(gearbox: Gearbox, folder: Path) -> None:
-    """Write the content of the gearbox file into the results folder, so that a report needs nothing else."""
+    """Write the content of the gearbox file into the results folder, so that a report needs no other file."""
     kept = {"source": str(Path(gearbox.source).resolve()), "content": gearbox.content}
     write_file(folder / CASE_FILE, json.dumps({**kept, "checksum": _checksum(kept)}, indent=1).encode("utf-8"))
 
 
 def _checksum(kept: dict[str, Any]) -> str:
-    """Checksum of a case as it is kept, however it is set out."""
+    """Checksum of the stored content of a gearbox file, independent of its formatting."""
     text = json.dumps([kept["source"], kept["content"]], sort_keys=True)
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
 def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
-    """Read the gearbox that the results of a folder belong to.
+    """Read the gearbox that the results in a folder belong to.
 
     Parameters
     ----------
-    permissions : where else files that the gearbox file names may lie
+    permissions : in which other folder files named in the gearbox file may lie
 
     Raises
     ------
     GearboxFileError
-        The folder holds no results, or what it says of its case cannot be used.
+        The folder contains no results, or its stored gearbox file cannot be used.
     """
     path = folder / CASE_FILE
     if not path.is_file():
@@ -71,7 +71,7 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
             raise ValueError("it was changed since it was written")
         content = kept["content"]
         source = kept["source"]
-    # Whoever makes up a file with its checksum may write into it what he likes.
+    # A file with a valid checksum may still be forged and have any content.
     except (FileError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise GearboxFileError(
             f"{path}: cannot be used ({error}); run `exugear modes` into this folder again"
@@ -80,36 +80,36 @@ def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
 
 
 def modes_path(folder: str | Path, choice: Choice) -> Path:
-    """Place of the modes of a choice that names its inertia set: ``<variant>/<law>-<inertias>/modes.nc``."""
+    """Path of the modes for model settings with an inertia set: ``<variant>/<law>-<inertias>/modes.nc``."""
     return Path(folder) / choice.variant / f"{choice.mesh_model}-{choice.inertias}" / "modes.nc"
 
 
 def bearings_path(folder: str | Path, choice: Choice) -> Path:
-    """Place of what the bearings of a choice bear: beside its modes."""
+    """Path of the bearing loads for model settings, in the folder of the modes."""
     return modes_path(folder, choice).with_name("bearings.json")
 
 
 def bodies_folder(folder: Path) -> Path:
-    """Place of the reductions of elastic bodies: ``bodies``."""
+    """Folder of the reduced flexible bodies: ``bodies``."""
     return folder / "bodies"
 
 
 @dataclass(frozen=True)
 class StepTiming:
-    """What a step of the work took."""
+    """Run time and memory of a step of the computation."""
 
     step: str
-    """What was done."""
+    """Name of the step."""
     seconds: float
-    """Wall time."""
+    """Wall-clock time, s."""
     memory: float
-    """Peak of the process's memory, bytes."""
+    """Peak memory of the process, bytes."""
 
 
 def peak_memory() -> float:
-    """Highest memory of this process so far, bytes; NaN on Windows."""
+    """Peak memory of this process so far, bytes; NaN on Windows."""
     if sys.platform == "win32":
-        return math.nan  # no such account without a further library
+        return math.nan  # Windows provides no value without an additional library
     import resource
 
     peak = float(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
@@ -117,23 +117,23 @@ def peak_memory() -> float:
 
 
 def note_time(folder: Path, step: str, seconds: float) -> None:
-    """Add a line to the folder's account of time; processes may do so at once."""
+    """Append a line to the list of run times in the folder; several processes may do so concurrently."""
     append_line(folder / TIMES_FILE, json.dumps(asdict(StepTiming(step, round(seconds, 2), peak_memory()))))
 
 
 @contextmanager
 def time_noted(folder: Path, step: str) -> Iterator[None]:
-    """Note how long a step took, if it ended well; a folder that cannot be written then costs the note alone."""
+    """Store the run time of a step that succeeded; if the folder cannot be written, only this entry is lost."""
     start = time.perf_counter()
     yield
     try:
         note_time(folder, step, time.perf_counter() - start)
-    except OSError as error:  # the work itself is done
+    except OSError as error:  # the result of the step is already stored
         _log.warning("The run time could not be recorded: %s", error)
 
 
 def times_spent(folder: Path) -> tuple[StepTiming, ...]:
-    """Last account of each step, in the order in which the steps were last done."""
+    """Last entry of each step, in the order in which the steps were last completed."""
     last: dict[str, StepTiming] = {}
     for entry in _lines(folder / TIMES_FILE):
         last.pop(entry.step, None)
@@ -145,13 +145,13 @@ def _lines(path: Path) -> Iterator[StepTiming]:
     try:
         lines = read_text(path).splitlines()
     except FileError:
-        return  # an account that is missing or is none
+        return  # the list is missing or not readable
     for line in lines:
         try:
             values: dict[str, Any] = json.loads(line)
             spent = StepTiming(str(values["step"]), float(values["seconds"]), float(values["memory"]))
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
-            continue  # a line cut short by a kill says nothing
+            continue  # a line truncated by a killed process contains no entry
         if math.isfinite(spent.seconds):
             yield spent
 
@@ -159,59 +159,59 @@ def _lines(path: Path) -> Iterator[StepTiming]:
 def run_directory(out: str | Path, choice: Choice) -> Path:
     """Directory of a run: ``<variant>/<load case>-<law>-<inertias>`` in the results directory.
 
-    Nothing in the choice is left open (`Choice.of`).
+    All model settings must be filled in (`Choice.of`).
     """
     return Path(out) / choice.variant / f"{choice.load_case}-{choice.mesh_model}-{choice.inertias}"
 
 
-# Studies in a results folder: their datasets and pictures, as a report finds them
+# Studies in a results folder: their datasets and pictures, as a report reads them
 
 STUDIES, DATASET, PICTURES = "studies", "study.nc", "pictures"
-"""Folder of all studies in a results folder; file of one, and folder of its pictures."""
+"""Folder of all studies in a results folder; file of one study, and folder of its pictures."""
 STUDY_LAYOUT = Layout(
     "study", STUDY, {}, ("title", "study", "case", "case_digest", "input_hash", "points", "failed", "missing")
 )
 WORDS = ("labels", "report")
-"""Tables of a gearbox file that no figure of a study reads."""
+"""Tables of a gearbox file that no output of a study depends on."""
 OF_LIFE = ("loads", "operation", "rating")
-"""Tables that figures of lives read, and no other."""
+"""Tables on which only outputs on life depend."""
 
 
 @dataclass(frozen=True)
 class StoredStudy:
-    """A study that was put together."""
+    """A study in a results folder with its combined dataset."""
 
     path: Path
-    """Its dataset."""
+    """Path of the dataset."""
     title: str
     description: str
     points: int
     failed: int
     missing: int
     fits: bool
-    """Whether the case is the one that it varied."""
+    """Whether the study varied this gearbox file."""
     pictures: tuple[Path, ...]
 
 
 def read_content(gearbox: Gearbox, of_life: bool) -> dict[str, Any]:
-    """Tables of a gearbox file that figures of a study read, those of lives among them or not."""
+    """Tables of a gearbox file on which outputs of a study depend, with or without those of life."""
     unread = WORDS if of_life else (*WORDS, *OF_LIFE)
     return {key: value for key, value in gearbox.content.items() if key not in unread}
 
 
 def case_digest(gearbox: Gearbox, of_life: bool = False) -> str:
-    """Hash of all that the figures of a study depend on in a case."""
+    """Hash of all content of a gearbox file on which the outputs of a study depend."""
     content = read_content(gearbox, of_life)
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
-    """Find the studies in a results folder; what is no study of this version is left out.
+    """Find the studies in a results folder, without files of other versions or other content.
 
     Parameters
     ----------
     folder : results folder
-    gearbox : its case
+    gearbox : gearbox to which the folder belongs
     """
     for path in sorted((folder / STUDIES).glob(f"*/{DATASET}")):
         try:
@@ -231,11 +231,11 @@ def stored_studies(folder: Path, gearbox: Gearbox) -> Iterator[StoredStudy]:
         )
 
 
-# The file of what bearings and meshes bear: JSON, units in the keys, hash of its input, version of its method
+# The file of bearing and mesh loads: JSON, units in the keys, hash of its input, version of its method
 
 
 def duty_summary(duty: BearingLoadState) -> dict[str, Any]:
-    """Figures of a bearing by key, in the units that catalogues use; lives without end are None."""
+    """Results of a bearing by key, in the units that catalogues use; an infinite life is None."""
     return {
         "bearing": duty.name,
         "type": duty.kind,
@@ -262,7 +262,7 @@ def duty_summary(duty: BearingLoadState) -> dict[str, Any]:
 
 
 def mesh_summary(duty: MeshLoadState) -> dict[str, Any]:
-    """Figures of a mesh by key; what no contact was solved for is None."""
+    """Results of a mesh by key; None for results of a contact that was not computed."""
     return {
         "mesh": duty.name,
         "force_kN": 1e-3 * duty.force,
@@ -277,12 +277,12 @@ def mesh_summary(duty: MeshLoadState) -> dict[str, Any]:
 
 
 def duties_summary(duties: Iterable[BearingLoadState], meshes: Iterable[MeshLoadState]) -> dict[str, Any]:
-    """Figures of all bearings and of all meshes."""
+    """Results of all bearings and of all meshes."""
     return {"bearings": [*map(duty_summary, duties)], "meshes": [*map(mesh_summary, meshes)]}
 
 
 def read_duties(path: Path) -> dict[str, Any]:
-    """Read what `write_duties` wrote.
+    """Read a file written by `write_duties`.
 
     Raises
     ------
@@ -307,7 +307,7 @@ def _finite(value: float) -> float | None:
 def write_duties(
     path: Path, duties: Iterable[BearingLoadState], meshes: Iterable[MeshLoadState], input_hash: str
 ) -> Path:
-    """Write what bearings and meshes bear (atomically) and return the path."""
+    """Write the loads of bearings and meshes (atomically) and return the path."""
     content = {
         "input_hash": input_hash,
         "method_version": MODES,

@@ -1,11 +1,13 @@
-"""The file of a run: it grows beside the pieces of the run, and is read back, whole or in pieces.
+"""The file of a run: it is written along with the pieces of the run; complete and incomplete runs can be read.
 
-A run in progress, or one that was stopped, is the folder ``run.partial`` (`exugear.results.run_file`). ``run.nc`` grows
-in it, beside the pieces, and takes its place when the run is complete (`RunFile`). `load_run` reads both.
+A run that is in progress or was stopped is the folder ``run.partial``. ``run.nc`` is
+written in this folder, next to the pieces, and is moved to its final place when the run is complete (`RunFile`).
+`load_run` reads both forms.
 
-The pieces ``000001.npz``, ``000002.npz``, ... hold a stretch of time each. A piece is written whole or not at all and
-names the checksum of the one before it, so that pieces of different runs never mix and a kill costs one piece at most.
-They are no netCDF, because making some 30 variables anew takes 60 ms, and a piece is due after 100 ms of a fast run.
+Each of the pieces ``000001.npz``, ``000002.npz``, ... covers an interval of time. A piece is written atomically and
+contains the checksum of the previous one. So pieces of different runs never mix, and a killed process loses at most one
+piece. The pieces are not netCDF files, because creating about 30 variables takes 60 ms, and a fast run writes a piece
+every 100 ms.
 """
 
 from __future__ import annotations
@@ -35,7 +37,7 @@ from fe_ste.tools.stores import ErrorKeeper, Layout, load_dataset, open_sealed, 
 if TYPE_CHECKING:
     import xarray as xr
 
-# Variables in the files of a run: its signals, and the state to go on from
+# Variables in the files of a run: its signals, and the state from which it is resumed
 
 STATE = (
     Variable("state_q", ("coordinate",), "m or rad"),
@@ -46,14 +48,14 @@ STATE = (
     Variable("state_judgement", ("criterion", "figure"), "value, s, index"),
     Variable("state_pending", ("pending", "signal"), "of the signals"),
 )
-"""What a `exugear.results.run_file.Checkpoint` is kept as."""
+"""Variables in which a `Checkpoint` is stored."""
 VARIABLES = {variable.name: variable for variable in (*(signal for signal in SIGNALS if signal.stored), *STATE)}
-"""All variables by name, in the order of the file; a run holds those of its mesh law."""
+"""All variables by name, in the order of the file; a run contains those of its mesh model."""
 GROWING = ("time", "balance_time")
-"""Dimensions along which a run grows piece by piece."""
+"""Dimensions along which the pieces of a run are appended."""
 
 
-# A run in progress, or one that was stopped: a folder of pieces, each with the state to go on from
+# A run that is in progress or was stopped: a folder of pieces, each with the state from which it is resumed
 
 _PIECE_NAME = re.compile(r"\d{6}\.npz")
 _log = logging.getLogger(__name__)
@@ -61,57 +63,57 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """State from which a run goes on."""
+    """State from which a run is resumed."""
 
     step: int
-    """Number of the step that led to it."""
+    """Number of the time step that led to the state."""
     q: Floats
     v: Floats
     """(size,) coordinates and velocities."""
     past: Floats
-    """(n, size) accelerations at the last steps, the latest last, as far as a method of integration goes back."""
+    """(n, size) accelerations at the last steps, the latest last, as many as the integration method needs."""
     pending: Floats
-    """(n, columns) samples that the filter still holds."""
+    """(n, columns) samples that the filter still needs."""
     pending_first: int
-    """Number of the first of them."""
+    """Number of the first of these samples."""
     balance: Floats
-    """(terms,) account of energy, J, as in `exugear.system.signals.BALANCE_TERMS`."""
+    """(terms,) energy balance, J, as in `exugear.system.signals.BALANCE_TERMS`."""
     powers: Floats
     """(powers,) powers, W, as in `exugear.system.signals.POWERS`."""
     start_angle: float
-    """Angle that a drive started ahead by, rad."""
+    """Angle by which a drive started ahead, rad."""
     mesh_times: Floats
     """(times, meshes) s, as in `exugear.system.signals.MESH_TIMES`."""
     judgement: Floats
-    """Running figures of an `exugear.transient.outcome.ValidityMonitor`."""
+    """Intermediate values of an `exugear.transient.outcome.ValidityMonitor`."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """A stretch of a run."""
+    """An interval of a run."""
 
     arrays: Mapping[str, NDArray[Any]]
-    """Variables by name, see `exugear.results.run_file.VARIABLES`."""
+    """Variables by name, see `VARIABLES`."""
     attributes: Mapping[str, Any]
-    """Of the run, and of the state at the end of the piece."""
+    """Attributes of the run, and of the state at the end of the piece."""
     names: Mapping[str, list[str]]
-    """Of meshes and supports."""
+    """Names of meshes and supports."""
     follows: str
-    """Checksum of the piece before, empty for the first."""
+    """Checksum of the previous piece; empty for the first."""
 
     def write(self, path: Path) -> str:
-        """Write it whole or not at all; return its checksum."""
+        """Write the piece atomically and return its checksum."""
         words = {"attributes": self.attributes, "names": self.names, "follows": self.follows}
         return write_arrays(path, {"words": np.array(json.dumps(words)), **self.arrays})
 
     @classmethod
     def read(cls, path: Path, names: Collection[str] | None = None) -> tuple[Piece, str]:
-        """Read it, or only the arrays of these names, and its checksum.
+        """Read a piece, or only some of its arrays, and return it with its checksum.
 
         Raises
         ------
         FileError
-            It is missing, damaged, or no piece of a run.
+            The file is missing, damaged, or not a piece of a run.
         """
         with open_sealed(path) as (file, checksum):
             try:
@@ -125,24 +127,24 @@ class Piece:
 
 
 class RunPieces:
-    """Writer of one run, piece by piece; no file is open between writes.
+    """Writer of the pieces of one run; no file stays open between writes.
 
     Parameters
     ----------
-    folder : where the pieces lie
+    folder : folder of the pieces
     attributes
-        What is run: begins anew with these attributes. Without them the pieces that are there are gone on with.
+        Attributes of a new run. If omitted, the run of the existing pieces is resumed.
 
     Attributes
     ----------
     paths : files of the pieces
-    lengths : length of each dimension in `exugear.results.run_file.GROWING` and of what the filter holds, so far
-    attributes : of the whole run
+    lengths : length so far of each dimension in `GROWING` and of the filter's samples
+    attributes : attributes of the whole run
 
     Raises
     ------
     FileError
-        There is nothing to go on with, or the folder is a link.
+        There is no run to resume, or the folder is a link.
     """
 
     def __init__(self, folder: Path, layout: SignalLayout, attributes: Mapping[str, Any] | None = None) -> None:
@@ -163,7 +165,7 @@ class RunPieces:
         self.attributes = dict(piece.attributes)
 
     def _count(self, path: Path, piece: Piece, checksum: str) -> None:
-        """Count a piece that is on the disk."""
+        """Register a piece that has been written."""
         self.paths.append(path)
         self._checksum = checksum
         self.lengths = {name: self.lengths[name] + len(piece.arrays[name]) for name in GROWING}
@@ -174,9 +176,9 @@ class RunPieces:
 
         Parameters
         ----------
-        times, rows : (n,) (n, columns) decimated samples, s and as the layout says
-        balance_times, balances : (k,) (k, terms) lines of the account of energy, s and J
-        state : state to go on from
+        times, rows : (n,) (n, columns) decimated samples, s and in the units of the layout
+        balance_times, balances : (k,) (k, terms) terms of the energy balance, s and J
+        state : state from which the run is resumed
         """
         self.attributes |= {
             "state_step": state.step,
@@ -196,7 +198,7 @@ class RunPieces:
             "state_judgement": state.judgement,
             "state_pending": state.pending,
         }
-        with np.errstate(over="ignore"):  # a run that diverges
+        with np.errstate(over="ignore"):  # if a run diverges
             arrays = {name: np.ascontiguousarray(value, VARIABLES[name].kind) for name, value in values.items()}
         names = {dimension: list(entries) for dimension, entries in self._layout.names.items()}
         piece = Piece(arrays, self.attributes, names, self._checksum)
@@ -205,7 +207,7 @@ class RunPieces:
         return piece
 
     def last_checkpoint(self) -> Checkpoint:
-        """Read the state that the last piece was left with."""
+        """Read the state at the end of the last piece."""
         last, _ = Piece.read(self.paths[-1])
         arrays = last.arrays
         attributes = last.attributes
@@ -224,11 +226,11 @@ class RunPieces:
         )
 
     def note(self, key: str, value: Any) -> None:
-        """Add an attribute to the pieces that follow and to the whole run."""
+        """Add an attribute to the following pieces and to the whole run."""
         self.attributes[key] = value
 
     def mark(self) -> None:
-        """Write a piece without samples: it keeps what was noted since the last one."""
+        """Write a piece without samples to store the attributes added since the last one."""
         nothing = np.zeros(0)
         rows = np.zeros((0, self._layout.count))
         lines = np.zeros((0, len(BALANCE_TERMS)))
@@ -240,7 +242,7 @@ def _piece_path(folder: Path, number: int) -> Path:
 
 
 def whole_pieces(folder: Path) -> Iterator[tuple[Path, Piece, str]]:
-    """Pieces from the first on with their checksums, as far as each is whole and follows the one before."""
+    """Yield the pieces with their checksums, up to the last that is complete and follows its predecessor."""
     last = ""
     for number in itertools.count(1):
         path = _piece_path(folder, number)
@@ -252,18 +254,18 @@ def whole_pieces(folder: Path) -> Iterator[tuple[Path, Piece, str]]:
             _log.warning("%s; the run resumes before that point", error)
             return
         if piece.follows != last:
-            return  # of a run before: a kill fell between beginning anew and removing it
+            return  # piece of an earlier run, if the process was killed before removing it
         yield path, piece, checksum
         last = checksum
 
 
 def has_pieces(folder: Path) -> bool:
-    """Tell whether a folder holds a run to go on with."""
+    """Return whether a folder contains a run that can be resumed."""
     return _piece_path(folder, 1).is_file()
 
 
 def kept_attributes(folder: Path) -> dict[str, Any]:
-    """Attributes of the last piece in a folder that can be read; none without one."""
+    """Attributes of the last readable piece in a folder; empty without one."""
     for path in sorted(folder.glob("*.npz"), reverse=True):
         with suppress(FileError):
             return dict(Piece.read(path, ())[0].attributes)
@@ -271,12 +273,12 @@ def kept_attributes(folder: Path) -> dict[str, Any]:
 
 
 def discard_pieces(folder: Path, keep: Iterable[Path] = ()) -> None:
-    """Remove the pieces of a run, the last first, and what a kill left unfinished; nothing else.
+    """Remove the pieces of a run, the last first, and unfinished files of a killed process; keep all other files.
 
     Raises
     ------
     FileError
-        The folder is a link: what it leads to may be anybody's.
+        The folder is a link, whose target may contain other files.
     """
     if folder.is_symlink():
         raise FileError(f"{folder}: is a link; remove it, interrupted runs are stored in a folder of this name")
@@ -287,19 +289,19 @@ def discard_pieces(folder: Path, keep: Iterable[Path] = ()) -> None:
         if name not in kept and (_PIECE_NAME.fullmatch(name) or name.endswith(".partial")):
             os.unlink(folder / name)
     if not kept:
-        with suppress(OSError):  # somebody keeps a file of his own there
+        with suppress(OSError):  # the user has put other files there
             os.rmdir(folder)
 
 
-# The file of a run: it grows beside the pieces of the run, and is read back, whole or in pieces
+# The file of a run: it is written along with the pieces of the run; complete and incomplete runs can be read
 
 FINAL_NAME = "run.nc"
 PARTIAL_NAME = "run.partial"
-"""Folder with the pieces of a run that is not complete."""
+"""Folder with the pieces of an incomplete run."""
 EARLIER_PARTIAL_NAME = "run.partial.nc"
-"""What an earlier version wrote instead; it can be neither trusted nor gone on with."""
+"""File that an earlier version wrote instead; it is not valid and cannot be resumed."""
 TEXT = np.dtype("O", metadata={"vlen": str})
-"""Text of any length, as HDF5 stores it."""
+"""Text of any length, in the data type of HDF5."""
 _LAYOUT = Layout(
     "run",
     RUN,
@@ -309,16 +311,16 @@ _LAYOUT = Layout(
 
 
 class RunFile:
-    """The file of a run, which grows while the run goes on; as a context manager it removes what is not finished.
+    """The file of a run, which grows during the run; as a context manager it removes an unfinished file.
 
-    Samples come to their places as the pieces are written, so that little is left to do at the end. Until it is
-    finished nothing can go on from this file: that is what pieces are for.
+    Samples are written to their final positions together with the pieces, so that little work remains at the end. An
+    unfinished file cannot be resumed; the pieces serve that purpose.
 
     Parameters
     ----------
-    path : its place when it is finished; until then it is in the folder of the pieces
-    pieces : of the run; what a run that was stopped has left is taken over from their files
-    samples : how many there are of each signal in the whole run
+    path : path of the finished file; until then the file is in the folder of the pieces
+    pieces : pieces of the run; those of a stopped run are copied from their files
+    samples : number of samples of each signal in the whole run
     """
 
     def __init__(self, path: Path, pieces: RunPieces, samples: int) -> None:
@@ -334,32 +336,32 @@ class RunFile:
         self._file: h5netcdf.File
 
     def __enter__(self) -> RunFile:
-        """Leave the disk alone: the file is made with the first piece."""
+        """Return the object; the file is created with the first piece."""
         return self
 
     def __exit__(self, *raised: Any) -> None:
-        """Remove the file, unless it is finished."""
+        """Remove the file if it is unfinished."""
         with suppress(_Unfinished):
             self._open.__exit__(*(raised if raised[0] else (_Unfinished, _Unfinished(), None)))
 
     def add(self, piece: Piece) -> None:
-        """Take over the piece that was written last.
+        """Copy the piece that was written last.
 
         Raises
         ------
         OSError
-            The disk is full, say; the pieces are kept.
+            The file cannot be written, for example on a full disk; the pieces are kept.
         """
         self._take_over(len(self._pieces.paths) - 1)
         self._take(piece)
 
     def finish(self) -> None:
-        """Write what the end alone tells, give the file its name and remove the pieces.
+        """Write the values that are known only at the end, rename the file and remove the pieces.
 
         Raises
         ------
         OSError
-            As `add`.
+            As in `add`.
         """
         self._take_over(len(self._pieces.paths))
         if self._last is None or self._written != self._samples:
@@ -381,7 +383,7 @@ class RunFile:
         discard_pieces(self._pieces.folder)
 
     def _take_over(self, pieces: int) -> None:
-        """Take so many pieces from their files, as far as they are not taken yet."""
+        """Copy pieces from their files up to a number, skipping those already copied."""
         for path in self._pieces.paths[self._taken : pieces]:
             self._take(Piece.read(path)[0])
 
@@ -398,7 +400,7 @@ class RunFile:
         self._last, self._written, self._taken = piece, end, self._taken + 1
 
     def _begin(self, piece: Piece) -> None:
-        """Make the file with the names that a piece has, and room for all samples."""
+        """Create the file with the names of a piece and space for all samples."""
         self._raw = self._open.enter_context(replacement(self._path, self._pieces.folder))
         self._target = ErrorKeeper(self._raw)
         self._file = self._open.enter_context(h5netcdf.File(self._target, "w"))
@@ -412,7 +414,7 @@ class RunFile:
 
 
 class _Unfinished(Exception):
-    """What ends a file that is not to be kept."""
+    """Exception that closes a file that is not kept."""
 
 
 def _dimension(name: str) -> str:
@@ -421,12 +423,12 @@ def _dimension(name: str) -> str:
 
 
 def _define(file: h5netcdf.File, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Define variables like these, with the dimensions that are not there yet."""
+    """Define variables for these arrays, and their dimensions if missing."""
     for name, values in arrays.items():
         variable = VARIABLES[name]
         for dimension, size in zip(variable.dimensions, values.shape, strict=True):
             if dimension not in file.dimensions:
-                # What has no length must be able to grow: netCDF knows no empty dimension.
+                # netCDF has no empty dimension, so one of length zero is unlimited.
                 file.dimensions[dimension] = size or None
         shape = [file.dimensions[dimension].size for dimension in variable.dimensions]
         chunks = None if all(shape) else tuple(max(1, size) for size in shape)
@@ -440,8 +442,8 @@ def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset
 
     Parameters
     ----------
-    path : ``run.nc``, or the folder ``run.partial`` of a run that goes on or was stopped
-    names : variables; all by default
+    path : ``run.nc``, or the folder ``run.partial`` of a run that is in progress or was stopped
+    names : variables to read; all by default
 
     Raises
     ------
@@ -462,7 +464,7 @@ def load_run(path: str | Path, names: Iterable[str] | None = None) -> xr.Dataset
 
 
 def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Read some variables and the attributes of a run, without labels: xarray's start costs more than that.
+    """Read some variables and the attributes of a run, without labels; this avoids the import time of xarray.
 
     Parameters
     ----------
@@ -471,7 +473,7 @@ def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]],
     Raises
     ------
     FileError
-        The run is missing or damaged, or has no such variable.
+        The run is missing or damaged, or lacks a variable.
     """
     if path.is_dir():
         stopped = load_run(path, names)
@@ -484,7 +486,7 @@ def read_run(path: Path, names: Iterable[str]) -> tuple[dict[str, NDArray[Any]],
 
 
 def _values(variable: h5netcdf.Variable) -> NDArray[Any]:
-    """Values of a variable; texts as Python's."""
+    """Values of a variable; texts are converted to Python strings."""
     values = np.asarray(variable[...])
     if values.dtype == object:
         return np.array([text.decode() for text in values], dtype=str)
@@ -492,7 +494,7 @@ def _values(variable: h5netcdf.Variable) -> NDArray[Any]:
 
 
 def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
-    """Read the run that the pieces in a folder make."""
+    """Read the run from the pieces in a folder."""
     asked = set(VARIABLES) if wanted is None else {*wanted, *_LAYOUT.variables}
     parts: dict[str, list[NDArray[Any]]] = {}
     for _, piece, _ in whole_pieces(folder):
@@ -515,7 +517,7 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
 
 
 def verdict_of(attributes: Mapping[str, Any]) -> str:
-    """Why the run of a file is not to be trusted, from its attributes; empty if nothing speaks against it.
+    """Reason why a run is invalid, from the attributes of its file; empty for a valid run.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""How far the compiled solver is from Exudyn: the beginning of a run, integrated by both.
+"""Comparison of the compiled solver with Exudyn: the beginning of a run, integrated by both.
 
-A run of Exudyn to compare with lies in the folder ``exudyn`` of the results folder, at the place that the run itself
-has in the results folder. `exugear.project.Project.compare_with_exudyn` makes it.
+The reference run of Exudyn is in the folder ``exudyn`` of the results folder, at the same relative path as the run in
+the results folder. `exugear.project.Project.compare_with_exudyn` creates it.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ COMPARED = {
     "mesh_force": "mesh forces",
     "support_force": "bearing forces",
 }
-"""Signals that are compared, and what they are."""
+"""Compared signals and their descriptions."""
 
 
 @dataclass(frozen=True)
 class SolverComparison(ReprMixin, line=" of {exudyn}, {duration:.3g} s: {largest:.1e} apart"):
-    """A run beside the same one by Exudyn, over the time that both have."""
+    """Differences between a run and the same run by Exudyn, over the time covered by both."""
 
     exudyn: str
     """Version and method of Exudyn."""
     compiled: str
     """Method of the compiled solver."""
     duration: float
-    """s."""
+    """Compared time, s."""
     difference: dict[str, float]
-    """Signal -> largest difference at any time, over the largest value of that signal anywhere."""
+    """By signal, largest difference at any time divided by the largest value of that signal at any place."""
     time: Floats
     """(n,) s."""
     overall: tuple[Floats, Floats]
@@ -49,7 +49,7 @@ class SolverComparison(ReprMixin, line=" of {exudyn}, {duration:.3g} s: {largest
 
     @property
     def words(self) -> str:
-        """One sentence on the comparison."""
+        """Summary of the comparison in one sentence."""
         apart = ", ".join(f"{COMPARED[name]} {value:.0e}" for name, value in self.difference.items())
         return (
             f"Comparison over the first {self.duration:.2g} s, compiled solver ({self.compiled}) against {self.exudyn}"
@@ -67,7 +67,7 @@ def compare_solvers(path: Path, exudyn_path: Path) -> SolverComparison:
     Raises
     ------
     FileError
-        If a file is missing or damaged, or the runs are not of the same input and solver pair.
+        A file is missing or damaged, or the runs are not of the same input and solver pair.
     """
     own = load_run(path)
     other = load_run(exudyn_path)

@@ -90,19 +90,19 @@ class Mode:
 
 
 def crossings(
-    gearset: HarmonicBalanceModel, tracks: ModeTracks, forcing: Forcing, operation: tuple[float, float] | None = None
+    model: HarmonicBalanceModel, tracks: ModeTracks, forcing: Forcing, operation: tuple[float, float] | None = None
 ) -> tuple[Crossing, ...]:
     """Crossings of lines of single bases with modes over the speeds of these, the strongest first.
 
     `forcing` gives the forces of the meshes (lines, m, f), N, that vary in the static state. Between the speeds
     `operation` (rad/s, without sign) peaks are held against the largest of those there.
     """
-    lines = _looked_at(gearset)
-    forces = forcing(gearset.at(float(gearset.system.speeds[1])))[lines]
-    met = _passages(tracks, gearset.lines.orders[lines])
+    lines = _looked_at(model)
+    forces = forcing(model.at(float(model.system.speeds[1])))[lines]
+    met = _passages(tracks, model.lines.orders[lines])
     if not met:
         return ()
-    peaks = np.array([_peak(gearset, tracks, mode, speed, forces[at]) for mode, at, speed in met])
+    peaks = np.array([_peak(model, tracks, mode, speed, forces[at]) for mode, at, speed in met])
     shares = _shares(peaks)
     counted = _shares(peaks)
     if operation is not None:
@@ -114,9 +114,9 @@ def crossings(
 
     def exact(n: int) -> Crossing:
         mode, at, speed = met[n]
-        value = _followed(gearset.system, tracks, mode, speed).value
+        value = _followed(model.system, tracks, mode, speed).value
         near = Crossing(speed, lines[at], mode, value.imag / 2.0 / np.pi, -value.real / abs(value), float(shares[n]))
-        return _met(gearset.system, tracks, gearset.lines.orders, near)
+        return _met(model.system, tracks, model.lines.orders, near)
 
     low = tracks.speeds[0]
     high = tracks.speeds[-1]
@@ -190,9 +190,9 @@ def missed_tops(
     return np.sort(np.array(tops))
 
 
-def _looked_at(gearset: HarmonicBalanceModel) -> list[int]:
+def _looked_at(model: HarmonicBalanceModel) -> list[int]:
     """Orders of a single mesh frequency, and their sidebands."""
-    index = gearset.lines.index[:, : len(gearset.waves.base_orders)]
+    index = model.lines.index[:, : len(model.waves.base_orders)]
     return [int(line) for line in np.flatnonzero(np.count_nonzero(index, axis=1) == 1)]
 
 
@@ -220,15 +220,15 @@ def _followed(system: MeanSystem, tracks: ModeTracks, mode: int, speed: float) -
     return Mode(complex(tracks.eigenvalues[n, mode]), tracks.shapes[n, mode], left)
 
 
-def _peak(gearset: HarmonicBalanceModel, tracks: ModeTracks, mode: int, speed: float, force: Complexes) -> Floats:
+def _peak(model: HarmonicBalanceModel, tracks: ModeTracks, mode: int, speed: float, force: Complexes) -> Floats:
     """Find what a mode makes at resonance of a line with forces (m, f) of the meshes, (signals,).
 
     Signals are the overall transmission error and the deflections of the meshes.
     """
-    own = _followed(gearset.system, tracks, mode, speed)
-    ports = gearset.ports_at(speed)
-    rows = np.vstack([gearset.row_of_overall(speed)[None], ports.readings[:, DEFLECTION]])
-    pushed = abs(own.left @ (gearset.loads(ports) @ force.ravel()))
+    own = _followed(model.system, tracks, mode, speed)
+    ports = model.ports_at(speed)
+    rows = np.vstack([model.row_of_overall(speed)[None], ports.readings[:, DEFLECTION]])
+    pushed = abs(own.left @ (model.loads(ports) @ force.ravel()))
     return np.asarray(np.abs(rows @ own.shape) * pushed / abs(own.value.real))
 
 
@@ -291,33 +291,33 @@ class Contributions:
     mean stiffness of the meshes and the excitation staying as they are."""
 
 
-def contributions(gearset: HarmonicBalanceModel, speed: float, line: int) -> Contributions:
+def contributions(model: HarmonicBalanceModel, speed: float, line: int) -> Contributions:
     """Find what makes a line of the overall transmission error at a speed.
 
     Parameters
     ----------
-    gearset : of a law along a row, which has a first-order excitation
+    model : of a law along a row, which has a first-order excitation
     speed : of the input, rad/s
     line : place in the line set, of one base alone: combinations are no sum over meshes
     """
-    frequency = abs(speed) * float(gearset.lines.orders[line])
-    row = gearset.row_of_overall(speed)
-    forces, loads = _excitation(gearset, speed, line)
-    dynamic = gearset.system.dynamic(speed, frequency)
+    frequency = abs(speed) * float(model.lines.orders[line])
+    row = model.row_of_overall(speed)
+    forces, loads = _excitation(model, speed, line)
+    dynamic = model.system.dynamic(speed, frequency)
     # One solution from either side: what the signal sees of any load, and what moves under these loads.
     adjoint = np.linalg.solve(dynamic.T, row.astype(np.complex128)).astype(np.complex128)
     motion = np.linalg.solve(dynamic, loads).astype(np.complex128)
     total = complex(row @ motion)
     meshes: dict[str, float] = {}
-    parts = (adjoint @ forces).reshape(len(gearset.waves.waves), -1).sum(axis=1)
-    for wave, part in zip(gearset.waves.waves, parts, strict=True):
+    parts = (adjoint @ forces).reshape(len(model.waves.waves), -1).sum(axis=1)
+    for wave, part in zip(model.waves.waves, parts, strict=True):
         meshes[wave.family] = meshes.get(wave.family, 0.0) + _share(complex(part), total)
-    supports, bodies = _derivatives(gearset, speed, frequency, adjoint, motion, total)
-    modes = _modes(gearset, speed, frequency, loads, row, total)
+    supports, bodies = _derivatives(model, speed, frequency, adjoint, motion, total)
+    modes = _modes(model, speed, frequency, loads, row, total)
     return Contributions(speed, abs(total), meshes, modes, supports, bodies)
 
 
-def loudest_near(gearset: HarmonicBalanceModel, speed: float, width: float, line: int) -> float:
+def loudest_near(model: HarmonicBalanceModel, speed: float, width: float, line: int) -> float:
     """Return the speed (rad/s) of the largest `linear` amplitude of an order, within a share `width` of another speed.
 
     At the maximum, the height of a peak changes with a parameter as the amplitude at that fixed speed does: the shift
@@ -327,8 +327,8 @@ def loudest_near(gearset: HarmonicBalanceModel, speed: float, width: float, line
 
     def quietness(factor: float) -> float:
         at = speed * factor
-        dynamic = gearset.system.dynamic(at, abs(at) * float(gearset.lines.orders[line]))
-        return -abs(complex(gearset.row_of_overall(at) @ np.linalg.solve(dynamic, _excitation(gearset, at, line)[1])))
+        dynamic = model.system.dynamic(at, abs(at) * float(model.lines.orders[line]))
+        return -abs(complex(model.row_of_overall(at) @ np.linalg.solve(dynamic, _excitation(model, at, line)[1])))
 
     found = scipy.optimize.minimize_scalar(
         quietness, bounds=(1.0 - width, 1.0 + width), method="bounded", options={"xatol": 1e-4 * width}
@@ -336,11 +336,11 @@ def loudest_near(gearset: HarmonicBalanceModel, speed: float, width: float, line
     return speed * float(found.x)
 
 
-def _excitation(gearset: HarmonicBalanceModel, speed: float, line: int) -> tuple[Complexes, Complexes]:
+def _excitation(model: HarmonicBalanceModel, speed: float, line: int) -> tuple[Complexes, Complexes]:
     """Generalized peak forces of each wave (size, m f) on a line, and their sum (size,)."""
-    ports = gearset.ports_at(speed)
-    excess = transmission_errors(gearset, ports, speed)[line]
-    forces = -2.0 * gearset.loads(ports) * excess.ravel()
+    ports = model.ports_at(speed)
+    excess = transmission_errors(model, ports, speed)[line]
+    forces = -2.0 * model.loads(ports) * excess.ravel()
     return forces, np.asarray(forces.sum(axis=1))
 
 
@@ -350,12 +350,12 @@ def _share(part: complex, total: complex) -> float:
 
 
 def _modes(
-    gearset: HarmonicBalanceModel, speed: float, frequency: float, loads: Complexes, row: Floats, total: complex
+    model: HarmonicBalanceModel, speed: float, frequency: float, loads: Complexes, row: Floats, total: complex
 ) -> tuple[tuple[float, float], ...]:
     """Shares of the modes of the averaged system, those of negative frequency counted with their conjugates."""
-    values, right, left = mean_modes(gearset.system, speed)
-    size = gearset.system.size
-    pushed = np.linalg.solve(gearset.system.mass, loads)
+    values, right, left = mean_modes(model.system, speed)
+    size = model.system.size
+    pushed = np.linalg.solve(model.system.mass, loads)
     found = []
     for value, shape, partner in zip(values, right[:, :size] @ row, left[:, size:], strict=True):
         part = shape * (partner @ pushed) / (1j * frequency - value)
@@ -365,15 +365,15 @@ def _modes(
 
 
 def _derivatives(
-    gearset: HarmonicBalanceModel, speed: float, frequency: float, adjoint: Complexes, motion: Complexes, total: complex
+    model: HarmonicBalanceModel, speed: float, frequency: float, adjoint: Complexes, motion: Complexes, total: complex
 ) -> tuple[dict[str, float], dict[str, float]]:
     """Relative changes of the amplitude per relative change of bearings' stiffness and of bodies' inertia.
 
     A change dD of the dynamic stiffness D changes the signal by -(row D^-1) dD (D^-1 loads). Damping goes with the
     stiffness.
     """
-    system = gearset.system
-    frame = gearset.system.frame
+    system = model.system
+    frame = model.system.frame
     assembly = frame.assembly
     t = frame.matrices(0.0)[0]
     q, _, _ = frame.state(0.0, speed, system.static_at(speed))

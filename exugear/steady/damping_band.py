@@ -1,7 +1,7 @@
 """How high the peaks of a steady response are at both ends of the plausible range of damping.
 
-Damping is the most uncertain input of a gearbox model. The highest peaks are therefore solved again with the least and
-the largest plausible damping (`damping.modal_band_percent`; half and twice the damping without it), at some speeds
+Damping is the most uncertain input of a gearbox model. The highest peaks are therefore solved again with the lowest and
+the highest plausible damping (`damping.modal_band_percent`; half and twice the damping without it), at some speeds
 about each peak, where its maximum may have moved. Methods that are linear in the deflections only: with contact loss
 another damping may lead to another state.
 """
@@ -9,6 +9,7 @@ another damping may lead to another state.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from exugear.system.kernels.modal_damping import modal_matrix
 from exugear.system.modal_damping import with_modal_damping
 from fe_ste.tools.arrays import Booleans, Floats, Integers
 
-HALF, TWICE = 0.5, 2.0
+FACTORS = (0.5, 2.0)
 """Factors on the damping where the file states no range."""
 MOST_PEAKS = 20
 """Highest peaks of each quantity that are solved again."""
@@ -39,27 +40,40 @@ class DampingBand:
     line: Integers
     """(k,) place of each peak among the points and the lines of the response."""
     amplitude: Floats
-    """(k, s, 2) with the least and with the largest damping, in the quantities' units."""
+    """(k, s, 2) with the lowest and with the highest damping, in the quantities' units."""
     quantities: tuple[str, ...]
     """Names of the quantities, see `exugear.steady.mean_system.signals.Quantity`."""
 
+    def variables(self) -> dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]:
+        """Variables of a dataset, with their dimensions and attributes."""
+        words = "peak amplitude with the lowest and the highest plausible damping"
+        return {
+            "band_point": (("peak",), self.point, {"long_name": "point of the response"}),
+            "band_line": (("peak",), self.line, {"long_name": "line of the response"}),
+            "band_amplitude": (
+                ("peak", "quantity", "damping_limit"),
+                self.amplitude,
+                {"long_name": words, "units": "m, N, m/s2"},
+            ),
+        }
 
-def damping_band(gearset: HarmonicBalanceModel, method: Method, speed: Floats, amplitude: Floats) -> DampingBand:
-    """Solve the highest peaks of a response again with the least and the largest plausible damping.
+
+def damping_band(model: HarmonicBalanceModel, method: Method, speed: Floats, amplitude: Floats) -> DampingBand:
+    """Solve the highest peaks of a response again with the lowest and the highest plausible damping.
 
     Parameters
     ----------
-    gearset : with linear bearings, of a mesh model without contact loss
+    model : with linear bearings, of a mesh model without contact loss
     method : ``linear`` or ``parametric``
     speed : (points,) of the overall input, rad/s, ascending
     amplitude : (points, lines, signals) of the response, of line 0 the mean
     """
-    quantities = quantities_of([signal.name for signal in gearset.signal_names])
-    point, line, rises = _highest_peaks(gearset, quantities, speed, amplitude)
+    quantities = quantities_of([signal.name for signal in model.signal_names])
+    point, line, rises = _highest_peaks(model, quantities, speed, amplitude)
     found = np.zeros((len(point), len(quantities), 2))
-    respond = linear_response if method == "linear" else parametric_response
-    for end, system in enumerate(damping_limits(gearset.system)):
-        damped = gearset.with_system(system)
+    respond = {"linear": linear_response, "parametric": parametric_response}[method]
+    for end, system in enumerate(damping_limits(model.system)):
+        damped = model.with_system(system)
         for at in np.unique(point):
             here = np.flatnonzero(point == at)
             for about in ABOUT:
@@ -74,7 +88,7 @@ def damping_band(gearset: HarmonicBalanceModel, method: Method, speed: Floats, a
 
 
 def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
-    """Return an averaged system with the least and with the largest plausible damping.
+    """Return an averaged system with the lowest and with the highest plausible damping.
 
     Gyroscopic and Coriolis terms stay as they are: they do not dissipate.
     """
@@ -82,37 +96,34 @@ def damping_limits(system: MeanSystem) -> tuple[MeanSystem, MeanSystem]:
     band = assembly.gearbox.case.damping.modal_band_percent
     present = system.at(system.damping, 0.0)
     present = 0.5 * (present + present.T)
-    if band is None:
-        low, high = HALF * present, TWICE * present
-    else:
+    changes = [(factor - 1.0) * present for factor in FACTORS]
+    if band is not None:
+        # Dampers with stated values are no less certain than the rest of the model, and stay.
         turned = system.frame.matrices(0.0)[0]
         still = np.zeros(assembly.size)
-        low, high = (
-            turned.T
-            @ modal_matrix(still, with_modal_damping(replace(assembly, modal=None), percent=percent).modal)
-            @ turned
-            for percent in band
-        )
-        # Dampers with stated values are no less certain than the rest of the model, and stay.
-        present = turned.T @ modal_matrix(still, assembly.modal) @ turned
+        now = modal_matrix(still, assembly.modal)
+        undamped = replace(assembly, modal=None)
+        limits = (modal_matrix(still, with_modal_damping(undamped, percent).modal) for percent in band)
+        changes = [turned.T @ (limit - now) @ turned for limit in limits]
     return (
-        replace(system, damping=system.damping + (low - present)),
-        replace(system, damping=system.damping + (high - present)),
+        replace(system, damping=system.damping + changes[0]),
+        replace(system, damping=system.damping + changes[1]),
     )
 
 
 def _highest_peaks(
-    gearset: HarmonicBalanceModel, quantities: tuple[Quantity, ...], speed: Floats, amplitude: Floats
+    model: HarmonicBalanceModel, quantities: tuple[Quantity, ...], speed: Floats, amplitude: Floats
 ) -> tuple[Integers, Integers, Booleans]:
     """Points (k,) and lines (k,) of the highest peaks of any quantity, and which quantities (k, s) have one there.
 
     Within the operating range, where the file has one and the response reaches it.
     """
-    stated = operating_range(gearset.waves.assembly.gearbox)
+    stated = operating_range(model.waves.assembly.gearbox)
     inside = np.ones(len(speed), dtype=bool)
     if stated is not None:
         within = (np.abs(speed) >= stated[0]) & (np.abs(speed) <= stated[1])
-        inside = within if within.any() else inside
+        if within.any():
+            inside = within
     chosen: set[tuple[int, int]] = set()
     of_quantity: list[set[tuple[int, int]]] = []
     for quantity in quantities:

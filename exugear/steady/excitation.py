@@ -16,9 +16,9 @@ from exugear.steady.harmonics.lines import (
     beside,
     count_of_lines,
     joined,
-    lattice,
     line_set,
     modulated,
+    rank1_lattice,
 )
 from exugear.steady.mean_system.bearing_waves import (
     TILTS,
@@ -53,6 +53,7 @@ from exugear.steady.mean_system.signals import (
     mesh_signal_names,
     signal_rows,
 )
+from exugear.steady.mean_system.tooth_friction import FrictionResponse, tooth_friction
 from exugear.system.kernels.meshes import SPIN_1
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Complexes, Floats, Integers
@@ -86,6 +87,17 @@ class Interface:
     """(m, f) torque of the drive per steady force, N m/N."""
     bearings: BearingMean | None
     """Nonlinear bearings in the averaged system."""
+    friction: FrictionResponse | None = None
+    """Response to the friction of the teeth, if the gearbox file requests it."""
+
+    @cached_property
+    def static(self) -> Complexes:
+        """Readings (n, m, r) without forces of the meshes beyond the averaged system: static state and friction."""
+        found = np.zeros((len(self.frequencies), *self.ports.static.shape), dtype=complex)
+        if self.friction is not None:
+            found += self.read(self.friction.motion)
+        found[0] += self.ports.static
+        return found
 
     @cached_property
     def deflection(self) -> Complexes:
@@ -170,13 +182,13 @@ class HarmonicBalanceModel:
         # Shared by all that differ in their lines alone.
         self._lattices: dict[tuple[HarmonicTruncation, int, int], TorusSampling] = {}
         self._one_by_one: dict[int, HarmonicBalanceModel] = {}
-        self.parting = LAWS[waves.assembly.mesh_model].loses_contact
+        self.loses_contact = LAWS[waves.assembly.mesh_model].loses_contact
         self.bearings: BearingWaves | None = None
         self._bearing_means: tuple[BearingMean, ...] = ()
         ports = []
         rows = []
         for speed in waves.system.speeds:
-            ports.append(mesh_ports(waves, float(speed), self.parting))
+            ports.append(mesh_ports(waves, float(speed), self.loses_contact))
             rows.append(signal_rows(waves.system, float(speed)))
         self._ports = _stacked(ports)
         self._rows = {
@@ -186,14 +198,14 @@ class HarmonicBalanceModel:
         self.signal_names: tuple[SignalName, ...] = (*self._row_names, *mesh_signal_names(waves))
 
     @property
-    def wander(self) -> bool:
+    def shuttles(self) -> bool:
         """Whether the load of any mesh with a model along a row shuttles."""
-        return self.waves.wander and not self.parting
+        return self.waves.shuttles and not self.loses_contact
 
     @property
-    def bent(self) -> bool:
+    def is_nonlinear(self) -> bool:
         """Whether forces are not parabolas of the inputs of the models: teeth or rolling elements may lose contact."""
-        return self.parting or self.bearings is not None
+        return self.loses_contact or self.bearings is not None
 
     @cached_property
     def with_bearings(self) -> HarmonicBalanceModel:
@@ -249,15 +261,15 @@ class HarmonicBalanceModel:
         return places_with_bearings(found, self.bearings, len(self.waves.base_orders), speed, angles)
 
     @cached_property
-    def lattice(self) -> TorusSampling:
+    def sampling(self) -> TorusSampling:
         """Samples on which forces are evaluated in time."""
-        least = max(self._least, SAMPLES_PER_HARMONIC * self._reach.harmonics if self.bent else 0)
+        least = max(self._least, SAMPLES_PER_HARMONIC * self._reach.harmonics if self.is_nonlinear else 0)
         key = self._reach, least, self.waves.passing
         known = self._lattices.get(key)
         if self.waves.passing:
-            known = lattice(self.lines, self.larger, least, shared=True)
+            known = rank1_lattice(self.lines, self.larger, least, shared=True)
         elif known is None:
-            known = lattice(self.larger, self.larger, least)
+            known = rank1_lattice(self.larger, self.larger, least)
         self._lattices[key] = known
         return TorusSampling(self.lines, known.generator, known.samples)
 
@@ -265,7 +277,7 @@ class HarmonicBalanceModel:
     def denser(self) -> HarmonicBalanceModel:
         """The same on twice as many samples, on which other lines alias."""
         other = self._copied()
-        other._least = 2 * self.lattice.samples
+        other._least = 2 * self.sampling.samples
         return other
 
     @cached_property
@@ -339,7 +351,7 @@ class HarmonicBalanceModel:
         """
         waves = self.waves
         usual = self._usual
-        if not self.parting or self.bearings is not None:
+        if not self.loses_contact or self.bearings is not None:
             return None
         if (waves.carriers and not waves.passing) or not any(wave.wave for wave in waves.waves):
             return None
@@ -432,7 +444,7 @@ class HarmonicBalanceModel:
         deflection and misalignment.
         """
         found = {(DEFLECTION, DEFLECTION): self.cycle_coefficients}
-        if self.wander:
+        if self.shuttles:
             across, _, twice = self.cycle_moments
             found[DEFLECTION, MISALIGNMENT] = found[MISALIGNMENT, DEFLECTION] = -across
             found[MISALIGNMENT, MISALIGNMENT] = twice
@@ -469,9 +481,9 @@ class HarmonicBalanceModel:
         found = np.ones(self._ports["static"].shape[1:])
         count = len(firsts)
         found[:count, POSITION] = pitch
-        if self.wander:
+        if self.shuttles:
             found[:count, MISALIGNMENT] = pitch
-        if self.parting:
+        if self.loses_contact:
             found[:count, [TILT, BACK_TILT]] = pitch[:, None]
         if self.bearings is not None:
             found[count:, TILTS] = self.bearings.radii[:, None]
@@ -519,11 +531,30 @@ class HarmonicBalanceModel:
             rows=SignalRows(self._row_names, **rows),
             torque=system.torque_at(speed),
             torque_per_force=still.reshape(shape),
-            bearings=self._bearings_at(speed) if self.bearings else None,
+            bearings=self._bearings_at(speed),
+            friction=self._friction_at(speed, ports, pencil, frequencies),
         )
 
-    def _bearings_at(self, speed: float) -> BearingMean:
-        """Bearings in the averaged system at a speed of the input, rad/s."""
+    def _friction_at(
+        self, speed: float, ports: MeshInterface, pencil: tuple[Floats, Floats], frequencies: Floats
+    ) -> FrictionResponse | None:
+        """Solve for the response to the friction of the teeth at a speed of the input, rad/s; None without friction."""
+        system = self.system
+        if system.frame.assembly.gearbox.case.damping.tooth_friction == 0.0:
+            return None
+        loads = tooth_friction(self.waves, self.lines, ports, speed, self.harmonics)
+        motion = np.zeros((len(frequencies), system.size), dtype=complex)
+        still = system.still(pencil[0], loads[0].real[:, None])[:, 0]
+        motion[0] = still[:-1]
+        for line in np.flatnonzero(loads[1:].any(axis=1)) + 1:
+            dynamic = pencil[0] - frequencies[line] ** 2 * system.mass + 1j * frequencies[line] * pencil[1]
+            motion[line] = np.linalg.solve(dynamic, loads[line])
+        return FrictionResponse(loads, motion, float(still[-1]))
+
+    def _bearings_at(self, speed: float) -> BearingMean | None:
+        """Nonlinear bearings in the averaged system at a speed of the input, rad/s; None without any."""
+        if self.bearings is None:
+            return None
         return BearingMean(*(self.system.at(np.array(own), speed) for own in zip(*self._bearing_means, strict=True)))
 
     def row_of_overall(self, speed: float) -> Floats:

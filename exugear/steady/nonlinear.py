@@ -53,32 +53,30 @@ SHORTEST = 1.0 / 64.0
 class HarmonicResidual:
     """The equations of all lines at one speed; n lines, m waves, r readings, f forces."""
 
-    gearset: HarmonicBalanceModel
+    model: HarmonicBalanceModel
     interface: Interface
-    lattice: TorusSampling
+    sampling: TorusSampling
 
     @cached_property
     def static(self) -> Complexes:
-        """Readings (n, m, r) of the static state."""
-        out = np.zeros((len(self.lattice.lines.orders), *self.interface.ports.static.shape), dtype=complex)
-        out[0] = self.interface.ports.static
-        return out
+        """Readings (n, m, r) of the static state with friction."""
+        return self.interface.static
 
     @cached_property
     def places(self) -> MeshPlaces:
         """Where laws are evaluated."""
-        return self._places(self.lattice.angles)
+        return self._places(self.sampling.angles)
 
     def _places(self, angles: Floats) -> MeshPlaces:
-        return self.gearset.places(self.interface.speed, self.interface.ports.positions, angles)
+        return self.model.places(self.interface.speed, self.interface.ports.positions, angles)
 
     @cached_property
     def mean_force(self) -> Floats:
         """Forces (m, f) in the static state: those of the mean stiffness along the deflection, and of bearings."""
         found = np.zeros(self.interface.ports.forces.shape[:2])
         m = self.meshes
-        gearset = self.gearset
-        found[:m, DEFLECTION] = gearset.waves.mean_stiffness * gearset.pressed(self.interface.ports.static)
+        model = self.model
+        found[:m, DEFLECTION] = model.waves.mean_stiffness * model.pressed(self.interface.ports.static)
         if self.interface.bearings is not None:
             found[m:, :COMPONENTS] = self.interface.bearings.load
         return found
@@ -93,12 +91,12 @@ class HarmonicResidual:
     @property
     def meshes(self) -> int:
         """Number of the meshes' waves, behind which those of bearings follow."""
-        return len(self.gearset.waves.waves)
+        return len(self.model.waves.waves)
 
     @cached_property
     def _curved(self) -> bool:
         """Whether laws along a row are curves, and not their tangents."""
-        return bool(self.gearset.waves.loads.any())
+        return bool(self.model.waves.loads.any())
 
     def _stiffness(self, places: MeshPlaces) -> Floats:
         """Return stiffness in places, N/m, and two derivatives per cycle, (3 q, s, u); none for models with tables.
@@ -107,7 +105,7 @@ class HarmonicResidual:
         their axial shift follows, or the arrays required by `sample_wandering_line`. It contains only the harmonics of
         the method `parametric`: others would alias.
         """
-        if self.gearset.parting:
+        if self.model.loses_contact:
             return np.zeros((0, 0, 0))
         positions = places.positions
         spectra = self._cycle_spectra
@@ -124,24 +122,24 @@ class HarmonicResidual:
     @cached_property
     def _cycle_spectra(self) -> Complexes:
         """Harmonics (m, 3 q, h + 1) over the mesh cycle of what `_stiffness` has."""
-        gearset = self.gearset
+        model = self.model
         if self._curved:
-            found = [*gearset.cycle_curves]
-            found += [gearset.cycle_ways, gearset.cycle_moments_beyond] if gearset.wander else []
+            found = [*model.cycle_curves]
+            found += [model.cycle_ways, model.cycle_moments_beyond] if model.shuttles else []
         else:
-            found = [gearset.cycle_coefficients, gearset.cycle_pulls]
-            found += [*gearset.cycle_moments, gearset.cycle_moments_beyond] if gearset.wander else []
-        rate = 2j * np.pi * np.arange(gearset.harmonics + 1)
+            found = [model.cycle_coefficients, model.cycle_pulls]
+            found += [*model.cycle_moments, model.cycle_moments_beyond] if model.shuttles else []
+        rate = 2j * np.pi * np.arange(model.harmonics + 1)
         return np.stack([own * rate**order for own in found for order in range(3)], axis=1)
 
     @cached_property
     def _lattice_stiffness(self) -> Floats:
         """As `_stiffness` has it, on the samples of the lattice: each mesh follows the angle of one base."""
-        if self.gearset.parting:
+        if self.model.loses_contact:
             return self._stiffness(self.places)
-        waves = self.gearset.waves.waves
+        waves = self.model.waves.waves
         positions = self.places.positions
-        forward = self.gearset.forward(self.interface.speed)
+        forward = self.model.forward(self.interface.speed)
         spectra = self._cycle_spectra
         out = np.empty((spectra.shape[1], *positions.shape))
         for u, n in enumerate(self.places.means[: positions.shape[1]]):
@@ -150,18 +148,18 @@ class HarmonicResidual:
                 continue
             # All angles are zero at the first sample.
             own = spectra[n] * np.exp(2j * np.pi * positions[0, u] * np.arange(spectra.shape[2]))
-            out[:, :, u] = self.lattice.along_base(waves[n].base, own if forward[n] else own.conj())
+            out[:, :, u] = self.sampling.along_base(waves[n].base, own if forward[n] else own.conj())
         return out
 
     def _sample(self, readings: Floats, rates: Floats, places: MeshPlaces, stiffness: Floats) -> LawSamples:
         """Sample the laws in all places: readings and rates (s, u, r), stiffness (6, s, u); results (s, u, ...)."""
-        waves = self.gearset.waves
-        meshes = self.gearset.waves.assembly.meshes
+        waves = self.model.waves
+        meshes = self.model.waves.assembly.meshes
         found = []
         for u, n in enumerate(places.means):
             if n >= self.meshes:
                 found.append(self._sample_bearing(n - self.meshes, readings[:, u]))
-            elif self.gearset.parting:
+            elif self.model.loses_contact:
                 whole = readings[:, u].copy()
                 whole[:, POSITION] += places.positions[:, u]
                 found.append(sample_table(meshes, waves.waves[n].first, whole, rates[:, u]))
@@ -173,8 +171,8 @@ class HarmonicResidual:
 
     def _sample_row(self, wave: int, readings: Floats, stiffness: Floats) -> LawSamples:
         """Sample the law of a mesh along a row with readings (s, r), stiffness (3 q, s)."""
-        load = float(self.gearset.waves.loads[wave])
-        if self.gearset.wander:
+        load = float(self.model.waves.loads[wave])
+        if self.model.shuttles:
             reading = readings[:, [DEFLECTION, MISALIGNMENT, POSITION]]
             if not self._curved:
                 return sample_wandering_line(stiffness, reading)
@@ -187,7 +185,7 @@ class HarmonicResidual:
 
     def _sample_bearing(self, wave: int, readings: Floats) -> LawSamples:
         """Sample the law of a bearing with readings (s, r), their last one none of it."""
-        bearings = self.gearset.bearings
+        bearings = self.model.bearings
         assert bearings is not None
         force, slope = sample_rolling(bearings.laws, bearings.waves[wave].law, readings[:, :COMPONENTS])
         slope = np.pad(slope, ((0, 0), (0, 0), (0, readings.shape[1] - COMPONENTS)))
@@ -195,10 +193,10 @@ class HarmonicResidual:
 
     def _sample_readings(self, readings: Complexes) -> tuple[Floats, Floats]:
         """Sample (s, m, r) readings and of their rates, the latter zero where no law asks for them."""
-        values = self.lattice.values(readings)
-        if not self.gearset.parting:
+        values = self.sampling.values(readings)
+        if not self.model.loses_contact:
             return values, np.zeros_like(values)
-        return values, self.lattice.values(rates_of(self.gearset, self.interface, readings))
+        return values, self.sampling.values(rates_of(self.model, self.interface, readings))
 
     def forces(self, readings: Complexes) -> tuple[Complexes, Tangent, Floats]:
         """Return the forces (n, m, f) in addition to the averaged system, and their linearisation by the readings.
@@ -210,7 +208,7 @@ class HarmonicResidual:
             back = self.places.back
             values, rates = self._sample_readings(readings)
             sampled = self._sample(there @ values, there @ rates, self.places, self._lattice_stiffness)
-            excess = self.lattice.coefficients(back @ sampled.force) - self._mean_part(readings)
+            excess = self.sampling.coefficients(back @ sampled.force) - self._mean_part(readings)
             self._last[:] = [(readings, excess, sampled)]
         _, excess, sampled = self._last[0]
         return excess, Tangent(self, sampled), sampled.force
@@ -229,9 +227,9 @@ class HarmonicResidual:
         back = self.places.back
         moved, moving = self._sample_readings(step)
         found = np.einsum("sufr,sur->suf", sampled.slope, there @ moved)
-        if self.gearset.parting:
+        if self.model.loses_contact:
             found += np.einsum("sufr,sur->suf", sampled.damping, there @ moving)
-        return np.asarray(self.lattice.coefficients(back @ found) - self._mean_slopes(step))
+        return np.asarray(self.sampling.coefficients(back @ found) - self._mean_slopes(step))
 
     def averaged(self, sampled: LawSamples) -> Complexes:
         """Balance (n, m r, m r) of each line by itself, laws at their mean slopes over time: what couples no lines."""
@@ -250,17 +248,17 @@ class HarmonicResidual:
             means.append(found.reshape(-1, m * r))
         unit = np.eye(m * r)
         # Rates of the waves as their meshes see them: their own, and what the turning carries along.
-        carried = self.interface.speed * np.kron(self.gearset.partners, np.eye(r))
+        carried = self.interface.speed * np.kron(self.model.partners, np.eye(r))
         forces = means[0] + means[1] @ (1j * self.interface.frequencies[:, None, None] * unit + carried)
         return np.asarray(unit + self.interface.readings.reshape(n, m * r, -1) @ forces)
 
     def _less_mean(self, slopes: Floats, by_rates: bool) -> None:
         """Subtract the slopes of the averaged system from slopes (..., m, f, m, r)."""
-        waves = self.gearset.waves
+        waves = self.model.waves
         at = np.arange(self.meshes)
         if by_rates:
             # The damper of laws along a row is the same in the mean system; that of a table comes and goes.
-            if self.gearset.parting:
+            if self.model.loses_contact:
                 slopes[..., at, DEFLECTION, at, DEFLECTION] -= waves.damping
             return
         slopes[..., at, DEFLECTION, at, DEFLECTION] -= waves.mean_stiffness
@@ -281,13 +279,13 @@ class HarmonicResidual:
         there = self.places.there
         back = self.places.back
         means = self.places.means
-        lines = self.lattice.lines
+        lines = self.sampling.lines
         alone = np.abs(np.delete(lines.index, base, axis=1)).sum(axis=1) == 0
         angles = np.zeros((samples, lines.index.shape[1]))
         angles[:, base] = 2.0 * np.pi * np.arange(samples) / samples
         places = self._places(angles)
         own = np.where(alone[:, None, None], readings, 0.0)
-        rates = rates_of(self.gearset, self.interface, own)
+        rates = rates_of(self.model, self.interface, own)
         values = there @ lines.values(own, angles)
         moving = there @ lines.values(rates, angles)
         along = self._sample(values, moving, places, self._stiffness(places))
@@ -307,17 +305,17 @@ class HarmonicResidual:
 
     def _varies(self, wave: int, base: int) -> bool:
         """Return whether the model of a component varies with a base: bearings vary with all of them."""
-        return wave >= self.meshes or self.gearset.waves.waves[wave].base == base
+        return wave >= self.meshes or self.model.waves.waves[wave].base == base
 
     def _mean_slopes(self, change: Complexes) -> Complexes:
         """Find the forces (n, m, f) of the mean stiffness under changes of the readings (n, m, r)."""
-        waves = self.gearset.waves
+        waves = self.model.waves
         m = self.meshes
         deflection = change[:, :m, DEFLECTION]
         found = np.zeros((len(change), *self.interface.ports.forces.shape[:2]), dtype=complex)
         found[:, :m, DEFLECTION] = waves.mean_stiffness * deflection
-        if self.gearset.parting:
-            found[:, :m, DEFLECTION] += waves.damping * rates_of(self.gearset, self.interface, deflection)
+        if self.model.loses_contact:
+            found[:, :m, DEFLECTION] += waves.damping * rates_of(self.model, self.interface, deflection)
         if self.interface.bearings is not None:
             slope = self.interface.bearings.slope
             own = change[:, m:, :COMPONENTS]
@@ -361,7 +359,7 @@ class Tangent:
 
         The balance of each line by itself, solved exactly, leaves GMRES what varying laws do between lines.
         """
-        lengths = self.balance.gearset.lengths
+        lengths = self.balance.model.lengths
 
         def apply(scaled: Complexes) -> Complexes:
             return lengths * self.alone(self.missing(scaled / lengths))
@@ -383,7 +381,7 @@ class Tangent:
 
 
 def nonlinear_response(
-    gearset: HarmonicBalanceModel, interface: Interface, lattice: TorusSampling, start: Complexes | None = None
+    model: HarmonicBalanceModel, interface: Interface, sampling: TorusSampling, start: Complexes | None = None
 ) -> tuple[Response, Complexes]:
     """Response by the laws in time, and the readings (n, m, r), from which a neighbouring speed may start.
 
@@ -392,7 +390,7 @@ def nonlinear_response(
     HarmonicBalanceError
         Newton's method found no balance from this start.
     """
-    balance = HarmonicResidual(gearset, interface, lattice)
+    balance = HarmonicResidual(model, interface, sampling)
     readings, products = solve_balance(balance, balance.static if start is None else start)
     return response_of_readings(balance, readings, products), readings
 
@@ -403,7 +401,7 @@ def solve_balance(balance: HarmonicResidual, readings: Complexes, enough: float 
     `enough` is the residual over the size of the deflections that counts as balanced.
     """
     size = float(np.linalg.norm(balance.static[..., DEFLECTION]))
-    lengths = balance.gearset.lengths
+    lengths = balance.model.lengths
     products = 0
     excess, tangent, _ = balance.forces(readings)
     missing = readings - balance.static - balance.answer(excess)
@@ -436,21 +434,21 @@ def solve_balance(balance: HarmonicResidual, readings: Complexes, enough: float 
 
 def response_of_readings(balance: HarmonicResidual, readings: Complexes, products: int = 0) -> Response:
     """Response of a steady state whose readings (n, m, r) are known."""
-    gearset = balance.gearset
+    model = balance.model
     interface = balance.interface
     excess, _, whole = balance.forces(readings)
-    waves = gearset.waves
+    waves = model.waves
     m = balance.meshes
     deflection = readings[:, :m, DEFLECTION]
     apart = np.zeros(m)
-    if gearset.parting:
+    if model.loses_contact:
         means = balance.places.means
         back = balance.places.back
-        force = balance.lattice.coefficients(back @ (whole[..., [FRONT]] - whole[..., [BACK]]))[:, :m, 0]
+        force = balance.sampling.coefficients(back @ (whole[..., [FRONT]] - whole[..., [BACK]]))[:, :m, 0]
         free = np.mean((whole[..., FRONT] == 0.0) & (whole[..., BACK] == 0.0), axis=0)
         apart = np.array([free[[mean == n for mean in means]].mean() if n in means else 0.0 for n in range(len(apart))])
     else:
-        rates = rates_of(gearset, interface, deflection)
+        rates = rates_of(model, interface, deflection)
         force = excess[:, :m, 0] + waves.mean_stiffness * deflection + waves.damping * rates
         force[0] -= waves.mean_stiffness * waves.rest
     free = _free_shares(balance, whole)
@@ -459,7 +457,7 @@ def response_of_readings(balance: HarmonicResidual, readings: Complexes, product
 
 def _free_shares(balance: HarmonicResidual, whole: Floats) -> Floats:
     """Shares of time (b,) in which bearings have no force, which are whole (s, u, f) in all places; planets' mean."""
-    bearings = balance.gearset.bearings
+    bearings = balance.model.bearings
     m = balance.meshes
     if bearings is None:
         return np.zeros(0)
@@ -506,23 +504,23 @@ class Candidate:
     """Estimate of the fastest growth there, 1/s."""
 
 
-def candidates(gearset: HarmonicBalanceModel, low: float, high: float) -> tuple[Candidate, ...]:
+def candidates(model: HarmonicBalanceModel, low: float, high: float) -> tuple[Candidate, ...]:
     """Find combination resonances between two speeds (rad/s), the fastest growing first, to first order."""
     middle = 0.5 * (low + high)
-    values, right, left = mean_modes(gearset.system, middle)
-    size = gearset.system.size
-    ports = gearset.ports_at(middle)
-    felt = left[:, size:] @ np.linalg.solve(gearset.system.mass, gearset.loads(ports).astype(complex))
-    felt = felt.reshape(len(felt), len(gearset.waves.waves), -1)
+    values, right, left = mean_modes(model.system, middle)
+    size = model.system.size
+    ports = model.ports_at(middle)
+    felt = left[:, size:] @ np.linalg.solve(model.system.mass, model.loads(ports).astype(complex))
+    felt = felt.reshape(len(felt), len(model.waves.waves), -1)
     seen = right[:, :size] @ np.moveaxis(ports.readings, (0, 1, 2), (2, 0, 1))
     decay = -values.real
     frequency = values.imag
     slow = min(abs(low), abs(high))
     found = []
-    for base, order in enumerate(gearset.waves.base_orders):
-        own = np.array([wave.base == base for wave in gearset.waves.waves])
-        for harmonic in range(1, gearset.harmonics + 1):
-            tangents = {at: own * values[:, harmonic] for at, values in gearset.cycle_tangents.items()}
+    for base, order in enumerate(model.waves.base_orders):
+        own = np.array([wave.base == base for wave in model.waves.waves])
+        for harmonic in range(1, model.harmonics + 1):
+            tangents = {at: own * values[:, harmonic] for at, values in model.cycle_tangents.items()}
             turned = {at: values.conj() for at, values in tangents.items()}
             for sign in (1.0, -1.0):
                 there = _couple_modes(felt, tangents, seen.conj() if sign > 0.0 else seen)
@@ -556,28 +554,28 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
     base : base that varies
     least : minimum number of kicks per period
     """
-    gearset = balance.gearset
+    model = balance.model
     interface = balance.interface
-    system = gearset.system
+    system = model.system
     ports = interface.ports
     size = system.size
     speed = interface.speed
-    period = 2.0 * np.pi / (abs(speed) * float(gearset.waves.base_orders[base]))
+    period = 2.0 * np.pi / (abs(speed) * float(model.waves.base_orders[base]))
     values = system.eigenvalues(speed)
     kicks = max(kicks_needed(float(np.abs(values).max()) / 2.0 / np.pi, period), least)
     varying = balance.tangents_along(readings, base, kicks)
     lower = np.linalg.solve(system.mass, np.hstack([-system.stiffness_at(speed), -system.damping_at(speed)]))
     pushes = np.vstack(
-        [np.zeros((size, varying.shape[1])), np.linalg.solve(system.mass, gearset.loads(ports))],
+        [np.zeros((size, varying.shape[1])), np.linalg.solve(system.mass, model.loads(ports))],
     )
     rows = ports.readings.reshape(-1, size)
     # Rates of the waves as their meshes see them: those in the frame, and what the turning carries along.
-    carried = speed * np.tensordot(gearset.partners, ports.readings, axes=1).reshape(-1, size)
+    carried = speed * np.tensordot(model.partners, ports.readings, axes=1).reshape(-1, size)
     by_rates = np.zeros_like(rows) if ports.rates is None else ports.rates.reshape(-1, size)
     reads = np.block([[rows, by_rates], [carried, rows]])
     # Meshes of other bases do not vary: they belong to the constant part. Bearings do with all bases.
-    own = np.ones(len(gearset.weights), dtype=bool)
-    own[: len(gearset.waves.waves)] = [wave.base == base for wave in gearset.waves.waves]
+    own = np.ones(len(model.weights), dtype=bool)
+    own[: len(model.waves.waves)] = [wave.base == base for wave in model.waves.waves]
     pushed = np.repeat(own, ports.forces.shape[1])
     read = np.tile(np.repeat(own, ports.readings.shape[1]), 2)
     constant = np.vstack([np.eye(size, 2 * size, size), lower])
@@ -590,7 +588,7 @@ def growth_at(balance: HarmonicResidual, readings: Complexes, base: int, least: 
     reads = reads[read]
     found, shapes = exponents(constant, pushes, reads, varying, period)
     # Free rolling neither grows nor decays but for what the losses change with the speed: it is known by its shape.
-    assembly = gearset.waves.assembly
+    assembly = model.waves.assembly
     turning = assembly.rolling_velocity(np.zeros(assembly.size), system.frame.speeds)
     along = system.mass @ np.linalg.solve(system.frame.matrices(0.0)[0], turning)
     moved = shapes[:size]
@@ -605,17 +603,17 @@ def growth_of_state(balance: HarmonicResidual, readings: Complexes, parted: bool
     Parameters as of `growth_at`; `parted` is True with contact loss. NaN where planets mesh out of phase: the carrier's
     angle is then an excitation in addition to the mesh cycle.
     """
-    if balance.gearset.waves.carriers:
+    if balance.model.waves.carriers:
         return math.nan
     least = PARTING_KICKS if parted else SMOOTH_KICKS
-    return max(growth_at(balance, readings, base, least) for base in range(len(balance.gearset.waves.base_orders)))
+    return max(growth_at(balance, readings, base, least) for base in range(len(balance.model.waves.base_orders)))
 
 
-def mean_growth(gearset: HarmonicBalanceModel) -> float:
+def mean_growth(model: HarmonicBalanceModel) -> float:
     """Largest growth rate of the averaged system over its speeds, 1/s; free rotation excluded."""
     rates = []
-    for speed in gearset.system.speeds:
-        values = gearset.system.eigenvalues(float(speed))
+    for speed in model.system.speeds:
+        values = model.system.eigenvalues(float(speed))
         elastic = np.abs(values.imag) > 2.0 * np.pi * RIGID_BODY_LIMIT
         rates.append(float(values.real[elastic].max(initial=-np.inf)))
     return max(rates)

@@ -32,7 +32,7 @@ from exugear.steady.nonlinear import (
     solve_balance,
 )
 from exugear.steady.response import Response, linear_response, parametric_response, signals, transmission_errors
-from exugear.steady.settings import SteadySettings
+from exugear.steady.settings import Method
 from exugear.steady.settling import SettlingRun, SettlingSegment, cannot_settle
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -70,7 +70,7 @@ PERTURBATION = 1.02
 """Factor on the motion of an unstable state from which a run begins."""
 
 
-def gearset_of(
+def harmonic_balance_model(
     assembly: Assembly, speeds: Floats, harmonics: int | None = None, combinations: int = 3
 ) -> HarmonicBalanceModel:
     """Build the model of an assembly for input speeds (rad/s), orders as in `SteadySettings`; linear bearings.
@@ -86,7 +86,7 @@ def gearset_of(
 class ContactLossState:
     """A steady state of a gearbox, contact loss included."""
 
-    gearset: HarmonicBalanceModel
+    model: HarmonicBalanceModel
     """With the lines that it took."""
     readings: Complexes
     """(n, m, r) what the laws read."""
@@ -98,56 +98,58 @@ class ContactLossState:
     averaged: ContactLossState | None = None
     """The state with planets averaged over a revolution of the carrier, where this one has sidebands of it."""
 
-    def on(self, gearset: HarmonicBalanceModel, interface: Interface | None = None) -> ContactLossState:
-        """Return the state in the lines of another gearset, which are some of its own."""
-        if gearset is self.gearset:
+    def on(self, model: HarmonicBalanceModel, interface: Interface | None = None) -> ContactLossState:
+        """Return the state in the lines of another model, which are some of its own."""
+        if model is self.model:
             return self
         old = self.response
-        at = gearset.places_in(self.gearset)
+        at = model.places_in(self.model)
         response = replace(
             old,
-            interface=interface or gearset.at(old.interface.speed),
+            interface=interface or model.at(old.interface.speed),
             deflection=old.deflection[at],
             excess=old.excess[at],
             force=old.force[at],
             apart=old.apart[at[1]] if len(at) > 1 else old.apart,
         )
-        return replace(self, gearset=gearset, readings=self.readings[at], response=response)
+        return replace(self, model=model, readings=self.readings[at], response=response)
 
 
 class PointSolver:
-    """Solves one speed after the other; at the level `nonlinear` each starts from the one before.
+    """Solves one speed after the other; with the method `nonlinear`, each starts from the one before.
 
     Parameters
     ----------
-    gearset : with linear bearings; the level `nonlinear` takes them by their laws
+    model : with linear bearings; the method `nonlinear` replaces those with rolling elements by their models
+    method : as in `exugear.steady.settings.SteadySettings`
     """
 
-    def __init__(self, gearset: HarmonicBalanceModel, settings: SteadySettings) -> None:
-        self.linear, self._level = gearset, settings.method
-        self.gearset = gearset.with_bearings if settings.method == "nonlinear" else gearset
+    def __init__(self, model: HarmonicBalanceModel, method: Method) -> None:
+        self.linear = model
+        self.method = method
+        self.model = model.with_bearings if method == "nonlinear" else model
         self._last: Complexes | None = None
         self.state: ContactLossState | None = None
 
     @property
-    def lattice(self) -> TorusSampling:
-        """Samples of the level `nonlinear`."""
-        return self.gearset.lattice
+    def sampling(self) -> TorusSampling:
+        """Samples of the method `nonlinear`."""
+        return self.model.sampling
 
     def forcing(self, interface: Interface) -> Complexes:
         """Find the forces of the meshes (lines, m, f) that vary in the static state, N, bearings being linear."""
-        if not self.linear.parting:
+        if not self.linear.loses_contact:
             return transmission_errors(self.linear, interface.ports, interface.speed)
-        balance = HarmonicResidual(self.linear, interface, self.linear.lattice)
+        balance = HarmonicResidual(self.linear, interface, self.linear.sampling)
         return balance.forces(balance.static)[0]
 
     def growth(self, low: float, high: float) -> float:
         """Fastest growth of a disturbance between two speeds of the input (rad/s), 1/s."""
-        gearset = self.linear
-        found = [mean_growth(gearset)]
-        unknown = gearset.parting or gearset.waves.carriers
-        for candidate in () if unknown else candidates(gearset, low, high)[:CHECKED]:
-            balance = HarmonicResidual(gearset, gearset.at(candidate.speed), gearset.lattice)
+        model = self.linear
+        found = [mean_growth(model)]
+        unknown = model.loses_contact or model.waves.carriers
+        for candidate in () if unknown else candidates(model, low, high)[:CHECKED]:
+            balance = HarmonicResidual(model, model.at(candidate.speed), model.sampling)
             found.append(growth_at(balance, balance.static, candidate.base))
         return max(found)
 
@@ -159,59 +161,59 @@ class PointSolver:
         HarmonicBalanceError
             No steady state was found.
         """
-        interface = self.gearset.at(speed)
-        if self._level == "linear":
-            return linear_response(self.gearset, interface)
-        if self._level == "parametric":
-            return parametric_response(self.gearset, interface)
-        if self.gearset.bent:
-            self.state = _with_passing(self._parting(speed))
-            return self.state.on(self.gearset, interface).response
+        interface = self.model.at(speed)
+        if self.method == "linear":
+            return linear_response(self.model, interface)
+        if self.method == "parametric":
+            return parametric_response(self.model, interface)
+        if self.model.is_nonlinear:
+            self.state = _with_passing(self._with_contact_loss(speed))
+            return self.state.on(self.model, interface).response
         return self._settle_in_time(interface)
 
     @property
-    def branch_gearset(self) -> HarmonicBalanceModel:
+    def continuation_model(self) -> HarmonicBalanceModel:
         """HarmonicBalanceModel with the orders of a continuation: twice the harmonics with contact loss."""
-        if self.gearset.bent:
-            return self.gearset.finer
-        return self.gearset
+        if self.model.is_nonlinear:
+            return self.model.finer
+        return self.model
 
     def readings(self, speed: float) -> Complexes:
         """Return the inputs of the mesh models (n, m, r) at an input speed (rad/s), in the orders of a continuation."""
-        if self.gearset.bent:
-            state = self._parting(speed)
-            return readings_in(state.gearset, state.readings, self.branch_gearset)
-        self._settle_in_time(self.gearset.at(speed))
+        if self.model.is_nonlinear:
+            state = self._with_contact_loss(speed)
+            return readings_in(state.model, state.readings, self.continuation_model)
+        self._settle_in_time(self.model.at(speed))
         assert self._last is not None
         return self._last
 
     def response_to(self, readings: Complexes, speed: float) -> Response:
         """Response at an input speed (rad/s) for known inputs of the mesh models (n, m, r), on a continuation."""
-        gearset = self.branch_gearset
-        interface = self.gearset.at(speed)
-        own = gearset.at(speed) if gearset is not self.gearset else interface
-        response = response_of_readings(HarmonicResidual(gearset, own, gearset.lattice), readings)
-        if gearset is self.gearset:
+        model = self.continuation_model
+        interface = self.model.at(speed)
+        own = model.at(speed) if model is not self.model else interface
+        response = response_of_readings(HarmonicResidual(model, own, model.sampling), readings)
+        if model is self.model:
             return response
-        return ContactLossState(gearset, readings, response, np.nan).on(self.gearset, interface).response
+        return ContactLossState(model, readings, response, np.nan).on(self.model, interface).response
 
     def _settle_in_time(self, interface: Interface) -> Response:
         try:
-            found, self._last = nonlinear_response(self.gearset, interface, self.lattice, self._last)
+            found, self._last = nonlinear_response(self.model, interface, self.sampling, self._last)
         except HarmonicBalanceError:
             if self._last is None:
                 raise
-            found, self._last = nonlinear_response(self.gearset, interface, self.lattice)
+            found, self._last = nonlinear_response(self.model, interface, self.sampling)
         return found
 
-    def _parting(self, speed: float) -> ContactLossState:
+    def _with_contact_loss(self, speed: float) -> ContactLossState:
         """Find the state at a speed: that near the last one if it is stable, else where a run in time settles."""
         last = self._last_averaged
         found = None
         reason = ""
         try:
-            gearset, readings = _thinned(last, self.gearset) if last else (self.gearset, None)
-            found = _refined(gearset, speed, readings)
+            model, readings = _thinned(last, self.model) if last else (self.model, None)
+            found = _refined(model, speed, readings)
         except HarmonicBalanceError as error:
             reason = str(error)
             found = self._from_rest(speed)
@@ -227,10 +229,10 @@ class PointSolver:
         simulation has to show which state the gearbox reaches.
         """
         last = self.state
-        if self.gearset.bearings is None or last is None or _parted(last.response):
+        if self.model.bearings is None or last is None or _parted(last.response):
             return None
         with suppress(HarmonicBalanceError):
-            return _refined(self.gearset, speed, None)
+            return _refined(self.model, speed, None)
         return None
 
     @property
@@ -243,22 +245,22 @@ class PointSolver:
     def _settled(self, speed: float, unstable: ContactLossState | None, reason: str) -> ContactLossState:
         """Find the state to which a run in time settles that begins at the last one, or at an unstable one."""
         begin = unstable or self._last_averaged
-        gearset = begin.gearset if begin else self.gearset
-        interface = gearset.at(speed)
-        verdict = cannot_settle(gearset.system)
+        model = begin.model if begin else self.model
+        interface = model.at(speed)
+        verdict = cannot_settle(model.system)
         if not verdict:
-            motion = np.zeros((len(gearset.lines.orders), gearset.system.size), dtype=complex)
+            motion = np.zeros((len(model.lines.orders), model.system.size), dtype=complex)
             if begin is not None:
                 motion = PERTURBATION * begin.response.motion
             rows = interface.ports.readings[:, DEFLECTION]
-            run = SettlingRun(gearset.system, gearset.lines, rows, gearset.waves.base_orders, speed, motion)
+            run = SettlingRun(model.system, model.lines, rows, model.waves.base_orders, speed, motion)
             for _ in range(LEGS):
                 leg = run.leg()
                 if leg is None:
                     verdict = "the motion in time is not finite"
                     break
                 verdict = leg.verdict
-                found = _state_near(gearset, interface, leg)
+                found = _state_near(model, interface, leg)
                 if found is not None and not self._grows(found):
                     return found
                 unstable = found or unstable
@@ -269,7 +271,7 @@ class PointSolver:
 
     def _grows(self, state: ContactLossState) -> bool:
         """Return whether a disturbance of a state grows within a time simulation."""
-        slowest = abs(state.response.interface.speed) * float(self.gearset.waves.base_orders.min())
+        slowest = abs(state.response.interface.speed) * float(self.model.waves.base_orders.min())
         return state.growth * 2.0 * np.pi / slowest > GROWING
 
 
@@ -279,33 +281,33 @@ def _with_passing(state: ContactLossState) -> ContactLossState:
     speed = state.response.interface.speed
     size = float(np.linalg.norm(state.readings[1:, :, DEFLECTION]))
     for _ in range(MOST_SIDEBANDS):
-        gearset = found.gearset.passing(np.linalg.norm(found.readings[..., DEFLECTION], axis=1) > SIDEBAND_TOL * size)
-        if gearset is None:
+        model = found.model.passing(np.linalg.norm(found.readings[..., DEFLECTION], axis=1) > SIDEBAND_TOL * size)
+        if model is None:
             break
-        balance = HarmonicResidual(gearset, gearset.at(speed), gearset.lattice)
-        start = readings_in(found.gearset, found.readings, gearset)
-        known = found.gearset.places_in(gearset)[0].ravel()
+        balance = HarmonicResidual(model, model.at(speed), model.sampling)
+        start = readings_in(found.model, found.readings, model)
+        known = found.model.places_in(model)[0].ravel()
         new = np.linalg.norm(balance.missing(start)[..., DEFLECTION], axis=1)
         new[known] = 0.0
         wanted = largest(new, SIDEBAND_TOL * size)
         if not wanted.any() or (found is state and float(np.linalg.norm(new)) < UNEQUAL * size):
             break
         wanted[known] = True
-        gearset = gearset.of(wanted)
-        balance = HarmonicResidual(gearset, gearset.at(speed), gearset.lattice)
-        start = readings_in(found.gearset, found.readings, gearset)
+        model = model.of(wanted)
+        balance = HarmonicResidual(model, model.at(speed), model.sampling)
+        start = readings_in(found.model, found.readings, model)
         enough = SIDEBAND_RESIDUAL * size / float(np.linalg.norm(balance.static[..., DEFLECTION]))
         try:
             readings, products = solve_balance(balance, start, enough)
         except HarmonicBalanceError:
             return _remarked(state, "passing planets add orders, but no solution including them was found")
         response = response_of_readings(balance, readings, found.response.products + products)
-        found = replace(state, gearset=gearset, readings=readings, response=response, averaged=state)
+        found = replace(state, model=model, readings=readings, response=response, averaged=state)
     if found is state:
         return state
-    overall = np.abs(signals(found.gearset, found.response)[1:, 0])
-    bases = len(found.gearset.waves.base_orders)
-    share = float(np.linalg.norm(overall[found.gearset.lines.index[1:, bases:].any(axis=1)]) / np.linalg.norm(overall))
+    overall = np.abs(signals(found.model, found.response)[1:, 0])
+    bases = len(found.model.waves.base_orders)
+    share = float(np.linalg.norm(overall[found.model.lines.index[1:, bases:].any(axis=1)]) / np.linalg.norm(overall))
     if share < SIDEBAND_WARNING:
         return found
     return _remarked(
@@ -317,18 +319,18 @@ def _remarked(state: ContactLossState, remark: str) -> ContactLossState:
     return replace(state, remark="; ".join(filter(None, (state.remark, remark))))
 
 
-def _state_near(gearset: HarmonicBalanceModel, interface: Interface, leg: SettlingSegment) -> ContactLossState | None:
+def _state_near(model: HarmonicBalanceModel, interface: Interface, leg: SettlingSegment) -> ContactLossState | None:
     """Find the state near what a run in time settled to."""
     ports = interface.ports
     moved = leg.motion.copy()
-    moved[0] -= gearset.system.static_at(interface.speed)
+    moved[0] -= model.system.static_at(interface.speed)
     readings = interface.read(moved)
     readings[0] += ports.static
     try:
-        found = _refined(gearset, interface.speed, readings)
+        found = _refined(model, interface.speed, readings)
     except HarmonicBalanceError:
         return None
-    own = found.on(gearset)
+    own = found.on(model)
     # Phases hang on the last of the damping, to which the drive of the run adds.
     difference = np.linalg.norm((np.abs(own.readings) - np.abs(readings))[1:, :, DEFLECTION])
     if difference < SAME_STATE_TOL * np.linalg.norm(readings[1:, :, DEFLECTION]):
@@ -336,9 +338,9 @@ def _state_near(gearset: HarmonicBalanceModel, interface: Interface, leg: Settli
     return None
 
 
-def _refined(gearset: HarmonicBalanceModel, speed: float, start: Complexes | None) -> ContactLossState:
+def _refined(model: HarmonicBalanceModel, speed: float, start: Complexes | None) -> ContactLossState:
     """Solve at a speed, from given readings or the static state, with those lines more that it lacks."""
-    balance = HarmonicResidual(gearset, gearset.at(speed), gearset.lattice)
+    balance = HarmonicResidual(model, model.at(speed), model.sampling)
     readings = balance.static if start is None else start
     products = 0
     for _ in range(MOST_REFINED):
@@ -349,9 +351,9 @@ def _refined(gearset: HarmonicBalanceModel, speed: float, start: Complexes | Non
             break
         # Kinks where something parts reach farther than any smooth law does.
         kinks = _parted(response_of_readings(balance, readings))
-        before = balance.gearset
-        lines = balance.gearset.with_lines(joined(balance.gearset.lines, lacking), kinks)
-        balance = HarmonicResidual(lines, lines.at(speed), lines.lattice)
+        before = balance.model
+        lines = balance.model.with_lines(joined(balance.model.lines, lacking), kinks)
+        balance = HarmonicResidual(lines, lines.at(speed), lines.sampling)
         readings = readings_in(before, readings, lines)
     readings, took = solve_balance(balance, readings)
     products += took
@@ -360,7 +362,7 @@ def _refined(gearset: HarmonicBalanceModel, speed: float, start: Complexes | Non
         balance, readings, took = _without_aliases(balance, readings)
         response = response_of_readings(balance, readings, products + took)
     growth = growth_of_state(balance, readings, _parted(response))
-    return ContactLossState(balance.gearset, readings, response, growth)
+    return ContactLossState(balance.model, readings, response, growth)
 
 
 def _parted(response: Response) -> bool:
@@ -373,8 +375,8 @@ def _without_aliases(balance: HarmonicResidual, readings: Complexes) -> tuple[Ha
     size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
     products = 0
     for _ in range(MOST_DENSER):
-        denser = balance.gearset.denser
-        ahead = HarmonicResidual(denser, balance.interface, denser.lattice)
+        denser = balance.model.denser
+        ahead = HarmonicResidual(denser, balance.interface, denser.sampling)
         if float(np.linalg.norm(ahead.missing(readings)[..., DEFLECTION])) < ALIASED * size:
             break
         balance = ahead
@@ -388,14 +390,14 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
 
     Their forces are those on the samples that the state has; what each line answers by itself is taken for its size.
     """
-    whole = balance.gearset.whole
+    whole = balance.model.whole
     size = float(np.linalg.norm(readings[1:, :, DEFLECTION]))
-    ahead = HarmonicResidual(whole, whole.at(balance.interface.speed), whole.lattice)
-    start = readings_in(balance.gearset, readings, whole)
+    ahead = HarmonicResidual(whole, whole.at(balance.interface.speed), whole.sampling)
+    start = readings_in(balance.model, readings, whole)
     excess, tangent, _ = ahead.forces(start)
     missing = tangent.alone(ahead.answer(excess) + ahead.static - start)
     new = np.linalg.norm(missing[..., DEFLECTION], axis=1)
-    new[balance.gearset.places_in(whole)[0]] = 0.0
+    new[balance.model.places_in(whole)[0]] = 0.0
     wanted = largest(new, LEFT_OUT * size)
     if wanted.any():
         return whole.lines.part(wanted)
@@ -405,20 +407,20 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
 def _thinned(state: ContactLossState, usual: HarmonicBalanceModel) -> tuple[HarmonicBalanceModel, Complexes]:
     """Orders of a state, without negligible ones beyond the usual orders, and its readings in them."""
     sizes = np.linalg.norm(state.readings[..., DEFLECTION], axis=1)
-    needed = np.isin(np.arange(len(sizes)), usual.places_in(state.gearset)[0])
+    needed = np.isin(np.arange(len(sizes)), usual.places_in(state.model)[0])
     sizes[needed] = 0.0
     kept = needed | largest(sizes, DROP_LINE_TOL * float(np.linalg.norm(state.readings[1:, :, DEFLECTION])))
-    gearset = state.gearset
+    model = state.model
     if kept.all():
-        return gearset, state.readings
-    thinner = gearset.with_lines(gearset.lines.part(kept), _parted(state.response))
-    return thinner, readings_in(gearset, state.readings, thinner)
+        return model, state.readings
+    thinner = model.with_lines(model.lines.part(kept), _parted(state.response))
+    return thinner, readings_in(model, state.readings, thinner)
 
 
-def readings_in(gearset: HarmonicBalanceModel, readings: Complexes, other: HarmonicBalanceModel) -> Complexes:
-    """Enter readings (n, m, r) in the lines of another gearset; what only one of both has is left out."""
+def readings_in(model: HarmonicBalanceModel, readings: Complexes, other: HarmonicBalanceModel) -> Complexes:
+    """Enter readings (n, m, r) in the lines of another model; what only one of both has is left out."""
     found = np.zeros((len(other.lines.orders), *other.lengths.shape), dtype=complex)
-    places = gearset.places_in(other)
+    places = model.places_in(other)
     there = places[0].ravel() >= 0
     found[(places[0][there], *places[1:])] = readings[there]
     return found

@@ -56,50 +56,54 @@ class Response:
         """Coefficients (n, size) of the motion about the static state, in the rotating frame."""
         lines, size = self.interface.motion.shape[:2]
         found = self.interface.motion.reshape(lines, size, -1) @ self.excess.reshape(lines, -1, 1)
-        return np.asarray(-found[..., 0])
+        friction = self.interface.friction
+        if friction is None:
+            return np.asarray(-found[..., 0])
+        return np.asarray(friction.motion - found[..., 0])
 
     @property
     def torque(self) -> float:
         """Mean torque of the drive that keeps the speed, N m."""
-        return self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
+        torque = self.interface.torque - float(np.sum(self.interface.torque_per_force * self.excess[0].real))
+        if self.interface.friction is None:
+            return torque
+        return torque + self.interface.friction.torque
 
 
-def linear_response(gearset: HarmonicBalanceModel, interface: Interface) -> Response:
+def linear_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
     """Compute the response to static transmission errors as given displacements, first order in stiffness variation.
 
     F = -k_mean e with e = s - mean of s, the transmission error under the static force F_0; of a curve k_mean is the
     mean of the tangent. Where the load shuttles by w, s contains w (g - g0), and F_0 w is a moment.
     """
-    static = interface.ports.static[:, DEFLECTION]
-    excess = transmission_errors(gearset, interface.ports, interface.speed)
-    deflection = _answer(interface, excess)[..., DEFLECTION]
-    deflection[0] += static
-    return _response(gearset, interface, deflection, excess, 0)
+    excess = transmission_errors(model, interface.ports, interface.speed)
+    deflection = interface.static[..., DEFLECTION] + _answer(interface, excess)[..., DEFLECTION]
+    return _response(model, interface, deflection, excess, 0)
 
 
-def transmission_errors(gearset: HarmonicBalanceModel, ports: MeshInterface, speed: float) -> Complexes:
+def transmission_errors(model: HarmonicBalanceModel, ports: MeshInterface, speed: float) -> Complexes:
     """Find the forces (n, m, f) that static transmission errors make of the mean stiffness, and moments, N and N m."""
-    mean = gearset.waves.mean_stiffness[:, None]
-    compliances, ways = (_varying(own) for own in (gearset.cycle_compliances, gearset.cycle_ways))
+    mean = model.waves.mean_stiffness[:, None]
+    compliances, ways = (_varying(own) for own in (model.cycle_compliances, model.cycle_ways))
     spectra = {(DEFLECTION, DEFLECTION): -mean * compliances}
     # What the errors go with: force, and misalignment.
-    static = np.zeros((len(gearset.lines.index), *ports.forces.shape[:2]), dtype=complex)
-    static[0, :, DEFLECTION] = mean[:, 0] * gearset.pressed(ports.static)
-    if gearset.wander:
+    static = np.zeros((len(model.lines.index), *ports.forces.shape[:2]), dtype=complex)
+    static[0, :, DEFLECTION] = mean[:, 0] * model.pressed(ports.static)
+    if model.shuttles:
         static[0, :, MISALIGNMENT] = ports.static[: len(mean), MISALIGNMENT]
         spectra |= {(DEFLECTION, MISALIGNMENT): -mean * ways, (MISALIGNMENT, DEFLECTION): -ways}
-    found = _products(gearset, spectra, ports, speed, static)
-    if gearset.wander:
-        beyond = {(MISALIGNMENT, DEFLECTION): -_varying(gearset.cycle_moments_beyond)}
-        found += _products(gearset, beyond, ports, speed, _everywhere(gearset, found.shape))
+    found = _products(model, spectra, ports, speed, static)
+    if model.shuttles:
+        beyond = {(MISALIGNMENT, DEFLECTION): -_varying(model.cycle_moments_beyond)}
+        found += _products(model, beyond, ports, speed, _everywhere(model, found.shape))
     found[0] = 0.0
     return found
 
 
-def _everywhere(gearset: HarmonicBalanceModel, shape: tuple[int, ...]) -> Complexes:
+def _everywhere(model: HarmonicBalanceModel, shape: tuple[int, ...]) -> Complexes:
     """Values (n, m, f) of one at all times in all places: what these have alike is what the mean wave has."""
     ones = np.zeros(shape, dtype=complex)
-    ones[0, :, DEFLECTION] = [wave.wave == 0 for wave in gearset.waves.waves]
+    ones[0, :, DEFLECTION] = [wave.wave == 0 for wave in model.waves.waves]
     return ones
 
 
@@ -109,23 +113,23 @@ def _varying(cycle: Complexes) -> Complexes:
 
 
 def _products(
-    gearset: HarmonicBalanceModel, spectra: Spectra, ports: MeshInterface, speed: float, values: Complexes
+    model: HarmonicBalanceModel, spectra: Spectra, ports: MeshInterface, speed: float, values: Complexes
 ) -> Complexes:
     """Products (n, m, f) of values (n, m, f) with functions of the mesh cycles."""
-    functions = gearset.coupled(spectra, ports, speed)
-    return gearset.coupling.of(functions, values.reshape(len(values), -1)).reshape(values.shape)
+    functions = model.coupled(spectra, ports, speed)
+    return model.coupling.of(functions, values.reshape(len(values), -1)).reshape(values.shape)
 
 
-def parametric_response(gearset: HarmonicBalanceModel, interface: Interface) -> Response:
+def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Response:
     """Response to stiffness that varies with the position in the mesh cycle, this moving with the mean speed alone.
 
     The equations y = y_static - G (K y - given) of all lines are solved with readings as lengths, l y.
     """
-    shape = len(gearset.lines.index), *interface.ports.forces.shape[:2]
-    functions = _slopes_beyond_mean(gearset, interface)
-    lengths = gearset.lengths[: shape[1], : shape[2]].ravel()
+    shape = len(model.lines.index), *interface.ports.forces.shape[:2]
+    functions = _slopes_beyond_mean(model, interface)
+    lengths = model.lengths[: shape[1], : shape[2]].ravel()
     answers = lengths[:, None] * interface.along_forces
-    coupling = gearset.coupling
+    coupling = model.coupling
     scaled = [
         function / _group_values(lengths, group) for function, group in zip(functions, coupling.groups, strict=True)
     ]
@@ -138,22 +142,22 @@ def parametric_response(gearset: HarmonicBalanceModel, interface: Interface) -> 
         add_answered(cached_struct(coupling.terms), *parts, readings, *memory, octets, out)
         return out
 
-    given = given_forces(gearset, interface).reshape(shape[0], -1)
+    given = given_forces(model, interface).reshape(shape[0], -1)
     start = -(answers @ given[..., None])[..., 0]
-    start[0] += lengths * interface.ports.static[:, : shape[2]].ravel()
+    start += lengths * interface.static[..., : shape[2]].reshape(shape[0], -1)
     found, products = solve_lines(apply, start, TOLERANCE)
     excess = (given + coupling.of(scaled, found)).reshape(shape)
-    return _response(gearset, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
+    return _response(model, interface, (found / lengths).reshape(shape)[..., DEFLECTION], excess, products)
 
 
-def _slopes_beyond_mean(gearset: HarmonicBalanceModel, interface: Interface) -> list[Complexes]:
+def _slopes_beyond_mean(model: HarmonicBalanceModel, interface: Interface) -> list[Complexes]:
     """Return the slopes of the forces along a row beyond the averaged system, like `HarmonicBalanceModel.coupled`."""
-    functions = gearset.coupled(gearset.cycle_tangents, interface.ports, interface.speed)
+    functions = model.coupled(model.cycle_tangents, interface.ports, interface.speed)
     forces = interface.ports.forces.shape[1]
-    for group, function in zip(gearset.coupling.groups, functions, strict=True):
+    for group, function in zip(model.coupling.groups, functions, strict=True):
         mean = np.flatnonzero(~group.harmonics.any(axis=1))[0]
         at = np.arange(DEFLECTION, group.size, forces)
-        function[mean, at, at] -= gearset.waves.mean_stiffness[(group.begin + at) // forces]
+        function[mean, at, at] -= model.waves.mean_stiffness[(group.begin + at) // forces]
     return functions
 
 
@@ -162,17 +166,17 @@ def _group_values(values: Floats, group: Group) -> Floats:
     return values[group.begin : group.begin + group.size]
 
 
-def given_forces(gearset: HarmonicBalanceModel, interface: Interface) -> Complexes:
+def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
     """Return the forces (n, m, f) of tangents at zero deflection in addition to the averaged system: of curves only."""
-    waves = gearset.waves
+    waves = model.waves
     ports = interface.ports
-    shape = len(gearset.lines.index), *ports.forces.shape[:2]
-    if not (waves.loads.any() or gearset.wander):
+    shape = len(model.lines.index), *ports.forces.shape[:2]
+    if not (waves.loads.any() or model.shuttles):
         return np.zeros(shape, dtype=complex)
-    spectra = {(DEFLECTION, DEFLECTION): -gearset.cycle_pulls}
-    if gearset.wander:
-        spectra[MISALIGNMENT, DEFLECTION] = gearset.cycle_moments[1] - gearset.cycle_moments_beyond
-    products = _products(gearset, spectra, ports, interface.speed, _everywhere(gearset, shape))
+    spectra = {(DEFLECTION, DEFLECTION): -model.cycle_pulls}
+    if model.shuttles:
+        spectra[MISALIGNMENT, DEFLECTION] = model.cycle_moments[1] - model.cycle_moments_beyond
+    products = _products(model, spectra, ports, interface.speed, _everywhere(model, shape))
     products[0, :, DEFLECTION] += waves.mean_stiffness * waves.rest
     return products
 
@@ -185,33 +189,33 @@ def _answer(interface: Interface, excess: Complexes) -> Complexes:
 
 
 def _response(
-    gearset: HarmonicBalanceModel, interface: Interface, deflection: Complexes, excess: Complexes, products: int
+    model: HarmonicBalanceModel, interface: Interface, deflection: Complexes, excess: Complexes, products: int
 ) -> Response:
     """Complete a response with the whole forces of its meshes, those of mean stiffness and damping among them."""
-    waves = gearset.waves
-    rates = rates_of(gearset, interface, deflection)
+    waves = model.waves
+    rates = rates_of(model, interface, deflection)
     force = excess[..., DEFLECTION] + waves.mean_stiffness * deflection + waves.damping * rates
     force[0] -= waves.mean_stiffness * waves.rest
     force *= waves.line_of_action
     return Response(interface, deflection, excess, force, products, np.zeros(len(waves.waves)), np.zeros(0))
 
 
-def rates_of(gearset: HarmonicBalanceModel, interface: Interface, values: Complexes) -> Complexes:
+def rates_of(model: HarmonicBalanceModel, interface: Interface, values: Complexes) -> Complexes:
     """Rates (n, m, ...) of what meshes read (n, m, ...), as the meshes see it that travel through the waves."""
     frequencies = interface.frequencies.reshape(-1, *(1,) * (values.ndim - 1))
-    partners = gearset.partners[: values.shape[1], : values.shape[1]]
+    partners = model.partners[: values.shape[1], : values.shape[1]]
     carried = np.moveaxis(np.tensordot(partners, values, axes=(1, 1)), 0, 1)
     return np.asarray(1j * frequencies * values + interface.speed * carried)
 
 
-def signals(gearset: HarmonicBalanceModel, response: Response) -> Complexes:
+def signals(model: HarmonicBalanceModel, response: Response) -> Complexes:
     """Coefficients (n, signals) of all signals of a response, in the order of `HarmonicBalanceModel.signal_names`."""
     interface = response.interface
     of_motion = interface.rows.of(response.motion, interface.frequencies)
     # Rows have the bearings of the mean system; what non-linear ones have beyond it acts on their bodies, too.
-    if gearset.bearings is not None:
-        beyond = response.excess[:, len(gearset.waves.waves) :, : gearset.bearing_signals.shape[1]]
-        of_motion[:, gearset.bearing_signals] -= beyond
+    if model.bearings is not None:
+        beyond = response.excess[:, len(model.waves.waves) :, : model.bearing_signals.shape[1]]
+        of_motion[:, model.bearing_signals] -= beyond
     levers = interface.ports.levers
     deflection = response.deflection
     if levers.any():
@@ -220,7 +224,7 @@ def signals(gearset: HarmonicBalanceModel, response: Response) -> Complexes:
     return np.concatenate([of_motion, deflection, response.force], axis=1)
 
 
-def dissipated_and_given(gearset: HarmonicBalanceModel, response: Response) -> tuple[float, float]:
+def dissipated_and_given(model: HarmonicBalanceModel, response: Response) -> tuple[float, float]:
     """Return mean power dissipated by damping, and mean power supplied by the varying meshes, W.
 
     Both are equal in a steady state.
@@ -229,13 +233,16 @@ def dissipated_and_given(gearset: HarmonicBalanceModel, response: Response) -> t
     motion = response.motion
     w = interface.frequencies[1:, None]
     moving = motion[1:]
-    damping = gearset.system.damping_at(interface.speed)
-    stiffness = gearset.system.stiffness_at(interface.speed)
+    damping = model.system.damping_at(interface.speed)
+    stiffness = model.system.stiffness_at(interface.speed)
     rates = 1j * w * moving
     # A stiffness that is not symmetric takes power, too. Matrices are real: so are the products with both parts.
     places = np.concatenate([moving.real, moving.imag])
     speeds = np.concatenate([rates.real, rates.imag])
     taken = 2.0 * float(np.sum(speeds * (speeds @ damping.T + places @ stiffness.T)))
     ports = interface.ports
-    along = np.tensordot(rates, ports.forces, axes=(1, 2)) * gearset.weights[:, None]
-    return taken, -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))
+    along = np.tensordot(rates, ports.forces, axes=(1, 2)) * model.weights[:, None]
+    given = -2.0 * float(np.sum((response.excess[1:] * along.conj()).real))
+    if interface.friction is not None:
+        given += 2.0 * float(np.sum((interface.friction.loads[1:] * rates.conj()).real))
+    return taken, given

@@ -115,16 +115,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
             {"units": "1", "long_name": "contact-loss fraction"},
         ),
     }
-    band = response.band
-    variables |= {
-        "band_point": (("peak",), band.point, {"long_name": "point of the response"}),
-        "band_line": (("peak",), band.line, {"long_name": "line of the response"}),
-        "band_amplitude": (
-            ("peak", "quantity", "damping_limit"),
-            band.amplitude,
-            {"long_name": "peak amplitude with the least and the largest plausible damping", "units": "m, N, m/s2"},
-        ),
-    }
+    variables |= response.band.variables()
     if response.bearing_names:
         words = "fraction of time in which a bearing is unloaded (no rolling element in contact)"
         variables["unloaded_fraction"] = (("point", "bearing"), solved.free, {"units": "1", "long_name": words})
@@ -134,7 +125,7 @@ def to_dataset(response: SteadyResponse) -> xr.Dataset:
         "base": np.array(response.base_names, dtype=object),
         "signal": np.array([signal.name for signal in response.signals], dtype=object),
     }
-    coordinates["quantity"] = np.array(band.quantities, dtype=object)
+    coordinates["quantity"] = np.array(response.band.quantities, dtype=object)
     if response.bearing_names:
         coordinates["bearing"] = np.array(response.bearing_names, dtype=object)
     return xr.Dataset(variables, coordinates, _attributes(response))

@@ -32,7 +32,7 @@ from exugear.steady.mean_system.mesh_places import DEFLECTION
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.mean_system.signals import Quantity, SignalName, quantities_of
 from exugear.steady.nonlinear import HarmonicResidual, Tangent, growth_of_state
-from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import Response, dissipated_and_given, signals
 from exugear.steady.settings import SteadySettings, check_law, check_speeds
 from exugear.system.system import Assembly
@@ -89,18 +89,18 @@ def follow_branch(
     SteadyError
         Planets mesh out of phase.
     """
-    gearset = solver.branch_gearset
-    if gearset.waves.carriers:
+    model = solver.continuation_model
+    if model.waves.carriers:
         raise SteadyError(
-            f"continuation: planets of {gearset.waves.carriers[0][0]} mesh out of phase, and stability is not "
+            f"continuation: planets of {model.waves.carriers[0][0]} mesh out of phase, and stability is not "
             "computed with excitation by the carrier angle; remove --continuation"
         )
 
     def balance_at(speed: float) -> HarmonicResidual:
-        return HarmonicResidual(gearset, gearset.at(speed), gearset.lattice)
+        return HarmonicResidual(model, model.at(speed), model.sampling)
 
     # The unknowns are lengths: a mesh cycle and a radian count as a base pitch.
-    lengths = gearset.lengths
+    lengths = model.lengths
 
     def residual(scaled: Complexes, speed: float) -> tuple[Complexes, Tangent]:
         balance = balance_at(speed)
@@ -127,7 +127,7 @@ def follow_branch(
     )
     readings = found.lines / lengths
     growth = [
-        growth_of_state(balance_at(float(speed)), reading, gearset.bent)
+        growth_of_state(balance_at(float(speed)), reading, model.is_nonlinear)
         for speed, reading in zip(found.parameter, readings, strict=True)
     ]
     ended = "" if found.whole else _ended(found, last)
@@ -228,7 +228,7 @@ class SteadyResponse(ReprMixin):
     """Largest relative change of the ten highest peaks with 1.5 times as many harmonics; NaN where each state has as
     many orders as it needs."""
     band: DampingBand
-    """How high the highest peaks are with the least and the largest plausible damping."""
+    """How high the highest peaks are with the lowest and the highest plausible damping."""
     campbell: Campbell
     """Modes over the speeds, up to the highest orders that `crossings` evaluates."""
 
@@ -302,32 +302,32 @@ def response_of(
     check_speeds(assembly.gearbox, settings.speeds)
     check_law(assembly.mesh_model, settings.method)
     even = settings.speeds.values
-    gearset = gearset_of(assembly, even, settings.harmonics, settings.combinations)
-    solver = PointSolver(gearset, settings)
+    model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations)
+    solver = PointSolver(model, settings.method)
     told = progress or (lambda done, total: None)
-    tracks = _tracks(gearset, even)
+    tracks = _tracks(model, even)
     operation = operating_range(assembly.gearbox)
-    looked_for = settings.at_resonances and (gearset.parting or gearset.waves.varies)
-    found = crossings(gearset, tracks, solver.forcing, operation) if looked_for else ()
+    looked_for = settings.at_resonances and (model.loses_contact or model.waves.varies)
+    found = crossings(model, tracks, solver.forcing, operation) if looked_for else ()
     folds: tuple[float, ...] = ()
     ended = ""
     if settings.branches:
         solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, told)
     else:
-        solved = _solve(solver, settings, found, looked_for, _Work(known, told, keep, keep_every))
+        solved = _solve(solver, even, found, looked_for, _Work(known, told, keep, keep_every))
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
     explained, growth, campbell = _evaluate_mean_system(solver, even, found, tracks)
     return SteadyResponse(
-        assembly=gearset.waves.assembly,
+        assembly=model.waves.assembly,
         settings=settings,
         input_hash=settings.hash_with(assembly),
-        lines=gearset.lines,
-        base_names=gearset.base_names,
-        wave_names=tuple(wave.name for wave in gearset.waves.waves),
-        signals=gearset.signal_names,
-        bearing_names=solver.gearset.bearing_names,
+        lines=model.lines,
+        base_names=model.base_names,
+        wave_names=tuple(wave.name for wave in model.waves.waves),
+        signals=model.signal_names,
+        bearing_names=solver.model.bearing_names,
         solved=solved.part(there),
         unsolved=tuple(zip(solved.speed[~there].tolist(), solved.remark[~there].tolist(), strict=True)),
         crossings=found,
@@ -335,42 +335,42 @@ def response_of(
         folds=folds,
         branch_ended=ended,
         growth_rate=float(np.fmax.reduce(solved.growth, initial=growth)),
-        planet_spread=gearset.system.planet_spread,
-        stiffness_variation=gearset.system.variation,
-        harmonics=gearset.usual_harmonics,
-        left_out=gearset.waves.left_out(gearset.usual_harmonics),
-        change_with_more=_change_with_more(solver, settings, solved.part(there)),
-        band=_band(solver, settings, solved.part(there)),
+        planet_spread=model.system.planet_spread,
+        stiffness_variation=model.system.variation,
+        harmonics=model.usual_harmonics,
+        left_out=model.waves.left_out(model.usual_harmonics),
+        change_with_more=math.nan if settings.branches else _change_with_more(solver, solved.part(there)),
+        band=_band(solver, solved.part(there)),
         campbell=campbell,
     )
 
 
-def _band(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints) -> DampingBand:
+def _band(solver: PointSolver, solved: SolvedPoints) -> DampingBand:
     """Find how high the highest peaks are over the range of damping, where the method is linear in the deflections."""
-    gearset = solver.linear
-    if settings.method == "nonlinear" or gearset.parting:
-        return no_band(tuple(quantity.name for quantity in quantities_of([s.name for s in gearset.signal_names])))
-    return damping_band(gearset, settings.method, solved.speed, np.abs(solved.amplitude).astype(np.float64))
+    model = solver.linear
+    if solver.method == "nonlinear" or model.loses_contact:
+        return no_band(tuple(quantity.name for quantity in quantities_of([s.name for s in model.signal_names])))
+    return damping_band(model, solver.method, solved.speed, np.abs(solved.amplitude).astype(np.float64))
 
 
 def _evaluate_mean_system(
     solver: PointSolver, speeds: Floats, found: tuple[Crossing, ...], tracks: ModeTracks
 ) -> tuple[tuple[tuple[int, Contributions], ...], float, Campbell]:
     """Find what makes the lines at the strongest crossings, the fastest growth, and the Campbell diagram."""
-    gearset = solver.linear
-    explained = () if gearset.parting else _contributions(gearset, found)
-    return explained, solver.growth(float(speeds.min()), float(speeds.max())), campbell_of(gearset.system, tracks)
+    model = solver.linear
+    explained = () if model.loses_contact else _contributions(model, found)
+    return explained, solver.growth(float(speeds.min()), float(speeds.max())), campbell_of(model.system, tracks)
 
 
-def _tracks(gearset: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
+def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
     """Follow modes that a mesh or one of its harmonics may reach; of elastic bodies, those that their band holds."""
-    assembly = gearset.waves.assembly
+    assembly = model.waves.assembly
     low = float(speeds.min())
     high = float(speeds.max())
-    highest = HARMONICS * float(gearset.waves.base_orders.max()) * float(np.abs(speeds).max()) / (2.0 * np.pi)
+    highest = HARMONICS * float(model.waves.base_orders.max()) * float(np.abs(speeds).max()) / (2.0 * np.pi)
     if assembly.elastic_bodies:
         highest = min(highest, assembly.gearbox.case.elasticity.band_Hz)
-    return modes_over_speed(gearset.system, low, high, highest)
+    return modes_over_speed(model.system, low, high, highest)
 
 
 @dataclass(frozen=True)
@@ -383,32 +383,30 @@ class _Work:
     keep_every: float
 
 
-def _solve(
-    solver: PointSolver, settings: SteadySettings, found: tuple[Crossing, ...], tops: bool, work: _Work
-) -> SolvedPoints:
+def _solve(solver: PointSolver, even: Floats, found: tuple[Crossing, ...], tops: bool, work: _Work) -> SolvedPoints:
     """Solve even speeds and those of crossings, then those of tops between them if wanted; in ascending order."""
-    speeds = with_crossings(settings.speeds.values, found)
-    solved = _continued(_empty(solver.gearset, speeds), 0, lambda: solver, work)
+    speeds = with_crossings(even, found)
+    solved = _continued(_empty(solver.model, speeds), 0, lambda: solver, work)
     if tops:
-        solved = _with_tops(solver, settings, solved, work)
+        solved = _with_tops(solver, solved, work)
     return solved.part(np.argsort(solved.speed, kind="stable"))
 
 
-def _with_tops(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints, work: _Work) -> SolvedPoints:
+def _with_tops(solver: PointSolver, solved: SolvedPoints, work: _Work) -> SolvedPoints:
     """Solve at speeds where neighbours indicate peaks higher than at any known speed, until none remain.
 
     Each such state starts independently of others, so that a resumed computation gives the same results.
     """
-    quantities = quantities_of([signal_name.name for signal_name in solver.gearset.signal_names])
-    operation = operating_range(solver.gearset.waves.assembly.gearbox)
+    quantities = quantities_of([signal_name.name for signal_name in solver.model.signal_names])
+    operation = operating_range(solver.model.waves.assembly.gearbox)
     tops: KnownTops = {}
     for _ in range(ROUNDS):
         more = _missed(solved, quantities, operation, tops)
         if not more.size:
             break
         count = len(solved.speed)
-        solved = solved.joined_with(_empty(solver.gearset, more))
-        solved = _continued(solved, count, lambda: PointSolver(solver.linear, settings), work)
+        solved = solved.joined_with(_empty(solver.model, more))
+        solved = _continued(solved, count, lambda: PointSolver(solver.linear, solver.method), work)
         # A speed that nobody asked for and that has no state is none to tell of.
         told = np.isfinite(solved.drive_torque)
         told[:count] = True
@@ -427,22 +425,22 @@ def _missed(
     return missed_tops(known.speed, known.amplitude, smooth, quantities, operation, tops)
 
 
-def _change_with_more(solver: PointSolver, settings: SteadySettings, solved: SolvedPoints) -> float:
+def _change_with_more(solver: PointSolver, solved: SolvedPoints) -> float:
     """Return the largest relative change of the highest peaks of the transmission error with more harmonics."""
-    gearset = solver.gearset
-    if gearset.bent or settings.branches:
+    model = solver.model
+    if model.is_nonlinear:
         return math.nan
-    if not gearset.waves.varies:
+    if not model.waves.varies:
         return 0.0
-    other = PointSolver(solver.linear.with_harmonics(math.ceil(MORE * gearset.usual_harmonics)), settings)
+    other = PointSolver(solver.linear.with_harmonics(math.ceil(MORE * model.usual_harmonics)), solver.method)
     values: Floats = np.abs(solved.amplitude[:, :, 0].astype(np.complex128))
     found = [(point, line) for line in range(1, values.shape[1]) for point in _tops_of(values[:, line])]
     found.sort(key=lambda peak: -values[peak])
     changes = [0.0]
     for point, line in found[:CHECKED]:
-        place, _ = other.gearset.lines.find(gearset.lines.index[line])
+        place, _ = other.model.lines.find(model.lines.index[line])
         response = other.response(float(solved.speed[point]))
-        own = 2.0 * abs(complex(signals(other.gearset, response)[int(place), 0]))
+        own = 2.0 * abs(complex(signals(other.model, response)[int(place), 0]))
         changes.append(abs(own / max(float(values[point, line]), 1e-300) - 1.0))
     return max(changes)
 
@@ -462,7 +460,7 @@ def _continued(out: SolvedPoints, first: int, solver: Callable[[], PointSolver],
     if known is not None:
         count = max(first, _same_beginning(known.speed, out.speed))
         own = solver()
-        if not first and own.gearset.bent and count < len(out.speed):
+        if not first and own.model.is_nonlinear and count < len(out.speed):
             count = _count_in_contact(known, count)
             if count:
                 own.response(float(out.speed[count - 1]))
@@ -488,7 +486,7 @@ def _continued(out: SolvedPoints, first: int, solver: Callable[[], PointSolver],
 def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
     """Solve point n, or enter why it has no steady state; the others do not suffer from that."""
     try:
-        _fill(out, n, solver.gearset, solver.response(float(out.speed[n])))
+        _fill(out, n, solver.model, solver.response(float(out.speed[n])))
     except HarmonicBalanceError as error:
         for values in (out.amplitude, out.drive_torque, out.energy_error, out.apart, out.free):
             values[n] = np.nan
@@ -498,12 +496,12 @@ def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
         out.growth[n], out.remark[n] = solver.state.growth, solver.state.remark[:LONGEST_REMARK]
 
 
-def _contributions(gearset: HarmonicBalanceModel, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
+def _contributions(model: HarmonicBalanceModel, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
     """Find the contributions to the orders at the strongest crossings, each at its maximum."""
     explained = []
     for crossing in found[:EXPLAINED]:
-        speed = loudest_near(gearset, crossing.speed, 2.0 * crossing.damping, crossing.line)
-        explained.append((crossing.line, contributions(gearset, speed, crossing.line)))
+        speed = loudest_near(model, crossing.speed, 2.0 * crossing.damping, crossing.line)
+        explained.append((crossing.line, contributions(model, speed, crossing.line)))
     return tuple(explained)
 
 
@@ -519,37 +517,39 @@ def _follow_branch(
     branch = follow_branch(
         solver, first, last, lambda s: progress(int(100.0 * abs(s - first) / abs(last - first)), 100)
     )
-    out = _empty(solver.gearset, branch.speed)
+    out = _empty(solver.model, branch.speed)
     for n, (speed, readings) in enumerate(zip(branch.speed, branch.readings, strict=True)):
-        _fill(out, n, solver.gearset, solver.response_to(readings, float(speed)))
+        _fill(out, n, solver.model, solver.response_to(readings, float(speed)))
     out.growth[:] = branch.growth
     return out, branch.folds, branch.ended
 
 
-def _empty(gearset: HarmonicBalanceModel, speeds: Floats) -> SolvedPoints:
+def _empty(model: HarmonicBalanceModel, speeds: Floats) -> SolvedPoints:
     points = len(speeds)
-    shape = (points, len(gearset.lines.orders), len(gearset.signal_names))
+    shape = (points, len(model.lines.orders), len(model.signal_names))
     return SolvedPoints(
         speed=speeds,
         amplitude=np.zeros(shape, dtype=np.complex64),
         drive_torque=np.zeros(points),
         energy_error=np.zeros(points),
         products=np.zeros(points),
-        apart=np.zeros((points, len(gearset.waves.waves))),
-        free=np.zeros((points, len(gearset.bearing_names))),
+        apart=np.zeros((points, len(model.waves.waves))),
+        free=np.zeros((points, len(model.bearing_names))),
         growth=np.full(points, np.nan),
         remark=np.zeros(points, dtype=f"<U{LONGEST_REMARK}"),
     )
 
 
-def _fill(out: SolvedPoints, n: int, gearset: HarmonicBalanceModel, response: Response) -> None:
+def _fill(out: SolvedPoints, n: int, model: HarmonicBalanceModel, response: Response) -> None:
     """Enter the response at one speed as point n."""
-    found = signals(gearset, response)
+    found = signals(model, response)
     found[1:] *= 2.0
     out.amplitude[n] = found
-    taken, given = dissipated_and_given(gearset, response)
-    out.drive_torque[n], out.products[n] = response.torque, response.products
-    out.apart[n], out.free[n] = response.apart, response.free
+    taken, given = dissipated_and_given(model, response)
+    out.drive_torque[n] = response.torque
+    out.products[n] = response.products
+    out.apart[n] = response.apart
+    out.free[n] = response.free
     out.energy_error[n] = (taken - given) / max(abs(taken), abs(given), 1e-300)
 
 

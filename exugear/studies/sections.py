@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from exugear.gearbox.reading import fault_line, parsed, shortened
+from exugear.gearbox.reading import fault_line, one_of, parsed, shortened
 from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.sections.entries import Name, Text
 from exugear.gearbox.variant import Variant
@@ -145,7 +145,7 @@ class ParameterSection(StudyPart):
         given = [kind for kind in KINDS if getattr(self, kind) is not None]
         if len(given) != 1:
             raise ValueError(f"set exactly one of {', '.join(KINDS)}; {' and '.join(given) or 'none'} is set")
-        if (self.path is not None) + (self.paths is not None) != (0 if self.settings is not None else 1):
+        if (self.path is not None) + (self.paths is not None) + (self.settings is not None) != 1:
             raise ValueError("set path or paths; settings contain their own paths and require neither")
         if self.correlation != 1.0 and not (self.is_drawn and self.paths):
             raise ValueError("correlation applies to the draws of several paths; set paths and a distribution")
@@ -391,8 +391,10 @@ def _described(fault: Any) -> str:
             f"did you mean {near[0]!r}?" if near else f"known keys are {', '.join(known)}"
         )
     remedy = _REMEDIES.get(fault["type"])
+    if fault["type"] == "literal_error":
+        remedy = one_of(fault["ctx"]["expected"], fault["input"])
     if remedy is None:
-        text = str(fault["msg"]).removeprefix("Value error, ").removeprefix("Input ")
+        text = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "must", 1)
         remedy = text[:1].lower() + text[1:]
     value = fault["input"]
     shown = "" if isinstance(value, dict) or fault["type"] == "missing" else f" = {shortened(value)}"

@@ -331,7 +331,7 @@ def _connectors(
         point_load=np.zeros((len(supports), 6)),
         rolling=no_rolling(0),
     )
-    return with_laws(connectors, [linear_law(bearing, gearbox.case.damping.time_of("bearing")) for bearing in supports])
+    return with_laws(connectors, [linear_law(bearing, gearbox.damping_times.bearing) for bearing in supports])
 
 
 def _attached(coordinates: Mapping[str, tuple[int, ...]], body: str, item: str | None) -> str | None:

@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 import scipy.linalg
 
-from exugear.gearbox.sections.case import DampedElement, DampingSection
+from exugear.gearbox.body_parts import damping_times
+from exugear.gearbox.sections.case import DampingSection
 from exugear.gearbox.variant import VariantError
 from exugear.system.bearings.stiffness import equally_spaced, planet_families
 from exugear.system.kernels.modal_damping import ModalArrays
@@ -23,7 +24,8 @@ from exugear.system.statics import RIGID_BODY_LIMIT, linearise, static_state
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 
-KINDS: tuple[DampedElement, ...] = ("bearing", "mesh", "coupling")
+NAMED = 3
+"""Modes that are named where none is near a frequency."""
 TAKEN = 0.05
 """Permissible relative distance of a mode from its frequency in `modal_modes`."""
 
@@ -52,11 +54,13 @@ def with_modal_damping(assembly: Assembly, percent: float | None = None) -> Asse
         )
     q = static_state(assembly).q
     linear = linearise(assembly, q)
-    frequency, shapes = real_modes(linear.mass, linear.total_stiffness, assembly.motions)
+    modes = real_modes(linear.mass, linear.total_stiffness, assembly.motions)
+    frequency = modes[0]
     damped = frequency > RIGID_BODY_LIMIT
     if assembly.elastic_bodies:
         damped &= frequency <= assembly.gearbox.case.elasticity.band_Hz
-    frequency, shapes = frequency[damped], shapes[:, damped]
+    frequency = frequency[damped]
+    shapes = modes[1][:, damped]
     stated = np.einsum("im,ij,jm->m", shapes, linear.total_damping, shapes)
     wanted = 2.0 * damping_ratios(section, frequency) * 2.0 * np.pi * frequency
     columns = linear.mass @ shapes * np.sqrt(np.maximum(wanted - stated, 0.0))
@@ -90,8 +94,9 @@ def damping_in_words(section: DampingSection) -> str:
     """
     given = section.modal_percent
     if given is None:
-        times = ((f"{kind}s" if kind != "mesh" else "meshes", section.time_of(kind)) for kind in KINDS)
-        return f"in proportion to stiffness: {', '.join(f'{name} {1e6 * time:g} µs' for name, time in times)}"
+        times = damping_times(section)
+        listed = (("bearings", times.bearing), ("meshes", times.mesh), ("couplings", times.coupling))
+        return f"in proportion to stiffness: {', '.join(f'{name} {1e6 * time:g} µs' for name, time in listed)}"
     if isinstance(given, float):
         words = [f"{given:g} % of critical in every mode"]
     else:
@@ -126,13 +131,13 @@ def damping_ratios(section: DampingSection, frequency: Floats) -> Floats:
         points, percent = np.array(given).T
         ratios = 0.01 * np.interp(frequency, points, percent)
     for near, percent_of_mode in section.modal_modes:
-        place = int(np.argmin(np.abs(frequency - near))) if len(frequency) else -1
-        if place < 0 or abs(frequency[place] - near) > TAKEN * near:
-            nearest = f"the nearest is at {frequency[place]:.4g} Hz" if place >= 0 else "there are no modes"
+        place = np.abs(frequency - near)
+        if not (place <= TAKEN * near).any():
             raise VariantError(
-                f"damping.modal_modes: no mode within {100 * TAKEN:g} % of {near:g} Hz; {nearest}: see exugear modes"
+                f"damping.modal_modes: no mode within {100 * TAKEN:g} % of {near:g} Hz; modes are at "
+                f"{', '.join(f'{own:.4g}' for own in frequency[np.argsort(place)][:NAMED])} Hz, ..."
             )
-        ratios[place] = 0.01 * percent_of_mode
+        ratios[np.argmin(place)] = 0.01 * percent_of_mode
     return np.asarray(ratios)
 
 

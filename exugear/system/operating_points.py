@@ -218,7 +218,7 @@ def _point(support: Bearing, bodies: dict[str, Body], law: SupportLaw, strain: F
 
 def _resting(assembly: Assembly, points: Sequence[OperatingPoint | None]) -> tuple[Assembly, tuple[SupportLaw, ...]]:
     """Assembly with the rows of all catalogue bearings, placed by their loads, and their laws."""
-    time = assembly.gearbox.case.damping.time_of("bearing")
+    time = assembly.gearbox.damping_times.bearing
     laws = tuple(
         linear_law(support, time) if point is None else _law_at_rest(support, point.stiffness, point.direction, time)
         for support, point in zip(assembly.supports, points, strict=True)
@@ -252,7 +252,7 @@ def _lasting_laws(
 ) -> tuple[ConnectorArrays, float]:
     """Connectors with the laws that last in motion, and how far bearings of equal planets were apart in stiffness."""
     bodies = _bodies(assembly)
-    time = assembly.gearbox.case.damping.time_of("bearing")
+    time = assembly.gearbox.damping_times.bearing
     all_around = [state for states in over_turns.values() for state in states] or [here]
     equal = {planet.name for planets in _equal(assembly) for planet in planets}
     found = []

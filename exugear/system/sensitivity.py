@@ -201,7 +201,7 @@ def assumed_parameters(
     parameters.append(
         Parameter(label, values, body.axial, lambda x: built(_inertia_changes(gearbox, body, inertias, x), touching))
     )
-    time = 1e6 * gearbox.case.damping.time_of("mesh")
+    time = 1e6 * gearbox.damping_times.mesh
     if time > 0.0:
         values = tuple(time * part for part in FRACTIONS)
         parameters.append(

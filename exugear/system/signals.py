@@ -60,15 +60,15 @@ class Signal(Variable):
     """
 
     filled_by: tuple[str, ...] = ()
-    """Functions of `exugear.transient.compiled.sampling` that fill its columns, or its part of the account; or
-    methods of `exugear.transient.compiled.solver`. Empty where `formula` gives it, or where it is a time itself."""
+    """Functions of `exugear.transient.compiled.sampling`, or methods of `exugear.transient.compiled.solver`, that fill
+    its columns or its part of the energy balance. Empty if `formula` computes it, or if it is a time itself."""
     formula: Callable[[SignalLayout, Floats], Floats | Booleans] | None = None
-    """Makes it of the columns of samples: (layout, rows) to an array of rows and its further dimensions. Of a time
-    that is added up: in which samples it passes."""
+    """Function that computes it from the columns of samples: (layout, rows) to an array of rows and its further
+    dimensions. For an accumulated time: whether it elapses in each sample."""
     laws: Literal["all", "table", "bilateral"] = "all"
     """Mesh models with this signal: all, the model `table`, or all others. A time missing in a model is zero."""
     on_bearings: bool = False
-    """Whether only variants on bearings have it; of ideal joints `exugear.system.signals` derives it."""
+    """Whether only variants with bearings have it; for ideal joints it is derived in this module."""
     stored: bool = True
     """Whether the signal is stored in the file; other signals are used only in the formulas."""
     is_power: bool = False

@@ -26,11 +26,11 @@ from fe_ste.tools.display import ReprMixin, TitledRows
 
 
 class RunError(RuntimeError):
-    """A run that went wrong; what was reached before is kept."""
+    """A run that failed; earlier results are kept."""
 
 
 class LimitError(RunError):
-    """A run that was stopped beyond a limit of `exugear.transient.outcome`, with what was reached."""
+    """A run that was stopped beyond a limit of this module, with its results so far."""
 
     def __init__(self, message: str, run: Run) -> None:
         super().__init__(message)
@@ -99,7 +99,7 @@ class Run(ReprMixin):
     wall: float
     """Simulated and wall time, s."""
     reasons: tuple[str, ...] = ()
-    """Why it is invalid (`exugear.transient.outcome`), none if it is valid."""
+    """Reasons why the run is invalid; empty if it is valid."""
     halted: bool = False
     """Whether it was stopped beyond a limit, and cannot be resumed."""
 

@@ -1,21 +1,23 @@
-"""Trilinear bricks with incompatible modes: gradients, stiffness of single elements and of whole meshes.
+"""Trilinear bricks with incompatible modes: gradients, stiffness of elements and meshes, and errors near a load.
 
-Eight nodes, eight Gauss points. The three incompatible modes 1 - xi^2 of each element let it bend without shear.
+The elements have eight nodes and eight Gauss points. Their three incompatible modes 1 - xi^2 represent bending without
+shear.
 
-Near a load the elements cannot follow the field, and the displacement of the flank under a tent load departs from the
-true one. The departure depends on the elements within two or three of their sizes only. So it is found on a flat block:
-the bricks behind the flank, laid with their shapes on the surface of a half-space, where the exact solution is known.
-The block's other faces move as the half-space does (Boussinesq); the excess displacement of its surface is the error.
+Near a load the elements cannot resolve the field, so that the displacement of the flank under a tent load has an error.
+The error depends only on the elements within two or three element sizes of the load. `brick_error` therefore computes
+it on a flat block: the bricks behind the flank are placed with their shapes at the surface of a half-space, for which
+the exact solution is known. The other faces of the block have the displacement of the half-space (Boussinesq). The
+excess displacement of its surface is the error.
 
 Frame of the block: x across the contact lines, y along them, z into the material.
 
-An end face meets the flank of a helical tooth at an acute or obtuse angle, and layers of bricks are too thick to follow
-the field at such an edge. As in `fe_ste.elasticity.bricks` the bricks behind the flank are laid on a plane surface,
-which ends at an edge here. The exact solution is that of a wedge (`fe_ste.elasticity.halfspace.wedge_images`).
+An end face meets the flank of a helical tooth at an acute or obtuse angle, and layers of bricks are too thick to
+resolve the field at such an edge. For `end_errors` the bricks behind the flank are again placed at a plane surface,
+which ends at an edge. The exact solution is that of a wedge (`fe_ste.elasticity.halfspace.wedge_images`).
 
-Along the edge all bricks are taken as those at the middle of the profile. Bricks and exact solution are then solved
-wave number by wave number: one row of bricks, and the Fourier transform of 1 / distance, 2 K_0(wave number times
-distance).
+All bricks along the edge are taken equal to those at the middle of the profile. Bricks and exact solution are then
+solved for each wave number separately: for one row of bricks, and with the Fourier transform of 1 / distance, 2
+K_0(wave number times distance).
 """
 
 from __future__ import annotations
@@ -46,15 +48,15 @@ def stiffness_matrix(
 ) -> scipy.sparse.csr_matrix:
     """Assemble the stiffness matrix of 8-node hexahedra with Wilson-Taylor incompatible modes.
 
-    The plain trilinear brick is too stiff in bending. Three quadratic modes per direction, internal to each
-    element and condensed there, cure it; their gradients are taken with the Jacobian of the element's middle so
-    that the element passes the patch test on any shape.
+    The plain trilinear brick is too stiff in bending. Three quadratic modes per direction, internal to each element and
+    condensed there, correct this. Their gradients use the Jacobian at the centre of the element, so that an element of
+    any shape passes the patch test.
 
     Parameters
     ----------
     points : (n, 3) nodes, m
     hexahedra : (m, 8) connectivity in VTK order
-    incompatible_modes : False gives the plain brick, for comparison
+    incompatible_modes : False selects the plain brick, for comparison
 
     Returns
     -------
@@ -63,7 +65,7 @@ def stiffness_matrix(
     Raises
     ------
     ValueError
-        If an element has a Gauss point with no positive volume.
+        An element has a Gauss point without positive volume.
 
     References
     ----------
@@ -80,12 +82,12 @@ def stiffness_matrix(
 def element_stiffness(
     points: Floats, hexahedra: Integers, material: Material, incompatible_modes: bool = True
 ) -> tuple[Integers, Floats]:
-    """Stiffness of single elements; parameters, errors and source as `stiffness_matrix`.
+    """Stiffness of single elements; parameters, errors and source as in `stiffness_matrix`.
 
     Returns
     -------
     nodes : (m, 8) nodes of each element in the order of its matrix
-    stiffness : (m, 24, 24) N/m; unknown ``3 place of the node + direction``
+    stiffness : (m, 24, 24) N/m; unknown ``3 index of the node in the element + direction``
     """
     nodes, gradients, volumes = brick_gradients(points, hexahedra)
     if incompatible_modes:
@@ -106,12 +108,12 @@ def brick_gradients(points: Floats, hexahedra: Integers) -> tuple[Integers, Floa
     nodes : (m, 8) nodes of each element in the order of the gradients
     gradients : (11, 3, m, 8)
         By function, direction, element and Gauss point; the last three functions are the incompatible modes, 1/m.
-    volumes : (m, 8) of the Gauss points, m^3
+    volumes : (m, 8) volumes of the Gauss points, m^3
 
     Raises
     ------
     ValueError
-        If an element has a Gauss point with no positive volume.
+        An element has a Gauss point without positive volume.
     """
     basis = skfem.Basis(skfem_mesh(points, hexahedra), skfem.ElementHex1(), intorder=3)
     determinant = basis.mapping.detDF(basis.X)
@@ -124,20 +126,20 @@ def brick_gradients(points: Floats, hexahedra: Integers) -> tuple[Integers, Floa
 
 
 def brick_values() -> Floats:
-    """Return the brick's eight shape functions at its Gauss points, (function, point), ordered as `brick_gradients`."""
+    """Return the brick's eight shape functions at its Gauss points, (function, point), as in `brick_gradients`."""
     element = skfem.ElementHex1()
     points, _ = skfem.quadrature.get_quadrature(element, 3)
     return np.stack([element.lbasis(points, number)[0] for number in range(8)])
 
 
 def _incompatible_gradients(basis: skfem.CellBasis, determinant: Floats) -> Floats:
-    """Gradients (3, 3, elements, Gauss points) of 1 - xi^2 in each direction, with the Jacobian of the middle."""
-    # Taylor, Beresford and Wilson: Jacobian and determinant of the middle make the mean gradient vanish, so that the
-    # modes do no work on a constant stress and the patch test is passed.
+    """Gradients (3, 3, elements, Gauss points) of 1 - xi^2 in each direction, with the Jacobian at the centre."""
+    # Taylor, Beresford and Wilson: with Jacobian and determinant at the centre the mean gradient vanishes, so that the
+    # modes do no work on a constant stress and the element passes the patch test.
     middle = np.full((3, 1), 0.5)
     inverse = basis.mapping.invDF(middle)[..., 0]
     ratio = basis.mapping.detDF(middle) / determinant
-    # Mode 1 - (2 X - 1)^2 over X from 0 to 1, whose derivative this is.
+    # Derivative of the mode 1 - (2 X - 1)^2, with X from 0 to 1.
     slope = 4.0 * (1.0 - 2.0 * basis.X)
     return np.asarray(np.einsum("iae,iq,eq->iaeq", inverse, slope, ratio))
 
@@ -165,44 +167,46 @@ def gradient_products(gradients: Floats, volume: Floats, material: Material) -> 
 
 
 def _condense_bubbles(stiffness: Floats) -> Floats:
-    """Eliminate the nine unknowns of the modes, which no load and no neighbour touches (static condensation)."""
+    """Eliminate the nine unknowns of the modes, which have no loads and no neighbours (static condensation)."""
     coupling = stiffness[:, 24:, :24]
     return np.asarray(
         stiffness[:, :24, :24] - coupling.transpose(0, 2, 1) @ np.linalg.solve(stiffness[:, 24:, 24:], coupling)
     )
 
 
-# What bricks err by under the loads on a flank: the part that comes from the size of those next to the load
+# Errors of bricks under the loads on a flank, caused by the size of the elements next to the load
 
-#: Layers on either side of a load at which its error is read, and elements from a load to the faces of the block.
+#: Layers on either side of a load for which its error is evaluated, and elements from a load to the faces of the
+# block.
 ERROR_REACH = 3
 BLOCK_MARGIN = 4
 
-#: Part of the tooth's elements that the block is deep.
+#: Depth of the block as a fraction of the tooth's elements.
 _DEPTH = 2.0 / 3.0
 
-#: Radius of a flank that is as good as flat, in lengths of the flank.
+#: Radius at which a flank counts as flat, in lengths of the flank.
 _FLAT = 1e5
 
 
 def brick_error(mesh: SectorMesh, side: int, incompatible_modes: bool = True) -> Floats:
-    """Displacement of the flank nodes under tent loads by the bricks less the true one, on a half-space.
+    """Error of the bricks in the displacement of the flank nodes under tent loads, on a half-space.
 
     Parameters
     ----------
     mesh : with layers of one thickness
     side : loaded flank: +1 counter-clockwise, -1 clockwise
-    incompatible_modes : see `fe_ste.elasticity.bricks.stiffness_matrix`
+    incompatible_modes : see `stiffness_matrix`
 
     Returns
     -------
     (f, 2 r + 1, f)
-        By flank node read, layers from the load to it, -r to r with r = `ERROR_REACH`, and flank node loaded, m/N.
+        Bricks minus exact solution by displaced flank node, layer distance -r to r with r = `ERROR_REACH` from the
+        load, and loaded flank node, m/N.
 
     Raises
     ------
     ValueError
-        If the layers differ in thickness.
+        The layers differ in thickness.
     """
     steps = np.diff(mesh.axial_positions)
     if np.ptp(steps) > 1e-9 * steps.mean():
@@ -212,7 +216,7 @@ def brick_error(mesh: SectorMesh, side: int, incompatible_modes: bool = True) ->
     stiffness = stiffness_matrix(points, hexahedra, mesh.gear.material, incompatible_modes)
     given = np.ones(numbers.shape, dtype=bool)
     given[:-1, 1:-1, 1:-1] = False
-    # Node by node along the profile, so that the free ones couple in a narrow band.
+    # Numbering along the profile couples the free nodes in a narrow band.
     by_profile = numbers.swapaxes(0, 1)
     fixed = unknowns_of(numbers[given])
     free = unknowns_of(by_profile[~given.swapaxes(0, 1)])
@@ -238,7 +242,7 @@ class FlankSpacing(NamedTuple):
 
 
 def _solved(matrix: SparseMatrix, right: Floats) -> Floats:
-    """Solve a positive definite system whose matrix has a narrow band: a sparse solver takes longer to load."""
+    """Solve a positive definite system with a narrow band; loading a sparse solver would take longer."""
     entries = scipy.sparse.tril(matrix, format="coo")
     below = entries.row - entries.col
     band = np.zeros((below.max() + 1, len(right)))
@@ -247,7 +251,7 @@ def _solved(matrix: SparseMatrix, right: Floats) -> Floats:
 
 
 def flank_spacing(mesh: SectorMesh, side: int) -> FlankSpacing:
-    """Return how the nodes of a flank of equal layers lie on a plane."""
+    """Return the spacing of the nodes of a flank with equal layers, developed onto a plane."""
     gear = mesh.gear
     roll = mesh.section.flank_roll
     handed = side * (-1.0 if gear.internal else 1.0)
@@ -258,9 +262,9 @@ def flank_spacing(mesh: SectorMesh, side: int) -> FlankSpacing:
 
 
 def flat_block(mesh: SectorMesh, side: int) -> tuple[Floats, Integers]:
-    """Return the nodes (n, 3) of the block and their numbers by depth, place along the profile and layer.
+    """Return the nodes (n, 3) of the block and their numbers by depth, position along the profile and layer.
 
-    Along the profile there are `BLOCK_MARGIN` nodes more on either side of the flank's.
+    Along the profile the block has `BLOCK_MARGIN` additional nodes on either side of the flank.
     """
     gear = mesh.gear
     section = mesh.section
@@ -285,7 +289,7 @@ def flat_block(mesh: SectorMesh, side: int) -> tuple[Floats, Integers]:
     beyond = step * np.arange(1, BLOCK_MARGIN + 1)
     arcs = np.concatenate([arc[0] - beyond[::-1], arc, arc[-1] + beyond])
     layers = layer * np.arange(-ERROR_REACH - 1, ERROR_REACH + 2)
-    # In the section the normal of the flank leans by beta_b out of it.
+    # The normal of the flank is inclined to the section by beta_b.
     lean = side * np.sin(gear.base_helix_angle)
     numbers = np.arange(across.size * len(layers)).reshape(*across.shape, len(layers))
     points = np.empty((*numbers.shape, 3))
@@ -325,17 +329,17 @@ def _tent_loads(count: int, surface: tuple[int, ...]) -> Floats:
 
 
 def _half_space(mesh: SectorMesh, side: int, places: Floats) -> Floats:
-    """Displacement (n, 3, f) of a half-space at places away from the loads, under the tent loads, m/N."""
+    """Displacement (n, 3, f) of a half-space under the tent loads at positions away from them, m/N."""
     arc, layer, shear, cosine = flank_spacing(mesh, side)
     material = mesh.gear.material
     gauss, weight = np.polynomial.legendre.leggauss(3)
     step = arc[1] - arc[0]
     within = (gauss + 1.0) / 2.0
-    parts = max(2, int(np.ceil(layer / step)))  # along the layer about as fine as along the profile
+    parts = max(2, int(np.ceil(layer / step)))  # about as fine along the layer as along the profile
     along = ((np.arange(parts)[:, None] + within) / parts).ravel()
     z = layer * np.concatenate([-along, along])
     height = np.tile(np.tile(weight, parts) * (1.0 - along), 2)
-    # Loads by interval of the profile, point in it, and point along the layers; each has a part in two tents.
+    # Loads by interval of the profile, point in it, and point along the layers; each contributes to two tents.
     shape = (len(arc) - 1, len(within), len(z))
     interval = np.repeat(np.arange(shape[0]), shape[1] * shape[2])
     s, at = (np.broadcast_to(part, shape).ravel() for part in (within[:, None], z))
@@ -352,7 +356,7 @@ def _surface_displacement(mesh: SectorMesh, side: int) -> Floats:
     arc, layer, shear, cosine = flank_spacing(mesh, side)
     material = mesh.gear.material
     layers = layer * np.arange(-ERROR_REACH - 1.0, ERROR_REACH + 2.0, dtype=np.float64)
-    # Flank coordinates of a cylinder so large that arc lengths are roll angles.
+    # On a cylinder of very large radius the roll angles represent arc lengths.
     radius = _FLAT * float(np.ptp(arc))
     integrals = tent_integrals(1.0 + arc / radius, layers, radius, shear / radius, cosine, np.zeros((2, 0, 3)))
     shape = (len(arc), len(layers)) * 2
@@ -360,39 +364,40 @@ def _surface_displacement(mesh: SectorMesh, side: int) -> Floats:
     return np.asarray(read * (1.0 - material.poissons_ratio**2) / (np.pi * material.youngs_modulus))
 
 
-# What bricks err by under loads near an end face, beyond what they err by inside the face width
+# Additional errors of bricks under loads near an end face, compared with loads inside the face width
 
-#: Wave numbers; errors are found up to this many nodes along the profile.
+#: Number of wave numbers, and of nodes along the profile over which errors are evaluated.
 WAVES = 8
 
 #: Layers next to an end whose loads are corrected, and layers of nodes of the bricks.
 END_LAYERS = 5
 _LAYERS = 8
 
-#: Rows of bricks behind those of the flat block, each this much deeper than the one before it: to no displacement.
+#: Additional rows of bricks below those of the flat block, with depths that grow by a factor, down to zero
+# displacement.
 _DEEPER = 6
 _GROWTH = 1.5
 
-#: Points of the integrals over a layer, and wave numbers on either side that the nodes cannot tell from one.
+#: Points of the integrals over a layer, and number of aliased wave numbers on either side.
 _POINTS = 12
 _ALIASES = 5
 
 
 def end_errors(mesh: SectorMesh, side: int, images: Floats, incompatible_modes: bool = True) -> tuple[Floats, Floats]:
-    """Displacement of the flank nodes under tent loads by the bricks less the true one, less that inside the face.
+    """Additional error of the bricks in the displacement of the flank nodes near the end faces.
 
     Parameters
     ----------
     mesh : with layers of one thickness
     side : loaded flank: +1 counter-clockwise, -1 clockwise
     images : (2, n, 3) image loads behind the lower and the upper end
-    incompatible_modes : see `fe_ste.elasticity.bricks.stiffness_matrix`
+    incompatible_modes : see `stiffness_matrix`
 
     Returns
     -------
     lower, upper : (2 w - 1, r, l)
-        By nodes along the profile from the load to the place read, from -w + 1 to w - 1 with w = `WAVES`; by layer
-        read and layer loaded, `END_LAYERS` each, counted from the end; m/N.
+        Error minus that inside the face width, m/N, by distance in nodes along the profile from the load, -w + 1 to
+        w - 1 with w = `WAVES`; by displaced layer and loaded layer, `END_LAYERS` each, counted from the end.
     """
     loaded = np.arange(END_LAYERS)
     middle = END_LAYERS
@@ -401,19 +406,19 @@ def end_errors(mesh: SectorMesh, side: int, images: Floats, incompatible_modes: 
     errors = []
     for end, of_end in zip((-1, 1), images, strict=True):
         error = _Row(mesh, side, end, _LAYERS, incompatible_modes).error(loaded, of_end)[:, :END_LAYERS]
-        # Layers of the row inside run from the upper end downwards.
+        # The layers of the inner row run from the upper end downwards.
         error -= known[:, middle + end * (loaded[:, None] - loaded)]
         errors.append(_inverse_transform(error))
     return errors[0], errors[1]
 
 
 def _wave_numbers() -> Floats:
-    """Phases from node to node along the profile: half a step off zero, as the far field is not asked for."""
+    """Phases per node along the profile: offset from zero by half a step, because the far field is not needed."""
     return np.asarray((np.arange(WAVES) + 0.5) * np.pi / WAVES)
 
 
 def _inverse_transform(transform: Floats) -> Floats:
-    """Sum waves to a function of the nodes from load to place."""
+    """Transform from wave numbers to the distance in nodes from the load."""
     away = np.arange(1 - WAVES, WAVES)
     waves = np.exp(1j * _wave_numbers()[:, None] * away) / WAVES
     return np.asarray(np.einsum("krl,kj->jrl", transform, waves).real)
@@ -442,7 +447,7 @@ class _Row:
         self._nodes = np.arange(len(behind) * layers).reshape(len(behind), layers)
 
     def error(self, loaded: Integers, images: Floats | None) -> Floats:
-        """Transform (w, layers, loads) of bricks less truth; without images the row has no end, but is held there."""
+        """Transform (w, layers, loads) of the error; without images the row has no free end and is fixed there."""
         return np.asarray(self._bricks(loaded, images is not None) - self._truth(loaded, images))
 
     def _bricks(self, loaded: Integers, ends: bool) -> Floats:
@@ -467,7 +472,7 @@ class _Row:
     def _truth(self, loaded: Integers, images: Floats | None) -> Floats:
         material = self._mesh.gear.material
         places, shares = np.polynomial.legendre.leggauss(_POINTS)
-        # The substitution gathers points at both ends, where the field of a layer's own load is a logarithm.
+        # The substitution concentrates points at both ends, where the field of a layer's own load is logarithmic.
         s = (places + 1.0) / 2.0
         within = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
         shares = 15.0 * shares * (s * (1.0 - s)) ** 2
@@ -477,7 +482,7 @@ class _Row:
         read = self._layer * np.arange(self._layers)[:, None]
         found = np.zeros((WAVES, self._layers, len(loaded)), dtype=complex)
         for column, layer in enumerate(loaded.tolist()):
-            total = 1.0 if layer else 0.5  # integral of the tent in layers, its halves 1/2 each
+            total = 1.0 if layer else 0.5  # integral of the tent over layers, 1/2 for each of its halves
             for below, part in ((layer - 1, within), (layer, 1.0 - within)):
                 if below < 0:
                     continue

@@ -1,24 +1,25 @@
-"""One tooth sector condensed onto its cut faces, with loads and read-outs on its flank.
+"""One tooth sector condensed onto its cut faces, with loads and displacements of its flank.
 
-Loads press on the flank nodes of one side, where the displacement is read, too. All that the ring or chain of sectors
-needs of the finite elements is in these matrices. Signs as in `fe_ste.elasticity.flank`.
+Loads act at the flank nodes of one side, where the displacement is evaluated, too. These matrices contain all
+finite-element data that the ring or chain of sectors needs. Signs are as in `fe_ste.elasticity.flank`.
 
-A sector, and any chain of sectors, turned by 180 degrees about the line through its middle is equal to itself. So it is
-two symmetric stiffness matrices on its plus face: one for even deformations, which that turn keeps, and one for odd
-ones, which it reverses; the minus face then moves as the plus face turned, or against it. The unknowns of a face are
-chosen so that the turn about the face's own middle keeps or reverses each: its signs, 1 or -1, ones first.
+A sector, and any chain of sectors, is invariant under rotation by 180 degrees about the line through its middle. It is
+therefore described by two symmetric stiffness matrices on its plus face: one for even deformations, which this rotation
+keeps, and one for odd ones, which it reverses. The minus face then moves as the rotated plus face, or opposite to it.
+The unknowns of a face are chosen so that rotation about the face's own middle keeps or reverses each: its signs, 1 or
+-1, ones first.
 
-A chain is made by doubling: a ring of z teeth takes some log2(z) eliminations of one face, where the discrete Fourier
-transform over the teeth takes z/2 complex ones.
+A chain is made by doubling: a ring of z teeth requires about log2(z) eliminations of one face, whereas the discrete
+Fourier transform over the teeth requires z/2 complex ones.
 
-A tooth is equal to itself turned by 180 degrees about its middle line (the x axis): z changes sign, and both flanks and
-both cut faces change places. So any deformation is the sum of an even one, which is equal to itself so turned, and an
-odd one, which changes sign; each needs the finite elements of the counter-clockwise half of the sector only.
+A tooth is invariant under rotation by 180 degrees about its middle line (the x axis), which changes the sign of z and
+exchanges both flanks and both cut faces. Any deformation is therefore the sum of an even one, which is invariant under
+this rotation, and an odd one, which changes sign. Each needs only the finite elements of the counter-clockwise half of
+the sector.
 
-The unknowns of a node of the section are those of all its layers, in the frame that turns with the section along the
-helix (`fe_ste.elasticity.condensation`); those of the cut face have its radial direction as first axis.
-
-There all layers of one height have the same elements: they are computed once.
+The unknowns of a node of the section are those of all its layers, in the frame that rotates with the section along the
+helix; those of the cut face have its radial direction as first axis. In this frame all layers of one height have equal
+elements, which are computed once.
 """
 
 from __future__ import annotations
@@ -557,16 +558,16 @@ def _mirror_images(mesh: SectorMesh) -> Integers:
     return images
 
 
-# One tooth sector condensed onto its cut faces, with loads and read-outs on its flank
+# One tooth sector condensed onto its cut faces, with loads and displacements of its flank
 
 
 @dataclass(frozen=True)
 class CondensedSector:
-    """One tooth sector condensed onto its cut faces, with loads and read-outs on its flank.
+    """One tooth sector condensed onto its cut faces, with loads and displacements of its flank.
 
-    Each cut face has m unknowns, the same on both sides of it, so that joining two sectors means equating the same
-    numbers; the flank has n nodes. What is ``fixed`` holds with the faces held, to which is added what their
-    displacements do. Pairs hold an even and an odd part, see `fe_ste.elasticity.condensation`.
+    Each cut face has m unknowns, the same on both sides of it, so that two sectors are joined by equating these
+    unknowns; the flank has n nodes. Values named ``fixed`` apply to fixed faces; contributions of the displacements
+    of the faces are added to them. Pairs consist of an even and an odd part, see the module.
     """
 
     stiffness: Chain

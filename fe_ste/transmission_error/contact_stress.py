@@ -45,20 +45,35 @@ def contact_line_stress(
     >>> round(1e-6 * float(contact_line_stress(pair, 0.0, 0, 0.0, 1e5)), 1)
     684.2
     """
+    _, along, base_points = contact_path(pair, pmc, tooth, axial)
+    curvature = math.cos(pair.pinion.base_helix_angle) * (1.0 / along + 1.0 / (base_points - along))
+    gears = (pair.pinion, pair.gear)
+    compliance = sum((1 - g.material.poissons_ratio**2) / g.material.youngs_modulus for g in gears)
+    return np.sqrt(np.maximum(line_load, 0.0) * curvature / (math.pi * compliance))
+
+
+def contact_path(pair: GearPair, pmc: ArrayLike, tooth: ArrayLike, axial: ArrayLike) -> tuple[float, Floats, float]:
+    """Find where tooth pairs touch along the line of action, m from its point on the base circle of gear 1.
+
+    Parameters
+    ----------
+    pmc, tooth, axial : as in `contact_line_stress`
+
+    Returns
+    -------
+    The place of the pitch point, the places of contact, limited to the path of contact, and the point on the base
+    circle of gear 2.
+    """
     pinion = pair.pinion
     gear = pair.gear
     kind = -1.0 if gear.internal else 1.0
-    # Along the line of action from its point on the base circle of gear 1; `base_points` is that of gear 2.
     twist = math.tan(pinion.base_helix_angle)
     pitch_point = pinion.base_radius * math.tan(pair.working_pressure_angle)
     base_points = pitch_point + kind * gear.base_radius * math.tan(pair.working_pressure_angle)
     along = pitch_point + pair.transverse_base_pitch * np.add(tooth, pmc) + twist * np.asarray(axial)
     ends = [math.sqrt(radius**2 - pinion.base_radius**2) for radius in flank_radii(pinion)]
     other_ends = [base_points - kind * math.sqrt(radius**2 - gear.base_radius**2) for radius in flank_radii(gear)]
-    along = np.clip(along, max(ends[0], min(other_ends)), min(ends[1], max(other_ends)))
-    curvature = math.cos(pinion.base_helix_angle) * (1.0 / along + 1.0 / (base_points - along))
-    compliance = sum((1 - g.material.poissons_ratio**2) / g.material.youngs_modulus for g in (pinion, gear))
-    return np.sqrt(np.maximum(line_load, 0.0) * curvature / (math.pi * compliance))
+    return pitch_point, np.clip(along, max(ends[0], min(other_ends)), min(ends[1], max(other_ends))), base_points
 
 
 def mean_over_contact_line(stress: ArrayLike, load: ArrayLike) -> Floats:

@@ -119,15 +119,15 @@ class MeanContact(ReprMixin):
     deflection: Floats
     """(2,) mean of the static transmission error, m."""
     stiffness: Floats
-    """(2,) force over that, by a little more force: 1 / mean (d deflection / d force), N/m."""
+    """(2,) tangent stiffness: 1 / mean (d deflection / d force), N/m."""
     load_centroid: Floats
     """(2,) axial position of the resultant, m from the middle of the common face; mean under the constant force."""
     tangent_load_centroid: Floats
-    """(2,) that of a little more force, m: derivative of the deflection by the misalignment."""
+    """(2,) that of the incremental load, m: derivative of the deflection by the misalignment."""
     deflection_by_distance: float
     """Slope of the deflection by the centre distance under constant force, between both misalignments."""
     face_load_factor: Floats
-    """(2,) K_Hbeta: highest over mean line load along the face, see `fe_ste.transmission_error.mean_contact`."""
+    """(2,) K_Hbeta: maximum divided by mean line load along the face width."""
     max_pressure: Floats
     edge_pressure: Floats
     """(2,) largest of the cycle, away from and at tip edges, Pa."""

@@ -66,7 +66,7 @@ def life(
 
 
 def _fail_if_short(data: xr.Dataset, path: Path) -> None:
-    """End with code 1 where a part fails or misses its required life or safety."""
+    """End with code 1 if a part fails, or misses its required life or safety factor."""
     lines = [line for key in ("failures", "shortfalls") for line in json.loads(data.attrs[key])]
     if lines:
         raise FailedError("\n".join(["required life not reached:", *lines, f"Results: {path}"]))
@@ -162,13 +162,13 @@ def _bearing_rows(data: xr.Dataset) -> list[dict[str, str]]:
 
 
 def _entries(data: xr.Dataset, name: str) -> Iterator[tuple[str, Callable[[str], float]]]:
-    """Label of each part, and what gives its figures by their keys."""
+    """Yield the label of each part, and a function that returns its results by key."""
     for place, label in enumerate(data[name].to_numpy().tolist()):
         yield label, partial(_figure, data, name, place)
 
 
 def _with_holder(data: xr.Dataset, label: str, kind: str) -> str:
-    """Label of a flank, and which of several planets it is."""
+    """Label of a flank, with the number of the planet if there are several."""
     holder = str(data[f"flank_{kind}_holder"].sel(flank=label).item())
     if holder:
         return f"{label} ({holder})"

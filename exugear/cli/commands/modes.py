@@ -18,7 +18,7 @@ from exugear.cli.case import (
     open_project,
 )
 from exugear.cli.console import exit_codes, note, print_json, refuse_not_converged, say
-from exugear.cli.tables import HARD_SPACE, print_table
+from exugear.cli.tables import HARD_SPACE, print_table, print_text
 
 if TYPE_CHECKING:
     from exugear.system.modes import Modes
@@ -75,7 +75,7 @@ def modes(
 
 
 def _draw_campbell(found: Modes, path: Path) -> Path:
-    """Draw the modes that the overall transmission error sees, over the speeds of the fastest load case."""
+    """Plot modes with participation in the overall transmission error over the speeds of the fastest load case."""
     from exugear.report.pictures.diagrams import plot_campbell
     from exugear.results.spectra.run_spectra import mobility_shares
     from exugear.results.spectra.waterfall import order_lines
@@ -118,7 +118,7 @@ def _mode_summaries(found: Modes) -> list[dict[str, Any]]:
 
 
 def _print_modes(found: Modes, rows: list[dict[str, Any]]) -> None:
-    """Print the table of modes: those that vibrate have damping and shares, rigid-body motions have none."""
+    """Print the table of modes; damping and TE participation are omitted for rigid-body modes."""
     from exugear.system.modal_damping import damping_in_words
 
     assembly = found.assembly
@@ -127,7 +127,7 @@ def _print_modes(found: Modes, rows: list[dict[str, Any]]) -> None:
     print_table(title, [_mode_row(row) for row in rows], texts, LEGEND)
     factor = assembly.housing_factor
     damping = damping_in_words(assembly.gearbox.case.damping)
-    say(f"Linearised at the static load; housing stiffness factor {factor:g}; damping {damping}.")
+    print_text(f"Linearised at the static load; housing stiffness factor {factor:g}; damping {damping}.")
 
 
 def _mode_row(summary: dict[str, Any]) -> dict[str, str]:

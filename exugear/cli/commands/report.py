@@ -1,4 +1,4 @@
-"""The command `report`: one web page of a results folder."""
+"""The command `report`: a web page on a results folder."""
 
 from __future__ import annotations
 
@@ -44,6 +44,7 @@ def report(
         check_allow_dir(allow_dir)
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
+        folder = _results_of(folder)
         try:
             with time_noted(folder, "report"), progress_bar() as bar, _parallel_worker() as executor:
                 task = bar.add_task("report", total=None)
@@ -58,8 +59,20 @@ def report(
         _tell_report(folder, written.path, written.statements, written.left_out, as_json)
 
 
+def _results_of(folder: Path) -> Path:
+    """Return the default results folder of the gearbox file in a folder, if only that one contains results."""
+    from exugear.project import default_folder
+    from exugear.results.folder import CASE_FILE
+
+    below = default_folder(folder / "gearbox.toml")
+    if (folder / CASE_FILE).is_file() or not (below / CASE_FILE).is_file() or not any(folder.glob("*.toml")):
+        return folder
+    note(f"Note: {folder} contains the gearbox file; its results are in {below}")
+    return below
+
+
 def _parallel_worker() -> AbstractContextManager[Executor | None]:
-    """Another process to work beside this one, where there is a core for it; it starts when it is given work."""
+    """Return a second worker process if a core is available for it; the process starts with its first task."""
     from fe_ste.tools.threads import Workers, available_cores
 
     if available_cores() > 1:

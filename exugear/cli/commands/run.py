@@ -35,21 +35,21 @@ if TYPE_CHECKING:
 
 
 class Solver(StrEnum):
-    """What integrates: the compiled loop, or Exudyn as the model of record."""
+    """Solver for time integration: the compiled loop, or Exudyn as the reference model."""
 
     compiled = "compiled"
     exudyn = "exudyn"
 
 
 class Integrator(StrEnum):
-    """Methods of the compiled solver: multistep with one evaluation a step, or Runge-Kutta with four, the reference."""
+    """Integration methods of the compiled solver: multistep with one evaluation per step, or Runge-Kutta with four."""
 
     adams = "adams"
     rk4 = "rk4"
 
 
 class MeshRoute(StrEnum):
-    """How forces of meshes enter Exudyn: by one element for all, or by a load with a user function on each gear."""
+    """Form of the mesh forces in Exudyn: one element for all meshes, or a load with a user function on each gear."""
 
     element = "element"
     loads = "loads"
@@ -157,7 +157,7 @@ def run(
 
 
 def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> SolverComparison:
-    """Integrate the beginning of the run by Exudyn."""
+    """Integrate the beginning of the run with Exudyn."""
     from exugear.transient.outcome import LimitError, RunError
     from fe_ste.tools.files import FileError
 
@@ -168,14 +168,14 @@ def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> So
 
 
 def _load_case(project: Project) -> LoadCase:
-    """Load case of the run, which is there unless the file has none."""
+    """Load case of the run; it exists unless the file has no load cases."""
     if project.choice.load_case is None:
         raise BadInputError(project.gearbox.fault("no load case; add a section [load_cases.NAME]"))
     return project.gearbox.load_cases[project.choice.load_case]
 
 
 def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
-    """Name of a run in the account of times."""
+    """Name of a run in the list of run times."""
     choice = project.choice
     label = f"run, {choice.variant}, {choice.load_case}, {choice.inertias}, {choice.mesh_model}, solver {solver}"
     if route is MeshRoute.loads:
@@ -184,7 +184,7 @@ def _label_of(project: Project, solver: Solver, route: MeshRoute) -> str:
 
 
 def _kept_band(project: Project, band: float | None, resume: bool) -> dict[str, float]:
-    """Return the band that is asked for, or that a stopped run has, and the stored rate that it takes, Hz."""
+    """Return the requested band, or that of the stopped run, and the required sample rate, Hz."""
     from exugear.transient.plan import rate_for
     from exugear.transient.runup import BAND
     from exugear.transient.start import kept_band
@@ -197,7 +197,7 @@ def _kept_band(project: Project, band: float | None, resume: bool) -> dict[str, 
 
 
 def _check_extent(project: Project, duration: float | None, sample_rate: float, folder: Path) -> None:
-    """Refuse a simulated time that is too short, or whose results do not fit on the disk."""
+    """Raise an error if the simulated time is too short or its results exceed the free disk space."""
     from exugear.system.tooth_mesh.laws.registry import LAWS
     from exugear.transient.plan import check_disk, check_duration, sample_bytes
 
@@ -212,7 +212,7 @@ def _check_extent(project: Project, duration: float | None, sample_rate: float, 
 
 
 def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
-    """Refuse a solver that cannot run what the file asks for, before anything is computed."""
+    """Raise an error if the solver does not support the model, before anything is computed."""
     floating = [name for name, body in gearbox.case.bodies.items() if body.flexibility == "ffrf"]
     if variant.is_elastic and solver is Solver.compiled and floating:
         raise BadInputError(
@@ -222,7 +222,7 @@ def _check_solver(gearbox: Gearbox, variant: Variant, solver: Solver) -> None:
 
 
 def _check_mesh_route(route: MeshRoute, variant: Variant, solver: Solver) -> None:
-    """Refuse loads on bodies where there are no loads, or no rigid bodies, before anything is computed."""
+    """Raise an error if the solver or variant does not support mesh forces as loads, before anything is computed."""
     if route is MeshRoute.element:
         return
     if variant.spins_only or variant.is_elastic:
@@ -239,7 +239,7 @@ def _check_mesh_route(route: MeshRoute, variant: Variant, solver: Solver) -> Non
 
 
 def _check_run_directory(directory: Path, resume: bool) -> None:
-    """Refuse a run that another process is at work on, and one to go on with that cannot be gone on with."""
+    """Raise an error if another process works on the run, or if a run to be resumed cannot be resumed."""
     from exugear.transient.start import refuse_if_busy, refuse_to_resume
 
     refuse_if_busy(directory)
@@ -248,7 +248,7 @@ def _check_run_directory(directory: Path, resume: bool) -> None:
 
 
 def _duration_to_resume(project: Project, duration: float | None) -> float | None:
-    """Return how long a stopped run is to become: as asked for, or else as it was; refuse what it is beyond."""
+    """Return the total duration of a resumed run: as specified, else as before; raise an error if it is too short."""
     from exugear.transient.start import kept_duration, refuse_shorter
 
     directory = project.run_directory
@@ -260,7 +260,7 @@ def _duration_to_resume(project: Project, duration: float | None) -> float | Non
 
 
 def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
-    """Say what looks like the wrong sign of a torque, or leads bearings or meshes far from the load they are of."""
+    """Print warnings about probable sign errors of torques, and loads outside the range of bearing or mesh models."""
     from exugear.gearbox.load_cases import (
         band_warning,
         bearing_range_warning,
@@ -277,10 +277,16 @@ def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
     of_tables = other_load_warning(project.gearbox, loads, law.of_one_load)
     for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, band_warning(loads, band))):
         note(f"Warning: load_cases.{load_case.name}: {doubt}", style="yellow")
+    if friction := project.gearbox.case.damping.tooth_friction:
+        note(
+            f"Warning: damping.tooth_friction = {friction:g}: runs do not include the friction of teeth; "
+            "exugear steady does",
+            style="yellow",
+        )
 
 
 def _simulate(project: Project, resume: bool, command: str, **options: Any) -> Run:
-    """Run the load case; options as those of `exugear.transient.runup.simulate`, `command` goes on from a stop."""
+    """Run the load case with the options of `exugear.transient.runup.simulate`; `command` resumes it."""
     from exugear.results.run_file import PARTIAL_NAME, has_pieces
     from exugear.transient.outcome import LimitError, RunError
 
@@ -300,7 +306,7 @@ def _simulate(project: Project, resume: bool, command: str, **options: Any) -> R
 
 
 def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, command: str, as_json: bool) -> None:
-    """Print what a run reached; end with 130 if the user stopped it, with 1 if it is not to be trusted."""
+    """Print the results of a run; end with code 130 if the user stopped it, with 1 if it is invalid."""
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nInvalid so far: {reason}" for reason in finished.reasons)
         raise StoppedError(

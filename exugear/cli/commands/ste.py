@@ -37,15 +37,15 @@ if TYPE_CHECKING:
     from fe_ste.reference.table import NonlinearTable
     from fe_ste.transmission_error.table import MeshTable
 
-#: Fewer positions of the mesh cycle would not show the harmonics that dynamics ask of a table.
+#: Minimum number of positions, with which the mesh cycle resolves the harmonics needed by the dynamics.
 LEAST_TABLE_POSITIONS = 8
 
-#: Pictures of teeth that take longer than another process takes to start: a second or so each.
+#: Minimum number of tooth pictures, at about a second each, that justifies the start of another process.
 WORTH_A_PROCESS = 3
 
 
 class Method(StrEnum):
-    """How the teeth deflect: by condensed finite elements, or by the full non-linear analysis they are checked by."""
+    """Method for tooth deflections: condensed finite elements, or the full nonlinear analysis used as reference."""
 
     superelement = "superelement"
     nonlinear = "nonlinear"
@@ -117,7 +117,7 @@ def ste(
 
 
 def _tell_misalignment(project: WatchedProject) -> None:
-    """Say how far the gears stand off straight, for which static tables are; nothing where bearings are unknown."""
+    """Print the misalignment of the gears, which static tables neglect; nothing if bearing data are unknown."""
     from exugear.system.bearings.rolling.rows import BearingError
     from exugear.system.bearings.stiffness import unsupported
     from exugear.system.statics import BalanceError, static_state
@@ -129,7 +129,7 @@ def _tell_misalignment(project: WatchedProject) -> None:
     try:
         with project.bars.row():
             state = static_state(project.assembly())
-    except (BalanceError, BearingError, MeshError):  # of which the verbs tell that need it
+    except (BalanceError, BearingError, MeshError):  # reported by the commands that need the state
         return
     largest: dict[str, float] = {}
     for element, misalignment in zip(state.assembly.elements, state.misalignment, strict=True):
@@ -169,7 +169,7 @@ def _requested_tables(
 def _compute_references(
     gearbox: Gearbox, case: Path, out: Path | None, names: list[str], positions: int | None, as_json: bool
 ) -> None:
-    """Run the reference analysis of the pairs and report; each position is kept as soon as it is solved."""
+    """Run the reference analysis of the pairs and print results; each position is stored when it is complete."""
     from exugear.project import default_folder
     from exugear.results.folder import keep_case, time_noted
     from exugear.system.tooth_mesh.reference_tables import (
@@ -227,7 +227,7 @@ def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -
 def _curves_beside(
     tables: dict[str, MeshTable], folder: Path, requests: list[TableRequest]
 ) -> Iterator[Future[list[Path]]]:
-    """Draw the curves of all tables, in another process where this one has some pictures of teeth to draw meanwhile."""
+    """Plot the curves of all tables, in another process if this one has enough tooth pictures to draw meanwhile."""
     from exugear.report.pictures.diagrams import contact_picture, draw_curves
     from fe_ste.tools.threads import Workers, available_cores
 
@@ -242,7 +242,7 @@ def _curves_beside(
 
 
 def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
-    """Draw the teeth in contact where the picture is missing or the table is new; return all such pictures."""
+    """Draw the teeth in contact if the picture is missing or the table is new; return all such pictures."""
     from exugear.report.pictures.diagrams import contact_picture, draw_contact
     from fe_ste.contact.kinematics import ContactError
     from fe_ste.tools.drawing import RenderingError

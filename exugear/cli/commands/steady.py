@@ -33,7 +33,7 @@ from exugear.cli.console import (
     refuse_not_converged,
     say,
 )
-from exugear.cli.tables import HARD_SPACE, print_table, significant
+from exugear.cli.tables import HARD_SPACE, print_table, print_text, significant
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,21 +58,21 @@ COLUMNS = {
 }
 """Headings of the table and the factors from SI units."""
 NOTICED_CHANGE = 1e-2
-"""Change of the loudest peaks by more harmonics that is to be minded."""
+"""Relative change of the highest peaks with more harmonics above which a warning is printed."""
 NOTICED_VARIATION = 1e-3
-"""Change of stiffness with the carrier's angle that is told."""
+"""Relative variation of stiffness with the carrier angle above which a warning is printed."""
 NOTICED_WAY = 0.3
-"""Moment of the load's way along the face, over the transmission error's push, that is told."""
+"""Ratio of shuttling moment to transmission error excitation above which a warning is printed."""
 
 
 BAND_LEGEND = (
-    "Zero-to-peak amplitudes with the largest and with the least damping; (ranks) where the rank within the quantity "
+    "Zero-to-peak amplitudes with the highest and with the lowest damping; (ranks) where the rank within the quantity "
     "depends on the damping."
 )
 
 
 class Method(StrEnum):
-    """What varies: the transmission error as excitation, the stiffness over the mesh cycle, or laws in time."""
+    """Methods: transmission error as excitation, time-varying stiffness, or nonlinear models evaluated in time."""
 
     linear = "linear"
     parametric = "parametric"
@@ -149,7 +149,7 @@ def steady(
 
 
 def _tell_of_other_loads(gearbox: Gearbox) -> None:
-    """Say which load cases load meshes otherwise than the static load does, which the response is at."""
+    """Print warnings about load cases whose mesh loads differ from the static load used for the response."""
     from exugear.gearbox.load_cases import load_in_words, other_load_warning, static_load_in_words, summarise_loads
 
     static = static_load_in_words(gearbox)
@@ -163,8 +163,8 @@ def _tell_of_other_loads(gearbox: Gearbox) -> None:
 
 
 def _refuse_what_has_none(project: Project) -> None:
-    """Refuse a variant without a steady response before tables and finite elements."""
-    with suppress(FailedError):  # which says nothing of the law that is asked for
+    """Raise an error for a variant without steady-state response before tables and finite elements are computed."""
+    with suppress(FailedError):  # such a failure does not apply to the selected mesh model
         variant = project.choice.variant
         if reason := steady_lack(assembled_by_iso(project.gearbox, variant), variant):
             raise BadInputError(reason)
@@ -223,7 +223,9 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
     fastest = float(abs(data["speed"]).max()) / RPM
     stable = f"slowest decay rate {-growth:.3g} 1/s (stable)" if growth <= 0.0 else f"fastest growth {growth:.3g} 1/s"
     damping = damping_in_words(project.gearbox.case.damping)
-    say(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}; damping {damping}.")
+    if friction := project.gearbox.case.damping.tooth_friction:
+        damping += f"; friction of teeth included, coefficient {friction:g}"
+    print_text(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}; damping {damping}.")
     say(f"Results: {project.steady_path(settings)}")
     _fail_if_doubtful(data, growth)
 
@@ -238,7 +240,9 @@ def _print_bands(gearbox: Gearbox, ranking: Ranking) -> None:
     if not shown:
         return
     band = gearbox.case.damping.modal_band_percent
-    damping = "half to twice the damping" if band is None else f"{band[0]:g} to {band[1]:g} % of critical damping"
+    damping = "half to twice the damping"
+    if band is not None:
+        damping = f"{band[0]:g} to {band[1]:g} % of critical damping"
     print_table(f"Amplitudes with {damping}", [_band_row(resonance) for resonance in shown], legend=BAND_LEGEND)
 
 
@@ -320,7 +324,7 @@ def _speeds_of(ranking: Ranking) -> str:
 
 
 def _tell_of_range(ranking: Ranking) -> None:
-    """Say which speeds are ranked, where they are all, and where nothing stands out."""
+    """Print which speed range is ranked, and notes if all speeds are ranked or no resonance was found."""
     if ranking.whole:
         note(
             "Ranking over all speeds: no computed speed lies in an operating range. Set rated_speed_rpm or "
@@ -331,9 +335,9 @@ def _tell_of_range(ranking: Ranking) -> None:
 
 
 def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
-    """End with code 1 where no speed has a steady state; where each has its own stability, its file tells which.
+    """End with code 1 if the response is unstable; stability known for each speed is left to the result file.
 
-    Likewise where teeth read tables beside states that are not solved, and where a branch is not whole.
+    The command also fails if meshes use table states next to non-converged ones, or if the continuation is incomplete.
     """
     refuse_not_converged([mesh for mesh in str(data.attrs["near_unconverged_states"]).split(", ") if mesh])
     if data.attrs["branch_ended"]:
@@ -343,7 +347,7 @@ def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
 
 
 def _tell_of_pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
-    """Say which meshes would have to pull, where the law does not let their teeth part."""
+    """Print which meshes have tensile forces, if the mesh model neglects contact loss."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import pulls
     from exugear.system.tooth_mesh.laws.registry import LAWS
@@ -367,7 +371,7 @@ def _pull_summary(pull: TensileMesh) -> dict[str, Any]:
 
 
 def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
-    """Say which speeds have no steady state, and where it does not last."""
+    """Print the speeds without a converged or stable steady state."""
     from exugear.gearbox.units import RPM
 
     for missing in json.loads(data.attrs["not_converged"]):
@@ -382,7 +386,7 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
 
 
 def _tell_of_wandering_loads(project: Project) -> tuple[Shuttling, ...]:
-    """Say where the load moves along the face so far that its moment counts, if the law leaves it out."""
+    """Print a warning if the shuttling moment is significant but neglected by the mesh model."""
     from exugear.system.tooth_mesh.laws.registry import LAWS
     from exugear.system.tooth_mesh.tables import wandering_loads
 
@@ -405,7 +409,7 @@ def _wandering_summary(load: Shuttling) -> dict[str, Any]:
 
 
 def _left_out(data: xr.Dataset) -> dict[str, float]:
-    """Share of the variation of each mesh's compliance that is above the harmonics, of planets by their family."""
+    """Neglected fraction of the compliance variation of each mesh, above the harmonics; planets by their family."""
     shares = zip(data["mesh_wave"].values, data["left_out"].values, strict=True)
     return {str(wave): float(share) for wave, share in shares if " " not in str(wave)}
 
@@ -417,7 +421,7 @@ def _known(value: float) -> float | None:
 
 
 def _tell_of_harmonics(data: xr.Dataset) -> None:
-    """Say how many harmonics there are, what they leave out, and what more of them change."""
+    """Print the number of harmonics, their truncation error, and the effect of more harmonics."""
     mesh, share = max(_left_out(data).items(), key=lambda own: own[1])
     change = _known(float(data.attrs["change_with_more"]))
     count = int(data.attrs["harmonics"])
@@ -434,7 +438,7 @@ def _tell_of_harmonics(data: xr.Dataset) -> None:
 
 
 def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
-    """Say how non-linear bearings were taken, what unequal loads of planets leave out, and which loads swing far."""
+    """Print how nonlinear bearings were modelled, effects of unequal planet loads, and large dynamic bearing loads."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import STRAINED, bearing_swings
 
@@ -505,9 +509,9 @@ def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
         if loudness.at:
             found[f"{quantity}_at"] = loudness.at
         if loudness.limits:
-            least, largest = loudness.limits
-            found[f"{quantity}_least_damping_{KEYS[quantity]}"] = least.amplitude
-            found[f"{quantity}_largest_damping_{KEYS[quantity]}"] = largest.amplitude
+            lowest, highest = loudness.limits
+            found[f"{quantity}_lowest_damping_{KEYS[quantity]}"] = lowest.amplitude
+            found[f"{quantity}_highest_damping_{KEYS[quantity]}"] = highest.amplitude
             found[f"{quantity}_places_over_damping"] = loudness.places
     return found
 

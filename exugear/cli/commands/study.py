@@ -1,4 +1,4 @@
-"""The command `study`: many variations of one gearbox as one dataset."""
+"""The command `study`: many variations of one gearbox, combined in one dataset."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ SHOWN_OF_FRONT = 5
 
 
 class Executor(StrEnum):
-    """Where points are computed."""
+    """Executor of the points."""
 
     processes = "processes"
     dask = "dask"
@@ -159,7 +159,7 @@ def _default_folder(study: Study, path: Path) -> Path:
 
 
 def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> StudyResult:
-    """Carry the study out behind a progress bar."""
+    """Run the study with a progress bar."""
     from exugear.studies.runner import optimise, run_study
 
     with progress_bar() as bar:
@@ -168,7 +168,7 @@ def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, re
 
         def show(done: int, failed: int, total: int) -> None:
             interruption.check()
-            first.append(done)  # what was there before says nothing of the time left
+            first.append(done)  # points from earlier runs do not indicate the remaining time
             failures = f", {failed} failed" if failed else ""
             text = f"point {done} of {total}{failures}"
             bar.update(task, completed=done - first[0], total=total - first[0], description=text)
@@ -179,7 +179,7 @@ def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, re
 
 
 def _draw(study: Study, folder: Path, swept: StudyResult) -> list[Path]:
-    """Draw what was put together."""
+    """Plot the combined results."""
     from exugear.studies.pictures import draw_study
 
     if swept.dataset is None:
@@ -192,7 +192,7 @@ def _draw(study: Study, folder: Path, swept: StudyResult) -> list[Path]:
 
 
 def _tell(study: Study, path: Path, folder: Path, swept: StudyResult, pictures: list[Path], as_json: bool) -> None:
-    """Print what came of it; end with 1 if points failed, or are missing where all were asked for."""
+    """Print the results; end with code 1 if points failed, or are missing although all were requested."""
     searched = study.file.optimise is not None
     total = len(swept.records if searched else study.design.points)
     failed = swept.failed
@@ -245,14 +245,14 @@ def _print(study: Study, folder: Path, swept: StudyResult, summary: dict[str, An
 
 
 def _judged(study: Study) -> list[str]:
-    """Variables that the points of a search are judged by: figures, or their percentiles over tolerances."""
+    """Variables that rate the points of an optimisation: outputs, or their percentiles over tolerances."""
     from exugear.studies.dataset import Criteria, judged_name
 
     return [judged_name(study, name, side) for name, side in Criteria.of(study.file).sides]
 
 
 def _fail_if_beyond(study: Study, swept: StudyResult) -> None:
-    """End with code 1 where a search found no point within its limits."""
+    """End with code 1 if no point of an optimisation is within its limits."""
     from exugear.studies.dataset import EVALUATION
 
     data = swept.dataset
@@ -272,7 +272,7 @@ def _limit_text(limit: LimitSection) -> str:
 
 
 def _print_front(study: Study, dataset: xr.Dataset) -> None:
-    """Print where a search began, and some of what no other point beats, spread over the front."""
+    """Print the start point of an optimisation, and some points of the Pareto front, spread over the front."""
     import numpy as np
 
     figures = _judged(study)

@@ -92,7 +92,7 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
 
 
 def _draw_pictures(modes: Modes, folder: Path, place: int, animation: bool) -> list[Path]:
-    """Draw the gearbox and one mode; nothing where this machine cannot render."""
+    """Draw the gearbox and one mode; return no pictures if this machine cannot render."""
     from exugear.report.pictures.scene import (
         animate_elastic_bodies,
         animate_mode,

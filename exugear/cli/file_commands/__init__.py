@@ -1,1 +1,1 @@
-"""Verbs about the gearbox file: write, import, describe and check one, put results back. One module each."""
+"""Commands on the gearbox file: write, import, describe, check and migrate it, export results. One module each."""

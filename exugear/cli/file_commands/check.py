@@ -151,7 +151,7 @@ def _print_availability(
 
 
 def _rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -> None:
-    """Print the rating of all gears; end with code 1 where a safety factor is below the required one."""
+    """Print the rating of all gears; end with code 1 if a safety factor is below the required one."""
     from exugear.cli.rating_tables import tell_rating
     from exugear.cli.watched import WatchedProject
     from exugear.gearbox.choice import Choice
@@ -169,7 +169,7 @@ def _rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -
 
 
 def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
-    """Read the file; of one with faults print these as an object, too, if that is asked for."""
+    """Read the file; if it has errors and JSON is requested, print them as an object, too."""
     from exugear.gearbox.reading import GearboxFileError
 
     try:
@@ -181,7 +181,7 @@ def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
 
 
 def _assemblies(gearbox: Gearbox, variants: Mapping[str, str]) -> dict[Variant, Assembly | FailedError]:
-    """Assemble each variant that is possible, once: those on bearings are one as long as all bodies are rigid."""
+    """Assemble each available variant once; `flexible` shares the assembly of `bushing`, as all bodies are rigid."""
     found: dict[Variant, Assembly | FailedError] = {}
     for variant in (Variant.of(name) for name, lack in variants.items() if not lack):
         if variant.is_elastic and Variant.bushing in found:
@@ -195,7 +195,7 @@ def _assemblies(gearbox: Gearbox, variants: Mapping[str, str]) -> dict[Variant, 
 
 
 def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[str, str]:
-    """Say of each variant why it has no steady response over speed; empty where it has one."""
+    """Return for each variant why it has no steady-state response over speed; empty if it has one."""
     return {
         str(variant): str(assembly) if isinstance(assembly, FailedError) else steady_lack(assembly, variant)
         for variant, assembly in assemblies.items()
@@ -203,7 +203,7 @@ def _steady_lacks(assemblies: Mapping[Variant, Assembly | FailedError]) -> dict[
 
 
 def _damping_warnings(assemblies: Mapping[Variant, Assembly | FailedError]) -> list[str]:
-    """Say which modes on bearings, with rigid bodies and teeth as stiff as ISO 6336-1 says, have unusual damping."""
+    """Return warnings about modes with unusual damping, for rigid bodies with the mesh stiffness of ISO 6336-1."""
     from exugear.system.modes import modes_of, unusual_damping
 
     assembly = assemblies.get(Variant.bushing) or assemblies.get(Variant.rigid)
@@ -213,7 +213,7 @@ def _damping_warnings(assemblies: Mapping[Variant, Assembly | FailedError]) -> l
 
 
 def _tell_scripts(gearbox: Gearbox) -> None:
-    """Check the solids, and say which of them only a script makes."""
+    """Check the solids, and print which of them require a script."""
     from exugear.system.bodies.of_gearbox import solids_of
 
     for key, model in solids_of(gearbox):
@@ -292,7 +292,7 @@ def _backlash(ends: list[float]) -> str:
 
 
 def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
-    """Sum up the tooth thickness of gears that have allowances of it."""
+    """Summarise the tooth thickness of gears with allowances."""
     from exugear.system.plausibility import thickness_range
 
     summaries = []
@@ -312,7 +312,7 @@ def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
 
 
 def _force_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
-    """Sum up the constant forces on bodies."""
+    """Summarise the constant forces on bodies."""
     return [
         {
             "force": force.name,
@@ -348,9 +348,9 @@ def _thickness_row(one: dict[str, Any]) -> dict[str, str]:
 def _bearing_summaries(
     gearbox: Gearbox, assembly: Assembly | FailedError | None
 ) -> tuple[list[dict[str, Any]], list[str]]:
-    """Load and stiffness of catalogue bearings, a line for those of all planets, and what is doubtful about them.
+    """Summarise load and stiffness of catalogue bearings, one row for those of all planets, and return their warnings.
 
-    With the mesh stiffness of ISO 6336: tables may not be there, and the static loads hardly depend on it.
+    The mesh stiffness is that of ISO 6336, because tables may not exist and the static loads barely depend on it.
     """
     from exugear.results.folder import duty_summary
     from exugear.system.bearings.duty import estimate_effects
@@ -406,7 +406,7 @@ def _bearing_row(summary: dict[str, Any], with_reaction: bool) -> dict[str, str]
 
 
 def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
-    """Sum up what each load case does to the rolling train; one that no run could take is bad input."""
+    """Summarise each load case on the kinematic gear train; a load case that no run could use is bad input."""
     from exugear.gearbox.load_cases import (
         band_warning,
         bearing_range_warning,

@@ -21,7 +21,7 @@ from exugear.cli.case import (
 from exugear.cli.console import BadInputError, exit_codes, note, print_json, say
 
 SHOWN = 10
-"""Most replaced attributes that are told."""
+"""Maximum number of replaced attributes that are printed."""
 
 
 def export(
@@ -78,7 +78,7 @@ def export(
 
 
 def _new_name(name: str) -> str:
-    """Name of the copy of a file, whatever ends the name has.
+    """Name of the copy of a file, which keeps its extensions.
 
     Examples
     --------

@@ -40,7 +40,7 @@ def import_(
         if imported.spectrum:
             table = target.with_name(SPECTRUM)
             content = imported.spectrum.encode("utf-8")
-            if not (table.is_file() and table.read_bytes() == content):  # as an import that was killed leaves it
+            if not (table.is_file() and table.read_bytes() == content):  # as left by an import that was killed
                 _refuse_existing(table)
                 write_file(table, content)
         write_file(target, imported.text.encode("utf-8"))
@@ -77,7 +77,7 @@ def _refuse_existing(path: Path) -> None:
 
 
 def _stem(file: Path) -> str:
-    """Name of a file without its ends: a REXS file may have two."""
+    """Name of a file without its extensions; a REXS file may have two."""
     return file.name.removesuffix(".zip").removesuffix(".xml").removesuffix(".json").rsplit(".rexs", 1)[0] or "imported"
 
 

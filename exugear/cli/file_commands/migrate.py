@@ -1,4 +1,4 @@
-"""The command `migrate`: rewrite a file of an earlier version with the names of today."""
+"""The command `migrate`: rewrite a file of an earlier version with the current names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command `new`: write a gearbox file to start from."""
+"""The command `new`: write a template gearbox file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from exugear.gearbox.templates.kinds import KINDS
 
 
 class Kind(StrEnum):
-    """Kinds of gearboxes that a file to start from is at hand for."""
+    """Kinds of gearboxes for which a template exists."""
 
     _ignore_ = ["members", "kind"]
     members = vars()
@@ -22,12 +22,14 @@ class Kind(StrEnum):
         members[kind] = kind
 
 
+PARALLEL = Kind("parallel")
+"""Template without an option, which the tutorial uses."""
 _KINDS_TOLD = "; ".join(f"{kind}: {words}" for kind, words in KINDS.items())
 
 
 def new(
     case: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.", show_default=False)],
-    kind: Annotated[Kind, typer.Option(metavar="NAME", help=f"Template. {_KINDS_TOLD}.", show_default=False)],
+    kind: Annotated[Kind, typer.Option(metavar="NAME", help=f"Template. {_KINDS_TOLD}.")] = PARALLEL,
     as_json: JsonOption = False,
 ) -> None:
     """Write a commented gearbox file to start from. It runs without changes."""

@@ -1,1 +1,1 @@
-"""Files of the industry's exchange format REXS: containers, versions, units, and the tree of what they hold."""
+"""Files of the industrial exchange format REXS: containers, versions, units, and the tree of their content."""

@@ -1,4 +1,4 @@
-"""Attributes that are put into a REXS file as it stands: all other bytes stay as they are."""
+"""Attributes that are inserted into an existing REXS file without changing its other bytes."""
 
 from __future__ import annotations
 
@@ -9,33 +9,33 @@ from dataclasses import dataclass
 from exugear.exchange.rexs.tree import RexsError, degree_sign
 
 OWN = "custom_exugear_"
-"""Beginning of the attributes that REXS has no name for; other programs pass them over."""
+"""Prefix of attributes for which REXS has no name; other programs ignore them."""
 JSON_KINDS: Mapping[type, str] = {str: "string", float: "floating_point", tuple: "floating_point_array"}
-"""Key of a value in JSON."""
+"""JSON key of a value by its type."""
 
 AdditionValue = str | float | tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Addition:
-    """An attribute for a component."""
+    """An attribute that is added to a component."""
 
     component: int
     name: str
-    """In the version of the file."""
+    """Name in the version of the file."""
     unit: str
     value: AdditionValue
-    """Str, float or tuple of float."""
+    """Value of type str, float or tuple of float."""
     load_case: int | None = None
-    """The load case that the value belongs to; None for the component itself."""
+    """Load case of the value; None for the component itself."""
 
 
 Edit = tuple[int, int, str]
-"""What stands between two places of a text, and what is put there instead."""
+"""Start and end of a section of text, and the text that replaces it."""
 
 
 def edited(text: str, edits: Iterable[Edit]) -> str:
-    """Text after some edits, none of which overlap; those at one place follow each other as given.
+    """Text after some edits, which must not overlap; edits at one position are applied in the given order.
 
     Examples
     --------
@@ -56,7 +56,7 @@ def by_place(additions: Iterable[Addition]) -> dict[tuple[int | None, int], dict
     Raises
     ------
     RexsError
-        Two of one name at one place.
+        Two additions have the same name and position.
     """
     gathered: dict[tuple[int | None, int], dict[str, Addition]] = {}
     for addition in additions:
@@ -68,7 +68,7 @@ def by_place(additions: Iterable[Addition]) -> dict[tuple[int | None, int], dict
 
 
 def number(value: float) -> str:
-    """Write a number as files have it: ten digits, always with a point or an exponent.
+    """Format a number for a file: ten digits, always with a point or an exponent.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def number(value: float) -> str:
 
 
 def unit_in(unit: str, version: tuple[int, int]) -> str:
-    """Return a unit as a version writes it.
+    """Return a unit in the notation of a REXS version.
 
     Examples
     --------
@@ -94,7 +94,7 @@ def unit_in(unit: str, version: tuple[int, int]) -> str:
 
 
 def json_entry(addition: Addition) -> str:
-    """Attribute as JSON has it."""
+    """Attribute in JSON notation."""
     value = addition.value
     kind = JSON_KINDS[type(value)]
     if isinstance(value, tuple):

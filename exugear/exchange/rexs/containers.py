@@ -1,4 +1,4 @@
-"""A REXS file as it lies on the disk: XML, JSON, or a zip archive with one of them."""
+"""Containers of REXS files: XML, JSON, or a zip archive with one of them."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from exugear.exchange.rexs.tree import Model, RexsError, plain
 from fe_ste.tools.files import FileError, open_regular
 
 LARGEST = 64_000_000
-"""Most bytes of a model, unpacked; the largest found is a tenth of it."""
+"""Maximum size of an unpacked model, bytes; the largest known model has a tenth of it."""
 MOST_MEMBERS = 1000
-"""Most members of an archive."""
+"""Maximum number of members of an archive."""
 _DAMAGES = (
     zipfile.BadZipFile,
     NotImplementedError,
@@ -37,14 +37,14 @@ _ENDINGS = (".rexs", ".rexsj", ".xml", ".json")
 
 
 def read_rexs(path: str | Path) -> Model:
-    """Read a REXS file of version 1.0 to 2.0; what it holds tells its kind, not its name.
+    """Read a REXS file of version 1.0 to 2.0; its format is detected from its content, not from its name.
 
-    Nothing outside the file is read, and of an archive nothing but its one model, in memory.
+    No other files are read. In an archive only the single model is unpacked, in memory.
 
     Raises
     ------
     RexsError
-        The file cannot be read, is no REXS file or asks for more than one may.
+        The file cannot be read, is not a REXS file, or exceeds the limits.
 
     Examples
     --------
@@ -69,14 +69,14 @@ def parsed(content: bytes, path: str | Path) -> Model:
 
 
 def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
-    """Bytes of a REXS file with attributes added: the same kind, version and encoding, and all else as it is.
+    """Return the bytes of a REXS file with added attributes; format, version, encoding and the rest are unchanged.
 
-    An attribute that its component has already is replaced. Of an archive the other members stay.
+    An existing attribute of the same name is replaced. Other members of an archive are kept.
 
     Raises
     ------
     RexsError
-        The file cannot be read, or an addition names a component that it does not have.
+        The file cannot be read, or an addition refers to a component that does not exist.
     """
     content = _bytes_of(path)
     model = parsed(content, path)
@@ -94,7 +94,7 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
 
 
 def _repacked(content: bytes, member: str, new: bytes) -> bytes:
-    """Archive with a new member in the place of an old one; the bytes of all others stay, packed as they are."""
+    """Return an archive in which one member is replaced; the packed bytes of all others are unchanged."""
     packed = io.BytesIO()
     with _damage_told(), zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as target:
         target.comment = old.comment
@@ -142,7 +142,7 @@ def _check_size(size: int) -> None:
 
 
 def _member(content: bytes) -> tuple[str, bytes]:
-    """Name and bytes of the one model in an archive."""
+    """Name and bytes of the single model in an archive."""
     with _damage_told(), zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
         if len(members) > MOST_MEMBERS:
@@ -164,7 +164,7 @@ def _member(content: bytes) -> tuple[str, bytes]:
 
 @contextmanager
 def _damage_told() -> Iterator[None]:
-    """Tell in words what an archive is damaged by; the modules that unpack raise what they meet."""
+    """Convert the exceptions of the unpacking modules to an error that describes the damage of an archive."""
     try:
         yield
     except RexsError:

@@ -1,4 +1,4 @@
-"""Attributes put into the JSON of a REXS file: spaces, order and the writing of numbers stay as they are."""
+"""Attributes inserted into the JSON text of a REXS file; spaces, order and number format are kept."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from json.decoder import scanstring  # type: ignore[attr-defined]
 from exugear.exchange.rexs.additions import Addition, Edit, edited, json_entry
 
 LONGEST_INDENT = 200
-"""Most blanks before an entry that are repeated."""
+"""Maximum indentation before an entry that is repeated."""
 _BLANK = re.compile(r"[ \t\r\n]*")
 _PLAIN = re.compile(r"[-+.\w]+")
 _MARK = b"\xef\xbb\xbf"
 
 
 def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Mapping[str, Addition]]) -> bytes:
-    """JSON with attributes added, or replaced where a component has one of the name already; see `xml_additions`."""
+    """Return JSON with added attributes, which replace existing ones of the same name; see `xml_additions`."""
     mark = _MARK if content.startswith(_MARK) else b""
     text = content[len(mark) :].decode("utf-8")
     components, load_cases = _places(_scanned(text, 0), text)
@@ -38,7 +38,7 @@ def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Ma
 
 @dataclass
 class _Node:
-    """A value: where it stands, and what is inside."""
+    """A value: its position and its content."""
 
     start: int
     end: int = 0
@@ -49,7 +49,7 @@ class _Node:
         return self.members.get(key)
 
     def all(self, key: str) -> list[_Node]:
-        """Return the objects in a list, or the one object in its place."""
+        """Return the objects in a list, or the single object in its place."""
         node = self.members.get(key)
         if node is None:
             return []
@@ -59,7 +59,7 @@ class _Node:
 
 
 def _scanned(text: str, start: int) -> _Node:
-    """Value that begins at a place, with the places of all that it holds."""
+    """Value that begins at a position, with the positions of its content."""
     node = _Node(_skip_blanks(text, start))
     place = node.start
     if text[place] == '"':
@@ -118,7 +118,7 @@ def _text(text: str, node: _Node) -> str:
 
 
 def _put_inside(text: str, place: _Node, key: str, new: Sequence[str]) -> Iterator[Edit]:
-    """Put values behind the last one of a list, which may be empty or missing."""
+    """Insert values after the last one of a list, which may be empty or missing."""
     if not new:
         return
     items = place.all(key)

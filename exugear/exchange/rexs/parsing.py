@@ -1,4 +1,4 @@
-"""XML and JSON of REXS into the tree of a model, with limits on what a stranger's file may ask for."""
+"""Conversion of REXS files in XML and JSON to the tree of a model, with limits for untrusted files."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ import numpy as np
 from exugear.exchange.rexs import tree as synonyms
 from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, Relation, RexsError, Value, plain
 
-# Encodings of XML: what the bytes of a REXS file are as text, and what turns the text into such bytes again
+# Encodings of XML: decoding of the bytes of a REXS file, and encoding of edited text
 
 MULTI_BYTE = frozenset(
     ("utf-8", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "utf-32-le", "utf-32-be")
     + ("gb2312", "gbk", "gb18030", "big5", "shift_jis", "cp932", "euc_jp", "euc_kr", "cp949")
 )
-"""Encodings with more than a byte to a letter that are read: each byte sequence is one text, in linear time."""
+"""Supported multi-byte encodings, which decode every byte sequence uniquely and in linear time."""
 _SINGLE_BYTE = re.compile(r"ascii|iso8859-\d{1,2}|cp\d{3,4}|koi8-[rut]|mac-\w+")
-"""Families of encodings with a byte to each letter, as Python calls them; others are no encodings of text files."""
+"""Supported families of single-byte encodings, by their names in Python; others are not used for text files."""
 _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF32_LE, "utf-32-le"),
     (codecs.BOM_UTF32_BE, "utf-32-be"),
@@ -38,7 +38,7 @@ _DECLARED = re.compile(rb"\s*<\?xml[^>]{0,200}?\bencoding\s*=\s*[\"']([\w.:-]{1,
 
 
 class Decoded(NamedTuple):
-    """Text of a file: its byte order mark, the encoding of all that follows, and what this says."""
+    """Text of a file, with its byte order mark and the encoding of the remaining bytes."""
 
     mark: bytes
     encoding: str
@@ -46,12 +46,12 @@ class Decoded(NamedTuple):
 
 
 def decoded(content: bytes) -> Decoded:
-    """Decode XML by its byte order mark, else by what its declaration says, else as UTF-8.
+    """Decode XML according to its byte order mark, else its declaration, else as UTF-8.
 
     Raises
     ------
     RexsError
-        The encoding is unknown, or the bytes are none of it.
+        The encoding is unknown, or the bytes are invalid in it.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def decoded(content: bytes) -> Decoded:
 
 
 def _without_mark(content: bytes) -> str:
-    """Tell the encoding of a file without a byte order mark: UTF-16 shows by its zeros, others are declared."""
+    """Return the encoding of a file without a byte order mark: UTF-16 if it has zero bytes, else the declared one."""
     if content[:1] == b"\x00":
         return "utf-16-be"
     if content[1:2] == b"\x00":
@@ -84,26 +84,26 @@ def _without_mark(content: bytes) -> str:
     raise RexsError(f"the file declares the encoding '{plain(name)}', which is not supported; expected UTF-8")
 
 
-# XML and JSON of REXS into the tree of a model, with limits on what a stranger's file may ask for
+# Conversion of REXS files in XML and JSON to the tree of a model, with limits for untrusted files
 
 DEEPEST = 24
-"""Most levels of nesting; a REXS file has nine."""
+"""Maximum depth of nesting; a REXS file has nine levels."""
 MOST_ELEMENTS = 500_000
-"""Most elements of an XML file; the largest found has 20,000."""
+"""Maximum number of elements of an XML file; the largest known file has 20,000."""
 LONGEST_WHOLE = 30
-"""Digits from which on a whole number of JSON is read as a float."""
+"""Number of digits from which a whole number of JSON is read as a float."""
 CODES = {"int32": "<i4", "float32": "<f4", "float64": "<f8"}
-"""Numbers packed as base64 (since 1.4): little-endian, matrices row by row."""
+"""Formats of numbers packed as base64 (since 1.4): little-endian, matrices row by row."""
 _FORBIDDEN = ("data_source", "referenced_component_id")
 
 
 def parse_model(content: bytes) -> Model:
-    """Read the model in the bytes of an XML or JSON file, whichever they are.
+    """Read the model from the bytes of an XML or JSON file.
 
     Raises
     ------
     RexsError
-        What is wrong with the file.
+        The file has errors.
     """
     if is_json(content):
         return _model(_header_of_json(content))
@@ -113,7 +113,7 @@ def parse_model(content: bytes) -> Model:
 
 
 def is_json(content: bytes) -> bool:
-    """Tell whether the bytes of a file begin as JSON does."""
+    """Return whether the bytes of a file begin like JSON."""
     return _start(content) in (b"{", b"[")
 
 
@@ -123,7 +123,7 @@ def _start(content: bytes) -> bytes:
 
 @dataclass
 class _Raw:
-    """A model as both formats give it: plain values, names as in the file."""
+    """A model before conversion, equal for both formats: plain values, and names as in the file."""
 
     version: str
     program: str
@@ -189,7 +189,7 @@ def _relation(
 
 
 def _present_names(attributes: Sequence[tuple[str, Attribute]]) -> dict[str, Attribute]:
-    """Attributes by their present names; where old and new stand side by side the new one counts."""
+    """Attributes by their current names; if an old and a current name occur together, the current one has priority."""
     named = {synonyms.ATTRIBUTES.get(key, key): attribute for key, attribute in attributes}
     return named | {key: attribute for key, attribute in attributes if key in named}
 
@@ -207,7 +207,7 @@ def _identifier(value: Any, what: str) -> int:
 def _unpacked(code: str, text: str, rows: int | None) -> tuple[Value, ...]:
     """Numbers of a base64 text; those of a matrix as its rows.
 
-    A text that is cut short is refused, as REXS pads none.
+    A truncated text is refused; REXS requires no padding.
     """
     if code not in CODES:
         raise RexsError(f"an array is packed as '{plain(code)}'; expected one of {', '.join(CODES)}")
@@ -249,7 +249,7 @@ def _header_of_json(content: bytes) -> _Raw:
 
 
 def _whole_number(digits: str) -> int | float:
-    """Whole number; one of more digits than any id has is a float, and infinite beyond that: it costs no time."""
+    """Whole number; to save time, one with more digits than any id is a float, which may be infinite."""
     if len(digits) < LONGEST_WHOLE:
         return int(digits)
     return float(digits)
@@ -266,7 +266,7 @@ def _table(value: Any, what: str) -> dict[str, Any]:
 
 
 def _tables(parent: Mapping[str, Any], key: str) -> Iterator[dict[str, Any]]:
-    """Objects of a list, which may be missing."""
+    """Yield the objects of a list, which may be missing."""
     values = _table(parent, key).get(key) or []
     if not isinstance(values, list):
         raise RexsError(f"not a REXS file: {key} is not a list")
@@ -353,7 +353,7 @@ def _xml_value(element: _Element) -> Value:
 
 
 def _elements(content: bytes) -> _Element:
-    """Tree of an XML file; a file that declares anything of its own is refused."""
+    """Tree of an XML file; a file with declarations of its own is refused."""
     top = _Element("", {})
     open_elements = [top]
     count = 0

@@ -1,4 +1,4 @@
-"""What a REXS file holds: components with attributes, relations between them, load cases."""
+"""Content of a REXS file: components with attributes, relations between them, load cases."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from functools import cached_property
 
 from fe_ste.tools.display import ReprMixin
 
-# Names and units over the versions of REXS: what a thing is called today, and what its unit is worth
+# Names and units in the versions of REXS: current names, and factors of units
 
 LEAST_VERSION, LAST_VERSION = (1, 0), (2, 0)
-"""Versions that are read; those in between changed names, which the tables below tell."""
+"""Supported versions; names changed in between, as the tables below list."""
 
 TYPES = {
     "flank_geometry": "cylindrical_gear_flank",
     "stage_gear_data": "cylindrical_stage_gear_data",
     "fixed_coupling": "coupling",
 }
-"""Old name of a component's type to the present one."""
+"""Current name of a component type by its old name."""
 
 ATTRIBUTES = {
     "axial_backlash": "operating_axial_bearing_clearance",
@@ -33,13 +33,13 @@ ATTRIBUTES = {
     "static_capacity": "radial_static_load_rating",
     "tip_radius_factor": "tip_corner_radius_factor_reference_profile",
 }
-"""Old name of an attribute to the present one, for those that are read."""
+"""Current name of an attribute by its old name, for those that are read."""
 
 ROLES = {"side_1": "inner_part", "side_2": "outer_part"}
-"""Old name of a role in a relation to the present one."""
+"""Current name of a role in a relation by its old name."""
 
 RELATIONS = {"coupling": "side"}
-"""Old name of a relation to the present one."""
+"""Current name of a relation by its old name."""
 
 _UNITS = {
     "none": ("number", 1.0),
@@ -75,13 +75,14 @@ _UNITS = {
     "h": ("time", 3600.0),
     "s": ("time", 1.0),
     "mm^2 / s": ("viscosity", 1e-6),
+    "C": ("temperature", 1.0),
 }
 
 
 def unit_factor(unit: str, wanted: str) -> float | None:
-    """Factor from a unit to a wanted one; None if they do not measure the same or the unit is unknown.
+    """Factor from a unit to a wanted one; None if the quantities differ or the unit is unknown.
 
-    An empty unit is the wanted one: some programs leave it out.
+    An empty unit counts as the wanted one, because some programs omit it.
 
     Examples
     --------
@@ -98,18 +99,18 @@ def unit_factor(unit: str, wanted: str) -> float | None:
 
 
 def degree_sign(version: tuple[int, int]) -> str:
-    """Return how a version writes degrees."""
+    """Return the notation of degrees in a version."""
     if version < (1, 4):
         return "°"
     return "deg"
 
 
-# Faults of a REXS file: one clear sentence each, told all at once
+# Errors of a REXS file: one clear sentence each, reported together
 
 SHOWN_FAULTS = 20
-"""Most faults that one message shows."""
+"""Maximum number of errors that a message shows."""
 LONGEST_TEXT = 80
-"""Characters of a file's text that a message or comment shows."""
+"""Maximum number of characters of a file's text in a message or comment."""
 
 
 class RexsError(ValueError):
@@ -118,7 +119,7 @@ class RexsError(ValueError):
     Attributes
     ----------
     faults : tuple of str
-        All of them, a sentence each; the message shows the first `SHOWN_FAULTS`.
+        All errors, one sentence each; the message shows the first `SHOWN_FAULTS`.
     """
 
     def __init__(self, *faults: str) -> None:
@@ -130,43 +131,43 @@ class RexsError(ValueError):
 
 
 class Faults(ReprMixin, line=": {_found!n}"):
-    """Faults gathered over several attempts."""
+    """Errors collected over several attempts."""
 
     def __init__(self) -> None:
         self._found: list[str] = []
 
     def add(self, sentence: str) -> None:
-        """Keep a fault."""
+        """Add an error."""
         self._found.append(sentence)
 
     @contextmanager
     def gathered(self) -> Iterator[None]:
-        """Keep the faults that end what is tried inside the context."""
+        """Collect the errors that end the code inside the context."""
         try:
             yield
         except RexsError as error:
             self._found += error.faults
 
     def of_each(self, attempts: Iterator[Callable[[], object]]) -> None:
-        """Try all and keep the faults of each."""
+        """Run all attempts and collect the errors of each."""
         for attempt in attempts:
             with self.gathered():
                 attempt()
 
     def tell(self) -> None:
-        """End here if there are any.
+        """Raise the collected errors, if any.
 
         Raises
         ------
         RexsError
-            All faults so far.
+            There are errors; the exception holds all of them.
         """
         if self._found:
             raise RexsError(*self._found)
 
 
 def plain(text: object, longest: int = LONGEST_TEXT) -> str:
-    r"""Text of a file as messages and comments show it: one line, printable, not too long.
+    r"""Text of a file for messages and comments: one line, printable, of limited length.
 
     Examples
     --------
@@ -180,18 +181,18 @@ def plain(text: object, longest: int = LONGEST_TEXT) -> str:
     return f"{line[: longest - 1]}…"
 
 
-# What a REXS file holds: components with attributes, relations between them, load cases
+# Content of a REXS file: components with attributes, relations between them, load cases
 
 LARGEST_NUMBER = 1e40
-"""Numbers beyond it are no quantity of a gearbox; files write 1e23 for 'rigid'. Powers of it are still numbers."""
+"""Limit of numbers that represent physical quantities; files write 1e23 for rigid. Powers of it are still finite."""
 
 Value = str | bool | float | tuple["Value", ...]
-"""A value as it stands in the file: texts of XML are turned into numbers when these are asked for."""
+"""A value as in the file; texts of XML are converted to numbers on access."""
 
 
 @dataclass(frozen=True)
 class Attribute:
-    """Value of a component with its unit; the unit is empty where the file gives none."""
+    """Value of a component with its unit; the unit is empty if the file has none."""
 
     value: Value
     unit: str = ""
@@ -199,34 +200,34 @@ class Attribute:
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """A part of the gearbox, or data on one."""
+    """A part of the gearbox, or data on a part."""
 
     number: int
-    """Its id, unique in the file."""
+    """Id of the component, unique in the file."""
     type: str
     name: str = ""
     attributes: Mapping[str, Attribute] = field(default_factory=dict)
-    """By their present names."""
+    """Attributes by their current names."""
     asked: set[str] = field(default_factory=set, repr=False)
-    """Names that were asked for so far: what nobody asks for is left out of an import, and told."""
+    """Names that have been read so far; the others are reported as omitted by an import."""
 
     def __str__(self) -> str:
-        """Return how messages and comments name it."""
+        """Return the name of the component in messages and comments."""
         name = plain(self.name)
         return f"{self.type} {self.number}" + (f" '{name}'" if name else "")
 
     def given(self, key: str) -> bool:
-        """Tell whether the file says anything under a key."""
+        """Return whether the file has a value of an attribute."""
         attribute = self._attribute(key)
         return attribute is not None and attribute.value not in ("", ())
 
     def quantity(self, key: str, unit: str = "none") -> float | None:
-        """Finite number in a unit; None where the file gives none.
+        """Finite number in a unit; None if the file has no value.
 
         Raises
         ------
         RexsError
-            The value is no number, or its unit does not measure the same.
+            The value is not a number, or its unit is of another quantity.
         """
         attribute = self._attribute(key)
         if attribute is None or not self.given(key):
@@ -234,12 +235,12 @@ class Component:
         return self._number(key, attribute.value) * self._factor(key, attribute, unit)
 
     def whole(self, key: str) -> int | None:
-        """Whole number; None where the file gives none.
+        """Whole number; None if the file has no value.
 
         Raises
         ------
         RexsError
-            The value is no whole number.
+            The value is not a whole number.
         """
         value = self.quantity(key)
         if value is not None and value != round(value):
@@ -249,17 +250,17 @@ class Component:
         return round(value)
 
     def has_lost_vector(self, key: str) -> bool:
-        """Tell whether something stands under a key that wants three numbers, and is not."""
+        """Return whether an attribute that requires three numbers has a value without them."""
         value = self.attributes[key].value if key in self.attributes else None
         return value is not None and not (isinstance(value, tuple) and len(value) == 3)
 
     def vector(self, key: str, unit: str = "mm") -> tuple[float, float, float] | None:
-        """Three numbers in a unit; None where the file gives nothing.
+        """Three numbers in a unit; None if the file has no value.
 
         Raises
         ------
         RexsError
-            The value is not three numbers.
+            The value does not have three numbers.
         """
         attribute = self._attribute(key)
         if attribute is None:
@@ -271,14 +272,14 @@ class Component:
         return u, v, w
 
     def text(self, key: str) -> str:
-        """Text on one line; empty where the file gives none."""
+        """Text on one line; empty if the file has no value."""
         attribute = self._attribute(key)
         if attribute is None or isinstance(attribute.value, tuple):
             return ""
         return plain(attribute.value)
 
     def flag(self, key: str, number: int = 0) -> bool | None:
-        """Truth value, of an array that with a number; None where the file gives none."""
+        """Truth value, or the entry of an array with a number; None if the file has no value."""
         attribute = self._attribute(key)
         if attribute is None:
             return None
@@ -289,7 +290,7 @@ class Component:
         return known.get(str(value).strip().lower())
 
     def with_attributes(self, attributes: Mapping[str, Attribute]) -> Component:
-        """Return the component with some attributes replaced, as a load case does."""
+        """Return the component with some attributes replaced, as by a load case."""
         return Component(self.number, self.type, self.name, {**self.attributes, **attributes}, self.asked)
 
     def _attribute(self, key: str) -> Attribute | None:
@@ -316,7 +317,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Relation:
-    """What joins components: their numbers by role."""
+    """Relation between components: their numbers by role."""
 
     type: str
     order: int
@@ -333,14 +334,14 @@ class LoadCase:
 
 @dataclass(frozen=True)
 class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relations!n} relations"):
-    """All of a REXS file."""
+    """Complete content of a REXS file."""
 
     version: str
     program: str
-    """What wrote the file, with its version."""
+    """Program that wrote the file, with its version."""
     components: Mapping[int, Component]
     relations: tuple[Relation, ...]
-    """Ordered ones in their order."""
+    """Relations; ordered ones in their order."""
     load_cases: tuple[LoadCase, ...] = ()
 
     def of_type(self, *types: str) -> tuple[Component, ...]:
@@ -353,7 +354,7 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
         return tuple(self.components[one.roles[wanted]] for one in found if wanted in one.roles)
 
     def relations_of(self, *types: str) -> Iterator[Relation]:
-        """Relations of some types."""
+        """Yield the relations of some types."""
         return (relation for relation in self.relations if relation.type in types)
 
     @cached_property

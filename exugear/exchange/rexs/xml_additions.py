@@ -1,4 +1,4 @@
-"""Attributes put into the XML of a REXS file: spaces, order, comments and encoding stay as they are."""
+"""Attributes inserted into the XML text of a REXS file; spaces, order, comments and encoding are kept."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from exugear.exchange.rexs.additions import Addition, Edit, edited, number
 from exugear.exchange.rexs.parsing import decoded
 
 LONGEST_INDENT = 200
-"""Most blanks before an element that are repeated."""
+"""Maximum indentation before an element that is repeated."""
 _TAG_END = re.compile(rb"(?:[^\"'>]|\"[^\"]*\"|'[^']*')*>")
 _COMPONENT = ("model", "components", "component")
 _LOAD_CASE = ("model", "load_spectrum", "load_case")
@@ -20,11 +20,11 @@ _IN_LOAD_CASE = (*_LOAD_CASE, "component")
 
 
 def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Mapping[str, Addition]]) -> bytes:
-    """XML with attributes added, or replaced where a component has one of the name already.
+    """Return XML with added attributes, which replace existing ones of the same name.
 
     Parameters
     ----------
-    content : a file that `exugear.exchange.rexs.parsing.parse_model` reads
+    content : file in a form that `exugear.exchange.rexs.parsing.parse_model` can read
     additions : mapping of (load case, component) to attributes by name
     """
     written = decoded(content)
@@ -38,7 +38,7 @@ def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Ma
             edits.append(
                 _new_component(elements, elements.load_cases[case], elements.components[None, component], attributes)
             )
-    # Places are of bytes; UTF-8 is cut between letters only, since edits stand at tags.
+    # Positions are in bytes; edits are at tags, so that UTF-8 is cut only between characters.
     raw = edited(elements.content.decode("latin-1"), [(a, b, new.encode().decode("latin-1")) for a, b, new in edits])
     text = raw.encode("latin-1").decode("utf-8")
     return written.mark + text.encode(written.encoding, errors="xmlcharrefreplace")
@@ -46,7 +46,7 @@ def with_additions(content: bytes, additions: Mapping[tuple[int | None, int], Ma
 
 @dataclass
 class _Place:
-    """An element: from its begin to the end of its first tag, and to its end; bytes."""
+    """Positions of an element in bytes: its beginning, the end of its first tag, and its end."""
 
     start: int
     tag_end: int
@@ -62,7 +62,7 @@ class _Found:
     load_cases: dict[int, _Place] = field(default_factory=dict)
 
     def space_before(self, place: _Place) -> str:
-        """Return the blanks before an element, as far as they are an indentation."""
+        """Return the blanks before an element if they are an indentation."""
         before = self.content[max(0, place.start - LONGEST_INDENT) : place.start]
         return before[len(before.rstrip()) :].decode("ascii")
 
@@ -70,12 +70,12 @@ class _Found:
         return self.content[place.start : place.tag_end].decode("utf-8")
 
     def tag(self, place: _Place) -> str:
-        """Return the name in an element's first tag, with its prefix."""
+        """Return the name in the first tag of an element, with its prefix."""
         return self.first_tag(place)[1:-1].rstrip("/").split()[0]
 
 
 def _elements(content: bytes) -> _Found:
-    """Places of components, their attributes and load cases in UTF-8."""
+    """Positions of components, their attributes and load cases in UTF-8."""
     found = _Found(content)
     path: list[str] = []
     stack: list[_Place] = []
@@ -122,13 +122,13 @@ def _edits(found: _Found, place: _Place, attributes: Mapping[str, Addition]) -> 
 
 
 def _prefix(tag: str) -> str:
-    """Prefix of a tag with its colon: elements in one stand for the same as their neighbours only with it."""
+    """Namespace prefix of a tag with its colon; inserted elements need the same prefix as adjacent ones."""
     prefix, colon, _ = tag.rpartition(":")
     return prefix + colon
 
 
 def _put_inside(found: _Found, place: _Place, new: Sequence[str]) -> Iterator[Edit]:
-    """Put elements behind the last one inside an element, or into an empty one."""
+    """Insert elements after the last one inside an element, or into an empty element."""
     if not new:
         return
     outside = found.space_before(place)
@@ -145,7 +145,7 @@ def _put_inside(found: _Found, place: _Place, new: Sequence[str]) -> Iterator[Ed
 
 
 def _new_component(found: _Found, case: _Place, model: _Place, attributes: Mapping[str, Addition]) -> Edit:
-    """Component of a load case, with the first tag that it has in the model."""
+    """Component of a load case, with the first tag of that component in the model."""
     space = found.space_before(case.children[-1] if case.children else case)
     inner = f"{space}  " if "\n" in space else ""
     head = found.first_tag(model)
@@ -156,7 +156,7 @@ def _new_component(found: _Found, case: _Place, model: _Place, attributes: Mappi
 
 
 def _element(addition: Addition, prefix: str) -> str:
-    """Attribute as XML has it."""
+    """Attribute in XML notation."""
     head = f"<{prefix}attribute id={quoteattr(addition.name)} unit={quoteattr(addition.unit)}>"
     value = addition.value
     if isinstance(value, tuple):

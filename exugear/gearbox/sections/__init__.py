@@ -1,1 +1,1 @@
-"""Sections of the gearbox file as it is written: pydantic models, unit in the key."""
+"""Sections of the gearbox file as it is written: pydantic models, with units in the keys."""

@@ -1,4 +1,4 @@
-"""Sections on bodies: place, inertia, and the shape or solid that makes them elastic."""
+"""Sections on bodies: position, inertia, and the shape or solid that makes them flexible."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ class InertiaSection(Section):
     """Mass properties of a body in one inertia set; moments about its centre of mass."""
 
     mass_kg: q.MassKg | None = None
-    """Mass; a body that only spins needs none."""
+    """Mass; optional for a spin-only body."""
     axial_kg_m2: q.InertiaKgM2
     """Moment of inertia about the axis."""
     transverse_kg_m2: q.InertiaKgM2 | None = None
     """Moment of inertia across the axis, about the centre of mass."""
     centre_of_mass_z_mm: q.PlaceMm | None = None
-    """Place of the centre of mass."""
+    """Axial position of the centre of mass."""
 
     @model_validator(mode="after")
     def _triangle(self) -> InertiaSection:
@@ -41,7 +41,7 @@ class InertiaSection(Section):
 
 
 class ShaftSectionSection(Section):
-    """A piece of a shaft: a cylinder, or a cone where a diameter at its end is given."""
+    """A piece of a shaft: a cylinder, or a cone if a diameter at its end is specified."""
 
     length_mm: q.LengthMm
     """Length."""
@@ -50,9 +50,9 @@ class ShaftSectionSection(Section):
     inner_diameter_mm: q.BoreMm = 0.0
     """Bore."""
     outer_diameter_end_mm: q.LengthMm | None = None
-    """Outer diameter at its +z end, of a cone."""
+    """Outer diameter of a cone at its +z end."""
     inner_diameter_end_mm: q.BoreMm | None = None
-    """Bore at its +z end, of a conical bore."""
+    """Diameter of a conical bore at its +z end."""
 
     @model_validator(mode="after")
     def _has_wall(self) -> ShaftSectionSection:
@@ -65,7 +65,7 @@ class ShaftSectionSection(Section):
 
 
 class BlankSection(Section):
-    """What a gear or bearing puts on its seat beyond the shaft itself: a rigid ring about the seat's centre."""
+    """Mass that a gear or bearing adds to its seat on the shaft: a rigid ring about the centre of the seat."""
 
     mass_kg: q.MassKg
     """Mass."""
@@ -85,44 +85,44 @@ class BlankSection(Section):
 
 
 class ShapeSection(Section):
-    """A stepped shaft, from `start_z_mm` on; its gears and bearings, and where torques act, become its seats.
+    """A stepped shaft that begins at `start_z_mm`; its gears, bearings and torque position become its seats.
 
-    `blanks` are by the name of the gear, bearing or mount that they sit with, or `torque`. They count in the inertia
+    The keys of `blanks` are the gear, bearing or mount at the same seat, or `torque`. Blanks contribute to the inertia
     that follows from the shape, in every variant.
     """
 
     start_z_mm: q.PlaceMm
-    """Where the first piece begins."""
+    """Axial position at which the first piece begins."""
     sections: Annotated[tuple[ShaftSectionSection, ...], Field(strict=False, min_length=1, max_length=200)]
-    """Pieces from there on, towards +z."""
+    """Pieces from there towards +z."""
     torque_z_mm: q.PlaceMm | None = None
-    """Place where torques act, and couplings without a seat."""
+    """Axial position of torques, and of couplings without a seat."""
     material: MaterialSection = MaterialSection()
     """Elastic material, steel by default."""
     blanks: dict[Name, BlankSection] = {}
-    """Rigid rings on its seats, by gear, bearing or mount; `torque` for the place where torques act."""
+    """Rigid rings at its seats, by gear, bearing or mount; `torque` for the position of torques."""
 
 
 class SolidSeatSection(Section):
-    """Where something sits on a solid: a band of a cylinder along z, or a flat ring across z (`inner_diameter_mm`).
+    """Seat on a solid: a band of a cylinder along z, or a flat ring normal to z (`inner_diameter_mm`).
 
-    The seat of a gear, bearing or mount takes its place, and as far as they are known its diameter and width, from
-    there. `sectors` divides the cylinder into equal seats, the first in the middle of +x. `same_as` names the seat
-    that a second bearing in the same bore sits on.
+    Position, and diameter and width if they are known, are by default those of the gear, bearing or mount. `sectors`
+    divides the cylinder into equal seats, the first centred on +x. `same_as` names the seat of another bearing in the
+    same bore.
     """
 
     diameter_mm: q.LengthMm | None = None
-    """Diameter of the cylinder, outer diameter of a flat ring."""
+    """Diameter of the cylinder, or outer diameter of a flat ring."""
     width_mm: q.LengthMm | None = None
     """Width of the cylinder along z."""
     inner_diameter_mm: q.BoreMm | None = None
-    """Inner diameter: makes it a flat ring across z."""
+    """Inner diameter of a flat ring normal to z; without it the seat is a cylinder."""
     position_mm: Point | None = None
-    """Middle of the seat; that of the gear, bearing or mount by default."""
+    """Centre of the seat; that of the gear, bearing or mount by default."""
     sectors: q.Sectors | None = None
-    """Equal seats that the cylinder is divided into, an odd number."""
+    """Number of equal seats into which the cylinder is divided; an odd number."""
     same_as: Name | None = None
-    """Seat of another bearing in the same bore; stands alone."""
+    """Seat of another bearing in the same bore; cannot be combined with other keys."""
 
     @model_validator(mode="after")
     def _kind(self) -> SolidSeatSection:
@@ -139,67 +139,68 @@ class SolidSeatSection(Section):
 
 
 class SolidSection(Section):
-    """A body of any shape from a file beside the gearbox file, in the gearbox's axes.
+    """A body of arbitrary shape from a file in the folder of the gearbox file, in the axes of the gearbox.
 
     Geometry (.step, .stp, .brep, or the script .geo, which needs permission to run) is meshed with tetrahedra by gmsh;
-    a mesh (.msh, .inp, .vtu, .vtk) is taken as it is. `torque_seat` names the seat where torques
-    act. `blanks` are by seat.
+    a mesh (.msh, .inp, .vtu, .vtk) is used unchanged. `torque_seat` names the seat at which torques act. The keys of
+    `blanks` are seats.
     """
 
     file: FileName
-    """Geometry or mesh beside the gearbox file."""
+    """Geometry or mesh in the folder of the gearbox file."""
     length_unit_mm: q.LengthUnitMm = 1.0
     """Unit of length of the file."""
     element_size_mm: q.ElementSizeMm | None = None
-    """Largest element of the mesh that is made."""
+    """Maximum element size of the generated mesh."""
     elements_around: q.ElementsAround = 12
-    """Elements around a full circle."""
+    """Number of elements around a full circle."""
     band_Hz: q.FrequencyHz | None = None
-    """Own vibrations are exact up to here; `elasticity.band_Hz` by default."""
+    """Cut-off frequency of the exact normal modes; `elasticity.band_Hz` by default."""
     torque_seat: Name | None = None
-    """Seat where torques act."""
+    """Seat at which torques act."""
     material: MaterialSection = MaterialSection()
     """Elastic material, steel by default."""
     seats: dict[Name, SolidSeatSection] = {}
     """Seats by gear, bearing or mount."""
     blanks: dict[Name, BlankSection] = {}
-    """Rigid rings on its seats, by seat."""
+    """Rigid rings at its seats, by seat."""
 
 
 class BodySection(Section):
-    """A rigid body turning about +z, a set of equal planets, a spin-only inertia or a fixed housing.
+    """A rigid body rotating about +z, a set of equal planets, a spin-only inertia or a fixed housing.
 
-    `flexibility` says what the variant `flexible` makes of it: "elastic" takes its shape or solid in the frame that
-    suits it, on the ground for a fixed body, turning with it for one that carries planets, and for all others one
-    that does not turn. "nonrotating" names the last and is refused for the others, as is "ffrf", a frame that floats
-    with the body (Exudyn only).
+    `flexibility` selects the model of the body in the variant `flexible`. "elastic" uses its shape or solid in a
+    suitable frame: stationary for a fixed body, rotating with a planet carrier, and non-rotating for all others.
+    "nonrotating" requires the latter and is refused for fixed bodies and carriers, as is "ffrf", a floating frame
+    (Exudyn only).
     """
 
     axis_position_mm: Annotated[tuple[q.PlaceMm, q.PlaceMm], Field(strict=False)] | None = None
-    """Place of the axis, x and y; planets have the three keys that follow instead, a spin-only body or a fixed one
-    without gears may have none. It is then shown where a body is that a coupling joins it to, else at the origin."""
+    """Position of the axis, x and y. Planets have the three next keys instead; it is optional for a spin-only body and
+    for a fixed body without gears. Such a body is shown at a coupled body, or else at the origin.
+    """
     carrier: Name | None = None
     """Body that carries the planets."""
     orbit_radius_mm: q.LengthMm | None = None
-    """Distance of the planets' axes from the carrier's."""
+    """Distance between the axes of planets and carrier."""
     planet_angles_deg: Annotated[tuple[q.AngleDeg, ...], Field(strict=False, max_length=MOST_PLANETS)] = ()
-    """Places of the planets at zero angle of the carrier; one body for each."""
+    """Angular positions of the planets at zero angle of the carrier; one body for each."""
     gears_z_mm: dict[Name, q.PlaceMm] = {}
-    """Gears on the body, by name: place of the middle of the face."""
+    """Gears on the body, by name: axial position of the middle of the face width."""
     fixed: bool = False
-    """Whether it stands still: the housing."""
+    """Whether the body is stationary, as a housing."""
     spin_only: bool = False
-    """Whether it only spins, without a place in space: a brake disc, a generator."""
+    """Whether the body has only rotational inertia and no position, as a brake disc or a generator."""
     enabled: bool = True
-    """Whether it takes part; what is joined to it alone steps aside with it."""
+    """Whether the body is included; elements that connect only to it are excluded with it."""
     inertia: dict[Name, InertiaSection] = {}
-    """Mass properties by inertia set; those that follow from shape, blanks and gears by default."""
+    """Mass properties by inertia set; by default they follow from shape, blanks and gears."""
     flexibility: Literal["none", "elastic", "nonrotating", "ffrf"] = "none"
-    """What the variant `flexible` makes of it."""
+    """Model of the body in the variant `flexible`."""
     shape: ShapeSection | None = None
-    """Stepped shaft, for elasticity."""
+    """Stepped shaft, for a flexible body."""
     solid: SolidSection | None = None
-    """Body of any shape, for elasticity."""
+    """Solid of arbitrary shape, for a flexible body."""
 
     @model_validator(mode="after")
     def _place(self) -> BodySection:

@@ -1,8 +1,8 @@
-"""The gearbox file as it is written: loads, settings, and the whole of its sections, unit in the key.
+"""The gearbox file as it is written: loads, settings, and the complete set of sections, with units in the keys.
 
-The models of this room know no mechanics. They refuse unknown keys, values of the wrong type and values that no
-gearbox can have (:mod:`exugear.gearbox.sections.entries`). :mod:`exugear.gearbox.gearbox` turns them into SI data
-and checks them against each other.
+The models of this package contain no mechanics. They refuse unknown keys, values of the wrong type and impossible
+values (:mod:`exugear.gearbox.sections.entries`). :mod:`exugear.gearbox.gearbox` converts them to SI data and checks
+their consistency.
 """
 
 from __future__ import annotations
@@ -40,21 +40,23 @@ class LoadCaseSection(Section):
     torques_N_m: dict[Name, q.TorqueNm] = {}
     """Constant torques on the gearbox by body, positive about +z."""
     torque_series: FileName | None = None
-    """CSV file of torques over time, beside the gearbox file."""
+    """CSV file of torques over time, in the folder of the gearbox file."""
     duration_s: q.DurationS = 30.0
     """Simulated time."""
     start_speed_rpm: q.SpeedRpm = 0.0
     """Speed of the overall input at the start."""
     start_speeds_rpm: dict[Name, q.SpeedRpm] = {}
-    """Speeds of further bodies at the start, of a train with several degrees of freedom; else its locked ones stand."""
+    """Initial speeds of further bodies in a train with several degrees of freedom; by default its locked bodies are at
+    standstill.
+    """
     driven_body: Name | None = None
-    """Body whose speed is prescribed; with the two keys that follow."""
+    """Body whose speed is prescribed; requires the next two keys."""
     end_speed_rpm: q.SpeedRpm | None = None
-    """Speed of that body at the end; it changes evenly."""
+    """Speed of that body at the end; the speed changes linearly."""
     drive_stiffness_N_m_per_rad: q.CouplingStiffness | None = None
     """Torsional spring between the drive and that body."""
     description: Text = ""
-    """Words for people."""
+    """Description for the user."""
 
     @model_validator(mode="after")
     def _drive(self) -> LoadCaseSection:
@@ -73,23 +75,23 @@ class LoadCaseSection(Section):
 
 
 class ForceSection(Section):
-    """Constant force and moment on a body, in the axes of the gearbox: the thrust of a propeller, a belt, a rotor.
+    """Constant force and moment on a body, in the axes of the gearbox: propeller thrust, belt forces, rotor loads.
 
-    It acts in static states, runs, steady responses and lives alike, whatever the torques are, as weight does; in the
-    variant `rigid` ideal joints take it. Where an elastic shaft has it, a seat is made there; on a solid it acts at
-    the seat of its name if there is one, else at the main seat with its moment about that.
+    It acts in static states, runs, steady-state responses and life calculations, independently of the torques, as
+    weight does. In the variant `rigid` ideal joints react it. On a flexible shaft a seat is added at its position. On a
+    solid it acts at the seat with its name if one exists, or else at the main seat, with its moment about that seat.
     """
 
     body: Name
-    """Body that it acts on; no planet, and none that only spins."""
+    """Body on which it acts; not a planet or a spin-only body."""
     z_mm: q.PlaceMm
-    """Place along the axis of the body where it acts."""
+    """Position along the axis of the body."""
     force_N: Annotated[tuple[q.ForceN, q.ForceN, q.ForceN], Field(strict=False)] = (0.0, 0.0, 0.0)
     """Force along x, y and z."""
     moment_N_m: Annotated[tuple[q.TorqueNm, q.TorqueNm], Field(strict=False)] = (0.0, 0.0)
-    """Moment about x and y; torques about z stand in `[static_load]` and `[load_cases]`."""
+    """Moment about x and y; torques about z are specified in `[static_load]` and `[load_cases]`."""
     description: Text = ""
-    """Words for people."""
+    """Description for the user."""
 
     @model_validator(mode="after")
     def _acts(self) -> ForceSection:
@@ -99,34 +101,31 @@ class ForceSection(Section):
 
 
 class OverallSection(Section):
-    """Which spins the overall transmission error compares, and where its length is taken."""
+    """Rotations that the overall transmission error compares, and the gear at which it is converted to a length."""
 
     input: Name
-    """Body whose angle counts as the input."""
+    """Body whose angle is the input."""
     output: Name
-    """Body whose angle counts as the output."""
+    """Body whose angle is the output."""
     output_gear: Name | None = None
-    """Gear whose base circle turns the angle into a length; needed where there are gears, else it is taken at 1 m."""
+    """Gear whose base radius converts the angle to a length; required if there are gears, otherwise the radius is 1 m.
+    """
 
 
 class StaticLoadSection(Section):
-    """The static state that fixes loaded flanks and the load of the STE tables."""
+    """The static state that determines the loaded flanks and the load of the STE tables."""
 
     torques_N_m: dict[Name, q.TorqueNm]
     """Torques on the gearbox by body, positive about +z."""
     locked: Annotated[tuple[Name, ...], Field(strict=False, max_length=MOST_ENTRIES)]
-    """Bodies that are held against these torques: as many as the train has degrees of freedom."""
-
-
-DampedElement = Literal["bearing", "mesh", "coupling"]
-"""Elements with a damping time of their own."""
+    """Bodies that react these torques: as many as the train has degrees of freedom."""
 
 
 class DampingSection(Section):
-    """Damping: a share of critical damping of each mode, or times in proportion to stiffness, c = time * k.
+    """Modal damping in percent of critical, or stiffness-proportional damping with c = time * k.
 
-    `modal_percent` replaces the times of meshes, bearings and couplings. Dampers with stated values and elastic bodies
-    count towards it. Measured gearboxes have 1 to 4 % at most frequencies.
+    `modal_percent` replaces the times of meshes, bearings and couplings. It includes the damping of dampers with
+    specified values and of flexible bodies. Measured gearboxes have 1 to 4 % at most frequencies.
     """
 
     modal_percent: q.ModalDamping | None = None
@@ -136,17 +135,19 @@ class DampingSection(Section):
     modal_band_percent: Annotated[tuple[q.ModalPercent, q.ModalPercent], Field(strict=False)] | None = None
     """Minimum and maximum plausible damping of all modes, for amplitude bands; by default half and twice the value."""
     bearing_time_s: q.DampingTimeS = 4e-6
-    """Damping of bearings over their stiffness."""
+    """Ratio of damping to stiffness of bearings."""
     mesh_time_s: q.DampingTimeS = 4e-6
-    """Damping of meshes over their stiffness."""
+    """Ratio of damping to stiffness of meshes."""
     coupling_time_s: q.DampingTimeS = 4e-6
-    """Damping of couplings over their stiffness."""
+    """Ratio of damping to stiffness of couplings."""
     body_time_s: q.DampingTimeS = 1e-6
-    """Damping of elastic bodies over their stiffness."""
+    """Ratio of damping to stiffness of flexible bodies."""
+    tooth_friction: q.Friction = 0.0
+    """Coefficient of friction of the teeth in steady-state responses (`exugear losses` lists it); none by default."""
 
     @model_validator(mode="after")
     def _check_modal(self) -> DampingSection:
-        """Refuse times that modal damping replaces, and tables and bands in the wrong order."""
+        """Raise an error for times that modal damping replaces, and for tables and bands in the wrong order."""
         if self.modal_percent is None:
             for key in ("modal_modes", "modal_band_percent"):
                 if key in self.model_fields_set:
@@ -163,27 +164,18 @@ class DampingSection(Section):
             raise ValueError("modal_band_percent: the first value must be smaller than the second")
         return self
 
-    @property
-    def is_modal(self) -> bool:
-        """Whether damping is stated for modes."""
-        return self.modal_percent is not None
-
-    def time_of(self, kind: DampedElement) -> float:
-        """Damping over stiffness (s) of bearings, meshes or couplings; zero where damping is stated for modes."""
-        return 0.0 if self.is_modal else float(getattr(self, f"{kind}_time_s"))
-
 
 class ElasticitySection(Section):
-    """How finely elastic bodies are described (variant `flexible`).
+    """Modal resolution of flexible bodies (variant `flexible`).
 
-    Normal modes of each body up to `band_Hz` are exact; mass scaling brings those above `limit_Hz` down to it, so
-    that a solver's step is not ruled by it.
+    Normal modes of each body up to `band_Hz` are exact. Mass scaling lowers the frequencies above `limit_Hz` to this
+    limit, so that they do not determine the time step of a solver.
     """
 
     band_Hz: q.FrequencyHz = 4500.0
-    """Own vibrations of each elastic body are exact up to here."""
+    """Cut-off frequency: the normal modes of each flexible body are exact up to here."""
     limit_Hz: q.FrequencyHz = 9000.0
-    """No own vibration is faster: what was above is slowed down to it by added mass."""
+    """Upper limit of the normal mode frequencies; higher ones are lowered to it by added mass."""
 
     @model_validator(mode="after")
     def _order(self) -> ElasticitySection:
@@ -193,32 +185,32 @@ class ElasticitySection(Section):
 
 
 class HousingSection(Section):
-    """Factor on bearing stiffness that stands for the housing seat in series; not where the housing is elastic."""
+    """Factor on bearing stiffness for the compliance of the housing seat in series; not used for a flexible housing."""
 
     factor: q.SeatFactor = 1.0
-    """Share of a deflection that the bearing takes; the rest is the seat's."""
+    """Fraction of the deflection that occurs in the bearing; the rest occurs in the seat."""
 
 
 _Vector = Annotated[tuple[q.Acceleration, q.Acceleration, q.Acceleration], Field(strict=False)]
 
 
 class GravitySection(Section):
-    """Weight as an acceleration vector in the model's axes; off by default."""
+    """Weight as an acceleration vector; off by default."""
 
     acceleration_m_per_s2: _Vector = (0.0, 0.0, 0.0)
-    """Vector in the axes of the gearbox."""
+    """Acceleration vector in the axes of the gearbox."""
 
 
 _ServiceSpeed = Annotated[q.SpeedRpm, Field(ge=0.0)]
 
 
 class OperationSection(Section):
-    """How the gearbox works in service; what a report sets its speeds against."""
+    """Operating speeds in service, with which a report compares its resonance speeds."""
 
     rated_speed_rpm: Annotated[q.SpeedRpm, Field(gt=0.0)] | None = None
     """Speed of the overall input at rated power, without sign."""
     speed_range_rpm: Annotated[tuple[_ServiceSpeed, _ServiceSpeed], Field(strict=False)] | None = None
-    """Lowest and highest speed of the overall input in service, without sign; 0.5 to 1.25 of rated by default."""
+    """Minimum and maximum speed of the overall input in service, without sign; 0.5 to 1.25 of rated by default."""
 
     @model_validator(mode="after")
     def _rising(self) -> OperationSection:
@@ -228,10 +220,10 @@ class OperationSection(Section):
 
 
 class ReportSection(Section):
-    """What a report looks for: modes near a frequency that was measured or published."""
+    """Reference values of a report, such as a measured or published frequency."""
 
     reference_frequency_Hz: q.FrequencyHz | None = None
-    """Frequency near which modes are shown, such as a measured one."""
+    """Frequency near which modes are listed, such as a measured one."""
 
 
 _Factors = Annotated[tuple[q.LoadFactor, ...], Field(strict=False, max_length=50)]
@@ -239,20 +231,23 @@ _Offsets = Annotated[tuple[q.OffsetUm, ...], Field(strict=False, max_length=50)]
 
 
 class SteSection(Section):
-    """Settings of the finite-element tables; the axes are those of a table with ``grid``."""
+    """Settings of the finite-element tables; the axes apply to tables with ``grid``."""
 
     positions: q.Positions = 50
-    """Positions over the mesh cycle."""
+    """Number of positions over the mesh cycle."""
     method: Literal["superelement", "nonlinear"] = "superelement"
     """Method of `exugear ste` without `--method`."""
     grid: bool = False
-    """Whether tables go over load, centre distance and misalignment."""
+    """Whether tables extend over load, centre distance and misalignment."""
     torque_factors: _Factors = (0.05, 0.2, 0.5, 1.0, 2.0, 3.0)
-    """Loads of a grid over the static torque of the pair; 1 among them."""
+    """Loads of a grid relative to the static torque of the pair; must include 1."""
     centre_distance_offsets_um: _Offsets | None = None
-    """Centre distances of a grid less that of the pair; 0 among them. Without it they follow from the static state."""
+    """Centre distances of a grid minus that of the pair; must include 0. By default they follow from the static state.
+    """
     misalignment_um: _Offsets | None = None
-    """Openings of a grid at the +z end over the common face width; 0 among them. Without it as above."""
+    """Misalignments of a grid as the gap at the +z end over the common face width; must include 0. By default they
+    follow from the static state.
+    """
 
     @model_validator(mode="after")
     def _axes(self) -> SteSection:
@@ -271,7 +266,7 @@ class SteSection(Section):
 
 
 Label = Annotated[Text, Field(min_length=1, max_length=80)]
-"""Words for a name: short, since tables and diagrams hold them."""
+"""Short text for a name, used in tables and diagrams."""
 NAMED_TABLES = (
     "bodies",
     "bearings",
@@ -289,30 +284,30 @@ NAMED_TABLES = (
 
 
 def labels_in_use(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Labels in the content of a gearbox file whose entries are there."""
+    """Labels in the content of a gearbox file whose entries exist."""
     known = {name for table in NAMED_TABLES for name in content.get(table, {})}
     return {name: words for name, words in content.get("labels", {}).items() if name in known}
 
 
 class GearboxFile(Section):
-    """The whole gearbox file."""
+    """The complete gearbox file."""
 
     name: Annotated[Text, Field(max_length=200)]
     """Title of the gearbox, for pages and pictures."""
     default_inertias: Name
-    """Inertia set that verbs take unless another is asked for; one of those under the bodies."""
+    """Inertia set that commands use by default; one of the sets of the bodies."""
     overall: OverallSection
-    """What the overall transmission error compares."""
+    """Input and output of the overall transmission error."""
     static_load: StaticLoadSection
-    """Static state that fixes loaded flanks, tables and operating points of bearings."""
+    """Static state that determines loaded flanks, tables and operating points of bearings."""
     gears: Entries[GearSection] = {}
-    """Toothed wheels by name."""
+    """Gears by name."""
     pairs: Entries[PairSection] = {}
-    """Pairs of gears that mesh, by name; each gets a table."""
+    """Pairs of meshing gears, by name; each has a table."""
     bodies: Entries[BodySection]
     """Bodies by name."""
     meshes: Entries[MeshSection] = {}
-    """Pairs at work between bodies, by name."""
+    """Meshes of gear pairs between bodies, by name."""
     load_cases: Entries[LoadCaseSection]
     """Load cases in time, by name; the first is the default."""
     forces: Entries[ForceSection] = {}
@@ -326,31 +321,31 @@ class GearboxFile(Section):
     couplings: Entries[CouplingSection] = {}
     """Torsional springs between bodies, by name."""
     deviations: Entries[DeviationSection] = {}
-    """Errors of wheels, by name."""
+    """Deviations of gears, by name."""
     pins: Entries[PinSection] = {}
-    """Errors of planets' pins, by name."""
+    """Position errors of planet pins, by name."""
     damping: DampingSection = DampingSection()
-    """Damping: a share of critical damping of each mode, or times in proportion to stiffness."""
+    """Modal damping, or stiffness-proportional damping."""
     elasticity: ElasticitySection = ElasticitySection()
-    """How finely elastic bodies are described."""
+    """Modal resolution of flexible bodies."""
     housing: HousingSection = HousingSection()
-    """Seats of bearings where the housing is not elastic."""
+    """Bearing seats in a housing that is not flexible."""
     gravity: GravitySection = GravitySection()
     """Weight."""
     operation: OperationSection = OperationSection()
-    """How the gearbox works in service."""
+    """Operating speeds in service."""
     report: ReportSection = ReportSection()
-    """What a report looks for."""
+    """Reference values of a report."""
     labels: Annotated[dict[Name, Label], Field(max_length=MOST_ENTRIES)] = {}
-    """Words for people by name of a body, bearing, pair or other entry; pages show them instead of the name."""
+    """Labels by name of a body, bearing, pair or other entry; pages show them instead of the name."""
     ste: SteSection = SteSection()
     """Tables of the transmission error."""
     loads: LoadsSection | None = None
     """Loads over the life of the gearbox."""
     rating: RatingSection | None = None
-    """How gears are rated."""
+    """Rating of gears and bearings."""
     lubricant: LubricantSection | None = None
-    """The oil."""
+    """Oil."""
 
     @model_validator(mode="after")
     def _labels_of_entries(self) -> GearboxFile:
@@ -361,7 +356,7 @@ class GearboxFile(Section):
         return self
 
     def __repr__(self) -> str:
-        """Return one short line: the title, and how many entries the tables have."""
+        """Return one short line: the title, and the number of entries of the tables."""
         tables = ("gears", "pairs", "bodies", "meshes", "bearings", "load_cases")
         counts = ", ".join(f"{len(getattr(self, table))} {table}" for table in tables)
         title = self.name if len(self.name) <= LONGEST_VALUE else f"{self.name[: LONGEST_VALUE - 1]}…"

@@ -1,4 +1,4 @@
-"""Sections on what joins bodies: joints, bearings, mounts, couplings, meshes."""
+"""Sections on connections of bodies: joints, bearings, mounts, couplings, meshes."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from exugear.gearbox.sections.entries import (
 
 
 class JointSection(Section):
-    """Ideal joint that leaves the spin about z free (used by the variant `rigid`)."""
+    """Ideal joint that permits rotation about z (used by the variant `rigid`)."""
 
     body: Name
-    """Body that turns."""
+    """Body that rotates."""
     on: Name = GROUND
-    """What it turns on: `ground`, a fixed body, a planet's carrier."""
+    """Supporting body: `ground`, a fixed body, or the carrier of a planet."""
     z_mm: q.PlaceMm
-    """Place along the axis."""
+    """Position along the axis."""
 
 
 _MatrixRow = Annotated[tuple[q.StiffnessEntry, ...], Field(strict=False, max_length=6)]
@@ -37,7 +37,7 @@ Matrix = Annotated[tuple[_MatrixRow, ...], Field(strict=False, max_length=6)]
 
 
 def _check_matrix(section: Section, matrix: Matrix | None) -> None:
-    """Refuse a matrix that is not 6x6, or that isotropic entries are combined with."""
+    """Raise an error for a matrix that is not 6x6, or that is combined with isotropic entries."""
     if matrix is not None and [len(row) for row in matrix] != [6] * 6:
         raise ValueError("matrix: specify 6 rows of 6 numbers, in the order x y z rx ry rz")
     others = section.model_fields_set - {"matrix"}
@@ -46,16 +46,16 @@ def _check_matrix(section: Section, matrix: Matrix | None) -> None:
 
 
 class StiffnessSection(Section):
-    """6x6 stiffness of a connector about its place: isotropic entries or the full matrix."""
+    """6x6 stiffness of a connector about its position: isotropic entries or the full matrix."""
 
     radial_N_per_m: q.Stiffness = 0.0
-    """Against displacement across the axis."""
+    """Stiffness for displacement normal to the axis."""
     axial_N_per_m: q.Stiffness = 0.0
-    """Against displacement along the axis."""
+    """Stiffness for displacement along the axis."""
     tilt_N_m_per_rad: q.Stiffness = 0.0
-    """Against tilting."""
+    """Stiffness for tilting."""
     torsion_N_m_per_rad: q.Stiffness = 0.0
-    """Against rotation about the axis."""
+    """Stiffness for rotation about the axis."""
     matrix: Matrix | None = None
     """Full 6x6 matrix instead, rows x y z rx ry rz, N/m, N and N m/rad."""
 
@@ -66,16 +66,16 @@ class StiffnessSection(Section):
 
 
 class ConnectorDampingSection(Section):
-    """6x6 viscous damping of a connector about its place: isotropic entries or the full matrix."""
+    """6x6 viscous damping of a connector about its position: isotropic entries or the full matrix."""
 
     radial_N_s_per_m: q.Stiffness = 0.0
-    """Against velocity across the axis."""
+    """Damping for velocity normal to the axis."""
     axial_N_s_per_m: q.Stiffness = 0.0
-    """Against velocity along the axis."""
+    """Damping for velocity along the axis."""
     tilt_N_m_s_per_rad: q.Stiffness = 0.0
-    """Against the rate of tilting."""
+    """Damping for the rate of tilting."""
     torsion_N_m_s_per_rad: q.Stiffness = 0.0
-    """Against the rate of rotation about the axis."""
+    """Damping for the rate of rotation about the axis."""
     matrix: Matrix | None = None
     """Full 6x6 matrix instead, rows x y z rx ry rz, N s/m, N s and N m s/rad."""
 
@@ -94,7 +94,7 @@ Profile = Annotated[
     ],
     Discriminator(lambda value: "name" if isinstance(value, str) else "table"),
 ]
-"""Roller profile by name, or drops (micrometres) over shares of half the length."""
+"""Roller profile by name, or profile drops (micrometres) over fractions of the half length."""
 BearingType = Literal[
     "cylindrical_roller",
     "needle_roller",
@@ -131,7 +131,7 @@ TYPES_OF_KEYS: dict[str, tuple[frozenset[str], str]] = {
     "locates_towards": (_ANGULAR | {"thrust_spherical_roller"}, "it locates the shaft in both directions or in none"),
     "axial_preload_um": (_ANGULAR, "only a pair with contact angles can be preloaded axially"),
 }
-"""Keys of a catalogue section that only some types have, and why."""
+"""Keys of a catalogue section that are valid for some types only, with the reason."""
 CONTACT_ANGLES_DEG: dict[str, tuple[float, float]] = {
     "tapered_roller": (5.0, 45.0),
     "spherical_roller": (2.0, 25.0),
@@ -140,24 +140,25 @@ CONTACT_ANGLES_DEG: dict[str, tuple[float, float]] = {
     "four_point_ball": (10.0, 45.0),
     "thrust_spherical_roller": (40.0, 58.0),
 }
-"""Contact angles that can be, by type; other types have none. Beyond 45 degrees it is a thrust bearing, of which
-one type is known."""
+"""Permitted contact angles by type; other types have none. Bearings above 45 degrees are thrust bearings, of which one
+type is supported.
+"""
 
 
 ROUNDING_MM = 1e-6
-"""What sums of lengths in millimetres may differ by."""
+"""Tolerance for sums of lengths in millimetres."""
 
 
 class CatalogueSection(Section):
-    """Boundary dimensions of a rolling bearing, and what is known of its inside; the rest is estimated from them.
+    """Boundary dimensions and known internal geometry of a rolling bearing; unknown data are estimated.
 
-    With `radial_load_kN` the stiffness is that under this load; without, that under the load of the statics.
+    The stiffness is that at `radial_load_kN`, or by default that at the static load.
     """
 
     type: BearingType
     """Type of the bearing."""
     designation: Text = ""
-    """Words for people; `check` compares bore and outer diameter with those of ISO 15 and 355."""
+    """Designation for the user; `check` compares bore and outer diameter with ISO 15 and ISO 355."""
     bore_mm: q.LengthMm
     """Bore."""
     outer_diameter_mm: q.LengthMm
@@ -167,49 +168,50 @@ class CatalogueSection(Section):
     contact_angle_deg: q.ContactAngleDeg | None = None
     """Contact angle; that of the type by default."""
     arrangement: Literal["single", "X", "O", "tandem"] = "single"
-    """How two bearings of a pair stand to each other."""
+    """Arrangement of the two bearings of a pair."""
     locates_towards: Literal["+z", "-z"] = "+z"
-    """Which way of the inner ring a single bearing, or a tandem, holds."""
+    """Axial locating direction of a single bearing or a tandem: direction in which the inner ring is restrained."""
     ribs: Literal["none", "+z", "-z", "both"] = "none"
-    """Which way of the inner ring the ribs of cylindrical rollers hold: "+z" a ring that is pushed towards +z."""
+    """Direction in which the ribs of cylindrical rollers restrain the inner ring: "+z" if it is pushed towards +z."""
     rib_contact_mm: q.LengthMm | None = None
-    """Length of the contact of a roller's end with a rib."""
+    """Length of the contact between roller end and rib."""
     row_count: q.RollingRows | None = None
-    """Rows of one bearing."""
+    """Number of rows of one bearing."""
     row_distance_mm: q.BoreMm | None = None
-    """Distance of the middles of two rows; by type and arrangement by default."""
+    """Distance between the middles of two rows; by default from type and arrangement."""
     full_complement: bool = False
-    """Whether it has no cage."""
+    """Whether the bearing has no cage."""
     element_count: q.RollingElements | None = None
-    """Balls or rollers of one row; as many as usual by default."""
+    """Number of balls or rollers of one row; by default a usual number."""
     element_diameter_mm: q.LengthMm | None = None
-    """Diameter of balls or rollers, of cones and barrels in their middle."""
+    """Diameter of balls or rollers; for tapered and barrel rollers at their middle."""
     element_length_mm: q.LengthMm | None = None
     """Effective length of rollers."""
     pitch_diameter_mm: q.LengthMm | None = None
-    """Diameter of the circle of their centres."""
+    """Pitch diameter of the rolling elements."""
     inner_groove_ratio: q.GrooveRatio | None = None
-    """Radius of the inner groove over the ball's diameter."""
+    """Radius of the inner groove divided by the ball diameter."""
     outer_groove_ratio: q.GrooveRatio | None = None
-    """Radius of the outer groove over the ball's diameter."""
+    """Radius of the outer groove divided by the ball diameter."""
     osculation: q.Osculation | None = None
-    """Radius of a barrel's outline over that of the raceway."""
+    """Profile radius of a barrel roller divided by that of the raceway."""
     profile: Profile = "standard"
-    """Profile of rollers: that of ISO/TS 16281, straight, or a table of drops."""
+    """Profile of rollers: that of ISO/TS 16281, straight, or a table of profile drops."""
     radial_clearance_mm: q.ClearanceMm = 0.0
-    """Clearance on the diameter, as mounted and warm; negative for preload."""
+    """Diametral clearance, mounted and at operating temperature; negative for preload."""
     axial_preload_um: q.AxialPreloadUm = 0.0
-    """Approach of both rows against line-to-line contact; negative for play."""
+    """Axial approach of both rows relative to zero clearance; negative for clearance."""
     dynamic_rating_kN: q.RatingKN | None = None
-    """Dynamic load rating as the catalogue prints it, of a pair that of both; by ISO 281 by default."""
+    """Dynamic load rating of the catalogue, for a pair that of both bearings; according to ISO 281 by default."""
     static_rating_kN: q.RatingKN | None = None
-    """Static load rating as the catalogue prints it, of a pair that of both; by ISO 76 by default."""
+    """Static load rating of the catalogue, for a pair that of both bearings; according to ISO 76 by default."""
     fatigue_load_limit_kN: q.RatingKN | None = None
-    """Fatigue load limit C_u (P_u) as the catalogue prints it, of a pair that of both; by ISO 281 by default."""
+    """Fatigue load limit C_u (P_u) of the catalogue, for a pair that of both bearings; according to ISO 281 by default.
+    """
     radial_load_kN: q.RadialLoadKN | None = None
-    """Load that the stiffness belongs to; that of the statics by default."""
+    """Radial load at which the stiffness applies; by default that of the static state."""
     axial_load_kN: q.AxialLoadKN | None = None
-    """Axial load beside it."""
+    """Axial load in addition to the radial load."""
 
     @model_validator(mode="after")
     def _keys_of_the_type(self) -> CatalogueSection:
@@ -259,7 +261,7 @@ class CatalogueSection(Section):
     def _dimensions(self) -> CatalogueSection:
         check_wall(self.bore_mm, self.outer_diameter_mm, "bore_mm")
         height = 0.5 * (self.outer_diameter_mm - self.bore_mm)
-        # Needle cages without rings: bore to outer diameter is two needles.
+        # Needle cages without rings: outer diameter minus bore is two needle diameters.
         most = height + ROUNDING_MM if self.type == "needle_roller" else height - ROUNDING_MM
         if self.element_diameter_mm is not None and self.element_diameter_mm > most:
             raise ValueError(
@@ -306,34 +308,36 @@ class CatalogueSection(Section):
 
 
 class BearingSection(Section):
-    """Compliant support (variants `bushing` and `flexible`): given 6x6 or from catalogue dimensions.
+    """Compliant support (variants `bushing` and `flexible`): 6x6 stiffness, or from catalogue dimensions.
 
-    Beside a `catalogue`, `stiffness` is a floor: it holds the directions that the rollers leave free. One of which
-    only the `designation` is known waits for either of them; until then the variant `rigid` alone runs.
+    With `catalogue` data, `stiffness` is a minimum for the directions in which the rollers carry no load. A bearing
+    with a `designation` only needs one of the two before variants other than `rigid` can run.
     """
 
     body: Name
-    """Body on its inner ring, or outer (`outer_ring`)."""
+    """Body on the inner ring, or on the outer ring (`outer_ring`)."""
     on: Name = GROUND
-    """The other body; `ground`, a fixed body, a carrier, another shaft."""
+    """The other body: `ground`, a fixed body, a carrier, another shaft."""
     z_mm: q.PlaceMm
-    """Place of the middle along the axis."""
+    """Axial position of the middle."""
     housing_factor_applies: bool = True
-    """Whether its seat yields by `housing.factor`."""
+    """Whether the housing stiffness factor `housing.factor` applies to its seat."""
     model: Literal["linear", "iso16281"] = "linear"
-    """Whether it is linear at its load, or follows its rows."""
+    """Linear model at the static load, or nonlinear model of the rolling elements."""
     cage: Literal["averaged", "turning"] = "averaged"
-    """Whether the elements of a non-linear bearing stand at the mean stiffness, or pass as the rings turn."""
+    """Cage of a nonlinear bearing: mean stiffness over the cage positions, or rolling elements that orbit with the
+    rings.
+    """
     outer_ring: Literal["body", "on"] | None = None
-    """Which of the two carries the outer ring; planets do by default, other bodies do not."""
+    """Body that carries the outer ring; by default a planet does, other bodies do not."""
     designation: Text = ""
-    """Words for people; a bearing with nothing else holds only in the variant `rigid`, until it gets its data."""
+    """Designation for the user; a bearing without other data can be used only in the variant `rigid`."""
     stiffness: StiffnessSection | None = None
-    """Stiffness given, or floor beside a catalogue."""
+    """Specified stiffness, or minimum stiffness with catalogue data."""
     catalogue: CatalogueSection | None = None
     """Catalogue data."""
     damping: ConnectorDampingSection | None = None
-    """Damping; in proportion to the stiffness by default."""
+    """Damping; proportional to the stiffness by default."""
 
     @model_validator(mode="after")
     def _source(self) -> BearingSection:
@@ -343,7 +347,7 @@ class BearingSection(Section):
 
     @property
     def is_known(self) -> bool:
-        """Whether more than its designation is known."""
+        """Whether more than the designation is specified."""
         return self.stiffness is not None or self.catalogue is not None
 
     @model_validator(mode="after")
@@ -360,43 +364,43 @@ class BearingSection(Section):
 
 
 class MountSection(Section):
-    """Elastic support of the gearbox on the ground; there where a fixed body is elastic, which else is the ground.
+    """Elastic support of the gearbox on the ground; active if the fixed body is flexible, else that is the ground.
 
-    A body that only bearings and mounts hold, such as a bearing pedestal, is held by its mounts in every variant on
-    bearings; one of them, or of its bearings on what stands, has torsion.
+    A body that only bearings and mounts support, such as a bearing pedestal, is supported by its mounts in every
+    variant with bearings. One of these mounts, or of the bearings on stationary bodies, must have torsional stiffness.
 
-    One that stands for a body (`instead_of`) steps aside when that body is enabled.
+    A mount that replaces a body (`instead_of`) is disabled if that body is enabled.
     """
 
     body: Name
-    """Body that is held."""
+    """Supported body."""
     instead_of: Name | None = None
-    """Body for which it stands while that is not enabled."""
+    """Body that it replaces while that body is not enabled."""
     position_mm: Point
-    """Place."""
+    """Position."""
     stiffness: StiffnessSection
     """Stiffness."""
     damping: ConnectorDampingSection | None = None
-    """Damping; in proportion to the stiffness by default."""
+    """Damping; proportional to the stiffness by default."""
 
 
 class CouplingSection(Section):
-    """Torsional spring between the spins of two bodies on one axis; one that stands still holds the other.
+    """Torsional spring between two bodies on one axis; if one body is fixed, the spring restrains the other.
 
-    It acts at the `seat` of elastic bodies, a bearing's name, and where torques act on those without such a seat. One
-    that stands for a body (`instead_of`) steps aside when that body is enabled.
+    It acts at the `seat` of flexible bodies, a bearing name, and at the torque position of bodies without this seat. A
+    coupling that replaces a body (`instead_of`) is disabled if that body is enabled.
     """
 
     bodies: Annotated[tuple[Name, Name], Field(strict=False)]
     """The two bodies."""
     seat: Name | None = None
-    """Bearing on whose seat of elastic bodies it acts."""
+    """Bearing at whose seat it acts on flexible bodies."""
     instead_of: Name | None = None
-    """Body for which it stands while that is not enabled."""
+    """Body that it replaces while that body is not enabled."""
     stiffness_N_m_per_rad: q.CouplingStiffness
     """Torsional stiffness."""
     damping_N_m_s_per_rad: q.CouplingDamping | None = None
-    """Torsional damping; in proportion to the stiffness by default."""
+    """Torsional damping; proportional to the stiffness by default."""
 
 
 Phases = Annotated[
@@ -404,11 +408,11 @@ Phases = Annotated[
     | Annotated[tuple[q.Phase, ...], Field(strict=False, max_length=MOST_PLANETS), Tag("each")],
     Discriminator(lambda value: "each" if isinstance(value, list | tuple) else "one"),
 ]
-"""One phase for all meshes of a set, or one for each."""
+"""One phase for all meshes of a set, or one per mesh."""
 
 
 class MeshSection(Section):
-    """A gear pair at work between two bodies; a planet set gives one mesh per planet."""
+    """A mesh of a gear pair between two bodies; a planet set has one mesh per planet."""
 
     pair: Name
     """Pair of gears."""
@@ -417,8 +421,8 @@ class MeshSection(Section):
     gear_body: Name
     """Body of the gear."""
     frame: Name | None = None
-    """Body in whose axes the line of centres stands still; follows from the bodies by default."""
+    """Body with which the line of centres rotates; by default it follows from the bodies."""
     position_angle_deg: q.AngleDeg | None = None
-    """Direction from pinion to gear in that frame; follows from the bodies by default."""
+    """Direction from pinion to gear in that frame; by default it follows from the bodies."""
     phase: Phases | None = None
-    """Position in the mesh cycle at zero angles; follows from teeth and places by default."""
+    """Position in the mesh cycle at zero angles; by default it follows from tooth numbers and positions."""

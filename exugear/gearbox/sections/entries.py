@@ -1,7 +1,7 @@
-"""What all sections of a gearbox file share: kinds of quantities, names, texts, tables of named entries.
+"""Common definitions of all sections of a gearbox file: kinds of quantities, names, texts, tables of named entries.
 
-A value that cannot be is an error: no gearbox has it, or the program could not hold what follows from it. One that is
-possible and unusual is a warning: most often a wrong unit or a slipped digit. Both ends belong to a range.
+An impossible value is an error: no gearbox has it, or the program could not handle the result. A possible but unusual
+value is a warning: most often it has a wrong unit or a wrong digit. Both limits belong to a range.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from fe_ste.tools.display import html_table
 
-# Kinds of quantities in a gearbox file: which values can be, and which are usual
+# Kinds of quantities in a gearbox file, with possible and usual values
 
 
 @dataclass(frozen=True)
@@ -26,22 +26,22 @@ class Range:
 
     least: float
     most: float
-    """What can be."""
+    """Limits of possible values."""
     usual: tuple[float, float] | None = None
-    """What occurs; all that can be by default. Zero is usual wherever it can be: it switches something off."""
+    """Limits of usual values; by default all possible ones. Zero is always usual if possible: it disables a feature."""
     why: str = ""
-    """What the limits come from."""
+    """Reason for the limits."""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Check the range after the type."""
         return core_schema.no_info_after_validator_function(self.checked, handler(source))
 
     def __get_pydantic_json_schema__(self, source: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """Tell the range to readers of the schema."""
+        """Add the range to the JSON schema."""
         return {**handler(source), "minimum": self.least, "maximum": self.most}
 
     def checked(self, value: float) -> float:
-        """Refuse what cannot be, NaN among it."""
+        """Return a value, or raise an error if it is impossible, including NaN."""
         if not self.least <= value <= self.most:
             raise PydanticCustomError(
                 "range", "{text}", {"text": f"must lie between {self.least:g} and {self.most:g}{self._reason}"}
@@ -49,7 +49,7 @@ class Range:
         return value
 
     def warning(self, value: float) -> str:
-        """Say what is unusual about a value that can be; empty for nothing."""
+        """Return a warning about an unusual value; empty if it is usual."""
         if self.usual is None or self.usual[0] <= value <= self.usual[1] or value == 0.0:
             return ""
         return f"unusual, most lie between {self.usual[0]:g} and {self.usual[1]:g}; check the unit"
@@ -65,7 +65,7 @@ def _symmetric_range(limit: float, usual: float, why: str = "") -> Range:
     return Range(-limit, limit, (-usual, usual), why)
 
 
-# Gears. Watch wheels have modules of 0.05 mm, the largest mill and ship gears 60 mm and 12 m.
+# Watch gears have modules of 0.05 mm, the largest mill and ship gears 60 mm and 12 m.
 Teeth = Annotated[int, Range(5, 2000, (5, 600), "below 5 lie worms, above 2000 racks")]
 ModuleMm = Annotated[float, Range(0.05, 100.0, (0.2, 50.0))]
 PressureAngleDeg = Annotated[float, Range(10.0, 35.0, (14.0, 30.0))]
@@ -81,7 +81,7 @@ ChamferMm = Annotated[float, Range(0.0, 50.0, (0.0, 10.0))]
 RollLengthMm = Annotated[float, Range(1e-3, 1000.0, (0.01, 200.0))]
 RollAngleDeg = Annotated[float, Range(1e-3, 120.0)]
 
-# Flanks are ground to micrometres; 1 mm of relief is already much for the largest gear.
+# Flanks are ground to micrometres; 1 mm of relief is large even for the largest gear.
 RemovedUm = Annotated[float, Range(0.0, 3000.0, (0.0, 500.0), "micrometres removed from a flank")]
 SlopeUm = Annotated[float, _symmetric_range(3000.0, 500.0, "micrometres over a flank")]
 PitchUm = Annotated[float, _symmetric_range(3000.0, 500.0, "ISO 1328 ends at 0.5 mm")]
@@ -93,7 +93,7 @@ YoungsModulusGPa = Annotated[float, Range(0.1, 1500.0, (1.0, 700.0))]
 PoissonsRatio = Annotated[float, Range(0.0, 0.49, (0.15, 0.45), "elements lock near 0.5")]
 Density = Annotated[float, Range(500.0, 25000.0, (900.0, 20000.0), "kg/m3")]
 
-# Places and sizes of shafts and housings.
+# Positions and sizes of shafts and housings.
 LengthMm = Annotated[float, Range(0.01, 1e5, (0.1, 2e4))]
 BoreMm = Annotated[float, Range(0.0, 1e5, (0.0, 2e4))]
 PlaceMm = Annotated[float, _symmetric_range(1e5, 3e4)]
@@ -104,7 +104,7 @@ Sectors = Annotated[int, Range(3, 63, (3, 31), "each is a seat of six coordinate
 AngleDeg = Annotated[float, Range(-3600.0, 3600.0, (-720.0, 720.0))]
 Phase = Annotated[float, _symmetric_range(1000.0, 10.0, "in mesh cycles")]
 
-# Masses, from watch wheels to the rotors of hydro generators.
+# Masses, from watch gears to the rotors of hydro generators.
 MassKg = Annotated[float, Range(1e-6, 1e7, (1e-4, 1e6))]
 InertiaKgM2 = Annotated[float, Range(1e-12, 1e10, (1e-9, 1e9))]
 
@@ -123,6 +123,7 @@ ModalPercent = Annotated[
 ]
 ModalPoint = Annotated[tuple[Annotated[float, Range(0.0, 1e5)], ModalPercent], Field(strict=False)]
 ModalDamping = ModalPercent | Annotated[tuple[ModalPoint, ...], Field(strict=False, min_length=1, max_length=1000)]
+Friction = Annotated[float, Range(0.0, 0.5, (0.0, 0.12), "lubricated gears have 0.02 to 0.1")]
 ContactAngleDeg = Annotated[float, Range(0.0, 59.0, (0.0, 52.0))]
 ClearanceMm = Annotated[float, Range(-1.0, 5.0, (-0.2, 1.0), "on the diameter")]
 RollingRows = Annotated[int, Range(1, 8, (1, 6))]
@@ -145,7 +146,7 @@ DurationS = Annotated[float, Range(1e-9, 1e6, (1e-2, 3600.0))]
 SpeedRpm = Annotated[float, _symmetric_range(1e6, 1e5)]
 Acceleration = Annotated[float, _symmetric_range(1000.0, 20.0, "m/s2")]
 
-# Loads over a life, and rating.
+# Life loads and rating.
 HoursPerYear = Annotated[float, Range(0.0, 8766.0, why="a year has 8766 hours")]
 EventsPerYear = Annotated[float, Range(0.0, 1e7, (0.0, 1e5))]
 WindSpeed = Annotated[float, Range(0.1, 100.0, (0.5, 15.0))]
@@ -166,12 +167,14 @@ LoadFactorK = Annotated[float, Range(1.0, 10.0, (1.0, 2.0))]
 AuxiliaryFactor = Annotated[float, Range(1.0, 1.2, None, "f_ZCa is 1.2 without flank modification")]
 Viscosity = Annotated[float, Range(1.0, 5000.0, (15.0, 1000.0), "mm2/s at 40 degrees Celsius")]
 HotViscosity = Annotated[float, Range(0.5, 1000.0, (2.0, 100.0), "mm2/s at 100 degrees Celsius")]
+HeatConductance = Annotated[float, Range(0.01, 1e6, (1.0, 1e4), "W/K from the oil to the surroundings")]
+OilDensity = Annotated[float, Range(500.0, 2000.0, (800.0, 1100.0), "kg/m3 at 15 degrees Celsius")]
 CarrierAngles = Annotated[int, Range(1, 360, (4, 72))]
 ToleranceClass = Annotated[int, Range(1, 11)]
 NominalHours = Annotated[float, Range(0.01, 1e7, (100.0, 3e5))]
 SafetyFactor = Annotated[float, Range(0.5, 10.0, (1.0, 3.0))]
 
-# Numerics.
+# Numerical settings.
 FrequencyHz = Annotated[float, Range(1.0, 1e6, (10.0, 1e5))]
 Positions = Annotated[int, Range(8, 2000, (8, 500))]
 LoadFactor = Annotated[float, Range(1e-3, 20.0, (1e-2, 10.0))]
@@ -179,7 +182,7 @@ OffsetUm = Annotated[float, _symmetric_range(5000.0, 1000.0)]
 
 
 def unusual_values(model: BaseModel) -> Iterator[tuple[str, float, str]]:
-    """Give key, value and warning of each value of a model that is possible and unusual."""
+    """Yield key, value and warning of each unusual value of a model."""
     for key, value, limits in _quantities(model, type(model), (), ""):
         warning = limits.warning(value)
         if warning:
@@ -187,7 +190,7 @@ def unusual_values(model: BaseModel) -> Iterator[tuple[str, float, str]]:
 
 
 def _quantities(value: Any, kind: Any, metadata: tuple[Any, ...], key: str) -> Iterator[tuple[str, float, Range]]:
-    """Give key, value and range of each quantity in a validated value of an annotated type."""
+    """Yield key, value and range of each quantity in a validated value of an annotated type."""
     if get_origin(kind) is Annotated:
         kind, *more = get_args(kind)
         yield from _quantities(value, kind, (*metadata, *more), key)
@@ -211,64 +214,64 @@ def _quantities(value: Any, kind: Any, metadata: tuple[Any, ...], key: str) -> I
 
 
 def _plain(kind: Any) -> Any:
-    """Outermost type without its annotations."""
+    """Outermost type without annotations."""
     while get_origin(kind) is Annotated:
         kind = get_args(kind)[0]
     return get_origin(kind) or kind
 
 
-# What all sections of a gearbox file share: names, texts, tables of named entries; unknown keys are refused
+# Common definitions of all sections: names, texts, tables of named entries; unknown keys are refused
 
 GROUND = "ground"
-"""Name of what stands still, where a body could be named."""
+"""Name of the stationary environment, used in place of a body."""
 MOST_ENTRIES = 500
-"""Most entries of a table such as [bearings]."""
+"""Maximum number of entries of a table such as [bearings]."""
 MOST_PLANETS = 40
-"""Most planets of a set."""
+"""Maximum number of planets of a set."""
 Name = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=80)]
-"""Name of a part; results folders and files are named by them, by up to three in one name."""
+"""Name of a part; names of results folders and files contain up to three of them."""
 Text = Annotated[str, Field(pattern=r"^[^\x00-\x08\x0b-\x1f\x7f]*$", max_length=2000)]
-"""Words for people: no control characters but tabs and line ends."""
+"""Text for the user: no control characters except tabs and line ends."""
 FileName = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=1000)]
 """Path of a file, relative to the folder of the gearbox file."""
 Entry = TypeVar("Entry")
 Entries = Annotated[dict[Name, Entry], Field(max_length=MOST_ENTRIES)]
 """Table of named entries."""
 Point = Annotated[tuple[PlaceMm, PlaceMm, PlaceMm], Field(strict=False)]
-"""Place in space. Arrays of a file are lists; nothing in them is converted."""
+"""Position in space. Arrays of a file are lists; their values are not converted."""
 LONGEST_LINE = 200
-"""Characters of a section shown as a line."""
+"""Maximum number of characters of a section shown as a line."""
 LONGEST_VALUE = 40
-"""Characters of one of its values."""
+"""Maximum number of characters of one of its values."""
 
 
 class Section(BaseModel):
-    """A table of the gearbox file; frozen, and no key or type is guessed."""
+    """A table of the gearbox file; frozen, with strict keys and types."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     def __repr__(self) -> str:
-        """Return one short line: the keys that were given."""
+        """Return one short line with the keys that were specified."""
         line = f"<{type(self).__name__}: {', '.join(f'{key} = {value}' for key, value in self._given().items())}>"
         if len(line) <= LONGEST_LINE:
             return line
         return f"{line[: LONGEST_LINE - 2]}…>"
 
     def __str__(self) -> str:
-        """Return the same short line."""
+        """Return the line of `repr`."""
         return repr(self)
 
     def _repr_html_(self) -> str:
         return html_table(type(self).__name__, self._given())
 
     def _given(self) -> dict[str, str]:
-        """Values that were given, as short texts."""
+        """Return the specified values as short texts."""
         fields = (key for key in type(self).model_fields if key in self.model_fields_set)
         return {key: _shown(getattr(self, key)) for key in fields}
 
 
 def _shown(value: Any) -> str:
-    """Return a value as a short text; of tables and long arrays the number of their entries."""
+    """Return a value as a short text; for tables and long arrays the number of entries."""
     if isinstance(value, Section):
         return "a table"
     if isinstance(value, Mapping) or (isinstance(value, tuple) and len(value) > 3):
@@ -280,7 +283,7 @@ def _shown(value: Any) -> str:
 
 
 def check_wall(inner: float, outer: float, keys: str) -> None:
-    """Refuse a ring without a wall; `keys` names the inner diameter.
+    """Raise an error for a ring without a wall; `keys` names the inner diameter.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Sections on gears: geometry, material, modification, pairs, errors of wheels and of planets' pins."""
+"""Sections on gears: geometry, material, modification, pairs, deviations of gears and planet pins."""
 
 from __future__ import annotations
 
@@ -14,30 +14,30 @@ class RackSection(Section):
     """Basic rack of one gear, as factors of the normal module (ISO 53)."""
 
     addendum: q.RackHeight = 1.0
-    """Height of the gear's tooth above the reference line, in normal modules."""
+    """Addendum of the gear's tooth in normal modules."""
     dedendum: q.RackHeight = 1.25
-    """Depth of the gear's tooth below the reference line, in normal modules."""
+    """Dedendum of the gear's tooth in normal modules."""
     tip_radius: q.RackRadius = 0.38
-    """Radius at the tip of the tool's tooth, in normal modules: it makes the root fillet."""
+    """Tip radius of the tool, which generates the root fillet, in normal modules."""
 
 
 class CutterSection(Section):
-    """Pinion-type cutter that generates the root fillet of a ring; without it this is an arc of the rack's radius.
+    """Pinion-type cutter of a ring gear; without it the root fillet is an arc with the rack's tip radius.
 
-    Its normal module, pressure angle and helix angle are those of the ring. Give its tip by one of two keys, or by
-    neither: it then reaches the root circle of the ring, which `root_diameter_mm` or the rack says.
+    Normal module, pressure angle and helix angle are those of the ring gear. Specify the tip by at most one of two
+    keys; by default it reaches the root circle of the ring gear, which follows from `root_diameter_mm` or the rack.
     """
 
     teeth: q.Teeth
-    """Number of its teeth (z_0)."""
+    """Number of teeth of the cutter (z_0)."""
     tip_radius: q.RackRadius
-    """Radius that rounds the tips of its teeth in the transverse section, in normal modules (rho_a0*)."""
+    """Tip corner radius of the cutter in the transverse section, in normal modules (rho_a0*)."""
     profile_shift: q.ProfileShift = 0.0
-    """Its profile shift (x_0) in normal modules; it falls as the cutter is ground again."""
+    """Profile shift of the cutter (x_0) in normal modules; it decreases as the cutter is reground."""
     addendum: q.RackHeight | None = None
-    """Height of its teeth above its reference line (h_a0*) in normal modules."""
+    """Addendum of the cutter (h_a0*) in normal modules."""
     tip_diameter_mm: q.LengthMm | None = None
-    """Its tip diameter (d_a0) instead."""
+    """Tip diameter of the cutter (d_a0), instead of the addendum."""
 
     @model_validator(mode="after")
     def _one_tip(self) -> CutterSection:
@@ -63,31 +63,31 @@ class ModificationSection(Section):
     tip_relief_um: q.RemovedUm = 0.0
     """Material removed at the tip."""
     tip_relief_length_mm: q.RollLengthMm | None = None
-    """Roll length from the tip over which it is removed; or the next key."""
+    """Roll length of the tip relief from the tip; or the next key."""
     tip_relief_start_roll_deg: q.RollAngleDeg | None = None
     """Roll angle at which the tip relief begins."""
     tip_relief_shape: Literal["linear", "parabolic"] = "linear"
-    """How it grows towards the tip."""
+    """Shape of the tip relief towards the tip."""
     root_relief_um: q.RemovedUm = 0.0
     """Material removed at the root."""
     root_relief_length_mm: q.RollLengthMm | None = None
-    """Roll length from the root form circle over which it is removed; or the next key."""
+    """Roll length of the root relief from the root form diameter; or the next key."""
     root_relief_start_roll_deg: q.RollAngleDeg | None = None
     """Roll angle at which the root relief begins."""
     root_relief_shape: Literal["linear", "parabolic"] = "linear"
-    """How it grows towards the root."""
+    """Shape of the root relief towards the root."""
     profile_crowning_um: q.RemovedUm = 0.0
     """Material removed at tip and root by a parabola over the roll length."""
     lead_crowning_um: q.RemovedUm = 0.0
     """Material removed at both ends by a parabola over the face."""
     profile_slope_um: q.SlopeUm = 0.0
-    """Material removed at the tip by a straight line over the roll length; negative: at the root."""
+    """Material removed at the tip, linear over the roll length; negative: at the root."""
     helix_slope_um: q.SlopeUm = 0.0
-    """Material removed at the +z end by a straight line over the face; negative: at the -z end."""
+    """Material removed at the +z end, linear over the face; negative: at the -z end."""
     twist_um: q.SlopeUm = 0.0
-    """Helix slope at the tip less that at the root."""
+    """Difference of the helix slopes, tip minus root."""
     topography: FileName | None = None
-    """CSV file of material removed over radius and face, beside the gearbox file."""
+    """CSV file of material removed over radius and face width, in the folder of the gearbox file."""
 
     @property
     def removes_material(self) -> bool:
@@ -111,16 +111,16 @@ class ModificationSection(Section):
 class ToothThicknessSection(Section):
     """Allowances of the tooth thickness on the reference circle, normal section, negative (DIN 3967: A_sne, A_sni).
 
-    Teeth are computed with their mean: it thins them by its amount over the cosine of the helix angle in the transverse
-    section. The ends give the least and the greatest backlash that `exugear check` tells.
+    Teeth are computed with the mean allowance, which thins them in the transverse section by its amount divided by the
+    cosine of the helix angle. The limits determine the minimum and maximum backlash that `exugear check` reports.
     """
 
     upper_allowance_um: q.AllowanceUm
-    """Upper allowance, nearer to zero: of the thickest tooth."""
+    """Upper allowance, closer to zero, for the thickest tooth."""
     lower_allowance_um: q.AllowanceUm | None = None
-    """Lower allowance, of the thinnest tooth; or the next key."""
+    """Lower allowance, for the thinnest tooth; or the next key."""
     tolerance_um: q.AllowanceRangeUm | None = None
-    """Tolerance, the upper less the lower allowance (DIN 3967: T_sn), instead of the lower one."""
+    """Tolerance, upper minus lower allowance (DIN 3967: T_sn), instead of the lower allowance."""
 
     @model_validator(mode="after")
     def _two_ends(self) -> ToothThicknessSection:
@@ -135,7 +135,7 @@ class ToothThicknessSection(Section):
 
 
 class GearSection(Section):
-    """One toothed wheel; helix angle signed, right hand positive."""
+    """One gear; helix angle signed, right hand positive."""
 
     teeth: q.Teeth
     """Number of teeth, positive for rings, too."""
@@ -144,37 +144,41 @@ class GearSection(Section):
     normal_pressure_angle_deg: q.PressureAngleDeg = 20.0
     """Normal pressure angle."""
     helix_angle_deg: q.HelixAngleDeg = 0.0
-    """Helix angle at the reference circle; right hand positive, a ring as the planet that it meshes with."""
+    """Helix angle at the reference circle; right hand positive, for a ring gear as for the meshing planet."""
     profile_shift: q.ProfileShift = 0.0
-    """Profile shift in normal modules; positive for a larger gear, of a ring as well."""
+    """Profile shift in normal modules; positive for a larger gear, also for a ring gear."""
     profile_shift_from_centre_distance: bool = False
-    """Whether the profile shift is the one that leaves no backlash at the centre distance, beside that of the mate."""
+    """Whether the profile shift follows from zero backlash at the centre distance, given that of the mating gear."""
     face_width_mm: q.FaceWidthMm
-    """Width of the teeth."""
+    """Face width."""
     held_diameter_mm: q.LengthMm
-    """Where the finite-element model is held: bore of a gear, outside of a ring's rim."""
+    """Diameter fixed in the finite-element model: bore of an external gear, outside of the rim of a ring gear."""
     internal: bool = False
-    """Whether it is a ring with teeth inside."""
+    """Whether the gear is a ring gear with internal teeth."""
     tooth_thinning_mm: q.ThinningMm = 0.0
-    """Tooth thickness taken off on the reference circle, for backlash."""
+    """Reduction of the tooth thickness on the reference circle, for backlash."""
     tooth_thickness: ToothThicknessSection | None = None
-    """Allowances of the tooth thickness instead."""
+    """Allowances of the tooth thickness, instead of the reduction."""
     tip_diameter_mm: q.LengthMm | None = None
     """Tip diameter; from rack and profile shift by default."""
     fitted_tip: bool = False
-    """Whether the tip is shortened as far as mates ask for: the rack's clearance, and room above their fillets."""
+    """Whether the tip is shortened as far as mating gears require: tip clearance of the rack, distance to their
+    fillets.
+    """
     root_diameter_mm: q.LengthMm | None = None
     """Root diameter; from rack and profile shift by default."""
     tip_form_diameter_mm: q.LengthMm | None = None
-    """Where a chamfer or rounding ends the flank at the tip (d_Fa); the tip diameter by default. Contact ends there."""
+    """Tip form diameter (d_Fa), at which a chamfer or rounding ends the flank; the tip diameter by default. Contact
+    ends there.
+    """
     tip_chamfer_mm: q.ChamferMm = 0.0
-    """Height of a chamfer at the tip, instead of the form diameter there."""
+    """Height of a tip chamfer, instead of the tip form diameter."""
     root_form_diameter_mm: q.LengthMm | None = None
-    """Where the flank ends at the root (d_Ff), if before its fillet begins, as after grinding. Contact ends there."""
+    """Root form diameter (d_Ff), if the flank ends before its fillet begins, as after grinding. Contact ends there."""
     rack: RackSection = RackSection()
     """Basic rack, ISO 53 A by default."""
     cutter: CutterSection | None = None
-    """Cutter of a ring, which makes its root fillet."""
+    """Cutter of a ring gear, which generates its root fillet."""
     material: MaterialSection = MaterialSection()
     """Elastic material, steel by default."""
     modification: ModificationSection | None = None
@@ -205,20 +209,20 @@ _Cycle = Annotated[tuple[q.MeshStiffness, ...], Field(strict=False, min_length=2
 
 
 class MeshStiffnessSection(Section):
-    """Mesh stiffness that the file states, for textbook models: no table is computed of its pair.
+    """Mesh stiffness specified in the file, for textbook models; no table is computed for the pair.
 
-    It is that of the whole face on the transverse line of action, force over deflection: constant, as a Fourier
-    series over the mesh cycle, or as values over it.
+    It is the stiffness of the whole face width, force divided by deflection along the transverse line of action. It is
+    constant, a Fourier series over the mesh cycle, or sampled over the mesh cycle.
     """
 
     mean_N_per_m: q.MeshStiffness | None = None
-    """Mean over the mesh cycle; alone it is constant."""
+    """Mean over the mesh cycle; without other keys the stiffness is constant."""
     cosine_N_per_m: _Waves = ()
-    """Cosine waves about the mean, first order first; at zero a loaded flank stands in the pitch point."""
+    """Cosine amplitudes about the mean, first order first; at phase zero a loaded flank contacts at the pitch point."""
     sine_N_per_m: _Waves = ()
-    """Sine waves about the mean likewise."""
+    """Sine amplitudes about the mean, first order first."""
     over_cycle_N_per_m: _Cycle | None = None
-    """Values at equal distances over the mesh cycle from zero on instead, joined by a smooth curve."""
+    """Samples at equal distances over the mesh cycle from zero, instead; they are interpolated smoothly."""
 
     @model_validator(mode="after")
     def _form(self) -> MeshStiffnessSection:
@@ -231,23 +235,24 @@ class MeshStiffnessSection(Section):
 
 
 class PairSection(Section):
-    """Two gears that mesh.
+    """Two meshing gears.
 
-    Gear 1 of tables and results is the smaller one, the planet against a ring, whichever the file calls `pinion`.
+    Gear 1 of tables and results is the smaller one, or the planet that meshes with a ring gear, whichever gear the file
+    calls `pinion`.
     """
 
     pinion: Name
-    """One gear, the smaller one by custom; the planet against a ring."""
+    """One gear, usually the smaller one; the planet if it meshes with a ring gear."""
     gear: Name
     """The other gear."""
     centre_distance_mm: q.LengthMm
-    """Distance of the axes, positive for rings, too."""
+    """Centre distance, positive also for ring gears."""
     common_face_width_mm: q.FaceWidthMm | None = None
-    """Width over which the faces touch, where that is less than the narrower face, as with chamfered ends."""
+    """Contact width of the faces, if smaller than the narrower face width, for example with chamfered ends."""
     table: bool = True
-    """Whether it gets a table of the transmission error; false where its stiffness is stated."""
+    """Whether a table of the transmission error is computed; false for a pair with specified stiffness."""
     stiffness: MeshStiffnessSection | None = None
-    """Stiffness that the file states, in place of a table."""
+    """Specified stiffness instead of a table."""
 
     @model_validator(mode="after")
     def _one_source(self) -> PairSection:
@@ -257,18 +262,18 @@ class PairSection(Section):
 
 
 class DeviationSection(Section):
-    """Errors of one wheel that return with each of its revolutions."""
+    """Deviations of one gear that repeat with each revolution."""
 
     body: Name
-    """Body that the wheel is on."""
+    """Body of the gear."""
     gear: Name | None = None
-    """Wheel; may be left out where the body has one."""
+    """Name of the gear; optional if the body has only one."""
     cumulative_pitch_um: Annotated[tuple[q.PitchUm, ...], Field(strict=False, max_length=2000)] = ()
     """Cumulative pitch deviation of each tooth (ISO 1328-1), positive into the tooth."""
     runout_um: q.RunoutUm = 0.0
     """Radial run-out, twice the eccentricity."""
     runout_angle_deg: q.AngleDeg = 0.0
-    """Where the eccentricity points at zero angle."""
+    """Direction of the eccentricity at zero angle."""
 
     @model_validator(mode="after")
     def _something(self) -> DeviationSection:
@@ -278,11 +283,11 @@ class DeviationSection(Section):
 
 
 class PinSection(Section):
-    """Position error of a planet's pin in its carrier."""
+    """Position error of a planet pin in its carrier."""
 
     body: Name
-    """The planet, by its number: `planet_1`."""
+    """Planet by its number: `planet_1`."""
     radial_um: q.PlaceErrorUm = 0.0
-    """Displacement away from the carrier's axis."""
+    """Displacement away from the axis of the carrier."""
     tangential_um: q.PlaceErrorUm = 0.0
     """Displacement in the sense of +z rotation."""

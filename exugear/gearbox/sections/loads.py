@@ -1,4 +1,4 @@
-"""Sections on measured loads and on rating: what acts on a gearbox over its life, and what its gears withstand."""
+"""Sections on life loads and rating: loads over the life of a gearbox, strength of its gears, and its oil."""
 
 from __future__ import annotations
 
@@ -10,68 +10,73 @@ from exugear.gearbox.sections import entries as q
 from exugear.gearbox.sections.entries import Entries, FileName, Name, Section, Text
 
 ChannelName = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=100)]
-"""Name of a channel, as the file of loads writes it; capitals do not matter."""
+"""Name of a channel in a load file; upper and lower case are equivalent."""
 _CurvePoint = Annotated[tuple[q.LoadCycles, q.LifeFactor], Field(strict=False)]
 Curve = Annotated[tuple[_CurvePoint, ...], Field(strict=False, min_length=2, max_length=20)]
-"""Life factor over load cycles, straight between its points in logarithms."""
+"""Life factor over load cycles, interpolated linearly in logarithms."""
 
 
 FilePattern = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f]+$", max_length=1000)]
-"""Names of files below the folder of the gearbox file, with `*` and `?` for what differs."""
+"""File names below the folder of the gearbox file, with the wildcards `*` and `?`."""
 
 
 class WindSection(Section):
-    """How long the wind blows at each speed: a Weibull distribution, for files of one wind speed each."""
+    """Weibull distribution of the wind speed, for load files of one wind speed each."""
 
     mean_m_per_s: q.WindSpeed
-    """Mean of the wind speed over the years."""
+    """Long-term mean of the wind speed."""
     shape: q.WeibullShape = 2.0
-    """Exponent of the distribution; 2 is Rayleigh's."""
+    """Shape parameter of the distribution; 2 is a Rayleigh distribution."""
     bin_m_per_s: q.WindSpeed = 2.0
-    """Width of the bins of wind speed, the first about 0; files of one bin share its hours by their length."""
+    """Width of the wind speed bins, the first centred at 0; files of one bin share its hours in proportion to their
+    length.
+    """
     hours_per_year: q.HoursPerYear = 8766.0
-    """Hours of all wind speeds together."""
+    """Total hours of all wind speeds."""
 
 
 class SourceSection(Section):
-    """One file of loads, or many of one kind, and how often in a year they happen."""
+    """One load file, or many of one kind, and their duration or number of occurrences per year."""
 
     file: FileName | None = None
-    """OpenFAST output (`.outb`, `.out`), a table (`.csv`) or load cases (`.rexs`), beside the gearbox file."""
+    """OpenFAST output (`.outb`, `.out`), a table (`.csv`) or load cases (`.rexs`), in the folder of the gearbox file.
+    """
     files: FilePattern | None = None
-    """Many series instead, such as `dlc/*.outb`: all that fit, each with the same channels."""
+    """Many time series instead, such as `dlc/*.outb`: all matching files, with identical channels."""
     kind: Literal["fatigue", "extreme"] = "fatigue"
-    """Whether it wears the gearbox out, or only its largest values count."""
+    """Whether the source contributes to fatigue damage, or only its extreme values are used."""
     case: Text = ""
-    """Words for people, such as the design load case."""
+    """Description for the user, such as the design load case."""
     hours_per_year: q.HoursPerYear | None = None
-    """How long it acts in a year, many files together, by their length; or one of the next keys. A table of counted
-    loads needs none: its hours are then those of the life."""
+    """Hours per year, for many files shared in proportion to their length; or one of the next keys. Not needed for a
+    table of counted loads, whose hours are then those of the life.
+    """
     events_per_year: q.EventsPerYear | None = None
-    """How often each file happens in a year as a whole, from what is skipped on."""
+    """Number of occurrences of each file per year, as a whole after the skipped part."""
     hours_table: FileName | None = None
-    """Table `file,hours_per_year` with a line for each of `files`, by its name without folder."""
+    """Table `file,hours_per_year` with a row for each of `files`, by its name without folder."""
     wind: ChannelName | None = None
-    """Channel of the wind speed, whose mean says which hours of `[loads.wind]` a file has."""
+    """Channel of the wind speed; its mean assigns the file to the hours of `[loads.wind]`."""
     skip_s: q.SkippedS | None = None
-    """Beginning of a series that is left out, such as a start from rest; 0 for none, to be stated."""
+    """Skipped part at the start of a time series, such as a start-up; required, 0 for none."""
     torque: ChannelName | None = None
-    """Channel of the torque on the body; in tables with commas `BODY_N_m` by default."""
+    """Channel of the torque on the body; in CSV tables `BODY_N_m` by default."""
     speed: ChannelName | None = None
-    """Channel of the speed of the body; in tables with commas `BODY_rpm` by default."""
+    """Channel of the speed of the body; in CSV tables `BODY_rpm` by default."""
     hub_forces: Annotated[tuple[ChannelName, ChannelName, ChannelName], Field(strict=False)] | None = None
-    """Channels of the force on the body along x, y and z of the gearbox, axes that stand still; `-` before a name turns
-    its sense."""
+    """Channels of the force on the body along x, y and z of the gearbox, in stationary axes; a `-` before a name
+    reverses the sign.
+    """
     hub_moments: Annotated[tuple[ChannelName, ChannelName], Field(strict=False)] | None = None
-    """Channels of the moments on the body about x and y, likewise."""
+    """Channels of the moments on the body about x and y, with the same conventions."""
     torque_factor: q.ChannelFactor = 1.0
-    """Factor on the torque: a sign for the sense of the body, or the scale of another machine."""
+    """Factor on the torque: a sign for the sense of rotation, or the scale of another machine."""
     hub_factor: q.ChannelFactor = 1.0
     """Factor on forces and moments of the hub."""
     speed_factor: q.ChannelFactor = 1.0
     """Factor on the speed."""
     partial_factor: q.PartialFactor | None = None
-    """Factor of safety on the loads of an extreme source."""
+    """Partial safety factor on the loads of an extreme source."""
 
     @model_validator(mode="after")
     def _how_often(self) -> SourceSection:
@@ -94,20 +99,20 @@ class SourceSection(Section):
 
 
 class LoadsSection(Section):
-    """Loads over the life of the gearbox, from files of turbines or test benches."""
+    """Loads over the life of the gearbox, from files of wind turbine simulations or test benches."""
 
     body: Name
-    """Body on which the torques act, with whose speed they turn."""
+    """Body on which the torques act, and to which the speeds belong."""
     life_years: q.LifeYears
-    """Time for which the gearbox is rated."""
+    """Design life of the gearbox."""
     bins: q.LoadBins = 64
-    """Bins of torque of either sign, from zero to the largest."""
+    """Number of torque bins for each sign, from zero to the maximum."""
     bin_value: Literal["mean", "upper"] = "mean"
-    """Torque that stands for a bin: the mean of its revolutions, or its upper edge, which adds damage."""
+    """Torque that represents a bin: the mean over its revolutions, or its upper edge, which is conservative."""
     wind: WindSection | None = None
-    """Wind of the site, for sources that name its channel."""
+    """Wind distribution of the site, for sources with a wind channel."""
     sources: Annotated[Entries[SourceSection], Field(min_length=1)]
-    """Files by name."""
+    """Load files by name."""
 
     @model_validator(mode="after")
     def _wind(self) -> LoadsSection:
@@ -120,15 +125,16 @@ class LoadsSection(Section):
 
 
 class StrengthSection(Section):
-    """What a gear withstands, by ISO 6336; numbers of its material from ISO 6336-5 or from tests."""
+    """Strength of a gear according to ISO 6336; material data from ISO 6336-5 or from tests."""
 
     sigma_H_lim_MPa: q.StressMPa
     """Allowable stress number for contact."""
     sigma_F_lim_MPa: q.StressMPa
-    """Nominal stress number for bending; the plain test gear withstands twice as much (Y_ST = 2)."""
+    """Nominal stress number for bending; the strength of the unnotched test gear is twice as large (Y_ST = 2)."""
     curve: Literal["case_hardened", "through_hardened"] | None = None
-    """S-N curves by name, those of ISO 6336-6; or the next two keys. The name says whose running in, notch sensitivity
-    and size factor count by the standard; those of case-hardened steel with own curves."""
+    """S-N curves of ISO 6336-6 by name; or the next two keys. The name also selects the method for running-in, notch
+    sensitivity and size factor; own curves use that of case-hardened steel.
+    """
     contact_curve: Curve | None = None
     """Life factor Z_NT over load cycles."""
     bending_curve: Curve | None = None
@@ -136,16 +142,18 @@ class StrengthSection(Section):
     roughness_Rz_um: q.RoughnessUm | None = None
     """Mean peak-to-valley roughness Rz of the flanks; or the next key."""
     roughness_Ra_um: q.MeanRoughnessUm | None = None
-    """Arithmetic mean roughness Ra of the flanks; Rz is six times as much (ISO 6336-2)."""
+    """Arithmetic mean roughness Ra of the flanks; Rz is taken as six times Ra (ISO 6336-2)."""
     root_factor: q.StrengthFactor | None = None
     """Product of the relative notch sensitivity, surface and size factors of the root (Y_drelT Y_RrelT Y_X); or the
     next key."""
     root_roughness_Rz_um: q.RoughnessUm | None = None
-    """Roughness Rz of the roots, from which these factors follow by ISO 6336-3."""
+    """Roughness Rz of the roots, from which these factors follow according to ISO 6336-3."""
     tolerance_class: q.ToleranceClass | None = None
-    """Flank tolerance class (ISO 1328-1:2013) of the gear; load factors by the standard need that of both gears."""
+    """Flank tolerance class (ISO 1328-1:2013) of the gear; load factors according to the standard require it for both
+    gears.
+    """
     mean_stress_factor: q.StrengthFactor | None = None
-    """Y_M of gears whose teeth bend both ways, such as planets and idlers; they need it."""
+    """Mean stress factor Y_M, required for gears with reversed tooth bending, such as planets and idler gears."""
 
     @model_validator(mode="before")
     @classmethod
@@ -179,7 +187,7 @@ class StrengthSection(Section):
 
 
 class RatingSection(Section):
-    """How gears are rated, and what they withstand."""
+    """Rating settings and the strength of the gears."""
 
     edition: Literal["ISO 6336:2019", "ISO 6336:2006"] = "ISO 6336:2019"
     """Edition of the standard, named in every output; its year alone is enough. The rating sheet shows what differs by
@@ -188,31 +196,33 @@ class RatingSection(Section):
     """Auxiliary factor of the contact stress of helical gears (ISO 6336-2:2019), of pairs of which a gear has a
     `modification`: less than 1.2 where that suits load and deformation. Others have 1.2."""
     dynamic_factor: q.LoadFactorK | None = None
-    """K_v of all meshes, as stated; or one of the next two keys and the least one."""
+    """Specified K_v of all meshes; or one of the next two keys together with `minimum_dynamic_factor`."""
     dynamic_factor_run: Name | None = None
-    """Load case whose run gives K_v over speed: largest over mean force of each mesh within 20 cycles."""
+    """Load case whose run determines K_v over speed: maximum divided by mean force of each mesh within 20 cycles."""
     dynamic_factor_steady: Literal["linear", "parametric", "nonlinear"] | None = None
-    """Level of the steady response that gives K_v over speed, by the same windows."""
+    """Method of the steady-state response that determines K_v over speed, with the same windows."""
     minimum_dynamic_factor: q.LoadFactorK | None = None
-    """Least K_v beside a run or a response: without errors of the wheels these have too little."""
+    """Minimum K_v with a run or steady-state response: without deviations of the gears these underestimate K_v."""
     application_factor: q.LoadFactorK = 1.0
-    """K_A on the nominal load of `exugear check --rating`, where there is no section `[loads]`: counted loads have what
-    they have."""
+    """K_A on the nominal load of `exugear check --rating` without a section `[loads]`; counted loads already include
+    it.
+    """
     nominal_hours: q.NominalHours | None = None
-    """Hours at that load and rated speed; without them the longest life of the S-N curves is asked for."""
+    """Hours at nominal load and rated speed; by default the longest life of the S-N curves is required."""
     viscosity_40_mm2_per_s: q.Viscosity | None = None
-    """Kinematic viscosity of the oil at 40 degrees Celsius, where there is no section `[lubricant]`."""
+    """Kinematic viscosity of the oil at 40 degrees Celsius, if there is no section `[lubricant]`."""
     carrier_angles: q.CarrierAngles = 12
-    """Angles of the input at which the static balance is taken."""
+    """Number of input angles at which the static equilibrium is solved."""
     gears: Entries[StrengthSection] = {}
-    """What gears withstand, by name of the gear; others are not rated."""
+    """Strength of gears, by name of the gear; other gears are not rated."""
     minimum_S_H: q.SafetyFactor = 1.0
-    """Safety against pitting that is asked for, over the life and under the largest load; rules for machines ask for
-    more than 1."""
+    """Required safety factor for pitting, over the life and under the maximum load; machine-specific standards require
+    more than 1.
+    """
     minimum_S_F: q.SafetyFactor = 1.0
-    """Safety against breakage that is asked for, likewise."""
+    """Required safety factor for tooth root breakage, over the life and under the maximum load."""
     minimum_S_0: q.SafetyFactor = 1.0
-    """Static safety of bearings that is asked for."""
+    """Required static safety factor of bearings."""
 
     @field_validator("edition", mode="before")
     @classmethod
@@ -239,7 +249,7 @@ class RatingSection(Section):
         return self
 
 
-# Section on the oil of a gearbox: what flanks and bearings are rated with
+# Section on the oil of a gearbox, for the rating of flanks and bearings
 
 Cleanliness = Literal["extreme", "high", "normal", "slight", "typical", "severe", "very_severe"]
 
@@ -250,15 +260,26 @@ class LubricantSection(Section):
     viscosity_40_mm2_per_s: q.Viscosity
     """Kinematic viscosity at 40 degrees Celsius."""
     viscosity_100_mm2_per_s: q.HotViscosity | None = None
-    """Kinematic viscosity at 100 degrees Celsius; modified lives of bearings need it."""
+    """Kinematic viscosity at 100 degrees Celsius; required for modified bearing life."""
     temperature_C: q.OilTemperature | None = None
-    """Of the oil in service; modified lives of bearings need it."""
+    """Temperature of the oil in service; required for modified bearing life."""
+    ambient_C: q.OilTemperature | None = None
+    """Ambient temperature: the oil temperature follows from it and the losses; instead of `temperature_C`."""
+    conductance_W_per_K: q.HeatConductance | None = None
+    """Heat flow from the oil to the surroundings per kelvin, of housing and cooler; with `ambient_C`."""
+    density_15_kg_per_m3: q.OilDensity | None = None
+    """Density of the oil at 15 degrees Celsius; 890 kg/m3 by default."""
     cleanliness: Cleanliness | None = None
-    """How clean it is by ISO 281:2007, table 13, where `slight` to `severe` are degrees of contamination; modified
-    lives of bearings need it."""
+    """Cleanliness according to ISO 281:2007, table 13, where `slight` to `severe` are degrees of contamination;
+    required for modified bearing life.
+    """
 
     @model_validator(mode="after")
     def _viscosities(self) -> LubricantSection:
+        if (self.ambient_C is None) != (self.conductance_W_per_K is None):
+            raise ValueError("set ambient_C and conductance_W_per_K together, or neither")
+        if self.ambient_C is not None and self.temperature_C is not None:
+            raise ValueError("temperature_C and ambient_C exclude each other; remove one of them")
         hot = self.viscosity_100_mm2_per_s
         if hot is not None and hot >= self.viscosity_40_mm2_per_s:
             raise ValueError(

@@ -1,1 +1,1 @@
-"""Gearbox files to start from."""
+"""Template gearbox files."""

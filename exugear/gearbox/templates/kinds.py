@@ -1,4 +1,4 @@
-"""Kinds of gearboxes that a file to start from is at hand for; each runs as it is."""
+"""Kinds of gearboxes for which a template file exists; each template can be run unchanged."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ KINDS = {
     "planetary": "a planetary stage with three planets and a fixed ring gear",
     "wind": "a planetary and two parallel stages, size of a 1 MW wind turbine",
 }
-"""What each kind is, in words."""
+"""Description of each kind."""
 
 
 def template(kind: str) -> str:
-    """Gearbox file of a kind, as text.
+    """Template gearbox file of a kind, as text.
 
     Parameters
     ----------

@@ -60,7 +60,7 @@ class Loudness:
     place: int | None
     """Rank among the peaks of that quantity, 1 for the highest; None on the flank of a higher peak."""
     limits: tuple[Limit, Limit] | None = None
-    """With the least and with the largest plausible damping; None where it was not solved again."""
+    """With the lowest and with the highest plausible damping; None where it was not computed."""
 
     @property
     def places(self) -> tuple[int, int] | None:
@@ -163,8 +163,10 @@ def _limits(data: xr.Dataset, quantities: tuple[Quantity, ...], peaks: Mapping[s
             for end in range(2)
         ]
         for n, (point, line) in enumerate(at):
-            low, high = (Limit(float(values[n, end]), places[end].get(n)) for end in range(2))
-            found[point, line - 1, quantity.name] = low, high
+            found[point, line - 1, quantity.name] = (
+                Limit(float(values[n, 0]), places[0].get(n)),
+                Limit(float(values[n, 1]), places[1].get(n)),
+            )
     return found
 
 

@@ -1,1 +1,1 @@
-"""Spectra of run-ups: waterfalls, order cuts, resonances and their modes, and variants compared by them."""
+"""Spectra of run-ups: waterfalls, order cuts, resonances with their modes, and comparison of variants."""

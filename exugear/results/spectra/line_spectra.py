@@ -1,4 +1,4 @@
-"""Line spectra over speed: what a steady response is made of, drawn and read as the waterfall of a run-up."""
+"""Line spectra over speed: the orders of a steady-state response, evaluated like the waterfall of a run-up."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from fe_ste.tools.arrays import Floats
 
 FRAMES, ROWS = 880, 1536
-"""Least number of speeds, and number of frequencies, of the picture."""
+"""Minimum number of speeds, and number of frequencies, of the picture."""
 THICK = 2
-"""Rows to both sides of its own that a line is drawn over: fewer are lost on a small screen."""
+"""Rows above and below its own over which an order is drawn; thinner lines disappear on a small screen."""
 HALF_POWER = 3.0
-"""dB below a peak at which its width is told."""
+"""Drop below a peak at which its width is evaluated, dB."""
 
 
 @dataclass(frozen=True)
 class LineSpectra(Waterfall):
-    """Lines at steady speeds, as a waterfall: `amplitude` is the picture, `line_level` the lines themselves."""
+    """Orders at constant speeds, as a waterfall: `amplitude` is the picture, `line_level` the level of each order."""
 
     orders: Floats
-    """(lines,) periods per turn of the reference shaft."""
+    """(lines,) periods per revolution of the reference shaft."""
     line_level: Floats
     """(n, lines) level at each speed, dB; NaN where no steady state is known."""
 
     def along(self, line: OrderLine) -> Floats:
-        """Level (dB) of an order at each speed, shape (n,); NaN throughout if it is none of the lines."""
+        """Level (dB) of an order at each speed, shape (n,); NaN throughout if the order is not included."""
         place = line.place(self.orders)
         if place is None:
             return np.full(self.speed.size, np.nan)
         return self.line_level[:, place]
 
     def resolution(self, line: OrderLine) -> Floats:
-        """Distance of the speeds along an order, Hz, shape (n,)."""
+        """Frequency step along an order that results from the spacing of the speeds, Hz, shape (n,)."""
         return np.asarray(np.abs(np.gradient(line.frequency(self.speed))), dtype=np.float64)
 
     @property
     def description(self) -> str:
-        """Source and reference in words, for captions."""
+        """Type of the spectra and reference amplitude as text, for captions."""
         return f"Orders at constant speeds, 0 dB = {self.reference_text}"
 
 
@@ -57,22 +57,22 @@ def line_spectra(
     reference: float = 1e-6,
     unit: str = "m",
 ) -> LineSpectra:
-    """Spectra over speed made of lines.
+    """Line spectra over speed.
 
     Parameters
     ----------
     speed : (n,) of the reference shaft, rad/s, ascending, three or more
-    orders : (lines,) periods per turn of the reference shaft
+    orders : (lines,) periods per revolution of the reference shaft
     amplitude : (n, lines) peak amplitudes in `unit`
     highest : highest frequency of the picture, Hz
-    unknown : speeds at which no state is known: nothing is drawn from the speed before to the speed behind
+    unknown : speeds without a known state: nothing is drawn between their two neighbours
     reference : amplitude of 0 dB, in `unit`
 
     Returns
     -------
     LineSpectra
-        At the given speeds and, between them, at so many more that lines are drawn without steps; there levels are
-        straight between their neighbours, so that no peak is made.
+        At the given speeds, and at additional speeds that avoid steps in the picture. Levels are interpolated linearly,
+        so that no artificial peaks occur.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def line_spectra(
 
 
 def _picture(speed: Floats, orders: Floats, amplitude: Floats, frequency: Floats) -> NDArray[Any]:
-    """Amplitudes over speeds and frequencies: each line over all rows that it passes on its way between speeds."""
+    """Amplitudes over speeds and frequencies; each order covers all rows that it crosses between adjacent speeds."""
     middle = 0.5 * (speed[1:] + speed[:-1])
     low = np.append(speed[0], middle)
     high = np.append(middle, speed[-1])
@@ -114,11 +114,11 @@ def _picture(speed: Floats, orders: Floats, amplitude: Floats, frequency: Floats
 
 
 def line_peaks(spectra: Waterfall, line: OrderLine, prominence: float) -> list[Pick]:
-    """Find the peaks of a least prominence (dB) along an order at steady speeds.
+    """Find the peaks of a minimum prominence (dB) along an order at constant speeds.
 
-    Each has half of its width at half power as its resolution: what lies nearer to it cannot be told apart.
+    The resolution of a peak is half of its half-power bandwidth; closer peaks cannot be separated.
     """
-    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+    import scipy.signal  # imported here because it loads all of scipy.stats
 
     usable = np.flatnonzero(np.isfinite(spectra.along(line)))
     if usable.size < 3:
@@ -130,7 +130,7 @@ def line_peaks(spectra: Waterfall, line: OrderLine, prominence: float) -> list[P
     picks = []
     for peak, height in zip(found, properties["prominences"], strict=True):
         quiet = np.flatnonzero(level < level[peak] - HALF_POWER)
-        # A prominent peak has quiet places on both sides.
+        # A prominent peak has lower levels on both sides.
         left = quiet[quiet < peak][-1]
         right = quiet[quiet > peak][0]
         width = 0.5 * float(frequency[right] - frequency[left])

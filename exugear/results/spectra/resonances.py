@@ -1,4 +1,4 @@
-"""Resonances of a run-up: peaks that stand out along the order lines of its waterfall, gathered by frequency."""
+"""Resonances of a run-up: prominent peaks along the order lines of its waterfall, grouped by frequency."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ class Pick:
     """A peak on an order line of a waterfall."""
 
     line: OrderLine
-    """The order that excites it."""
+    """Order that excites the peak."""
     time: float
     speed: float
     frequency: float
-    """Where it peaks: s, rad/s, Hz."""
+    """Time (s), speed (rad/s) and frequency (Hz) of the peak."""
     level: float
     prominence: float
-    """Level and prominence over its surroundings on the line, dB."""
+    """Level, and prominence over the surroundings on the order line, dB."""
     resolution: float
-    """How exactly the sweep allows the frequency to be told, Hz."""
+    """Frequency resolution that the sweep rate permits, Hz."""
 
 
 Peaks = Callable[[Waterfall, OrderLine, float], list[Pick]]
-"""Finds the peaks of a least prominence (dB) along an order line."""
+"""Function that finds the peaks of a minimum prominence (dB) along an order line."""
 
 
 def pick_resonances(
@@ -49,19 +49,19 @@ def pick_resonances(
 
     Parameters
     ----------
-    spectra : the run
-    lines : where to look
-    prominence : least height of a peak over the higher of the two valleys beside it, dB
+    spectra : spectra of the run
+    lines : order lines to search
+    prominence : minimum height of a peak above the higher of its two adjacent valleys, dB
     depth
-        Peaks so far below the highest level on any of the lines, dB, are left out: where an order excites
-        nothing, its line shows the ripple of the spectral floor.
+        Peaks that are lower than the highest level of all order lines by more than this, dB, are omitted: without
+        excitation an order line shows only the fluctuation of the spectral floor.
     peaks : callable, optional
-        Finds the peaks of a least prominence (dB) along a line: `peaks_on_line` by default, or that of steady
-        responses, `exugear.results.spectra.line_spectra.line_peaks`.
+        Finds the peaks of a minimum prominence (dB) along a line: `peaks_on_line` by default, or for steady-state
+        responses `exugear.results.spectra.line_spectra.line_peaks`.
 
     Returns
     -------
-    line by line, in order of time. Of peaks closer than the resolution the higher one is kept.
+    by order line, then by time. Of peaks closer than the resolution only the higher one is kept.
 
     Examples
     --------
@@ -84,8 +84,8 @@ def _highest(level: Floats) -> float:
 
 
 def peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> list[Pick]:
-    """Find the peaks of a least prominence (dB) along one order line, in order of time."""
-    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+    """Find the peaks of a minimum prominence (dB) along one order line, in order of time."""
+    import scipy.signal  # imported here because it loads all of scipy.stats
 
     level = spectra.along(line)
     usable = np.flatnonzero(np.isfinite(level))
@@ -105,7 +105,7 @@ def peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> lis
 def _pick_at(
     spectra: Waterfall, line: OrderLine, level: Floats, resolution: Floats, frame: int, prominence: float
 ) -> Pick:
-    """Refine a peak by the parabola through its frame and both neighbours."""
+    """Refine a peak by the parabola through its frame and the two adjacent ones."""
     before, here, after = level[frame - 1 : frame + 2]
     curvature = before - 2.0 * here + after
     offset = 0.5 * (before - after) / curvature if curvature < 0.0 else 0.0
@@ -128,11 +128,11 @@ class Resonance(ReprMixin, line=" {_frequency_text}, {_highest_text}, {picks!n} 
     """Peaks of several order lines at one frequency."""
 
     frequency: float
-    """Mean of the peaks, weighted by their resolution, Hz."""
+    """Mean frequency of the peaks, weighted by their resolution, Hz."""
     resolution: float
-    """Of the slowest of its lines, Hz."""
+    """Resolution of the order line with the lowest sweep rate, Hz."""
     picks: tuple[Pick, ...]
-    """The highest first."""
+    """Peaks, the highest first."""
 
     def _table(self) -> TitledRows:
         rows = {pick.line.name: f"{pick.level:.1f} dB at {pick.speed / RPM:.1f} rpm" for pick in self.picks}
@@ -149,7 +149,7 @@ class Resonance(ReprMixin, line=" {_frequency_text}, {_highest_text}, {picks!n} 
 
 
 def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
-    """Gather the peaks that several orders show of one resonance.
+    """Group the peaks of several orders that belong to one resonance.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def group_by_frequency(picks: Iterable[Pick]) -> tuple[Resonance, ...]:
 
     Returns
     -------
-    by frequency. The highest peak gathers those within the wider of both resolutions, then the next.
+    by frequency. Starting with the highest, each peak is grouped with those within the larger of both resolutions.
     """
     waiting = sorted(picks, key=lambda pick: -pick.level)
     groups: list[Resonance] = []
@@ -184,16 +184,16 @@ def _are_indistinct(first: Pick, second: Pick) -> bool:
 def match_eigenfrequencies(
     resonances: Sequence[Pick | Resonance], eigenfrequencies: ArrayLike
 ) -> tuple[int | None, ...]:
-    """Name the eigenfrequency that each resonance belongs to.
+    """Assign an eigenfrequency to each resonance.
 
     Parameters
     ----------
-    resonances : as a waterfall shows them
+    resonances : peaks or resonances of a waterfall
     eigenfrequencies : (n,) Hz
 
     Returns
     -------
-    index of the nearest eigenfrequency, or None where none lies within the resolution of the resonance
+    index of the nearest eigenfrequency, or None if none is within the resolution of the resonance
 
     Examples
     --------
@@ -213,7 +213,7 @@ def match_eigenfrequencies(
     return tuple(matches)
 
 
-# Order cuts: amplitude and phase of one order of a run-up, followed along its speed
+# Order cuts: amplitude and phase of one order of a run-up along its speed
 
 
 @dataclass(frozen=True)
@@ -225,9 +225,9 @@ class OrderCut(ReprMixin):
     time: Floats
     speed: Floats
     frequency: Floats
-    """(n,) middle of each window, s; speed there, rad/s; frequency of the order there, Hz."""
+    """(n,) centre of each window, s; speed there, rad/s; frequency of the order there, Hz."""
     amplitude: Complexes
-    """(n,) peak amplitude; its phase is that relative to ``cos(order * angle)``."""
+    """(n,) complex amplitude (zero-to-peak); its phase is relative to ``cos(order * angle)``."""
 
     def _line(self) -> str:
         return f": {shorten(', '.join(f'{name} {value}' for name, value in self._rows.items()), 180)}"
@@ -258,29 +258,28 @@ def order_cut(
 ) -> OrderCut:
     """Follow an order along the instantaneous speed.
 
-    The signal is multiplied by ``exp(-i order angle)``, the angle being the integral of the speed, and
-    averaged under a window. The order itself is at rest then: its amplitude comes out right however fast it
-    sweeps.
+    The signal is multiplied by ``exp(-i order angle)``, the angle being the integral of the speed, and averaged under a
+    window. This demodulates the order to zero frequency, so that its amplitude is exact at any sweep rate.
 
     Parameters
     ----------
     values, speed : (n,) signal and speed of the reference shaft (rad/s), uniformly sampled
     rate : sampling rate, Hz
     line : the order to follow
-    window_length : s; another order closer than about ``2 / window_length`` in Hz leaks in
-    overlap : share of each window that the next repeats, in [0, 1)
+    window_length : s; other orders closer than about ``2 / window_length`` in Hz cause leakage
+    overlap : overlap of adjacent windows, in [0, 1)
     window : name of a SciPy window
 
     Examples
     --------
     >>> time = np.arange(4000) / 2000.0
-    >>> speed = 2 * np.pi * (2.0 + 3.0 * time)  # 2 to 8 turns per second
+    >>> speed = 2 * np.pi * (2.0 + 3.0 * time)  # 2 to 8 revolutions per second
     >>> angle = 2 * np.pi * (2.0 * time + 1.5 * time**2)
     >>> cut = order_cut(0.5 * np.cos(30 * angle), speed, 2000.0, OrderLine("30", 30.0), window_length=0.1)
     >>> bool(np.all(np.abs(np.abs(cut.amplitude) - 0.5) < 1e-3))
     True
     """
-    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+    import scipy.signal  # imported here because it loads all of scipy.stats
 
     signal = np.asarray(values, dtype=np.float64)
     shaft = np.asarray(speed, dtype=np.float64)
@@ -302,22 +301,24 @@ def order_cut(
     )
 
 
-# Run-ups as sweeps through resonances: orders cut as finely as their sweep allows, and what does not build up
+# Sweeps through resonances in a run-up: suitable windows for order cuts, and resonances that do not build up fully
 
 MAX_SWEEP_RATIO = 0.3
-"""Severity of a sweep above which the peak of a resonance is told as lost: at 0.4 it lacks 8 %, at 20 two thirds."""
+"""Sweep-rate ratio above which a warning states that the resonance peak is not reached: the peak is 8 % lower at 0.4
+and two thirds lower at 20.
+"""
 FEWEST_SAMPLES = 16
-"""Samples of the shortest window."""
+"""Minimum number of samples of a window."""
 
 
 def sweep_severity(frequency: float, damping: float, rate: float) -> float:
-    """How much faster a sweep is than a resonance builds up: f' / (2 pi zeta^2 f^2).
+    """Sweep-rate ratio, which compares the sweep rate with the build-up of a resonance: f' / (2 pi zeta^2 f^2).
 
     Parameters
     ----------
-    frequency : of the resonance, Hz
-    damping : share of critical damping
-    rate : of the sweep, Hz/s
+    frequency : frequency of the resonance, Hz
+    damping : damping ratio
+    rate : sweep rate, Hz/s
 
     Examples
     --------
@@ -328,7 +329,7 @@ def sweep_severity(frequency: float, damping: float, rate: float) -> float:
 
 
 def sweep_rate(time: Floats, speed: Floats, order: float) -> float:
-    """Mean rate at which an order sweeps in a run, Hz/s; times (s) and speeds (rad/s) of the reference shaft.
+    """Mean sweep rate of an order in a run, Hz/s; times (s) and speeds (rad/s) of the reference shaft.
 
     Examples
     --------
@@ -341,15 +342,15 @@ def sweep_rate(time: Floats, speed: Floats, order: float) -> float:
 
 
 def run_up_cut(time: Floats, values: Floats, speed: Floats, line: OrderLine) -> OrderCut:
-    """Cut an order out of a run-up with the window that suits its sweep, one over the root of its rate in Hz/s.
+    """Cut an order out of a run-up with a window length matched to its sweep: one over the root of the rate in Hz/s.
 
     Parameters
     ----------
-    time, values, speed : (n,) s, evenly sampled; the signal; speed of the reference shaft, rad/s
+    time, values, speed : (n,) uniformly sampled: s; the signal; speed of the reference shaft, rad/s
     """
     rate = (len(time) - 1) / float(time[-1] - time[0])
     sweeps = sweep_rate(time, speed, line.order)
     window = 1.0 / math.sqrt(sweeps) if sweeps > 0.0 else 0.1 * float(time[-1] - time[0])
     window = max(FEWEST_SAMPLES / rate, min(window, 0.2 * float(time[-1] - time[0])))
-    # At low speed the window is as long as a period of the order: its mean would leak in.
+    # At low speed the window is as long as a period of the order, so that the mean value would leak into it.
     return order_cut(values - values.mean(), speed, rate, line, window_length=window)

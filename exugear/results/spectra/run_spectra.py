@@ -1,4 +1,4 @@
-"""Spectra of stored run-ups: their waterfall, and their resonances with the eigenmodes they belong to."""
+"""Spectra of stored run-ups: their waterfall, and their resonances with the assigned eigenmodes."""
 
 from __future__ import annotations
 
@@ -27,17 +27,18 @@ from exugear.results.spectra.waterfall import OrderLine, Waterfall, sweep_matche
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin, TitledRows
 
-# Eigenmodes in figures: what each one moves and strains, and how strongly the overall transmission error sees it
+# Results of eigenmodes: kinetic and strain energy, and participation in the overall transmission error
 
 NEAR = 0.05
-"""A mode within this part of a frequency counts as near it."""
+"""Relative difference in frequency up to which a mode counts as near a frequency."""
 
 
 def mobility_shares(modes: xr.Dataset) -> Floats:
-    """Share of each mode in the mobility of the overall transmission error, shape (n,); they add up to one.
+    """Participation of each mode in the overall transmission error (TE), shape (n,); the sum is one.
 
-    With unit modal mass the squares of what the overall transmission error sees of each mode add up to r M^-1 r^T,
-    whatever the stiffness: a measure without dimension of how strongly it sees each.
+    The participation is the square of the overall TE of a mode with unit modal mass, divided by the sum of these
+    squares over all modes. This sum is r M^-1 r^T, independent of the stiffness, so that the participation is
+    dimensionless.
     """
     squares = modes["overall_dte"].to_numpy() ** 2
     total = float(squares.sum())
@@ -47,37 +48,37 @@ def mobility_shares(modes: xr.Dataset) -> Floats:
 
 @dataclass(frozen=True)
 class ModeReport(ReprMixin):
-    """One eigenmode in figures."""
+    """Results of one eigenmode."""
 
     index: int
-    """In the list of modes, from 0."""
+    """Index in the list of modes, from 0."""
     frequency: float
     damping_ratio: float
-    """Hz, share of critical damping."""
+    """Frequency (Hz) and damping ratio."""
     name: str
-    """What moves, in words."""
+    """Description of the mode shape."""
     share: float
-    """See `mobility_shares`."""
+    """Participation in the overall transmission error, see `mobility_shares`."""
     amplification: float
-    """Overall transmission error at resonance per transmission error of the mesh that excites it most, m/m."""
+    """Overall transmission error at resonance divided by the transmission error of the dominant mesh, m/m."""
     mesh: str
-    """That mesh."""
+    """Dominant mesh: the one with the largest amplification."""
     strain: Mapping[str, float]
-    """Share of strain energy by mesh, bearing and coupling."""
+    """Fraction of the strain energy by mesh, bearing and coupling."""
     kinetic: Mapping[str, float]
-    """Share of kinetic energy by body."""
+    """Fraction of the kinetic energy by body."""
 
     def _line(self) -> str:
         share = f"share {100 * self.share:.2g} %"
         return f" {self.index}: {self.frequency:.1f} Hz, {share}, {shorten(self.name, 90)}"
 
     def is_near(self, frequency: float, tolerance: float = NEAR) -> bool:
-        """Tell whether the mode lies within a part of a frequency (Hz)."""
+        """Return whether the relative distance of the mode from a frequency (Hz) is within a tolerance."""
         return abs(self.frequency - frequency) <= tolerance * frequency
 
 
 def report_mode(modes: xr.Dataset, index: int) -> ModeReport:
-    """Gather the figures of one mode."""
+    """Collect the results of one mode."""
     mode = modes.isel(mode=index)
     amplification = mode["amplification"].to_numpy()
     strongest_mesh = int(np.argmax(amplification)) if amplification.size else -1
@@ -96,7 +97,7 @@ def report_mode(modes: xr.Dataset, index: int) -> ModeReport:
 
 
 def element_words(modes: xr.Dataset) -> list[str]:
-    """Name what is strained: meshes, bearings and couplings by their names, elastic bodies as themselves."""
+    """Return the names of the elements with strain energy: meshes, bearings, couplings, and flexible bodies."""
     bodies = {f"{name}_body": f"{name} itself" for name in modes["body"].to_numpy()}
     return [bodies.get(str(name), str(name)) for name in modes["element"].to_numpy()]
 
@@ -106,7 +107,7 @@ def _labelled(names: Iterable[str], values: Floats) -> dict[str, float]:
 
 
 def nearest_mode(modes: xr.Dataset, frequency: float, least_share: float = 0.0) -> ModeReport | None:
-    """Find the elastic mode nearest to a frequency (Hz) among those of a least share of mobility, or None."""
+    """Find the elastic mode nearest to a frequency (Hz) among those of a minimum TE participation, or None."""
     frequencies = modes["frequency"].to_numpy()
     allowed = np.flatnonzero((frequencies > 0.0) & (mobility_shares(modes) >= least_share))
     if not allowed.size:
@@ -114,27 +115,29 @@ def nearest_mode(modes: xr.Dataset, frequency: float, least_share: float = 0.0) 
     return report_mode(modes, int(allowed[np.argmin(np.abs(frequencies[allowed] - frequency))]))
 
 
-# Spectra of stored run-ups: their waterfall, and their resonances with the eigenmodes they belong to
+# Spectra of stored run-ups: their waterfall, and their resonances with the assigned eigenmodes
 
 LEAST_SHARE = 1e-5
-"""Modes with a smaller share of the overall transmission error's mobility are no match for a resonance of it."""
+"""Minimum participation of a mode that is assigned to a resonance of the overall transmission error."""
 SHIFT = 0.01
-"""Share of a frequency by which a resonance and its mode differ: turning shafts and stiffness at the load shift it."""
+"""Relative frequency difference between a resonance and its mode, due to rotating shafts and stiffness at the load."""
 
 LONGEST_WINDOW = 0.25
-"""Part of a run that a window has at most: one whose speed hardly changes would want a longer one than the run."""
+"""Maximum length of a window as a fraction of the run; at nearly constant speed the matched window would be longer than
+the run.
+"""
 _NAMES = ("time", "input_speed", "overall_dte")
 
 
 @dataclass(frozen=True)
 class RunSignals(ReprMixin, line=": {overall.size} samples at {rate:.6g} Hz"):
-    """What the waterfall of a run-up is made of."""
+    """Signals of a run-up from which its waterfall is computed."""
 
     path: Path
     attributes: Mapping[str, Any]
-    """What was run."""
+    """Attributes of the run."""
     rate: float
-    """Samples per second."""
+    """Sampling rate, Hz."""
     span: float
     """Simulated time, s."""
     speed: Floats
@@ -148,19 +151,19 @@ class RunSignals(ReprMixin, line=": {overall.size} samples at {rate:.6g} Hz"):
         Raises
         ------
         ValueError
-            The speed does not change, so that nothing says how long a window should be.
+            The speed does not change, so that no window length follows from it.
         """
         sweep = float(self.attributes["highest_order"]) * float(np.ptp(self.speed)) / (2.0 * math.pi * self.span)
         return min(sweep_matched_window(sweep), LONGEST_WINDOW * self.span)
 
     def waterfall(self, window_length: float | None = None) -> Waterfall:
-        """Waterfall of the overall transmission error with a window (s), the suitable one by default."""
+        """Waterfall of the overall transmission error with a window length (s), by default the suitable one."""
         length = self.suitable_window if window_length is None else window_length
         return waterfall(self.overall, self.speed, self.rate, window_length=length)
 
 
 def run_signals(path: str | Path) -> RunSignals:
-    """Read what the waterfall of a run-up is made of.
+    """Read the signals of a run-up from which its waterfall is computed.
 
     Raises
     ------
@@ -178,17 +181,17 @@ def run_signals(path: str | Path) -> RunSignals:
 
 
 def run_waterfall(path: str | Path, window_length: float | None = None) -> Waterfall:
-    """Waterfall of the overall DTE of a run-up.
+    """Waterfall of the overall transmission error of a run-up.
 
     Parameters
     ----------
     path : ``run.nc`` of a run-up, or ``run.partial``
-    window_length : s; what suits the fastest first-order sweep by default. Runs to be compared need the same.
+    window_length : s; by default suitable for the fastest first-order sweep. Runs to be compared need the same length.
 
     Raises
     ------
     ValueError
-        The speed does not change, so that nothing says how long a window should be, or the run is too short.
+        The speed does not change, so that no window length follows from it, or the run is too short.
     FileError
         The run is missing or damaged.
     """
@@ -197,21 +200,21 @@ def run_waterfall(path: str | Path, window_length: float | None = None) -> Water
 
 @dataclass(frozen=True)
 class Finding:
-    """A resonance of a run-up and the eigenmode it belongs to."""
+    """A resonance of a run-up and its eigenmode."""
 
     resonance: Resonance
     """Peaks of one or several orders at one frequency, the highest first."""
     mode: int | None
-    """Number, from 0, of the nearest eigenfrequency that the overall transmission error sees, if one lies within the
-    resolution."""
+    """Index, from 0, of the nearest eigenfrequency with sufficient TE participation, if one is within the resolution.
+    """
     mode_frequency: float
-    """Hz; NaN without a mode."""
+    """Frequency of the mode, Hz; NaN without a mode."""
     mode_name: str
-    """What moves, in words; empty without a mode."""
+    """Description of the mode shape; empty without a mode."""
 
     @property
     def strongest(self) -> Pick:
-        """Highest of its peaks."""
+        """Highest peak of the resonance."""
         return self.resonance.picks[0]
 
     @property
@@ -226,11 +229,11 @@ class VariantRun(ReprMixin):
 
     path: Path
     attributes: Mapping[str, Any]
-    """What was run."""
+    """Attributes of the run."""
     spectra: Waterfall
     picks: tuple[Pick, ...]
     modes: xr.Dataset | None
-    """As `exugear.system.modes.Modes.to_dataset` makes it."""
+    """Dataset of modes from `exugear.system.modes.Modes.to_dataset`."""
 
     def _line(self) -> str:
         return f" {shorten(f'{self.variant}, {self.conditions}', 150)}, {len(self.picks)} peaks"
@@ -247,7 +250,7 @@ class VariantRun(ReprMixin):
 
     @property
     def conditions(self) -> str:
-        """Load case, law and inertia set in words."""
+        """Load case, mesh model and inertia set as text."""
         load_case, law, inertias = (self.attributes[key] for key in ("load_case", "mesh_model", "inertias"))
         return f"load case {load_case}, mesh model {law}, inertia set {inertias}"
 
@@ -264,7 +267,7 @@ class VariantRun(ReprMixin):
         )
 
     def located(self, finding: Finding, frequency: float) -> Finding:
-        """Return a resonance with the mode nearest to where a steady response shows it, Hz, instead of the run-up."""
+        """Return a resonance with the mode nearest to its frequency (Hz) in a steady-state response."""
         if self.modes is None:
             return finding
         visible = self._seen_modes(self.modes)
@@ -290,9 +293,9 @@ def read_run(
     Parameters
     ----------
     path : ``run.nc``, or ``run.partial`` of a run that was stopped
-    lines : where to look for resonances
-    modes : modes of the same variant, law and inertia set
-    window_length : s; runs to be compared need the same
+    lines : order lines to search for resonances
+    modes : modes of the same variant, mesh model and inertia set
+    window_length : s; runs to be compared need the same length
 
     Raises
     ------
@@ -315,21 +318,21 @@ def analysed(
     return VariantRun(signals.path, signals.attributes, spectra, pick_resonances(spectra, lines), modes)
 
 
-# Two run-ups side by side: resonances that one shows and the other does not
+# Comparison of two run-ups: resonances that occur in only one of them
 
 
 @dataclass(frozen=True)
 class AbsenceRule:
-    """When a peak of one run counts as absent from another."""
+    """Rule by which a peak of one run counts as absent from another run."""
 
     prominence: float = 3.0
-    """On the same order line the other run has no peak of this prominence, dB, within the resolution, and."""
+    """The other run has no peak of this prominence, dB, on the same order line within the resolution."""
     margin: float = 6.0
-    """Its level at that place lies at least so far below, dB."""
+    """In addition, its level at this frequency is lower by at least this amount, dB."""
 
     @property
     def description(self) -> str:
-        """The rule in words, for captions."""
+        """The rule as text, for captions."""
         return (
             f"no peak of {self.prominence:g} dB prominence on the same order within the resolution, "
             f"and a level at least {self.margin:g} dB lower"
@@ -337,17 +340,17 @@ class AbsenceRule:
 
 
 def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | None = None) -> tuple[Pick, ...]:
-    """Select the peaks of one run that another run does not show.
+    """Select the peaks of one run that are absent from another run.
 
     Parameters
     ----------
     picks : peaks of the first run
-    other : the second run, with the same unit
-    rule : stated thresholds
+    other : spectra of the second run, in the same unit
+    rule : thresholds; default: those of `AbsenceRule`
 
     Returns
     -------
-    peaks that satisfy the rule; a peak where the second run has no data does not
+    peaks that satisfy the rule; peaks at which the second run has no data do not satisfy it
     """
     stated = rule or AbsenceRule()
     asked = tuple(picks)
@@ -356,7 +359,7 @@ def only_in_first(picks: Iterable[Pick], other: Waterfall, rule: AbsenceRule | N
 
 
 def _is_absent(pick: Pick, other: Waterfall, peaks: Sequence[Pick], rule: AbsenceRule) -> bool:
-    """Tell whether a peak is absent from another run, of which the peaks on the same order line are given."""
+    """Return whether a peak is absent from another run with the given peaks on the same order line."""
     frequency = pick.line.frequency(other.speed)
     level = other.along(pick.line)
     near = np.isfinite(level) & (np.abs(frequency - pick.frequency) <= pick.resolution)
@@ -368,13 +371,15 @@ def _is_absent(pick: Pick, other: Waterfall, peaks: Sequence[Pick], rule: Absenc
 
 @dataclass(frozen=True)
 class Comparison(ReprMixin):
-    """Run-ups of two variants under the same law, inertia set and load case."""
+    """Run-ups of two variants with the same mesh model, inertia set and load case."""
 
     first: VariantRun
     second: VariantRun
-    """The first is the compliant one: what it has and the second lacks is asked for."""
+    """The first run is that of the more compliant variant; the main question is which of its resonances the second
+    lacks.
+    """
     rule: AbsenceRule
-    """When a peak counts as absent."""
+    """Rule by which a peak counts as absent."""
 
     def _line(self) -> str:
         counts = f"only first {len(self.only_first)}, only second {len(self.only_second)}"
@@ -393,56 +398,57 @@ class Comparison(ReprMixin):
 
     @cached_property
     def only_first(self) -> tuple[Finding, ...]:
-        """Resonances of the first run whose loudest peaks the second does not show."""
+        """Resonances of the first run whose highest peak is absent from the second."""
         return self._lacking(self.first, self.second)
 
     @cached_property
     def only_second(self) -> tuple[Finding, ...]:
-        """Resonances of the second run whose loudest peaks the first does not show."""
+        """Resonances of the second run whose highest peak is absent from the first."""
         return self._lacking(self.second, self.first)
 
     def _lacking(self, run: VariantRun, other: VariantRun) -> tuple[Finding, ...]:
-        # A weak order may be absent where the loudest is not: what is told of a resonance is told of its loudest peak.
+        # The highest peak decides for the whole resonance, because a weak order may be absent although the highest is
+        # not.
         absent = set(only_in_first((own.strongest for own in run.findings()), other.spectra, self.rule))
         return tuple(finding for finding in run.findings() if finding.strongest in absent)
 
     @property
     def runs(self) -> tuple[VariantRun, VariantRun]:
-        """Both, the stiff one first, as pictures show them."""
+        """Both runs, that of the stiffer variant first, as pictures show them."""
         return self.second, self.first
 
 
 def compare(first: VariantRun, second: VariantRun, rule: AbsenceRule | None = None) -> Comparison:
-    """Set two run-ups side by side.
+    """Compare two run-ups.
 
     Raises
     ------
     ValueError
-        They differ in more than the variant, or were analysed with different windows.
+        The runs differ in more than the variant, or were analysed with different windows.
     """
     for key in ("gearbox", "load_case", "method", "mesh_model", "inertias"):
         values = first.attributes.get(key), second.attributes.get(key)
         if values[0] != values[1]:
             raise ValueError(f"runs to compare differ in {key}: {values[0]!r} and {values[1]!r}")
-    if not math.isclose(first.spectra.window_length, second.spectra.window_length, rel_tol=1e-9):  # of rounded times
+    if not math.isclose(first.spectra.window_length, second.spectra.window_length, rel_tol=1e-9):
         raise ValueError("runs to compare were analysed with windows of different length")
     return Comparison(first, second, rule or AbsenceRule())
 
 
-# Resonances under other lengths of the window: what depends on the length is no fact about the gearbox
+# Resonances for other window lengths: results that depend on the window are not properties of the gearbox
 
 WINDOW_FACTORS = (0.94, 0.98, 1.02, 1.06)
-"""Lengths of other windows over the one that suits the sweep."""
+"""Factors on the suitable window length."""
 
 
 @dataclass(frozen=True)
 class OtherWindow:
-    """What runs to be compared show with another window."""
+    """Peaks of the compared runs for another window length."""
 
     picks: Mapping[str, tuple[Pick, ...]]
-    """By variant, peaks of each run."""
+    """Peaks of each run, by variant."""
     absent: Mapping[tuple[str, str], tuple[Pick, ...]]
-    """(variant, other variant) peaks of the first that the second lacks."""
+    """Peaks of a variant that are absent from the other variant, by (variant, other variant)."""
 
 
 def other_windows(
@@ -451,13 +457,14 @@ def other_windows(
     factors: Iterable[float] = WINDOW_FACTORS,
     rule: AbsenceRule | None = None,
 ) -> tuple[OtherWindow, ...]:
-    """Look for the resonances of runs with other windows; one window of all runs is in memory at a time.
+    """Find the resonances of runs with other window lengths; the memory holds one length at a time.
 
     Parameters
     ----------
-    runs : of different variants, analysed with one window
-    factors : lengths over that of the window
-    rule : when a peak counts as absent
+    runs : of different variants, analysed with one window length
+    lines : order lines to search
+    factors : factors on this window length
+    rule : rule by which a peak counts as absent
 
     Raises
     ------
@@ -484,7 +491,7 @@ def _with_window(
 
 
 def is_among(pick: Pick, picks: Iterable[Pick]) -> bool:
-    """Tell whether a peak is among others: on the same order, within the wider of both resolutions.
+    """Return whether a peak is among others: on the same order, within the larger of both resolutions.
 
     Examples
     --------
@@ -500,10 +507,10 @@ def is_among(pick: Pick, picks: Iterable[Pick]) -> bool:
 
 
 def survives(pick: Pick, variant: str, windows: Iterable[OtherWindow]) -> bool:
-    """Tell whether every window shows a peak of a variant."""
+    """Return whether a peak of a variant occurs for every window length."""
     return all(is_among(pick, window.picks[variant]) for window in windows)
 
 
 def stays_absent(pick: Pick, variant: str, other: str, windows: Iterable[OtherWindow]) -> bool:
-    """Tell whether a peak of a variant is there and absent from the other variant with every window."""
+    """Return whether a peak of a variant occurs and is absent from the other variant for every window length."""
     return all(is_among(pick, window.absent[variant, other]) for window in windows)

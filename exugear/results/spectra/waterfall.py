@@ -1,10 +1,9 @@
 """Waterfalls: amplitude spectra of a run-up over the speed of the reference shaft, and the order lines in them.
 
-Amplitudes are peak amplitudes of a sine; levels are ``20 log10(amplitude / reference)`` in dB. Speeds are those of the
-reference shaft as in `exugear.results.spectra.waterfall`.
+Amplitudes are zero-to-peak amplitudes of a sine; levels are ``20 log10(amplitude / reference)`` in dB.
 
-The reference shaft is that of the overall input. Its speeds are in rad/s and count by magnitude: the line of order
-``o`` lies at the frequency ``o |speed| / 2 pi``.
+The reference shaft is that of the overall input. Its speeds are in rad/s and are used without sign: the line of order
+``o`` is at the frequency ``o |speed| / 2 pi``.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from exugear.gearbox.units import RPM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
-# Order lines: what turns with a gearbox excites a fixed number of times per turn of the reference shaft
+# Order lines: excitations with a constant number of periods per revolution of the reference shaft
 
 SAME_ORDER = 1e-6
-"""Share by which orders of one line may differ."""
+"""Relative difference up to which orders share a line."""
 
 
 @dataclass(frozen=True)
@@ -32,30 +31,30 @@ class OrderLine:
     """A named line of constant order in a waterfall."""
 
     name: str
-    """For legends and tables, such as ``"HS mesh"``."""
+    """Name for legends and tables, such as ``"HS mesh"``."""
     order: float
-    """Periods per turn of the reference shaft."""
+    """Periods per revolution of the reference shaft."""
 
     def place(self, orders: Floats) -> int | None:
-        """Place of the line among orders (n,); None if it is none of them."""
+        """Index of the line among orders (n,); None if it is not included."""
         nearest = int(np.argmin(np.abs(orders - self.order)))
         if abs(orders[nearest] - self.order) <= SAME_ORDER * self.order:
             return nearest
         return None
 
     def frequency(self, speed: ArrayLike) -> Floats:
-        """Frequency on the line, Hz, at speeds of the reference shaft in rad/s."""
+        """Frequency of the order line, Hz, at speeds of the reference shaft in rad/s."""
         return self.order * np.abs(np.asarray(speed, dtype=np.float64)) / (2.0 * math.pi)
 
 
 def harmonics(name: str, order: float, count: int) -> tuple[OrderLine, ...]:
-    """Lines of a mesh and its harmonics.
+    """Order lines of a mesh and its harmonics.
 
     Parameters
     ----------
-    name : name of the first
-    order : order of the first
-    count : how many, the first included
+    name : name of the first harmonic
+    order : order of the first harmonic
+    count : number of harmonics, including the first
 
     Examples
     --------
@@ -68,11 +67,11 @@ def harmonics(name: str, order: float, count: int) -> tuple[OrderLine, ...]:
 
 
 def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
-    """Mesh orders with harmonics; meshes of one frequency (sun and ring) share a line.
+    """Order lines of all meshes with harmonics; meshes of equal frequency (sun and ring) share a line.
 
     Parameters
     ----------
-    count : harmonics of each mesh, the first included
+    count : harmonics of each mesh, including the first
 
     Examples
     --------
@@ -80,7 +79,7 @@ def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
     >>> [(line.name, round(line.order, 3)) for line in order_lines(gearbox, 1)]
     [('sun_planet', 99.0), ('intermediate', 468.571), ('high_speed', 1792.795)]
     """
-    mesh_orders = gearbox.train.mesh_frequencies(2.0 * math.pi)  # at one turn per second
+    mesh_orders = gearbox.train.mesh_frequencies(2.0 * math.pi)  # at one revolution per second
     lines: list[OrderLine] = []
     known_orders: list[float] = []
     for mesh in gearbox.meshes:
@@ -91,7 +90,7 @@ def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
     return tuple(lines)
 
 
-# Amplitude spectra of signals, and how finely a window resolves a tone that sweeps
+# Amplitude spectra of signals, and the frequency resolution of a window for a sweeping tone
 
 
 def amplitude_spectrum(values: ArrayLike, rate: float, window: str = "hann", padding: int = 1) -> tuple[Floats, Floats]:
@@ -99,15 +98,15 @@ def amplitude_spectrum(values: ArrayLike, rate: float, window: str = "hann", pad
 
     Parameters
     ----------
-    values : (..., n) signal, along the last axis. One in single precision is analysed so, in half the time.
+    values : (..., n) signal, along the last axis. Single precision is retained and takes half the time.
     rate : sampling rate, Hz
-    window : name of a SciPy window. ``"flattop"`` reads amplitudes between bins to 0.1 %, ``"hann"`` to 15 %.
-    padding : length after appending zeros over `n`: spectral lines in between, no finer resolution
+    window : name of a SciPy window; amplitudes between bins err by up to 0.1 % (``"flattop"``) or 15 % (``"hann"``)
+    padding : length after zero padding divided by `n`; it adds spectral lines without improving the resolution
 
     Returns
     -------
     frequency : (padding n // 2 + 1,) Hz
-    amplitude : (..., padding n // 2 + 1) peak amplitude of a sine at that frequency; at frequency zero the mean
+    amplitude : (..., padding n // 2 + 1) zero-to-peak amplitude of a sine at that frequency; at frequency zero the mean
 
     Examples
     --------
@@ -116,12 +115,12 @@ def amplitude_spectrum(values: ArrayLike, rate: float, window: str = "hann", pad
     >>> float(frequency[50]), round(float(amplitude[50]), 12)
     (50.0, 3.0)
     """
-    import scipy.signal  # loads all of scipy.stats, for which others need not wait
+    import scipy.signal  # imported here because it loads all of scipy.stats
 
     signal = np.asarray(values)
     kind = np.float32 if signal.dtype == np.float32 else np.float64
     count = padding * signal.shape[-1]
-    weights = scipy.signal.get_window(window, signal.shape[-1])  # periodic: a tone on a bin comes out exactly
+    weights = scipy.signal.get_window(window, signal.shape[-1])  # periodic, so that a tone at a bin is exact
     scaled = (2.0 / weights.sum() * weights).astype(kind)
     amplitude: Floats = np.abs(scipy.fft.rfft(signal * scaled, n=count, axis=-1))
     amplitude[..., 0] *= 0.5
@@ -132,9 +131,9 @@ def amplitude_spectrum(values: ArrayLike, rate: float, window: str = "hann", pad
 
 
 def sweep_limited_resolution(sweep_rate: ArrayLike) -> Floats:
-    """Finest frequency resolution of a tone that sweeps, Hz: the root of its rate (Hz/s).
+    """Finest frequency resolution of a sweeping tone, Hz: the square root of its sweep rate (Hz/s).
 
-    During a window T the tone sweeps over rate x T, while the window resolves 1/T: best where both are equal.
+    During a window T the tone sweeps over rate x T, while the window resolves 1/T; both are equal at the optimum.
 
     Examples
     --------
@@ -146,7 +145,7 @@ def sweep_limited_resolution(sweep_rate: ArrayLike) -> Floats:
 
 
 def sweep_matched_window(sweep_rate: float) -> float:
-    """Window length, s, that resolves a tone sweeping at a rate (Hz/s) best.
+    """Window length, s, with the best resolution for a tone that sweeps at a rate (Hz/s).
 
     Examples
     --------
@@ -167,17 +166,17 @@ class Waterfall(ReprMixin, line=": {time.size} spectra of {frequency.size} lines
 
     time: Floats
     speed: Floats
-    """(n,) middle of each window, s, and the speed there, rad/s."""
+    """(n,) centre of each window, s, and the speed there, rad/s."""
     frequency: Floats
-    """(m,) Hz."""
+    """(m,) frequencies, Hz."""
     amplitude: Floats
-    """(n, m) peak amplitudes in `unit`."""
+    """(n, m) zero-to-peak amplitudes in `unit`."""
     window: str
-    """Name of the window."""
+    """Name of the window function."""
     window_length: float
-    """s."""
+    """Length of the window, s."""
     overlap: float
-    """Share of a window that the next one repeats."""
+    """Overlap of adjacent windows as a fraction of their length."""
     reference: float
     """Amplitude of 0 dB in `unit`."""
     unit: str
@@ -202,23 +201,23 @@ class Waterfall(ReprMixin, line=": {time.size} spectra of {frequency.size} lines
 
     @cached_property
     def level(self) -> Floats:
-        """Level in dB, shape (n, m); silence ends 200 dB below the reference."""
+        """Level in dB, shape (n, m); the lower limit is 200 dB below the reference."""
         return 20.0 * np.log10(np.maximum(self.amplitude / self.reference, 1e-10))
 
     @cached_property
     def _along(self) -> dict[OrderLine, Floats]:
-        """Levels along the order lines that were asked for."""
+        """Levels along the order lines that have been evaluated."""
         return {}
 
     def along(self, line: OrderLine) -> Floats:
-        """Level (dB) along an order line as `line_level` finds it, shape (n,); each line is looked for once."""
+        """Level (dB) along an order line from `line_level`, shape (n,); each line is evaluated once."""
         if line not in self._along:
             self._along[line] = line_level(self, line)
         return self._along[line]
 
     @property
     def description(self) -> str:
-        """Window, overlap and reference in words, for captions."""
+        """Window, overlap and reference as text, for captions."""
         return (
             f"{self.window.capitalize()} window {1e3 * self.window_length:.3g} ms, "
             f"overlap {100 * self.overlap:.0f} %, 0 dB = {self.reference_text}"
@@ -235,10 +234,10 @@ class Waterfall(ReprMixin, line=": {time.size} spectra of {frequency.size} lines
     def resolution(self, line: OrderLine) -> Floats:
         """Frequency resolution along an order line, Hz, shape (n,).
 
-        The wider of one over the window's length and what the sweep of that order allows.
+        It is the larger of one over the window length and the resolution that the sweep rate of the order permits.
         """
         frequency = line.frequency(self.speed)
-        # One frame alone tells of no sweep.
+        # No sweep rate follows from a single frame.
         rate = np.gradient(frequency, self.time) if self.time.size > 1 else np.zeros(1)
         resolution: Floats = np.maximum(sweep_limited_resolution(rate), 1.0 / self.window_length)
         return resolution
@@ -260,23 +259,22 @@ def waterfall(
     Parameters
     ----------
     values, speed : (n,)
-        Signal and speed of the reference shaft (rad/s), uniformly sampled from time zero on. A signal in single
-        precision is analysed so.
+        Signal and speed of the reference shaft (rad/s), uniformly sampled from time zero. Single precision is retained.
     rate : sampling rate, Hz
     window_length : s; `sweep_matched_window` of the fastest order of interest is the natural choice
-    overlap : share of each window that the next repeats, in [0, 1)
+    overlap : overlap of adjacent windows, in [0, 1)
     window : name of a SciPy window
     reference : amplitude of 0 dB, in `unit`
     unit : unit of the signal
 
     Returns
     -------
-    the mean of each window is removed: the static deflection is no vibration
+    the mean of each window is removed, because the static deflection is not vibration
 
     Raises
     ------
     ValueError
-        If the window has fewer than eight samples or the signal is shorter than one window.
+        The window has fewer than eight samples or the signal is shorter than one window.
 
     Examples
     --------
@@ -295,7 +293,7 @@ def waterfall(
     if not 0.0 <= overlap < 1.0:
         raise ValueError(f"overlap = {overlap} must lie in [0, 1)")
     frames = overlapping_frames(signal, length, overlap)
-    # Twice the spectral lines: a tone between two lines would lose up to 1.4 dB, so it loses 0.4 dB.
+    # Zero padding doubles the number of spectral lines: a tone between two lines then loses 0.4 dB instead of 1.4 dB.
     centred = frames - frames.mean(axis=1, keepdims=True)
     frequency, amplitude = amplitude_spectrum(centred, rate, window, padding=2)
     return Waterfall(
@@ -322,14 +320,14 @@ def line_level(spectra: Waterfall, line: OrderLine) -> Floats:
 
     Parameters
     ----------
-    spectra : the run
-    line : the order
+    spectra : spectra of the run
+    line : the order line
 
     Returns
     -------
     (n,)
-        Highest level within half the resolution to both sides of the line, dB; NaN where the line lies above
-        the band or so low (four spectral widths) that the window cannot tell it from the mean.
+        Highest level within half the resolution on both sides of the line, dB; NaN where the line is above the band,
+        or so low (four spectral widths) that the window cannot separate it from the mean.
     """
     frequency = line.frequency(spectra.speed)
     resolution = spectra.resolution(line)
@@ -338,7 +336,7 @@ def line_level(spectra: Waterfall, line: OrderLine) -> Floats:
     nearest = np.rint(frequency / spacing).astype(np.int64)
     index = nearest[:, None] + np.arange(-reach, reach + 1)
     last = spectra.frequency.size - 1
-    # The nearest spectral line always counts; half a resolution is at least that.
+    # The nearest spectral line is always included; half a resolution is at least that.
     near = np.abs(index * spacing - frequency[:, None]) <= np.maximum(0.5 * resolution, 0.5 * spacing)[:, None]
     level = np.take_along_axis(spectra.level, np.clip(index, 0, last), axis=1)
     highest: Floats = np.where(near, level, -np.inf).max(axis=1)

@@ -377,7 +377,7 @@ class TorusSampling(ReprMixin, line=": {samples} samples for {lines.index!n} lin
         return np.asarray(found)
 
 
-def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = False) -> TorusSampling:
+def rank1_lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = False) -> TorusSampling:
     """Find a lattice on which all lines of a larger set have slots of their own.
 
     Parameters
@@ -398,7 +398,7 @@ def lattice(lines: LineSet, larger: LineSet, least: int = 0, shared: bool = Fals
     --------
     >>> from exugear.steady.harmonics.lines import line_set
     >>> lines = line_set([1.0, 4.7], 2, 2)
-    >>> found = lattice(lines, line_set([1.0, 4.7], 4, 4))
+    >>> found = rank1_lattice(lines, line_set([1.0, 4.7], 4, 4))
     >>> signal = np.arange(7.0) + 0j
     >>> bool(np.allclose(found.coefficients(found.values(signal)), signal))
     True

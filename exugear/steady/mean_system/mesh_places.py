@@ -14,7 +14,7 @@ A function f of the mesh cycle multiplies the input of each mesh. In multi-blade
 
     sum over places of   back (waves, places)  f(position)  there (places, waves),
 
-as `exugear.steady.mean_system.mesh_places` has both. The position follows the angle of the base; of planets out of
+with both matrices from this module. The position follows the angle of the base; of planets out of
 phase, shapes rotate with the angle of the carrier. Both generate harmonics: those of the cycle are known, those of a
 revolution follow from few samples of it.
 """
@@ -134,10 +134,10 @@ class MeshInterface:
     """(m, r, size) rows of what the law reads by the rates of the coordinates; non-linear bearings have some."""
 
 
-def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshInterface:
-    """Rows of all mesh components at a speed of the input (rad/s); `parting` for the model `table`."""
+def mesh_ports(waves: MeshWaves, speed: float, loses_contact: bool) -> MeshInterface:
+    """Rows of all mesh components at a speed of the input (rad/s); `loses_contact` for the model `table`."""
     meshes = waves.assembly.meshes
-    rows, offsets = _table_rows(meshes) if parting else _row_rows(meshes, waves.wander)
+    rows, offsets = _table_rows(meshes) if loses_contact else _row_rows(meshes, waves.shuttles)
     means = np.array([wave.wave == 0 for wave in waves.waves])
     firsts = [wave.first for wave in waves.waves]
     readings = [waves.gradients(row, speed) for row in rows] + [waves.position_rows()]
@@ -145,7 +145,7 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshInterface:
     # The mean position counts from the static state; what planets are ahead of each other by stays.
     ahead = np.where(means, 0.0, readings[-1] @ waves.system.static_at(speed))
     levers = meshes.tilt[:, [TILT_LEVER]] * meshes.table.misalignment
-    forces = readings[:-1] if parting else [waves.gradients(meshes.force - levers, speed), *readings[1:-1]]
+    forces = readings[:-1] if loses_contact else [waves.gradients(meshes.force - levers, speed), *readings[1:-1]]
     shift = meshes.tilt[:, TILT_LEVER] * (meshes.table.nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST])
     beside = waves.values(levers, speed) + means * shift[firsts]
     return MeshInterface(
@@ -157,7 +157,7 @@ def mesh_ports(waves: MeshWaves, speed: float, parting: bool) -> MeshInterface:
     )
 
 
-def _row_rows(meshes: MeshArrays, wander: bool) -> tuple[list[Floats], list[Floats]]:
+def _row_rows(meshes: MeshArrays, shuttles: bool) -> tuple[list[Floats], list[Floats]]:
     """Return the input rows of a model along a row (`system.tooth_mesh.contact_state`), and values at zero coordinates.
 
     These are its deflection with the mean lever arm of the load and, where loads shuttle, the misalignment relative to
@@ -168,7 +168,7 @@ def _row_rows(meshes: MeshArrays, wander: bool) -> tuple[list[Floats], list[Floa
     turned = nominal[:, NOMINAL_MISALIGNMENT] - meshes.tilt[:, TILT_REST]
     row = meshes.deflection - lever[:, None] * meshes.table.misalignment
     offset = lever * turned
-    if not wander:
+    if not shuttles:
         return [row], [nominal[:, NOMINAL_DEFLECTION] - offset]
     moves = meshes.way_pieces > 0
     rows = [row, moves[:, None] * meshes.table.misalignment]

@@ -209,7 +209,7 @@ class MeshWaves:
         return np.asarray(own + np.array([mean[wave.family] for wave in self.waves]))
 
     @property
-    def wander(self) -> bool:
+    def shuttles(self) -> bool:
         """Whether the load of any mesh shuttles over its cycle."""
         return bool(self.assembly.meshes.way_pieces.any())
 
@@ -253,7 +253,7 @@ class MeshWaves:
     @property
     def varies(self) -> bool:
         """Whether the compliance of any mesh or its load's place changes over the cycle: else nothing excites."""
-        return self.wander or any(bool(tails[0]) for tails in self._tails.values())
+        return self.shuttles or any(bool(tails[0]) for tails in self._tails.values())
 
     def needed_harmonics(self) -> int:
         """Count the harmonics of each mesh frequency that the compliance asks for.

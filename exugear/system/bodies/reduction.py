@@ -116,10 +116,10 @@ class ReducedBody(
     ReprMixin,
     line=" {name}: {seats!n} seats, {modal_groups!n} modal coordinates, {rigid_inertia.mass:.4g} kg, frame {frame}",
 ):
-    """A reduced elastic body; n coordinates.
+    """A reduced flexible body; n coordinates.
 
     Coordinates are six per seat (ux uy uz, tilts thx thy, and thz unwrapped; m and rad), then the modal coordinates
-    of the modes inside (`exugear.system.bodies.reduction`).
+    of the internal modes.
     """
 
     name: str

@@ -4,7 +4,7 @@ A body is reduced free of all supports; a housing is held by supports on its sea
 coordinates determines the gyroscopic matrix:
 
 nonrotating
-    A body of revolution that rotates in a non-rotating frame: G = C' - C'^T with C' = int rho N (x d_y - y d_x) N, as
+    A rotating body of revolution in a non-rotating frame: G = C' - C'^T with C' = int rho N (x d_y - y d_x) N, as
     for turned shafts (`exugear.system.bodies.turned_section`).
 carrier
     A body in its own rotating frame: the constant Coriolis matrix, 2 int rho phi_i . (e_z x phi_j). Centrifugal
@@ -12,9 +12,9 @@ carrier
 ground
     A body that does not rotate: none.
 
-All elastic normal modes of a reduced solid (`exugear.system.bodies.solids`) are modes, so that static deflections are
-those of the reduced body; mass scaling brings those above the limit down to it. A floating frame describes the body by
-int rho f_a g_b of its position and its modes f, g; rigid rings on seats (blanks) are added.
+In a floating frame, all elastic normal modes of the reduced solid are retained, so that static deflections are those
+of the reduced body; mass scaling lowers the frequencies above the limit to this limit. The body is described by the
+integrals int rho f_a g_b of its position and its modes f, g; rigid rings on seats (blanks) are added.
 
 For a body of revolution a rotation by psi transforms the modes by exp(psi S), with eigenvalues of S at whole numbers: 0
 for torsion and stretching, 1 for bending.
@@ -80,29 +80,31 @@ else:
 
 
 ASYMMETRY_TOLERANCE = 5e-3
-"""Relative change of the seats' mass or stiffness by a quarter turn above which a body is not a body of revolution."""
+"""Relative change of the seats' mass or stiffness by rotation through 90 degrees above which a body is not a body of
+revolution.
+"""
 
 
 @dataclass(frozen=True)
 class SolidModel:
-    """All that a reduced solid depends on."""
+    """Complete input of the reduction of a solid."""
 
     name: str
     mesh: Any
-    """skfem.MeshTet2 or skfem.MeshHex2, in the gearbox's coordinates, m; or the file with it."""
+    """skfem.MeshTet2 or skfem.MeshHex2, in the gearbox's coordinates, m; or the file that contains it."""
     material: Material
     seats: tuple[SolidSeat, ...]
-    """Where other things sit."""
+    """Seats, at which other elements connect."""
     frame: Frame
-    """Where its coordinates are seen from."""
+    """Reference frame of the coordinates."""
     band: float
-    """free-interface normal modes up to here are exact, Hz."""
+    """Cut-off frequency up to which free-interface normal modes are exact, Hz."""
     limit: float
-    """Modes of the reduced body above this are brought down to it by mass scaling, Hz."""
+    """Limit to which mass scaling lowers higher mode frequencies of the reduced body, Hz."""
     blanks: Mapping[str, Blank] = field(default_factory=dict)
-    """Seat name -> rigid ring on it."""
+    """Rigid rings by the name of their seat."""
     axis: tuple[float, float] = (0.0, 0.0)
-    """(x, y) of the axis of turning, parallel to z, m."""
+    """(x, y) of the axis of rotation, parallel to z, m."""
 
     @property
     def key(self) -> str:
@@ -122,7 +124,7 @@ class SolidModel:
 
     @property
     def elements(self) -> Any:
-        """The mesh itself, read from its file if it is in one."""
+        """The mesh itself, read from its file if necessary."""
         if isinstance(self.mesh, SolidFile):
             return self.mesh.mesh
         return self.mesh
@@ -130,23 +132,23 @@ class SolidModel:
 
 @dataclass(frozen=True)
 class ReducedSolid:
-    """A solid's matrices and their reduction, before anything is dropped."""
+    """Matrices of a solid and their reduction, before parts of them are discarded."""
 
     solid: Solid
-    """The whole model."""
+    """The complete finite-element model."""
     component: ReducedComponent
-    """Reduced; component modes (3 n, coordinates)."""
+    """Reduced model with component modes (3 n, coordinates)."""
     seconds: float
-    """Wall time that it took."""
+    """Wall-clock time of the reduction, s."""
 
 
 def reduce_matrices(model: SolidModel, backend: Backend | None = None) -> ReducedSolid:
-    """Assemble a solid and reduce its matrices; what `reduce_solid` makes a body of.
+    """Assemble a solid and reduce its matrices, from which `reduce_solid` makes a body.
 
     Raises
     ------
     SolidError, ReductionError
-        As `reduce_solid`.
+        As in `reduce_solid`.
     """
     began = time.perf_counter()
     seats = [seat.name for seat in model.seats]
@@ -169,25 +171,25 @@ def reduce_matrices(model: SolidModel, backend: Backend | None = None) -> Reduce
 
 
 def reduce_solid(model: SolidModel, backend: Backend | None = None) -> ReducedBody:
-    """Reduce a solid.
+    """Reduce a solid to its seats and a few modal coordinates.
 
     Parameters
     ----------
     backend : {"pardiso", "superlu"}, optional
-        Library that factorises; the fastest installed by default.
+        Library for factorisation; by default the fastest one that is installed.
 
     Raises
     ------
     SolidError
-        A seat without faces, or two that share some.
+        A seat has no faces, or two seats share some.
     ReductionError
-        A blank without its seat, too few seats, or a body in the frame "nonrotating" that is not a body of revolution.
+        A blank has no seat, there are too few seats, or a body in the frame "nonrotating" is not a body of revolution.
     """
     return reduced_body(model, reduce_matrices(model, backend))
 
 
 def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
-    """Reduced body from a solid's matrices; errors as `reduce_solid`."""
+    """Reduced body from a solid's matrices; errors as in `reduce_solid`."""
     began = time.perf_counter()
     component = reduced.component
     size = reduced.component.component_modes.shape[1]
@@ -216,7 +218,7 @@ def reduced_body(model: SolidModel, reduced: ReducedSolid) -> ReducedBody:
 
 
 def reduction_file(model: SolidModel, folder: Path) -> Path:
-    """Place of a solid's reduction in the folder where they are stored."""
+    """Path of a solid's reduction in the folder where reductions are stored."""
     return folder / f"{model.name}-{model.key[:16]}.npz"
 
 
@@ -231,7 +233,7 @@ def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
     Raises
     ------
     ReductionError
-        Frame "nonrotating" for a body that a quarter turn changes.
+        A body in the frame "nonrotating" is not a body of revolution.
     """
     modes = reduced.component.component_modes
     size = reduced.component.component_modes.shape[1]
@@ -252,29 +254,30 @@ def gyroscopic_matrix(model: SolidModel, reduced: ReducedSolid) -> Floats:
         spin = np.zeros(size)
         spin[SPIN : 6 * len(model.seats) : 6] = 1.0
         momentum = reduced.component.mass @ spin
-        # Coriolis forces of the steady spin itself would be twice the centrifugal force: only what deforms has any.
+        # The steady rotation itself would have Coriolis forces of twice the centrifugal force; only deformation has any
+        # here.
         deforming = np.eye(size) - np.outer(spin, momentum) / (spin @ momentum)
         matrix = deforming.T @ matrix @ deforming
     return 0.5 * (matrix - matrix.T)
 
 
 def _blank_gyroscopics(blank: Blank, frame: Frame) -> Floats:
-    """Matrix G (6, 6) of a rigid ring on its seat, as `exugear.system.bodies.reduction.rigid_gyroscopic_matrix`.
+    """Matrix G (6, 6) of a rigid ring on its seat, from `exugear.system.bodies.reduction.rigid_gyroscopic_matrix`.
 
-    Its particles have int rho x^2 = int rho y^2 = axial / 2 and int rho z^2 = transverse - axial / 2.
+    Its mass distribution has int rho x^2 = int rho y^2 = axial / 2 and int rho z^2 = transverse - axial / 2.
     """
     return rigid_gyroscopic_matrix(RigidInertia(blank.mass, (0.0, 0.0, 0.0), blank.transverse, blank.axial), frame)
 
 
 def _check_revolution(model: SolidModel, component: ReducedComponent) -> None:
-    """Refuse a body that a quarter turn changes, or whose seats do not lie on the axis."""
+    """Raise an error if rotation through 90 degrees changes the body, or if its seats are not on the axis."""
     quarter = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     count = 6 * len(model.seats)
     turn = np.kron(np.eye(count // 3), quarter)
     off_axis = any(np.hypot(*(np.array(seat.centre[:2]) - model.axis)) > 0 for seat in model.seats)
     for name, matrix in (("mass", component.mass), ("stiffness", component.stiffness)):
         at_seats = matrix[:count, :count]
-        # Entries differ in unit: each is measured by the diagonal entries of its row and column.
+        # Entries differ in unit, so that each is compared with the diagonal entries of its row and column.
         diagonal = np.sqrt(np.maximum(at_seats.diagonal(), np.abs(turn) @ at_seats.diagonal()))
         change = float((np.abs(turn @ at_seats @ turn.T - at_seats) / np.outer(diagonal, diagonal)).max())
         if change > ASYMMETRY_TOLERANCE or off_axis:
@@ -285,7 +288,7 @@ def _check_revolution(model: SolidModel, component: ReducedComponent) -> None:
 
 
 def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
-    """Boundary of the mesh with displacement, and strain in the middle of the element below, per coordinate."""
+    """Boundary of the mesh with displacement, and strain at the centre of the adjacent element, per coordinate."""
     mesh = reduced.solid.mesh
     modes = reduced.component.component_modes
     facets = np.asarray(mesh.boundary_facets())
@@ -297,7 +300,7 @@ def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
     values, local = (np.stack(part) for part in zip(*functions, strict=True))
     slopes = shape_gradients(np.asarray(mesh.doflocs).T[dofs], values[:, None, :], local, np.ones(1))[2][..., 0]
     by_node = modes.reshape(-1, 3, modes.shape[1])
-    gradient = np.zeros((len(facets), 3, 3, modes.shape[1]))  # of displacement component by direction
+    gradient = np.zeros((len(facets), 3, 3, modes.shape[1]))  # displacement component by direction
     for function, slope in zip(dofs.T, slopes, strict=True):
         gradient += by_node[function][:, :, None, :] * slope.T[:, None, :, None]
     strain = [gradient[:, i, i] for i in range(3)]
@@ -316,11 +319,11 @@ def _surface(model: SolidModel, reduced: ReducedSolid) -> Surface:
     )
 
 
-# Elastic bodies in a frame that floats with them: normal modes, and integrals over their mass
+# Flexible bodies in a floating frame: normal modes, and integrals over their mass
 
 
 def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> FloatingBody:
-    """Modes of a solid in its own frame, and its integrals; from its reduced matrices if they are at hand."""
+    """Modes of a solid in its own frame, and its mass integrals; from its reduced matrices if they are available."""
     reduced = matrices or reduce_matrices(model)
     solid = reduced.solid
     component = reduced.component
@@ -333,7 +336,7 @@ def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> Fl
     places = np.array([seat.centre for seat in model.seats])
     mass = node_mass.sum() + sum(ring.mass for _, ring in rings)
     centre = (node_mass @ solid.nodes + sum(ring.mass * places[n] for n, ring in rings)) / mass
-    # The place from the centre and the modes, as fields over the nodes.
+    # Position relative to the centre, and modes, as fields over the nodes.
     fields_at_nodes = np.concatenate([(solid.nodes - centre)[:, :, None], modes.reshape(-1, 3, len(values))], axis=2)
     count = fields_at_nodes.shape[2]
     flat = fields_at_nodes.reshape(len(fields_at_nodes), -1)
@@ -344,7 +347,7 @@ def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> Fl
     for n, ring in rings:
         moved = by_mode[6 * n : 6 * n + 3]
         turns = by_mode[6 * n + 3 : 6 * n + 6]
-        field = np.zeros((3, 4, count))  # of 1, x, y, z from the seat's centre
+        field = np.zeros((3, 4, count))  # for 1, x, y, z from the centre of the seat
         field[:, 0, 0], field[:, 1:, 0] = places[n] - centre, np.eye(3)
         field[:, 0, 1:] = moved
         field[:, 1:, 1:] = skew(turns.T).transpose(1, 2, 0)
@@ -373,7 +376,7 @@ def floating_body(model: SolidModel, matrices: ReducedSolid | None = None) -> Fl
 
 
 def with_inertia(body: FloatingBody, wanted: RigidInertia) -> FloatingBody:
-    """Give a body the rigid inertia of another model of it; as `system.bodies.reduction.with_rigid_inertia` does.
+    """Adjust a body to the rigid inertia of another model, as `system.bodies.reduction.with_rigid_inertia` does.
 
     The added or missing inertia moves with the frame, that is with the rigid part of the motion.
     """
@@ -394,7 +397,7 @@ def load_or_reduce_floating(model: SolidModel, folder: Path | None) -> tuple[Red
     Raises
     ------
     exugear.system.bodies.solid_elements.SolidError, ReductionError
-        As `exugear.system.bodies.solids.reduce_solid`.
+        As in `reduce_solid`.
     """
     matrices = cache(lambda: reduce_matrices(model))
     if folder is None:
@@ -423,7 +426,7 @@ _STORED = {
     "stretching": "centrifugal_tension",
     "turning": "turning",
 }
-"""Names in files, which stay so that old files are found again, and in `FloatingBody`."""
+"""Names in files, which are kept so that existing files remain readable, and in `FloatingBody`."""
 
 
 def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> FloatingBody:

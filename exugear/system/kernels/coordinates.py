@@ -1,17 +1,15 @@
-"""Coordinates of bodies as used by all compiled models, inertia of rigid bodies, torsional springs.
+"""Coordinates of bodies in all compiled models, inertia of rigid bodies, and torsional springs.
 
 Coordinates are those of Exudyn's ``NodeRigidBodyRxyz``: translations x, y, z of the body's node (m), tilts a and b
-(rad) about x and about the tilted y, and the unwrapped spin about the body's own z axis (rad), so that its axes
-are turned by Rx(a) Ry(b) Rz(spin). All are zero in the reference state. Rates are the time derivatives of the
-coordinates. Generalized forces are conjugate to them: N for translations, N m for angles.
+(rad) about x and about the tilted y, and the unwrapped rotation about the body's own z axis (rad), called spin. The
+axes of the body are rotated by Rx(a) Ry(b) Rz(spin). All coordinates are zero in the reference state. Rates are the
+time derivatives of the coordinates. Generalized forces are conjugate to them: N for translations, N m for angles.
 
-A body has all six one after the other, or its spin alone; the ground has none. So has each seat of an elastic body,
-which a mesh or a bearing treats as a rigid body. Models that allow for missing coordinates give them the index -1; in
-the arrays of the compiled solver they point to a coordinate that stays zero.
+A body has all six coordinates consecutively, or only its spin; the ground has none. Each seat of a flexible body also
+has six, so that a mesh or a bearing treats it as a rigid body. Models that permit missing coordinates give them the
+index -1. In the arrays of the compiled solver, missing coordinates refer to one that remains zero.
 
-Numbers here become part of machine code: `fe_ste.tools.compilation` recompiles when this file changes.
-
-Coordinates are those of `exugear.system.kernels.coordinates`.
+Numbers in this module become part of machine code: `fe_ste.tools.compilation` recompiles when this file changes.
 """
 
 from __future__ import annotations
@@ -24,39 +22,40 @@ import numpy as np
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import compiled
 
-# Coordinates of bodies, as all compiled laws read them: what each is, and where it stands among a body's six
+# Coordinates of bodies as used by all compiled models: their meaning and index among the six of a body
 
 AXIAL = 2
-"""Translation along z, behind those along x and y."""
+"""Translation along z, after those along x and y."""
 TILT = 3
-"""First of the two tilts; the other one follows."""
+"""First of the two tilts, followed by the other one."""
 SPIN = 5
-"""Spin about the body's axis."""
+"""Rotation about the body's axis."""
 BODY_SIZE = 6
-"""Coordinates of a body or a seat."""
+"""Number of coordinates of a body or a seat."""
 PADDED, PADDED_TILT, PADDED_SPIN = 8, 4, 6
-"""Size of the padded row x y z 0 a b spin 0 that loops arranged for speed take a body's coordinates in, first tilt and
-spin there."""
+"""Size of the padded row x y z 0 a b spin 0, the form of a body's coordinates in loops optimised for speed, and the
+indices of the first tilt and of the spin in it.
+"""
 COSINE, SINE = range(2)
-"""Columns of the cosines and sines of all angles that turn anything, which such loops take once per evaluation."""
+"""Columns of the cosines and sines of all rotation angles, which such loops compute once per evaluation."""
 
 
 # Compiled inertia of rigid bodies, symmetric about their axes, on arrays of coordinates
 
 
 class InertiaArrays(NamedTuple):
-    """Inertias, axially symmetric with the centre of mass at the node."""
+    """Inertias of axially symmetric bodies with the centre of mass at the node."""
 
     body: Integers
     """(b,) first coordinate of each body with six coordinates."""
     mass: Floats
     transverse: Floats
     axial: Floats
-    """(b,) kg, kg m2, kg m2."""
+    """(b,) mass (kg), transverse and axial moment of inertia (kg m2)."""
     spin: Integers
-    """(s,) coordinate of each body with its spin alone."""
+    """(s,) coordinate of each body that has only its spin."""
     spin_inertia: Floats
-    """(s,) kg m2."""
+    """(s,) axial moment of inertia, kg m2."""
 
 
 @compiled
@@ -83,7 +82,7 @@ def accelerations(q: Floats, v: Floats, inertia: InertiaArrays, f: Floats, out: 
         da = v[a]
         db = v[b]
         p = ja * (v[spin] + da * sb)
-        # The first tilt's equation contains spin'': it is eliminated with the spin's own equation, solved last.
+        # The first tilt's equation contains spin'': the spin's own equation, solved last, eliminates it.
         out[a] = (f[a] - f[spin] * sb - p * db * cb + 2.0 * jt * da * db * sb * cb) / (jt * cb * cb)
         out[b] = (f[b] - jt * da * da * sb * cb + p * da * cb) / jt
         out[spin] = f[spin] / ja - out[a] * sb - da * db * cb
@@ -97,7 +96,7 @@ def kinetic_energies(q: Floats, v: Floats, inertia: InertiaArrays, out: Floats) 
     for n in range(inertia.body.size):
         o = inertia.body[n]
         square = v[o] ** 2 + v[o + 1] ** 2 + v[o + 2] ** 2
-        # Angular velocity across the axis, and about it: spin' + a' sin b.
+        # Angular velocity transverse to the axis, and about it: spin' + a' sin b.
         sb = math.sin(q[o + TILT + 1])
         cb = math.cos(q[o + TILT + 1])
         tilting = (v[o + TILT] * cb) ** 2 + v[o + TILT + 1] ** 2
@@ -107,11 +106,11 @@ def kinetic_energies(q: Floats, v: Floats, inertia: InertiaArrays, out: Floats) 
         out[inertia.body.size + n] = 0.5 * inertia.spin_inertia[n] * v[inertia.spin[n]] ** 2
 
 
-# Law of torsional springs on arrays of coordinates, which are those of `exugear.system.kernels.coordinates`
+# Torsional springs on arrays of coordinates
 
 
 class SpringArrays(NamedTuple):
-    """Torsional springs between two spins: (s, 2) coordinates, (s,) N m/rad and N m s/rad."""
+    """Torsional springs between two rotations: (s, 2) coordinates, (s,) N m/rad and N m s/rad."""
 
     coordinates: Integers
     stiffness: Floats
@@ -121,7 +120,7 @@ class SpringArrays(NamedTuple):
 def add_spring_forces(q: Floats, v: Floats, springs: SpringArrays, f: Floats) -> None:
     """Add the torques of the torsional springs to f."""
     first, second = springs.coordinates.T
-    # A shaft that the second body is ahead of pulls the first one along.
+    # If the second body is ahead, the torque accelerates the first one.
     torque = springs.stiffness * (q[second] - q[first]) + springs.damping * (v[second] - v[first])
     np.add.at(f, first, torque)
     np.subtract.at(f, second, torque)

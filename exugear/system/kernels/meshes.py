@@ -1,26 +1,27 @@
 r"""Compiled geometry of gear meshes on arrays of coordinates: deflection, its rate, and positions of the gears.
 
-Each mesh lives in a frame that carries its line of centres: ground, or a carrier of spin psi. With R the
-rotation by psi, p a gear's place relative to the frame's axis and S = z x,
+Each mesh has a frame with which its line of centres rotates: ground, or a carrier with the angle psi. With R the
+rotation by psi, p the position of a gear relative to the frame's axis and S = z x,
 
     z_b   = R^T (p_b + x_b) - p_b,  tilts likewise,  spin_b - psi          displacements seen from the frame
     delta = sum_b W_b . z_b                                                deflection, W constant
     pmc   = phase + (spin_1 - psi) cycles                                  position in the mesh cycle
     f     = -F dg/dq,  g = sum_b V_b . z_b                                 generalized force of a scalar force F
 
-A model along a row that resists misalignment gamma has the deflection and the moment of
-`exugear.system.tooth_mesh.contact_state` instead: e = delta - (zt + w) (gamma - g0) for delta, and + M d gamma/dq in
-addition.
+Row-based mesh models (without a table) that resist misalignment gamma use the deflection and moment of
+`exugear.system.tooth_mesh.contact_state` instead: e = delta - (zt + w) (gamma - g0) in place of delta, and the
+additional force + M d gamma/dq.
 
-The row g does not change when everything rotates with psi: the carrier's share of the force balances moments exactly.
-The mesh models (`exugear.system.tooth_mesh.laws`) give the force F at a deflection. Errors of pitch and run-out, given
-over a revolution of each gear, are subtracted from the deflection of any model.
+The row g is invariant under a common rotation by psi, so that the force on the carrier balances the moments exactly.
+The mesh models (`exugear.system.tooth_mesh.laws`) give the force F at a deflection. Pitch deviations and run-out,
+specified over a revolution of each gear, are subtracted from the deflection of any model.
 
 Coordinates are those of `exugear.system.kernels.coordinates`.
 
-The formulas are those of `exugear.system.kernels.meshes`, which the tests hold them against. What differs: sines of the
-frames' angles are computed once per evaluation and passed in, missing coordinates point to one that stays zero, so that
-the loops need no exceptions, and nothing is allocated.
+The module has two versions of these formulas, which the tests compare. The first, on `MeshArrays`, also has second
+derivatives. The second, on `Meshes`, is optimised for speed: sines of the frames' angles are computed once per
+evaluation and passed in, missing coordinates refer to one that remains zero, so that the loops need no exceptions, and
+no memory is allocated.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from fe_ste.tools.compilation import compiled, kernel
 from fe_ste.tools.octets import eight, put, sum_of
 
 FRAME = 2 * BODY_SIZE
-"""Local coordinates of a mesh: six of gear 1, six of gear 2, then the spin of the frame."""
+"""Local coordinates of a mesh: six of gear 1, six of gear 2, then the rotation of the frame."""
 ROW_SIZE = FRAME + 1
 SPIN_1 = SPIN
 SPIN_2 = BODY_SIZE + SPIN
@@ -58,14 +59,15 @@ WAY_COLUMNS, MOMENT_BEYOND = 8, 4
 
 
 class MeshArrays(NamedTuple):
-    """All meshes of a system as arrays; m meshes, n cubic pieces at most."""
+    """All meshes of a system as arrays for m meshes with at most n cubic pieces."""
 
     coordinates: Integers
-    """(m, 13) position of each local coordinate in the state, -1 where there is none."""
+    """(m, 13) index of each local coordinate in the state, -1 for a missing one."""
     axis: Floats
     """(m, 2, 2) axis of each gear relative to the frame's axis at zero angles, m."""
     form: Integers
-    """(m,) number of the law's compiled form, which `exugear.system.tooth_mesh.laws.mesh_forces` chooses by."""
+    """(m,) number of the mesh model's compiled form, by which `exugear.system.tooth_mesh.laws.mesh_forces` selects it.
+    """
     deflection: Floats
     force: Floats
     """(m, 12) rows W and V, m/m and m/rad."""
@@ -76,25 +78,27 @@ class MeshArrays(NamedTuple):
     pieces: Integers
     """(m,) number of equal pieces over the mesh cycle."""
     stiffness: Floats
-    """(m, n, c) coefficients of the law over each piece; of a stiffness four of a cubic, N/m."""
+    """(m, n, c) coefficients of the mesh model over each piece; for a stiffness the four of a cubic, N/m."""
     damping: Floats
-    """(m,) N s/m."""
+    """(m,) damping, N s/m."""
     tilt: Floats
-    """(m, 5) of a law along a row that resists misalignment: tilt stiffness kg (N m/rad) and damping (N m s/rad),
-    lever zt (m), moment F0 (zc - zt) (N m) and misalignment g0 (rad); zeros where it does not."""
+    """(m, 5) for row-based models that resist misalignment: tilt stiffness kg (N m/rad) and damping (N m s/rad), lever
+    zt (m), moment F0 (zc - zt) (N m) and misalignment g0 (rad); zeros for other models.
+    """
     way_pieces: Integers
-    """(m,) number of equal pieces of the load's ways along the face; 0 where it stays."""
+    """(m,) number of equal pieces of the shuttling over the mesh cycle; 0 without shuttling."""
     way: Floats
-    """(m, w, 8) coefficients over each piece of the mesh cycle: of the way w of what a little more deflection adds:
-    to the load, m, then of the moment F0 (c - w) that the load itself has beyond it, N m."""
+    """(m, w, 8) coefficients over each piece of the mesh cycle: of the axial position w of the incremental load's
+    centroid (m), then of the moment F0 (c - w) of the static load about it (N m).
+    """
     line_of_action: Floats
-    """(m,) F_bt per scalar mesh force."""
+    """(m,) ratio of F_bt to the scalar mesh force."""
     error_pieces: Integers
-    """(m, 2) number of equal cubic pieces of each gear's error over its revolution; 0 for no error."""
+    """(m, 2) number of equal cubic pieces of each gear's deviation over its revolution; 0 without deviation."""
     error: Floats
-    """(m, 2, e, 4) coefficients of the error over each piece, m along the transverse line of action."""
+    """(m, 2, e, 4) coefficients of the deviation over each piece, m along the transverse line of action."""
     table: TableArrays
-    """Tables of the meshes that follow one."""
+    """Tables of the meshes with the model `table`."""
 
     def one(self, n: int) -> MeshArrays:
         """Arrays of mesh n alone."""
@@ -106,7 +110,7 @@ class MeshArrays(NamedTuple):
 def periodic_cubic(samples: Floats) -> Floats:
     """Coefficients of a periodic C1 cubic through equally spaced samples over one cycle.
 
-    Slopes are central differences (Catmull and Rom 1974), so that a sample acts on its neighbourhood only.
+    Slopes are central differences (Catmull and Rom 1974), so that a sample affects only its neighbourhood.
 
     Parameters
     ----------
@@ -131,21 +135,21 @@ def periodic_cubic(samples: Floats) -> Floats:
 
 @kernel
 def stiffness_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float]:
-    """Stiffness (N/m) and its slope per cycle at any position in the mesh cycle; coefficients (n, 4)."""
-    # pmc is unwrapped: only its fraction tells the piece, and t in [0, 1) the position in that piece.
+    """Return stiffness (N/m) and its slope per cycle at any position in the mesh cycle; coefficients (n, 4)."""
+    # pmc is unwrapped: its fraction selects the piece, and t in [0, 1) is the position in that piece.
     scaled = (pmc - math.floor(pmc)) * pieces
     piece = piece_at(scaled, pieces)
     t = scaled - piece
     c = coefficients[piece]
     value: float = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-    # The cubic's derivative is per piece; there are `pieces` of them to a cycle.
+    # The derivative of the cubic is per piece, with `pieces` of them in a cycle.
     slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
     return value, slope
 
 
 @kernel
 def shuttling_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, float, float, float]:
-    """Way (m) and moment (N m) of coefficients (n, 8), each with its slope per cycle, as `stiffness_at`."""
+    """Axial position (m) and moment (N m) from coefficients (n, 8), with slopes per cycle, as in `stiffness_at`."""
     scaled = (pmc - math.floor(pmc)) * pieces
     piece = piece_at(scaled, pieces)
     t = scaled - piece
@@ -158,7 +162,7 @@ def shuttling_at(coefficients: Floats, pieces: int, pmc: float) -> tuple[float, 
 
 @kernel
 def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: Floats, turning: Floats) -> float:
-    """Value of sum W . z with its gradient (13,) and the gradient's derivative to psi (13,) for one mesh."""
+    """Value of sum W . z for one mesh, with its gradient (13,) and the derivative of the gradient by psi (13,)."""
     psi = q[index[FRAME]] if index[FRAME] >= 0 else 0.0
     c = math.cos(psi)
     s = math.sin(psi)
@@ -167,7 +171,7 @@ def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: F
     turning[:] = 0.0
     for end in range(2):
         o = BODY_SIZE * end
-        # Translations and tilts are vectors in the plane, both turned back by psi. Only translations have a lever p.
+        # Translations and tilts are vectors in the plane, both rotated back by psi. Only translations have a lever p.
         for pair in (0, TILT):
             if index[o + pair] < 0:
                 continue
@@ -179,15 +183,16 @@ def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: F
             wx = row[o + pair]
             wy = row[o + pair + 1]
             value += wx * (lx - px) + wy * (ly - py)
-            # dz/dq = R^T, so the gradient is the row turned forward; its derivative to psi is that turned by 90 deg.
+            # dz/dq = R^T, so the gradient is the row rotated forward; its derivative by psi is that rotated by 90 deg.
             gradient[o + pair] = c * wx - s * wy
             gradient[o + pair + 1] = s * wx + c * wy
             turning[o + pair] = -gradient[o + pair + 1]
             turning[o + pair + 1] = gradient[o + pair]
-            # dl/dpsi = -S l, l the gear's place from the frame's axis as the frame sees it; twice gives -l.
+            # dl/dpsi = -S l, with l the position of the gear relative to the frame's axis, in the frame; applied twice
+            # it is -l.
             gradient[FRAME] += wx * ly - wy * lx
             turning[FRAME] -= wx * lx + wy * ly
-        # Along z and about it the frame's turning changes nothing but the spin that is seen.
+        # In the axial direction, the rotation of the frame affects only the relative rotation about the axis.
         if index[o + AXIAL] >= 0:
             value += row[o + AXIAL] * q[index[o + AXIAL]]
             gradient[o + AXIAL] = row[o + AXIAL]
@@ -200,7 +205,7 @@ def frame_row(q: Floats, index: Integers, axis: Floats, row: Floats, gradient: F
 
 @kernel
 def error_at(m: int, end: int, angle: float, meshes: MeshArrays) -> tuple[float, float, float]:
-    """Error (m) of one gear of mesh m at its angle (rad) seen from the frame, with two derivatives by the angle."""
+    """Deviation (m) of one gear of mesh m at its angle (rad) relative to the frame, with two derivatives by it."""
     pieces = meshes.error_pieces[m, end]
     if pieces == 0:
         return 0.0, 0.0, 0.0
@@ -220,9 +225,9 @@ def error_at(m: int, end: int, angle: float, meshes: MeshArrays) -> tuple[float,
 def net_deflection(
     q: Floats, m: int, meshes: MeshArrays, row: Floats, side: float, gradient: Floats, turning: Floats, bend: Floats
 ) -> float:
-    """Value of a row less the gears' errors (side 1; plus them for the other flank, -1), gradient as `frame_row`.
+    """Value of a row minus the gears' deviations (side 1; plus for side -1), with gradient as in `frame_row`.
 
-    The errors' second derivatives by the two spins go to `bend` (2,).
+    The second derivatives of the deviations by the two rotations are stored in `bend` (2,).
     """
     index = meshes.coordinates[m]
     value: float = frame_row(q, index, meshes.axis[m], row, gradient, turning)
@@ -232,7 +237,7 @@ def net_deflection(
         spin = q[index[o]] if index[o] >= 0 else 0.0
         error, slope, curvature = error_at(m, end, spin - psi, meshes)
         value -= side * error
-        # The error depends on spin - psi: what its slope adds to one it takes from the other.
+        # The deviation depends on spin - psi, so that its slope has opposite signs for the two.
         gradient[o] -= side * slope
         gradient[FRAME] += side * slope
         bend[end] = -side * curvature
@@ -250,7 +255,7 @@ def mesh_pmc(q: Floats, m: int, meshes: MeshArrays) -> float:
 
 @kernel
 def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float, float, float]:
-    """Way w (m) of the load of mesh m at a position in its cycle, its slope; moment F0 (c - w) (N m), its slope."""
+    """Axial position w (m) of mesh m's load centroid and moment F0 (c - w) (N m), each with its slope per cycle."""
     if meshes.way_pieces[m] == 0:
         return 0.0, 0.0, 0.0, 0.0
     return shuttling_at(meshes.way[m], meshes.way_pieces[m], pmc)
@@ -258,7 +263,7 @@ def load_way(m: int, pmc: float, meshes: MeshArrays) -> tuple[float, float, floa
 
 @kernel
 def row_dot(index: Integers, row: Floats, v: Floats) -> float:
-    """Scalar product of a local row (13,) with the state's entries it belongs to."""
+    """Scalar product of a local row (13,) with the corresponding entries of the state."""
     total = 0.0
     for i in range(ROW_SIZE):
         if index[i] >= 0:
@@ -268,7 +273,7 @@ def row_dot(index: Integers, row: Floats, v: Floats) -> float:
 
 @kernel
 def relative_spin(v: Floats, index: Integers, end: int) -> float:
-    """Spin of a gear of a mesh seen from the mesh's frame; of coordinates or of their rates."""
+    """Rotation of a gear relative to the frame of its mesh, for coordinates or their rates."""
     spin = v[index[BODY_SIZE * end + SPIN]] if index[BODY_SIZE * end + SPIN] >= 0 else 0.0
     psi = v[index[FRAME]] if index[FRAME] >= 0 else 0.0
     difference: float = spin - psi
@@ -277,7 +282,7 @@ def relative_spin(v: Floats, index: Integers, end: int) -> float:
 
 @compiled
 def gear_position(q: Floats, m: int, meshes: MeshArrays, row: Floats, nominal: float) -> float:
-    """Centre distance (m) or misalignment (rad) of mesh m by its row."""
+    """Centre distance (m) or misalignment (rad) of mesh m from its row."""
     gradient = np.empty(ROW_SIZE)
     turning = np.empty(ROW_SIZE)
     index = meshes.coordinates[m]
@@ -288,12 +293,12 @@ def gear_position(q: Floats, m: int, meshes: MeshArrays, row: Floats, nominal: f
 @kernel
 def turn_rows(turning: Floats, bend: Floats, factor: float, out: Floats) -> None:
     """Add factor times the second derivatives of a row's value, (13, 13)."""
-    # The value is bilinear in psi and the others: a full row and column of psi, whose corner counts once.
+    # The value is bilinear in psi and the other coordinates: full row and column of psi, with the corner counted once.
     for i in range(ROW_SIZE):
         out[i, FRAME] += factor * turning[i]
         if i != FRAME:
             out[FRAME, i] += factor * turning[i]
-    # An error bends with spin - psi.
+    # The curvature of a deviation acts on spin - psi.
     for end in range(2):
         o = BODY_SIZE * end + SPIN
         out[o, o] += factor * bend[end]
@@ -304,8 +309,8 @@ def turn_rows(turning: Floats, bend: Floats, factor: float, out: Floats) -> None
 
 @kernel
 def rate_gradient(v: Floats, index: Integers, turning: Floats, bend: Floats, out: Floats) -> None:
-    """Differentiate a row's rate by the coordinates, (13,)."""
-    # d(gradient . v)/dq is the second derivative times v: the same pattern as in `turn_rows`.
+    """Differentiate the rate of a row by the coordinates, (13,)."""
+    # d(gradient . v)/dq is the second derivative times v, with the same pattern as in `turn_rows`.
     psi_rate = v[index[FRAME]] if index[FRAME] >= 0 else 0.0
     for i in range(ROW_SIZE):
         out[i] = turning[i] * psi_rate
@@ -325,102 +330,105 @@ def gear_positions(q: Floats, meshes: MeshArrays, out: Floats) -> None:
         out[m, 1] = gear_position(q, m, meshes, table.misalignment[m], table.nominal[m, NOMINAL_MISALIGNMENT])
 
 
-# Compiled geometry of gear meshes, arranged for speed: value, rate and gradient of a row in one pass
+# Compiled geometry of gear meshes, optimised for speed: value, rate and gradient of a row in one pass
 
 ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
 """Rows of `MeshMemory.gradient`."""
 LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE, LAST_ENERGY, LAST_DAMPED, LAST_CYCLE, LAST_OTHER = range(8)
 LAST_CENTRE, LAST_MISALIGNMENT, LAST_CENTRE_RATE = range(8, 11)
 """Columns of `MeshMemory.states`: deflection (m), rate (m/s), 1 outside a table, scalar force (N; of a table F_bt), and
-the terms of the mesh in the energy balance: elastic energy (J); power damped, of the stiffness that changes with pmc,
-and of a force that is not conjugate to its deflection (W); of a table change of centre distance (m), misalignment (rad)
-and rate of the centre distance (m/s)."""
+the terms of the mesh in the energy balance: elastic energy (J); dissipated power, power of the stiffness that changes
+with pmc, and power of a force that is not conjugate to its deflection (W); for tables, change of centre distance (m),
+misalignment (rad) and rate of the centre distance (m/s).
+"""
 STATES_SIZE = 11
 DEFLECTION_ROW, FORCE_ROW = range(2)
 """Rows of `Meshes.rows`."""
 FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
-"""First columns of the parts of each of them, and of those of the second gear."""
+"""First columns of the parts of each row, and first column of the second gear."""
 TILT_ROW_X, TILT_ROW_Y, TILT_SHIFT, TILT_RESISTANCE, TILT_DAMPER, TILT_ARM, TILT_PUSH = range(7)
 """Columns of `Meshes.tilt`: the misalignment's row over the tilts of gear 1, its negative being that of gear 2;
-misalignment at zero tilts against that of the contact's state (rad); tilt stiffness, damping, lever and moment as in
-`exugear.system.kernels.meshes.MeshArrays.tilt`."""
+misalignment at zero tilts relative to that of the contact state (rad); tilt stiffness, damping, lever and moment as in
+`MeshArrays.tilt`.
+"""
 PADDED_FRAME = 2 * PADDED
-"""Place of the frame's angle in a gradient of `MeshMemory.gradients`, behind two padded gears."""
+"""Index of the frame's angle in a gradient of `MeshMemory.gradients`, after two padded gears."""
 KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
 """Columns of the energy balance, as recorded by runs (`exugear.transient.compiled.sampling`).
 
-Kinetic and elastic energy (J); powers (W): of the loads, damped, of the stiffness that changes with pmc, of mesh forces
-that are not conjugate to their deflection, of bearings whose rate is not the derivative of their displacement.
+Kinetic and elastic energy (J); powers (W): of the loads, dissipated, of the stiffness that changes with pmc, of mesh
+forces that are not conjugate to their deflection, of bearings whose rate is not the derivative of their displacement.
 """
 
 
 class Meshes(NamedTuple):
-    """Meshes as in `MeshArrays`; missing coordinates point to one that stays zero."""
+    """Meshes as in `MeshArrays`; missing coordinates refer to one that remains zero."""
 
     coordinates: Integers
-    """(m, 13)"""
+    """(m, 13) index of each local coordinate in the state."""
     slot: Integers
     """(m,) index of the cosine and sine of the frame's angle among those of all frame angles."""
     axis: Floats
-    """(m, 2, 2) zero for gears without translations."""
+    """(m, 2, 2) as in `MeshArrays`; zero for gears without translations."""
     form: Integers
     deflection: Floats
     force: Floats
     conjugate: Integers
-    """(m,) 1 where the force row is the deflection row."""
+    """(m,) 1 if the force row is the deflection row."""
     tilting: Integers
-    """(m,) 1 where a law along a row resists misalignment."""
+    """(m,) 1 for row-based models that resist misalignment."""
     tilt: Floats
     """(m, 7) columns as named in this module."""
     way_pieces: Integers
     way: Floats
-    """Of the load's ways along the face."""
+    """Pieces and coefficients of the shuttling, as in `MeshArrays`."""
     spinning: Integers
-    """(m,) 1 where the gears have their spins alone."""
+    """(m,) 1 for gears with rotations only."""
     ends: Integers
-    """(m, 2) numbers of the two gears' places."""
+    """(m, 2) indices of the two gears among the padded positions."""
     rows: Floats
-    """(m, 2, 48) rows over both gears' padded places: parts W0, W1, W2 of the first, then of the second gear, whose:
-    row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame."""
+    """(m, 2, 48) rows over the padded positions of both gears: parts W0, W1, W2 of the first, then of the second gear.
+    The row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame.
+    """
     offsets: Floats
-    """(m, 2, 3) of each row: what cos psi, sin psi and psi itself add to its value."""
+    """(m, 2, 3) contributions of cos psi, sin psi and psi itself to the value of each row."""
     cycles: Floats
     phase: Floats
     pieces: Integers
     stiffness: Floats
     damping: Floats
     mean: Floats
-    """(m, 2) stiffness (N/m) and damping (N s/m) at the static load, mean over the cycle."""
+    """(m, 2) stiffness (N/m) and damping (N s/m) at the static load, averaged over the cycle."""
     line_of_action: Floats
     error_pieces: Integers
     error: Floats
     nominal: Floats
-    """(m,) deflection of gears in their nominal place, m."""
+    """(m,) deflection of gears in their nominal position, m."""
     table: TableArrays | None
-    """None where no mesh follows one."""
+    """None if no mesh has the model `table`."""
 
 
 class MeshMemory(NamedTuple):
-    """Memory of the meshes' laws."""
+    """Work memory of the mesh models."""
 
     gradient: Floats
-    """(3, 13) gradients of the deflection and of the force row, and the force of a mesh with a table."""
+    """(3, 13) gradients of the deflection row, of the force row, and of the force of a mesh with a table."""
     gradients: Floats
-    """(4, 17) gradients over two padded places and the frame's angle; the last one is a sum."""
+    """(4, 17) gradients over two padded positions and the frame's angle; the last one is a sum."""
     states: Floats
-    """(m, 11) what each mesh does, columns as named in this module."""
+    """(m, 11) state of each mesh, columns as named in this module."""
     pieces: Integers
     """(m, 2) load piece of each flank's table that was used last."""
     law: Scratch | None
-    """Memory of the law `table`; None where no mesh has it."""
+    """Work memory of the model `table`; None if no mesh has it."""
     row: Floats
-    """(12,) row of the push between the axes and the moment of misalignment."""
+    """(12,) row of the force between the axes and of the moment about the misalignment."""
     damping: Floats
-    """(5,) directions and sizes of the damping of a table."""
+    """(5,) directions and magnitudes of the damping of a table."""
 
 
 class MeshWork(Protocol):
-    """What laws read and fill of the memory of a loop over time: `exugear.transient.compiled.packing.Work`."""
+    """Memory of a time integration loop that mesh models read and fill: `exugear.transient.compiled.packing.Work`."""
 
     @property
     def force(self) -> Floats:
@@ -428,27 +436,27 @@ class MeshWork(Protocol):
 
     @property
     def turns(self) -> Floats:
-        """Cosine and sine of all angles that turn anything, (k, 2)."""
+        """Cosine and sine of all rotation angles that are needed, (k, 2)."""
 
     @property
     def places(self) -> Floats:
-        """Padded coordinates and rates of all places, (p, 16)."""
+        """Padded coordinates and rates at all positions, (p, 16)."""
 
     @property
     def loads(self) -> Floats:
-        """Generalized forces on all places, padded alike, (p, 16)."""
+        """Generalized forces at all positions, in the same padded form, (p, 16)."""
 
     @property
     def mesh(self) -> MeshMemory:
-        """Memory of the laws."""
+        """Work memory of the mesh models."""
 
 
 def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:
-    """Rows over padded places, their parts and offsets: see `Meshes`.
+    """Parts and offsets of rows over padded positions, see `Meshes`.
 
     Parameters
     ----------
-    rows : (m, r, 12) rows over the coordinates of both gears seen from the frame
+    rows : (m, r, 12) rows over the coordinates of both gears relative to the frame
     axis : (m, 2, 2) axis of each gear relative to the frame's at zero angles, m; zero for gears without translations
 
     Returns
@@ -461,7 +469,7 @@ def padded_rows(rows: Floats, axis: Floats) -> tuple[Floats, Floats]:
     parts = np.zeros((count, kinds, 2, SECOND))
     parts[..., FIXED + AXIAL], parts[..., FIXED + PADDED_SPIN] = gears[..., AXIAL], gears[..., SPIN]
     for i, o in ((0, 0), (TILT, PADDED_TILT)):
-        # Turned forward by psi: (c x - s y, s x + c y).
+        # Rotated forward by psi: (c x - s y, s x + c y).
         parts[..., ALONG_COSINE + o], parts[..., ALONG_COSINE + o + 1] = gears[..., i], gears[..., i + 1]
         parts[..., ALONG_SINE + o], parts[..., ALONG_SINE + o + 1] = -gears[..., i + 1], gears[..., i]
     offsets = np.zeros((count, kinds, 3))
@@ -496,7 +504,7 @@ def row_motion(
     level = offsets[0]
     lever = offsets[1]
     spins = offsets[2]
-    # What the frame's turning does to all of the above at once.
+    # Common effect of the frame's rotation on all of the above.
     turning = sum_of(turning_1 * place_1 + turning_2 * place_2) + (c * lever - s * level) + spins
     value = sum_of(gradient_1 * place_1 + gradient_2 * place_2) + ((c * level + s * lever - level) + spins * psi)
     rate = sum_of(gradient_1 * eight(first, PADDED) + gradient_2 * eight(second, PADDED)) + turning * psi_rate
@@ -510,9 +518,9 @@ def row_motion(
 def tilt_motion(
     m: int, psi_rate: float, c: float, s: float, meshes: Meshes, places: Floats
 ) -> tuple[float, float, float, float, float]:
-    """Misalignment of mesh m against that of its contact's state, and its rate; its gradient in three numbers.
+    """Misalignment of mesh m relative to that of the contact state, its rate, and its gradient in three numbers.
 
-    These are those by both tilts of gear 1, whose negatives belong to gear 2, and by the frame's angle.
+    The gradient is by both tilts of gear 1, with the opposite sign for gear 2, and by the frame's angle.
     """
     row = meshes.tilt[m]
     first = places[meshes.ends[m, 0]]
@@ -531,7 +539,7 @@ def tilt_motion(
 def mesh_row(
     q: Floats, v: Floats, index: Integers, axis: Floats, row: Floats, c: float, s: float, gradient: Floats
 ) -> tuple[float, float]:
-    """Value and rate of a row over the coordinates seen from its frame; fills its gradient (13,)."""
+    """Value and rate of a row over the coordinates relative to its frame; fills its gradient (13,)."""
     psi = q[index[FRAME]]
     psi_rate = v[index[FRAME]]
     value = 0.0
@@ -544,7 +552,7 @@ def mesh_row(
         for pair in (0, TILT):
             i = index[o + pair]
             j = index[o + pair + 1]
-            # Turned back by psi; the row turned forward is its gradient, whose product with v is the rate.
+            # Rotated back by psi; the row rotated forward is its gradient, whose product with v is the rate.
             x = px + q[i]
             y = py + q[j]
             lx = c * x + s * y
@@ -564,14 +572,14 @@ def mesh_row(
         rate += axial * v[index[o + AXIAL]] + spin * v[index[o + SPIN]]
         turning -= spin
         gradient[o + AXIAL], gradient[o + SPIN] = axial, spin
-    # The frame's angle comes last: what its turning does to all of the above at once.
+    # The frame's angle is the last coordinate: common effect of its rotation on all of the above.
     gradient[FRAME] = turning
     return value, rate + turning * psi_rate
 
 
 @kernel
 def error_and_slope_at(m: int, end: int, angle: float, meshes: Meshes) -> tuple[float, float]:
-    """Error (m) of one gear of mesh m at its angle (rad) seen from the frame, and its slope per rad."""
+    """Deviation (m) of one gear of mesh m at its angle (rad) relative to the frame, and its slope per rad."""
     pieces = meshes.error_pieces[m, end]
     turns = angle / (2.0 * math.pi)
     scaled = (turns - math.floor(turns)) * pieces
@@ -586,9 +594,10 @@ def error_and_slope_at(m: int, end: int, angle: float, meshes: Meshes) -> tuple[
 def subtract_errors(
     q: Floats, v: Floats, m: int, side: float, meshes: Meshes, gradient: Floats, size: int, spin_place: int, frame: int
 ) -> tuple[float, float]:
-    """Change of a deflection and its rate by the gears' errors; changes its gradient too.
+    """Change of a deflection and its rate due to the gears' deviations; changes its gradient, too.
 
-    The gradient has `size` places for each gear, the spin at `spin_place` of them, and the frame's angle at `frame`.
+    The gradient has `size` entries for each gear, with the rotation at `spin_place` of them, and the frame's angle at
+    `frame`.
     """
     delta = 0.0
     rate = 0.0
@@ -598,7 +607,8 @@ def subtract_errors(
             spin = index[BODY_SIZE * end + SPIN]
             psi = index[FRAME]
             error, slope = error_and_slope_at(m, end, q[spin] - q[psi], meshes)
-            # A flank that stands back closes later; seen from the other flank it stands ahead (side -1).
+            # A flank below its nominal position closes the gap later; for the other flank the sign is opposite (side
+            # -1).
             delta -= side * error
             rate -= side * slope * (v[spin] - v[psi])
             gradient[size * end + spin_place] -= side * slope

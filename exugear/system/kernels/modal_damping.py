@@ -52,11 +52,12 @@ class ModalArrays(NamedTuple):
 @kernel
 def share_of_planet(i: int, j: int, count: int, turned: float) -> float:
     """Weight w_ij of planet j before in planet i now, `turned` (rad) being the angle from one to the other."""
+    # What alternates from planet to planet keeps its sign in each.
     total = 1.0
     for m in range(1, (count - 1) // 2 + 1):
         total += 2.0 * math.cos(m * turned)
     if count % 2 == 0:
-        total += 1.0 if (i - j) % 2 == 0 else -1.0
+        total += 1.0 - 2.0 * ((i - j) % 2)
     return total / count
 
 
@@ -66,7 +67,9 @@ def turn_planets(q: Floats, modal: ModalArrays, back: bool, given: Floats, out: 
     for s in range(modal.frame.size):
         begin = modal.first[s]
         count = modal.first[s + 1] - begin
-        turned = 0.0 if modal.frame[s] < 0 else q[modal.frame[s]]
+        turned = 0.0
+        if modal.frame[s] >= 0:
+            turned = q[modal.frame[s]]
         for a in range(count):
             to = modal.planets[begin + a]
             for axis in range(BODY_SIZE):
@@ -75,14 +78,16 @@ def turn_planets(q: Floats, modal: ModalArrays, back: bool, given: Floats, out: 
             for b in range(count):
                 if modal.equal[s] == 0 and a != b:
                     continue
-                # From planet j before to planet i now; back it is the transpose.
-                i, j = (b, a) if back else (a, b)
-                angle = turned + modal.place[begin + i] - modal.place[begin + j]
-                weight = share_of_planet(i, j, count, angle) if modal.equal[s] == 1 else 1.0
+                # From the place of one planet before to that of the other now; back, the other way round.
+                between = modal.place[begin + a] - modal.place[begin + b]
+                angle = between + turned
+                if back:
+                    angle = between - turned
+                weight = 1.0
+                if modal.equal[s] == 1:
+                    weight = share_of_planet(a, b, count, angle)
                 c = weight * math.cos(angle)
                 d = weight * math.sin(angle)
-                if back:
-                    d = -d
                 of = modal.planets[begin + b]
                 if to[0] >= 0:
                     for plane in range(0, SPIN, TILT):
@@ -104,7 +109,9 @@ def add_modal_damping(q: Floats, v: Floats, modal: ModalArrays | None, memory: F
     if modal is None:
         return 0.0
     size, count = modal.columns.shape
-    moved, acting, amounts = memory[MOVED], memory[ACTING], memory[AMOUNTS]
+    moved = memory[MOVED]
+    acting = memory[ACTING]
+    amounts = memory[AMOUNTS]
     for i in range(size):
         moved[i] = v[i]
     turn_planets(q, modal, True, v, moved)
@@ -149,4 +156,6 @@ def modal_matrix(q: Floats, modal: ModalArrays | None) -> Floats:
 
 def modal_memory(modal: ModalArrays | None) -> Floats:
     """Memory for `add_modal_damping`, (3, m)."""
-    return np.zeros((3, 0 if modal is None else max(modal.columns.shape)))
+    if modal is None:
+        return np.zeros((3, 0))
+    return np.zeros((3, max(modal.columns.shape)))

@@ -42,6 +42,7 @@ from exugear.system.kernels.meshes import periodic_cubic
 from exugear.system.tooth_mesh.contact_state import ContactState, changed_over_cycle, even_contact
 from exugear.system.tooth_mesh.placement import (
     MeshError,
+    friction_rows,
     line_of_action_row,
     loaded_flanks,
     position_rows,
@@ -80,6 +81,8 @@ class MeshCurve:
     tangent_load_centroid: Floats | None = None
     """(n,) where the load bears along the face at the same positions, and what a little more deflection adds to it,
     m from its middle, in the axes of the table. The second is the first by default."""
+    friction: Floats | None = None
+    """(3, n) force and moments of friction at the same positions, see `friction_over_cycle`."""
 
     def at(self, force: float) -> MeshCurve:
         """Return the same curve by its stiffness at another load (N); without any, at that of the table."""
@@ -214,6 +217,11 @@ class MeshElement:
     load_ways: Floats = field(default_factory=lambda: np.zeros((2, 0)))
     """(2, n) axial shift of the load over the mesh cycle, and of an increment of load, each about its mean, in the axes
     of the mesh, m; empty if constant or unknown."""
+    friction: Floats | None = None
+    """(3, n) force and moments of friction over the mesh cycle per unit coefficient and mesh force, along
+    `friction_rows`; None if unknown."""
+    friction_rows: Floats | None = None
+    """(3, 12) rows of these forces and moments."""
 
     def with_contact(self, contact: ContactState) -> MeshElement:
         """Return the mesh, so far with even load, with the results of a solved contact, in the axes of its table.
@@ -326,7 +334,7 @@ def mesh_elements(
     flanks = usual if flanks is None else flanks
     phases, orientation = tooth_places(gearbox, flanks)
     bodies = {body.name: body for body in gearbox.bodies(inertias)}
-    time = gearbox.case.damping.time_of("mesh")
+    time = gearbox.damping_times.mesh
     static = gearbox.train.static_mesh_forces()
     elements = []
     for mesh in gearbox.meshes:
@@ -366,6 +374,8 @@ def mesh_elements(
             table=law.table_flanks(mesh, flank, ends, phase, data, time),
             computed_from=data.table if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
             load_ways=_load_ways(law, data, flank, usual[mesh.name]),
+            friction=data.friction if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
+            friction_rows=friction_rows(mesh, flank, ends),
         )
         if known is not None and law.tilts:
             element = replace(element.with_contact(known), computed_from=None)

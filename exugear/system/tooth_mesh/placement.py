@@ -17,7 +17,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh, WheelDeviation
-from exugear.system.kernels.coordinates import BODY_SIZE, TILT
+from exugear.system.kernels.coordinates import BODY_SIZE, SPIN, TILT
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats, Integers
 
@@ -160,6 +160,24 @@ def position_rows(mesh: Mesh, flank: int, nodes: tuple[Floats, Floats]) -> tuple
     misalignment = np.zeros(2 * BODY_SIZE)
     misalignment[[TILT, TILT + 1, BODY_SIZE + TILT, BODY_SIZE + TILT + 1]] = y, -x, -y, x
     return centre, misalignment
+
+
+def friction_rows(mesh: Mesh, flank: int, nodes: tuple[Floats, Floats]) -> Floats:
+    """Rows (3, 12) of friction on a flank about the two bodies' nodes, as `friction_over_cycle` lists its parts.
+
+    The force acts across the line of action in the transverse plane. Where teeth touch away from the pitch point it has
+    a moment about the gear axes, and away from the middle of the face one about the line of action, in the axes of a
+    table, which is turned about for the flank -1.
+    """
+    geometry = MeshGeometry.of(mesh)
+    line_of_action = geometry.plane_of_action(flank)
+    force = np.array([-line_of_action[1], line_of_action[0], 0.0])
+    turning = np.zeros(2 * BODY_SIZE)
+    turning[[SPIN, BODY_SIZE + SPIN]] = 1.0, -1.0
+    tilting = np.zeros(2 * BODY_SIZE)
+    tilting[[TILT, TILT + 1]] = -flank * line_of_action[:2]
+    tilting[[BODY_SIZE + TILT, BODY_SIZE + TILT + 1]] = flank * line_of_action[:2]
+    return np.array([wrench_row(force, pitch_point_of(mesh, geometry, nodes), nodes), turning, tilting])
 
 
 def mesh_phases(gearbox: Gearbox, flanks: Mapping[str, int]) -> dict[str, float]:

@@ -213,9 +213,9 @@ def outcome_into(output, *arguments, stderr=subprocess.PIPE, **options):
 
 
 def said(outcome):
-    """Standard error without the news that kernels are compiled, which the first test of an installation hears."""
+    """Standard error without the message that kernels are compiled, and without the warning of the GRC's damping."""
     lines = outcome.stderr.splitlines(keepends=True)
-    return "".join(line for line in lines if not line.startswith("Compiling kernels"))
+    return "".join(line for line in lines if not line.startswith(("Compiling kernels", "Warning: damping of")))
 
 
 def close_standard_output():

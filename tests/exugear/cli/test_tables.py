@@ -20,6 +20,7 @@ from exugear.cli.app import app
 from exugear.cli.commands import bearings, life, loads, modes, report, ste, steady
 from exugear.cli.commands import study as study_command
 from exugear.cli.file_commands import check
+from exugear.gearbox.sections.case import DampingSection
 from exugear.gearbox.variant import Variant
 from exugear.life.rating.sheet import FINITE_ELEMENTS, FlankSheet, RatingSheet
 from exugear.report.findings.loudness import Loudness, Ranking, Resonance
@@ -244,6 +245,7 @@ def test_modes(printed: Printed) -> None:
         },
     ]
     assembly = SimpleNamespace(variant="bushing", mesh_model="line_of_action", inertias=LONG, housing_factor=0.5)
+    assembly.gearbox = SimpleNamespace(case=SimpleNamespace(damping=DampingSection()))
     found: Any = SimpleNamespace(assembly=assembly)
     modes._print_modes(found, rows)
     printed.check(1)

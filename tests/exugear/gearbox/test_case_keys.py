@@ -29,10 +29,14 @@ from exugear.gearbox.sections import (
 )
 from exugear.gearbox.sections.entries import Section
 from exugear.results.folder import keep_case
+from exugear.steady.damping_band import damping_limits
+from exugear.steady.mean_system.mean_system import mean_system
+from exugear.steady.steady_response import harmonic_balance_model
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.stiffness import catalogue_stiffness, elastic_names, linear_law
 from exugear.system.bodies.of_gearbox import check_elastic_body
 from exugear.system.build import assemble
+from exugear.system.modal_damping import damping_in_words
 from exugear.system.operating_points import bearing_duties
 from exugear.system.readiness import check_parts, lacking, remarks
 from exugear.system.tooth_mesh.tables import wanted_table
@@ -96,6 +100,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
     thinned["tooth_thickness"] = {"upper_allowance_um": -20.0, "tolerance_um": 20.0}
     ring = next(gear for gear in contents["planetary"]["gears"].values() if gear.get("internal"))
     ring["cutter"] = {"teeth": 30, "tip_radius": 0.2, "addendum": 1.25}
+    contents["waves"]["damping"] = {"modal_percent": 2.0, "modal_modes": [], "modal_band_percent": [1.0, 4.0]}
     contents["spur"]["ste"] = {"method": "nonlinear", "positions": 8}
     for kind in get_args(connections.BearingType):
         catalogue_rows(connections.CatalogueSection(type=kind, bore_mm=50.0, outer_diameter_mm=90.0, width_mm=20.0))
@@ -115,6 +120,10 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
             assembly = assemble(gearbox, Choice(variant), {pair: np.array([1e9]) for pair in gearbox.pairs})
             assert assembly.constant_forces.shape == (assembly.size,)
             bearing_duties(assembly)
+        damping_in_words(gearbox.case.damping)
+        if gearbox.case.damping.modal_band_percent:
+            harmonic_balance_model(assembly, np.array([1.0, 2.0]), 1, 1).at(1.5)
+            damping_limits(mean_system(assembly, np.array([1.0, 2.0])))
         for support in (*gearbox.bearings, *gearbox.mounts):
             linear_law(support, gearbox.case.damping.bearing_time_s)
             connector_matrix(support.stiffness)

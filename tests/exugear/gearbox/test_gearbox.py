@@ -110,6 +110,7 @@ def _set(content: dict, dotted: str, value: object) -> dict:
     [
         ("gears.sun.teeth", 2, ["gears.sun.teeth = 2", "between 5 and 2000"]),
         ("gears.sun.theeth", 21, ["gears.sun.theeth = 21", "did you mean 'teeth'?"]),
+        ("bearings.hss_a.catalogue.type", "tapered_rolle", ["did you mean 'tapered_roller'?"]),
         ("gears.sun.face_width_mm", -1.0, ["gears.sun.face_width_mm = -1.0", "between 0.1 and 5000"]),
         ("gears.sun.helix_angle_deg", -7.495, ["pairs.sun_planet"]),
         ("pairs.high_speed.pinion", "nobody", ["pairs.high_speed.pinion = 'nobody'", "hs_pinion"]),

@@ -16,7 +16,7 @@ from exugear.steady import steady_response
 from exugear.steady.harmonics.branches import trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
 from exugear.steady.mean_system.mesh_places import DEFLECTION
-from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.settling import SettlingRun
@@ -75,9 +75,9 @@ def tough_pair(variant, **changes):
     table_case.STIFFNESS.clear()
     table_case.STIFFNESS.update(before)
     assembly = assemble(gearbox, Choice(variant, "table"), {"spur": surface})
-    gearset = gearset_of(assembly, np.array([50.0, 2000.0]))
-    solver = PointSolver(gearset, SteadySettings(SpeedRange(50.0, 2000.0, 2), "nonlinear"))
-    return Tough(assembly, solver, float(gearset.system.eigenvalues(100.0).imag.max()) / TEETH)
+    model = harmonic_balance_model(assembly, np.array([50.0, 2000.0]))
+    solver = PointSolver(model, "nonlinear")
+    return Tough(assembly, solver, float(model.system.eigenvalues(100.0).imag.max()) / TEETH)
 
 
 UP = np.arange(0.7, 1.2, 0.04)
@@ -144,8 +144,8 @@ def test_a_run_in_time_stays_on_a_state_with_contact_loss(name, share):
     duration = 8000 * step * max(1, round(300.0 * period / step / 8000))
     speed, lines = fitted(state, state.response, duration, step, 0.5 * duration)
     own.solver.response(speed)
-    again = own.solver.state.on(state.gearset)
-    known = 2.0 * signals(again.gearset, again.response)[1:, 0]
+    again = own.solver.state.on(state.model)
+    known = 2.0 * signals(again.model, again.response)[1:, 0]
     size = np.linalg.norm(known)
     assert np.linalg.norm(abs(lines) - abs(known)) < 1e-3 * size
     assert np.linalg.norm(lines - known) < 2e-3 * size
@@ -157,9 +157,9 @@ def test_a_state_that_is_said_to_be_unstable_does_not_last():
     own.solver._settled = lambda speed, state, reason: state
     shares = np.arange(1.16, 0.95, -0.04)
     state = own.swept(*shares)
-    gearset, speed = state.gearset, float(shares[-1] * own.resonance)
+    model, speed = state.model, float(shares[-1] * own.resonance)
     rows = state.response.interface.ports.readings[:, DEFLECTION]
-    run = SettlingRun(gearset.system, gearset.lines, rows, gearset.waves.base_orders, speed, state.response.motion)
+    run = SettlingRun(model.system, model.lines, rows, model.waves.base_orders, speed, state.response.motion)
     outside = [run.leg().outside for _ in range(4)]
     assert state.growth * 2.0 * np.pi / (TEETH * speed) > 0.02
     assert outside[-1] > 0.3
@@ -229,23 +229,23 @@ def train_solver(content, share, mesh_time, bearing_time, combinations):
         mesh.pair.name: table_case.surface_of(gearbox, mesh.pair.name, variation=3.0, stiffness=3e8)
         for mesh in gearbox.meshes
     }
-    gearset = gearset_of(
+    model = harmonic_balance_model(
         assemble(gearbox, Choice("bushing", "table"), tables), np.array([50.0, 2000.0]), 10, combinations
     )
-    return PointSolver(gearset, SteadySettings(SpeedRange(50.0, 2000.0, 2), "nonlinear", 10, combinations))
+    return PointSolver(model, "nonlinear")
 
 
 def stays(solver, speeds, periods):
     """Differences of lines and amplitudes at the last of several speeds from a run in time, over all lines."""
     for speed in speeds:
         solver.response(speed)
-    state, bases = solver.state, solver.gearset.waves.base_orders
+    state, bases = solver.state, solver.model.waves.base_orders
     step = min(2.0 * np.pi / (bases.max() * speeds[-1]) / 300.0, 1.0 / 240e3)
     duration = 8000 * step * max(1, round(periods * 2.0 * np.pi / (bases.min() * speeds[-1]) / step / 8000))
     measured, lines = fitted(state, state.response, duration, step, 0.5 * duration)
     solver.response(measured)
-    again = solver.state.on(state.gearset)
-    known = 2.0 * signals(again.gearset, again.response)[1:, 0]
+    again = solver.state.on(state.model)
+    known = 2.0 * signals(again.model, again.response)[1:, 0]
     size = np.linalg.norm(known)
     return np.linalg.norm(lines - known) / size, np.linalg.norm(abs(lines) - abs(known)) / size
 

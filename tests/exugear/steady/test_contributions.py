@@ -10,7 +10,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.steady.campbell import modes_over_speed
 from exugear.steady.crossings import contributions, crossings, loudest_near
-from exugear.steady.point_solver import gearset_of
+from exugear.steady.point_solver import harmonic_balance_model
 from exugear.steady.response import linear_response, signals, transmission_errors
 from exugear.system.build import assemble
 
@@ -18,47 +18,47 @@ RANGE = np.array([1.0, 22.5])
 
 
 @pytest.fixture(scope="module")
-def gearset(grc, stiffness):
-    return gearset_of(assemble(grc, Choice("bushing"), stiffness), RANGE)
+def model(grc, stiffness):
+    return harmonic_balance_model(assemble(grc, Choice("bushing"), stiffness), RANGE)
 
 
 @pytest.fixture(scope="module")
-def peak(gearset):
-    tracks = modes_over_speed(gearset.system, *RANGE, 3e3)
-    crossing = crossings(gearset, tracks, lambda at: transmission_errors(gearset, at.ports, at.speed))[0]
-    return loudest_near(gearset, crossing.speed, 2.0 * crossing.damping, crossing.line), crossing.line
+def peak(model):
+    tracks = modes_over_speed(model.system, *RANGE, 3e3)
+    crossing = crossings(model, tracks, lambda at: transmission_errors(model, at.ports, at.speed))[0]
+    return loudest_near(model, crossing.speed, 2.0 * crossing.damping, crossing.line), crossing.line
 
 
 @pytest.mark.validation
-def test_parts_by_mesh_add_up_to_the_line_of_the_linear_level(gearset, peak):
+def test_parts_by_mesh_add_up_to_the_line_of_the_linear_level(model, peak):
     speed, line = peak
-    found = contributions(gearset, speed, line)
+    found = contributions(model, speed, line)
     assert sum(found.meshes.values()) == pytest.approx(1.0)
-    known = 2.0 * abs(signals(gearset, linear_response(gearset, gearset.at(speed)))[line, 0])
+    known = 2.0 * abs(signals(model, linear_response(model, model.at(speed)))[line, 0])
     assert found.amplitude == pytest.approx(known, rel=1e-9)
 
 
-def test_one_mode_carries_most_of_a_resonance_and_all_together_carry_it(gearset, peak):
+def test_one_mode_carries_most_of_a_resonance_and_all_together_carry_it(model, peak):
     """What is left are modes below a hundredth each, and free rolling, which the overall signal does not see."""
-    found = contributions(gearset, *peak)
-    assert found.modes[0][0] == pytest.approx(gearset.lines.orders[peak[1]] * peak[0] / 2.0 / np.pi, rel=0.01)
+    found = contributions(model, *peak)
+    assert found.modes[0][0] == pytest.approx(model.lines.orders[peak[1]] * peak[0] / 2.0 / np.pi, rel=0.01)
     assert found.modes[0][1] > 0.8
     assert sum(share for _, share in found.modes) == pytest.approx(1.0, abs=0.05)
 
 
-def test_a_peak_is_loudest_where_it_is_said_to_be(gearset, peak):
+def test_a_peak_is_loudest_where_it_is_said_to_be(model, peak):
     speed, line = peak
-    here, *beside = (contributions(gearset, speed * (1.0 + shift), line).amplitude for shift in (0.0, -1e-3, 1e-3))
+    here, *beside = (contributions(model, speed * (1.0 + shift), line).amplitude for shift in (0.0, -1e-3, 1e-3))
     assert here > max(beside)
 
 
-def amplitude_with(other, gearset, peak):
-    """Amplitude of the line with the mean system of another gearset, the excitation staying as it is."""
+def amplitude_with(other, model, peak):
+    """Amplitude of the line with the mean system of another model, the excitation staying as it is."""
     speed, line = peak
-    interface = gearset.at(speed)
-    loads = gearset.loads(interface.ports) @ transmission_errors(gearset, interface.ports, interface.speed)[line, :, 0]
-    dynamic = other.system.dynamic(speed, speed * gearset.lines.orders[line])
-    return abs(gearset.row_of_overall(speed) @ np.linalg.solve(dynamic, loads))
+    interface = model.at(speed)
+    loads = model.loads(interface.ports) @ transmission_errors(model, interface.ports, interface.speed)[line, :, 0]
+    dynamic = other.system.dynamic(speed, speed * model.lines.orders[line])
+    return abs(model.row_of_overall(speed) @ np.linalg.solve(dynamic, loads))
 
 
 def slope(more, less, step):
@@ -69,10 +69,10 @@ STEP = 5e-4
 """Share by which a parameter is raised and lowered; static states move by as little."""
 
 
-def test_the_derivative_by_a_bearing_is_that_of_a_gearbox_with_a_stiffer_one(gearset, peak):
-    derivative = contributions(gearset, *peak).supports
+def test_the_derivative_by_a_bearing_is_that_of_a_gearbox_with_a_stiffer_one(model, peak):
+    derivative = contributions(model, *peak).supports
     family = max(derivative, key=lambda name: abs(derivative[name]))
-    assembly = gearset.waves.assembly
+    assembly = model.waves.assembly
     own = [support.family == family for support in assembly.supports]
     amplitudes = []
     for sign in (1.0, -1.0):
@@ -81,38 +81,38 @@ def test_the_derivative_by_a_bearing_is_that_of_a_gearbox_with_a_stiffer_one(gea
         changed = replace(
             assembly, connectors=arrays._replace(stiffness=factor * arrays.stiffness, damping=factor * arrays.damping)
         )
-        amplitudes.append(amplitude_with(gearset_of(changed, RANGE), gearset, peak))
+        amplitudes.append(amplitude_with(harmonic_balance_model(changed, RANGE), model, peak))
     assert derivative[family] == pytest.approx(slope(*amplitudes, STEP), rel=0.02, abs=0.02)
 
 
 @pytest.mark.sample
 @pytest.mark.parametrize("family", ["hss", "lss", "planet", "carrier"])
-def test_the_derivative_by_inertia_is_that_of_a_gearbox_with_a_heavier_body(grc, stiffness, gearset, peak, family):
+def test_the_derivative_by_inertia_is_that_of_a_gearbox_with_a_heavier_body(grc, stiffness, model, peak, family):
     """Mass, both moments of inertia and with them the gyroscopic terms; the latter are left out of the derivative."""
     section = grc.content["bodies"][family]["inertia"]["assemblies"]
     keys = ("mass_kg", "axial_kg_m2", "transverse_kg_m2")
     amplitudes = []
     for sign in (1.0, -1.0):
         changes = {f"bodies.{family}.inertia.assemblies.{key}": (1.0 + sign * STEP) * section[key] for key in keys}
-        other = gearset_of(assemble(grc.varied(changes), Choice("bushing"), stiffness), RANGE)
-        amplitudes.append(amplitude_with(other, gearset, peak))
-    derivative = contributions(gearset, *peak).bodies[family]
+        other = harmonic_balance_model(assemble(grc.varied(changes), Choice("bushing"), stiffness), RANGE)
+        amplitudes.append(amplitude_with(other, model, peak))
+    derivative = contributions(model, *peak).bodies[family]
     assert derivative == pytest.approx(slope(*amplitudes, STEP), rel=0.02, abs=0.02)
 
 
-def test_the_derivative_by_a_mesh_error_is_its_share(grc, stiffness, gearset, peak):
+def test_the_derivative_by_a_mesh_error_is_its_share(grc, stiffness, model, peak):
     """What varies of one pair's compliance a little more and less: its transmission error, with the mean kept."""
     speed, line = peak
-    shares = contributions(gearset, speed, line).meshes
+    shares = contributions(model, speed, line).meshes
     family = max(shares, key=lambda name: abs(shares[name]))
     amplitudes = []
     for sign in (1.0, -1.0):
         compliance = 1.0 / stiffness[family]
         own = 1.0 / (compliance.mean() + (1.0 + sign * STEP) * (compliance - compliance.mean()))
-        other = gearset_of(assemble(grc, Choice("bushing"), {**stiffness, family: own}), RANGE)
+        other = harmonic_balance_model(assemble(grc, Choice("bushing"), {**stiffness, family: own}), RANGE)
         forces = transmission_errors(other, other.ports_at(speed), speed)[line, :, 0]
-        interface = gearset.at(speed)
-        dynamic = gearset.system.dynamic(speed, speed * gearset.lines.orders[line])
-        loads = gearset.loads(interface.ports) @ forces
-        amplitudes.append(abs(gearset.row_of_overall(speed) @ np.linalg.solve(dynamic, loads)))
+        interface = model.at(speed)
+        dynamic = model.system.dynamic(speed, speed * model.lines.orders[line])
+        loads = model.loads(interface.ports) @ forces
+        amplitudes.append(abs(model.row_of_overall(speed) @ np.linalg.solve(dynamic, loads)))
     assert shares[family] == pytest.approx(slope(*amplitudes, STEP), rel=0.02)

@@ -13,7 +13,7 @@ from exugear.gearbox.units import RPM
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.mean_system.signals import quantities_of
-from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import signals
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_response import response_of
@@ -44,14 +44,14 @@ def parallel(tmp_path_factory):
 def dense_peaks(assembly, speeds, harmonics, count, most):
     """Loudest peaks of the three quantities by a dense sweep, each then searched for by itself: line, speed, height."""
     settings = SteadySettings(speeds, harmonics=harmonics)
-    gearset = gearset_of(assembly, np.array([speeds.first, speeds.last]), harmonics)
-    solver, sense = PointSolver(gearset, settings), np.sign(speeds.first + speeds.last)
+    model = harmonic_balance_model(assembly, np.array([speeds.first, speeds.last]), harmonics)
+    solver, sense = PointSolver(model, settings.method), np.sign(speeds.first + speeds.last)
 
     def sizes(speed):
-        amplitude = 2.0 * signals(gearset, solver.response(sense * speed))[1:]
+        amplitude = 2.0 * signals(model, solver.response(sense * speed))[1:]
         return [own.sizes(amplitude).max(axis=1) for own in quantities]
 
-    quantities = quantities_of([own.name for own in gearset.signal_names])
+    quantities = quantities_of([own.name for own in model.signal_names])
     at = np.geomspace(abs(speeds.first), abs(speeds.last), count)
     swept = [np.array(own) for own in zip(*(sizes(speed) for speed in at), strict=True)]
     found = {}
@@ -142,7 +142,7 @@ def spur(swing):
 @pytest.mark.validation
 def test_harmonics_follow_from_the_stiffness_and_more_change_little(parallel):
     """A smooth mesh takes the fewest; one that swings in steps as many as leave 2e-2 of its compliance out."""
-    smooth = gearset_of(parallel, np.array([30.0, 60.0]))
+    smooth = harmonic_balance_model(parallel, np.array([30.0, 60.0]))
     assert smooth.usual_harmonics == 10
     assembly = assemble(parallel.gearbox, BUSHING, {"stage_1": spur(0.5), "stage_2": stiff(9e8, 0.05)})
     response = response_of(assembly, SteadySettings(SpeedRange(30.0, 60.0, 20)))
@@ -182,6 +182,6 @@ def test_a_stiffness_that_does_not_vary_excites_nothing(parallel):
     response = response_of(assembly, SteadySettings(SpeedRange(30.0, 60.0, 5)))
     assert np.abs(response.solved.amplitude[:, 1:, 0]).max() < 1e-15
     assert not response.left_out.any()
-    gearset = gearset_of(assembly, np.array([30.0, 60.0]))
-    values = np.concatenate([gearset.system.eigenvalues(speed) for speed in (30.0, 45.0, 60.0)])
+    model = harmonic_balance_model(assembly, np.array([30.0, 60.0]))
+    values = np.concatenate([model.system.eigenvalues(speed) for speed in (30.0, 45.0, 60.0)])
     assert response.growth_rate == pytest.approx(values.real[np.abs(values.imag) > 10.0].max(), rel=1e-6)

@@ -35,10 +35,10 @@ def differences(solver, speed):
     RK4 at 1/120 kHz from the state, the last 2 of 3 s; the state is solved again at the mean speed of the run.
     """
     solver.response(speed)
-    state, gearset = solver.state, solver.gearset
+    state, model = solver.state, solver.model
     measured, lines = fitted(state, state.response, 3.0, 1.0 / 120e3, 2.0)
-    lines = lines[gearset.places_in(state.gearset)[0].ravel()[1:] - 1]
-    known = 2.0 * signals(gearset, solver.response(measured))[1:, 0]
+    lines = lines[model.places_in(state.model)[0].ravel()[1:] - 1]
+    known = 2.0 * signals(model, solver.response(measured))[1:, 0]
     size = np.linalg.norm(known)
     return np.linalg.norm(lines - known) / size, np.linalg.norm(abs(lines) - abs(known)) / size
 

@@ -57,7 +57,7 @@ def test_small_vibration_is_that_of_linear_bearings(gearbox):
         found = {}
         for level in ("parametric", "nonlinear"):
             solver = spur_solver(gearbox, (99.0, 101.0), share, level)
-            found[level] = signals(solver.gearset, solver.response(100.0))[1:, 0]
+            found[level] = signals(solver.model, solver.response(100.0))[1:, 0]
         apart_by.append(np.linalg.norm(found["nonlinear"] - found["parametric"]) / np.linalg.norm(found["parametric"]))
     assert apart_by[1] < 0.2 * apart_by[0]
 
@@ -86,25 +86,25 @@ def test_teeth_by_their_table_and_bearings_by_their_elements_stay_on_their_stead
     data = {"spur": table_case.surface_of(PLAIN, "spur")}
     solver = solver_of(assemble(PLAIN, Choice("bushing", "table"), data), (20.0, 400.0), "nonlinear", 14)
     assert apart(solver, speed, 0.4, 1.0 / 60e3, 0.2)[0] < 1e-3
-    taken, given = dissipated_and_given(solver.gearset, solver.response(speed))
+    taken, given = dissipated_and_given(solver.model, solver.response(speed))
     assert given == pytest.approx(taken, rel=1e-4)
 
 
 @pytest.mark.parametrize("speed", [80.0, 110.0, 220.0])
 def test_bearings_take_and_give_power_that_is_balanced(loose_solver, speed):
-    taken, given = dissipated_and_given(loose_solver.gearset, loose_solver.response(speed))
+    taken, given = dissipated_and_given(loose_solver.model, loose_solver.response(speed))
     assert given == pytest.approx(taken, rel=1e-6)
 
 
 def some(balance, size):
     values = np.random.default_rng(0).normal(size=(2, *balance.static.shape))
-    lines = size * (values[0] + 1j * values[1]) / balance.gearset.lengths
+    lines = size * (values[0] + 1j * values[1]) / balance.model.lengths
     lines[0] = lines[0].real
     return lines
 
 
 def difference_of_tangents(solver, speed):
-    balance = HarmonicResidual(solver.gearset, solver.gearset.at(speed), solver.lattice)
+    balance = HarmonicResidual(solver.model, solver.model.at(speed), solver.sampling)
     state, step = balance.static + some(balance, 1e-8), some(balance, 1e-11)
     ahead, behind = balance.forces(state + step)[0], balance.forces(state - step)[0]
     change = balance.forces(state)[1](step)
@@ -141,12 +141,12 @@ def test_forces_of_bearings_are_those_of_their_law_on_the_motion(grc_rows, stiff
     do the tangents of their bearings, which the response has at their mean: 1.4e-2 of what vibrates on them.
     """
     solver = solver_of(assemble(grc_rows, Choice("bushing"), stiffness), (1.0, 22.5), "nonlinear", 8, 3)
-    speed, gearset = 14.0, solver.gearset
+    speed, model = 14.0, solver.model
     response = solver.response(speed)
     frequencies, motion = response.interface.frequencies, response.motion
-    frame, assembly = gearset.system.frame, gearset.system.frame.assembly
-    still, planets = gearset.system.static_at(speed), frame.sets[0]
-    names, numbers = [own.name for own in gearset.signal_names], [support.name for support in assembly.supports]
+    frame, assembly = model.system.frame, model.system.frame.assembly
+    still, planets = model.system.static_at(speed), frame.sets[0]
+    names, numbers = [own.name for own in model.signal_names], [support.name for support in assembly.supports]
     planet = [numbers.index(f"pl_a_{n}") for n in (1, 2, 3)]
     known, found = [], []
     for time in (0.0, 0.0123, 0.0451, 0.0777):
@@ -157,7 +157,7 @@ def test_forces_of_bearings_are_those_of_their_law_on_the_motion(grc_rows, stiff
         angles = planets.ratio * psi + planets.angles
         radial = loads[planet, 0] * np.cos(angles) + loads[planet, 1] * np.sin(angles)
         known.append([*-loads[numbers.index("hss_a"), :2], *-radial])
-        values = dict(zip(names, (turning @ signals(gearset, response)).real, strict=True))
+        values = dict(zip(names, (turning @ signals(model, response)).real, strict=True))
         waves = [values[f"support_force pl_a {wave} radial"] for wave in ("mean", "cosine", "sine")]
         radial = planets.values(np.array(planets.ratio * psi)) @ waves
         found.append([*(values[f"support_force hss_a {axis}"] for axis in "xy"), *radial])
@@ -195,7 +195,7 @@ def test_a_bearing_that_comes_free_stays_on_its_steady_state(stop_solver, speed,
     response = stop_solver.response(speed)
     assert response.free == pytest.approx([share], abs=0.02)
     assert apart(stop_solver, speed, 0.6, 1.0 / 60e3, 0.3)[0] < most
-    taken, given = dissipated_and_given(stop_solver.gearset, response)
+    taken, given = dissipated_and_given(stop_solver.model, response)
     assert given == pytest.approx(taken, rel=1e-4)
 
 
@@ -223,8 +223,8 @@ def test_a_branch_on_non_linear_bearings_passes_the_states_at_single_speeds():
     solver, single = (spur_solver(LOOSE, (100.0, 130.0)) for _ in range(2))
     branch = follow_branch(solver, 125.0, 118.0)
     n = len(branch.speed) // 2
-    followed = signals(solver.gearset, solver.response_to(branch.readings[n], branch.speed[n]))[1:, 0]
-    found = signals(single.gearset, single.response(float(branch.speed[n])))[1:, 0]
+    followed = signals(solver.model, solver.response_to(branch.readings[n], branch.speed[n]))[1:, 0]
+    found = signals(single.model, single.response(float(branch.speed[n])))[1:, 0]
     assert np.linalg.norm(followed - found) < 1e-4 * np.linalg.norm(found)
     assert branch.growth[n] == pytest.approx(single.state.growth, rel=0.01)
 

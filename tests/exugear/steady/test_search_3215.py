@@ -47,7 +47,7 @@ def test_each_stiffness_found_makes_the_frequency_a_natural_one(search, grc, sti
     found = search.tuned(between[kind])
     assert found
     for radial in found:
-        system = search.gearset_with(search.Given(grc, stiffness, {}), own, radial, "bushing").system
+        system = search.model_with(search.Given(grc, stiffness, {}), own, radial, "bushing").system
         assert nearest(search, undamped(search, system)) < 3e-3
         assert nearest(search, mean_modes(system, 0.5 * search.FASTEST)[0].imag) < search.NEAR
 
@@ -67,7 +67,7 @@ def test_a_stiffness_between_those_found_does_not(search, grc, stiffness, betwee
     own = {"kind": "planet_bearings", **NEARLY_THE_FILE}
     first = search.tuned(between["planet_bearings"])[0]
     assert first > 1.3 * search.RANGES["planet_bearings"][0]
-    system = search.gearset_with(search.Given(grc, stiffness, {}), own, 0.8 * first, "bushing").system
+    system = search.model_with(search.Given(grc, stiffness, {}), own, 0.8 * first, "bushing").system
     assert nearest(search, undamped(search, system)) > 3e-3
 
 
@@ -77,7 +77,7 @@ def test_peaks_from_both_ends_of_the_range_are_those_of_the_gearbox_itself(
 ):
     """Amplitudes of all orders where the gearbox is assembled with the stiffness, to 2e-3 of the largest."""
     given, own = search.Given(grc, stiffness, {}), {"kind": kind, **NEARLY_THE_FILE}
-    itself = search.gearset_with(given, own, radial, "bushing")
+    itself = search.model_with(given, own, radial, "bushing")
     found = search.amplitudes(between[kind].stiff, between[kind].at(radial))
     for name, amplitude in search.amplitudes(itself, itself.system).items():
         exact, quick = np.nan_to_num(amplitude), np.nan_to_num(found[name])
@@ -94,7 +94,7 @@ def test_a_set_changes_the_gearbox_as_it_says(search, grc, stiffness):
     assert mass[1] == pytest.approx(0.7 * mass[0])
     # The equations are linear in it, as the search takes them; the static state moves a little with it.
     given = search.Given(grc, stiffness, {})
-    systems = [search.gearset_with(given, own, radial, "bushing").system for radial in (1e10, 2e10, 3e10)]
+    systems = [search.model_with(given, own, radial, "bushing").system for radial in (1e10, 2e10, 3e10)]
     first, second, third = (system.stiffness_at(0.0) for system in systems)
     assert np.abs(third - second - (second - first)).max() < 1e-3 * np.abs(third - first).max()
 

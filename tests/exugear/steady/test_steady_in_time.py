@@ -12,9 +12,8 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.steady.mean_system.mean_system import torque_of_vibration
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, POSITION
 from exugear.steady.nonlinear import HarmonicResidual
-from exugear.steady.point_solver import PointSolver, gearset_of
+from exugear.steady.point_solver import PointSolver, harmonic_balance_model
 from exugear.steady.response import dissipated_and_given, signals
-from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.system.build import assemble
 from exugear.system.loads import LoadTable
 from exugear.system.modes import overall_row
@@ -30,9 +29,8 @@ SPUR = Gearbox.from_dict(tomllib.loads(SPUR_CASE))
 
 
 def solver_of(assembly, speeds, level, harmonics=10, combinations=3):
-    gearset = gearset_of(assembly, np.array(speeds), harmonics, combinations)
-    settings = SteadySettings(SpeedRange(*speeds, 2), level, harmonics, combinations)
-    return PointSolver(gearset, settings)
+    model = harmonic_balance_model(assembly, np.array(speeds), harmonics, combinations)
+    return PointSolver(model, level)
 
 
 def spur_stiffness():
@@ -49,16 +47,16 @@ def spur_surface():
     table_case.STIFFNESS.update(before)
 
 
-def drive_of(gearset, response):
+def drive_of(model, response):
     """Torque that keeps the speed, what the vibration takes of it included."""
     own = response.interface
-    return response.torque + torque_of_vibration(gearset.system, own.speed, own.frequencies, response.motion)
+    return response.torque + torque_of_vibration(model.system, own.speed, own.frequencies, response.motion)
 
 
-def run_from(gearset, response, duration, step, torque):
+def run_from(model, response, duration, step, torque):
     """Instants, overall transmission error and angle of the input of a run in time that starts on a response."""
     interface = response.interface
-    system, assembly, motion = gearset.system, gearset.waves.assembly, response.motion
+    system, assembly, motion = model.system, model.waves.assembly, response.motion
     w = interface.frequencies[1:, None]
     u = system.static_at(interface.speed) + motion[0].real + 2.0 * motion[1:].sum(axis=0).real
     q, v, _ = system.frame.state(0.0, interface.speed, u, 2.0 * (1j * w * motion[1:]).sum(axis=0).real)
@@ -81,18 +79,18 @@ def fitted(solver, response, duration, step, last):
     A line above half the rate at which the run is read appears as another one below it, which may be one of the
     others: those that hardly are there are left at zero.
     """
-    gearset = solver.gearset
-    time, overall, angle = run_from(gearset, response, duration, step, drive_of(gearset, response))
+    model = solver.model
+    time, overall, angle = run_from(model, response, duration, step, drive_of(model, response))
     late = time > duration - last
     speed, start = np.polyfit(time[late], angle[late], 1)
     half_rate = np.pi / (time[1] - time[0])
-    size = abs(signals(gearset, response)[:, 0])
+    size = abs(signals(model, response)[:, 0])
     size[0] = np.inf
-    seen = np.flatnonzero((abs(speed * gearset.lines.orders) < half_rate) | (size > 1e-6 * size[1:].max()))
-    angles = np.outer(np.copysign(1.0, speed) * (speed * time[late] + start), gearset.lines.orders[seen])
+    seen = np.flatnonzero((abs(speed * model.lines.orders) < half_rate) | (size > 1e-6 * size[1:].max()))
+    angles = np.outer(np.copysign(1.0, speed) * (speed * time[late] + start), model.lines.orders[seen])
     columns = np.hstack([np.cos(angles), -np.sin(angles[:, 1:])])
     found = np.linalg.lstsq(columns, overall[late], rcond=None)[0]
-    lines = np.zeros(len(gearset.lines.orders), dtype=complex)
+    lines = np.zeros(len(model.lines.orders), dtype=complex)
     lines[seen[1:]] = found[1 : len(seen)] + 1j * found[len(seen) :]
     return float(speed), lines[1:]
 
@@ -104,7 +102,7 @@ def apart(solver, speed, duration, step, last):
     at the speed that the run has.
     """
     measured, lines = fitted(solver, solver.response(speed), duration, step, last)
-    known = 2.0 * signals(solver.gearset, solver.response(measured))[1:, 0]
+    known = 2.0 * signals(solver.model, solver.response(measured))[1:, 0]
     size = np.linalg.norm(known)
     return np.linalg.norm(lines - known) / size, np.linalg.norm(abs(lines) - abs(known)) / size
 
@@ -182,12 +180,12 @@ def test_what_a_vibration_takes_of_the_drive_is_what_a_run_without_it_gains_or_l
 
     The changing speed turned the lines by 9e-3 and 5e-3 of their size.
     """
-    response, gearset = shafts_solver.response(speed), shafts_solver.gearset
-    system, assembly = gearset.system, gearset.waves.assembly
-    time, _, angle = run_from(gearset, response, 3.0, 1.0 / 120e3, response.torque)
+    response, model = shafts_solver.response(speed), shafts_solver.model
+    system, assembly = model.system, model.waves.assembly
+    time, _, angle = run_from(model, response, 3.0, 1.0 / 120e3, response.torque)
     rate = 2.0 * float(np.polyfit(time[time > 1.0], angle[time > 1.0], 2)[0])
     rolling = assembly.rolling_velocity(np.zeros(assembly.size), system.frame.speeds)
-    missing = (drive_of(gearset, response) - response.torque) * float(rolling @ system.drive)
+    missing = (drive_of(model, response) - response.torque) * float(rolling @ system.drive)
     inertia = float(rolling @ assembly.mass_matrix @ rolling)
     assert -inertia * rate == pytest.approx(missing, rel=0.02)
 
@@ -210,10 +208,10 @@ def test_planets_that_bear_unequally_act_back_as_they_pass(table_solver, speed, 
     table_solver.response(speed)
     state = table_solver.state
     measured, lines = fitted(state, state.response, 3.0, 1.0 / 120e3, 2.0)
-    gearset = table_solver.gearset
-    known = 2.0 * signals(gearset, table_solver.response(measured))[1:, 0]
-    averaged = 2.0 * signals(gearset, table_solver.state.averaged.on(gearset).response)[1:, 0]
-    lines = lines[gearset.places_in(state.gearset)[0][1:] - 1]
+    model = table_solver.model
+    known = 2.0 * signals(model, table_solver.response(measured))[1:, 0]
+    averaged = 2.0 * signals(model, table_solver.state.averaged.on(model).response)[1:, 0]
+    lines = lines[model.places_in(state.model)[0][1:] - 1]
     size = np.linalg.norm(known)
     assert np.linalg.norm(lines - known) < most * size
     assert np.linalg.norm(lines - averaged) > effect * size
@@ -225,8 +223,8 @@ def test_planets_that_bear_alike_put_no_lines_beside_others():
     tables = {name: table_case.surface_of(gearbox, name, stiffness=3e8) for name in ("sun_planet", "planet_ring")}
     solver = solver_of(assemble(gearbox, Choice("rigid", "table"), tables), (50.0, 150.0), "nonlinear")
     solver.response(80.0)
-    everything = np.ones(len(solver.gearset.lines.orders), dtype=bool)
-    assert solver.gearset.passing(everything) is not None
+    everything = np.ones(len(solver.model.lines.orders), dtype=bool)
+    assert solver.model.passing(everything) is not None
     assert solver.state.averaged is None
 
 
@@ -237,8 +235,8 @@ def test_planets_ahead_of_each_other_count_at_every_level(grc, stiffness):
     for level in ("linear", "parametric", "nonlinear"):
         solver = solver_of(assembly, (1.0, 22.5), level, 6)
         forces = solver.response(18.0).excess[..., 0]
-        waves = {wave.name: n for n, wave in enumerate(solver.gearset.waves.waves)}
-        line = int(solver.gearset.lines.find(np.array([2, 0, 0]))[0])
+        waves = {wave.name: n for n, wave in enumerate(solver.model.waves.waves)}
+        line = int(solver.model.lines.find(np.array([2, 0, 0]))[0])
         found[level] = np.array([forces[line, waves[f"sun_planet {name}"]] for name in ("cosine", "sine")])
     size = np.linalg.norm(found["nonlinear"])
     assert np.linalg.norm(found["parametric"] - found["nonlinear"]) < 0.02 * size
@@ -257,7 +255,7 @@ def moving_load():
 def test_a_pair_whose_load_moves_along_the_face_stays_on_its_steady_state(speed):
     """As above; lines of the shafts' tilting are excited by the moment alone."""
     solver = solver_of(assemble(SPUR, Choice("bushing"), moving_load()), (50.0, 150.0), "nonlinear")
-    assert solver.gearset.wander
+    assert solver.model.shuttles
     assert apart(solver, speed, 0.4, 1.0 / 60e3, 0.2)[0] < 3e-4
 
 
@@ -283,27 +281,27 @@ def test_levels_agree_on_a_load_that_moves_along_the_face():
 def test_forces_by_products_of_lines_are_those_of_the_tangents_in_time():
     """Level `parametric` where the load moves: F = k d - k w t - p, M = -w F - b at 256 angles."""
     solver = solver_of(assemble(SPUR, Choice("bushing"), moving_load()), (50.0, 150.0), "parametric")
-    found, gearset = solver.response(80.0), solver.gearset
-    ports, waves = found.interface.ports, gearset.waves
+    found, model = solver.response(80.0), solver.model
+    ports, waves = found.interface.ports, model.waves
     readings = found.interface.read(found.motion)
     readings[0] += ports.static
     angles = 2.0 * np.pi * np.arange(256) / 256
-    values = gearset.lines.values(readings, angles[:, None])[:, 0]
+    values = model.lines.values(readings, angles[:, None])[:, 0]
     deflection, tilt = values[:, DEFLECTION], values[:, MISALIGNMENT]
-    sense = 1.0 if gearset.forward(80.0)[0] else -1.0
+    sense = 1.0 if model.forward(80.0)[0] else -1.0
     position = ports.positions[0] + ports.static[0, POSITION] + sense * angles / (2.0 * np.pi)
-    turning = np.exp(2j * np.pi * position[:, None] * np.arange(gearset.harmonics + 1))
+    turning = np.exp(2j * np.pi * position[:, None] * np.arange(model.harmonics + 1))
     turning[:, 1:] *= 2.0
-    cycles = gearset.cycle_coefficients, gearset.cycle_pulls, *gearset.cycle_moments, gearset.cycle_moments_beyond
+    cycles = model.cycle_coefficients, model.cycle_pulls, *model.cycle_moments, model.cycle_moments_beyond
     k, p, kw, pw, kww, beyond = ((turning @ own[0]).real for own in cycles)
     force, moment = k * deflection - kw * tilt - p, kww * tilt - kw * deflection + pw - beyond
-    by_time = np.fft.rfft(np.stack([force, moment], axis=1), axis=0)[gearset.lines.index[:, 0]] / 256
+    by_time = np.fft.rfft(np.stack([force, moment], axis=1), axis=0)[model.lines.index[:, 0]] / 256
     by_lines = found.excess[:, 0].copy()
     by_lines[:, DEFLECTION] += waves.mean_stiffness[0] * readings[:, 0, DEFLECTION]
     by_lines[0, DEFLECTION] -= waves.mean_stiffness[0] * waves.rest[0]
     for own, other in zip(by_lines.T, by_time.T, strict=True):
         assert np.linalg.norm(own - other) < 1e-6 * np.linalg.norm(other[1:])
-    taken, given = dissipated_and_given(gearset, found)
+    taken, given = dissipated_and_given(model, found)
     assert given == pytest.approx(taken, rel=1e-6)
 
 
@@ -312,7 +310,7 @@ def test_the_tangents_of_the_balance_are_those_of_differences(law, spur_surface)
     data = {"table": spur_surface, "moving load": moving_load()}.get(law, spur_stiffness())
     law = "table" if law == "table" else "line_of_action"
     solver = solver_of(assemble(SPUR, Choice("bushing", law), data), (50.0, 150.0), "nonlinear")
-    balance = HarmonicResidual(solver.gearset, solver.gearset.at(80.0), solver.lattice)
+    balance = HarmonicResidual(solver.model, solver.model.at(80.0), solver.sampling)
     rng = np.random.default_rng(0)
 
     def some(size):
@@ -337,8 +335,8 @@ def test_the_position_that_moves_with_the_vibration_changes_little(grc, stiffnes
     for level in ("parametric", "nonlinear"):
         solver = solver_of(assembly, (1.0, 22.5), level)
         response = solver.response(8.0)
-        taken, given = dissipated_and_given(solver.gearset, response)
+        taken, given = dissipated_and_given(solver.model, response)
         assert given == pytest.approx(taken, rel=1e-6)
-        found[level] = signals(solver.gearset, response)[1:, 0]
+        found[level] = signals(solver.model, response)[1:, 0]
     difference = np.linalg.norm(found["nonlinear"] - found["parametric"])
     assert 0.0 < difference < 1e-3 * np.linalg.norm(found["parametric"])

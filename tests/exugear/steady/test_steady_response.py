@@ -8,7 +8,7 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.steady.campbell import modes_over_speed
 from exugear.steady.crossings import Mode, crossings, improved, with_crossings
-from exugear.steady.point_solver import gearset_of
+from exugear.steady.point_solver import harmonic_balance_model
 from exugear.steady.response import (
     dissipated_and_given,
     linear_response,
@@ -24,13 +24,13 @@ RANGE = np.array([1.0, 22.5])
 
 
 @pytest.fixture(scope="module")
-def gearset(grc, stiffness):
-    return gearset_of(assemble(grc, Choice("bushing"), stiffness), RANGE)
+def model(grc, stiffness):
+    return harmonic_balance_model(assemble(grc, Choice("bushing"), stiffness), RANGE)
 
 
 @pytest.mark.parametrize("speed", [4.0, 10.0, 14.6])
-def test_damping_takes_the_power_that_the_meshes_give(gearset, speed):
-    taken, given = dissipated_and_given(gearset, parametric_response(gearset, gearset.at(speed)))
+def test_damping_takes_the_power_that_the_meshes_give(model, speed):
+    taken, given = dissipated_and_given(model, parametric_response(model, model.at(speed)))
     assert taken > 0.0
     assert given == pytest.approx(taken, rel=1e-4)
 
@@ -44,36 +44,36 @@ def test_the_linear_level_is_the_first_order_of_the_parametric_one(grc, stiffnes
     """A tenth of the variation leaves a hundredth of the difference between both."""
     apart = []
     for share in (1e-1, 1e-2):
-        gearset = gearset_of(assemble(grc, Choice("bushing"), scaled(stiffness, share)), RANGE)
-        interface = gearset.at(10.0)
-        linear, full = (signals(gearset, level(gearset, interface)) for level in (linear_response, parametric_response))
+        model = harmonic_balance_model(assemble(grc, Choice("bushing"), scaled(stiffness, share)), RANGE)
+        interface = model.at(10.0)
+        linear, full = (signals(model, level(model, interface)) for level in (linear_response, parametric_response))
         apart.append(np.linalg.norm((full - linear)[1:, 0]))
     assert apart[1] == pytest.approx(apart[0] / 100.0, rel=0.1)
 
 
 @pytest.mark.parametrize(("speed", "change"), [(4.0, 5e-3), (10.0, 1e-3)])
-def test_more_lines_hardly_change_the_response(gearset, speed, change):
+def test_more_lines_hardly_change_the_response(model, speed, change):
     """Twice the harmonics and larger combinations, over the size of all lines of the overall transmission error.
 
     At 4 rad/s harmonics beyond the tenth of the planets' mesh still lie among the modes.
     """
-    finer = gearset_of(gearset.waves.assembly, RANGE, 20, 5)
-    coarse, fine = (signals(own, parametric_response(own, own.at(speed)))[1:, 0] for own in (gearset, finer))
-    places, _ = finer.lines.find(gearset.lines.index[1:])
+    finer = harmonic_balance_model(model.waves.assembly, RANGE, 20, 5)
+    coarse, fine = (signals(own, parametric_response(own, own.at(speed)))[1:, 0] for own in (model, finer))
+    places, _ = finer.lines.find(model.lines.index[1:])
     assert np.linalg.norm(coarse - fine[places - 1]) < change * np.linalg.norm(fine)
 
 
 @pytest.fixture(scope="module")
-def found(gearset):
-    tracks = modes_over_speed(gearset.system, *RANGE, 3e3)
-    return crossings(gearset, tracks, lambda at: transmission_errors(gearset, at.ports, at.speed)), tracks
+def found(model):
+    tracks = modes_over_speed(model.system, *RANGE, 3e3)
+    return crossings(model, tracks, lambda at: transmission_errors(model, at.ports, at.speed)), tracks
 
 
-def test_crossings_lie_on_the_modes_that_were_followed(gearset, found):
+def test_crossings_lie_on_the_modes_that_were_followed(model, found):
     """Eigenvalues of the gearbox at each crossing's own speed; the followed mode is a straight line between speeds."""
     for crossing in found[0]:
-        values = gearset.system.eigenvalues(crossing.speed)
-        met = gearset.lines.orders[crossing.line] * abs(crossing.speed)
+        values = model.system.eigenvalues(crossing.speed)
+        met = model.lines.orders[crossing.line] * abs(crossing.speed)
         nearest = values[np.argmin(np.abs(values.imag - met))]
         assert nearest.imag == pytest.approx(met, rel=1e-9)
         assert -nearest.real / abs(nearest) == pytest.approx(crossing.damping, rel=1e-6)
@@ -89,26 +89,26 @@ def test_a_mode_whose_eigenvalue_is_exact_to_the_last_bit_is_found():
     assert abs(own.shape[1]) < 1e-14 and abs(own.left[1]) < 1e-14
 
 
-def test_one_speed_is_added_where_a_line_meets_a_mode(gearset, found):
+def test_one_speed_is_added_where_a_line_meets_a_mode(model, found):
     found = found[0]
     even = np.linspace(*RANGE, 20)
     speeds = with_crossings(even, found)
     strongest = found[0]
     assert strongest.share == 1.0
-    values = gearset.system.eigenvalues(strongest.speed)
-    met = gearset.lines.orders[strongest.line] * strongest.speed
+    values = model.system.eigenvalues(strongest.speed)
+    met = model.lines.orders[strongest.line] * strongest.speed
     assert np.abs(values.imag - met).min() < 1e-3 * met
     assert np.isin(even, speeds).all()
     assert np.count_nonzero(np.abs(speeds / strongest.speed - 1.0) < 1e-6) == 1
     assert len(speeds) <= len(even) + len(found)
 
 
-def test_a_peak_is_a_maximum_of_the_response(gearset, found):
+def test_a_peak_is_a_maximum_of_the_response(model, found):
     """At the crossing of the strongest line the response is above that two half-widths beside it."""
     strongest = found[0][0]
     offsets = np.array([-2.0, 0.0, 2.0]) * strongest.damping
     levels = [
-        abs(signals(gearset, parametric_response(gearset, gearset.at(strongest.speed * (1.0 + o))))[strongest.line, 0])
+        abs(signals(model, parametric_response(model, model.at(strongest.speed * (1.0 + o))))[strongest.line, 0])
         for o in offsets
     ]
     assert levels[1] > 1.3 * max(levels[0], levels[2])

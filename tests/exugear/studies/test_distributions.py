@@ -147,6 +147,10 @@ def test_settings_set_several_keys_by_one_name(tmp_path):
         ({"samples": 8}, "no parameter has a distribution"),
         ({"outputs": {"f": {"quantity": "frequencis"}}}, "did you mean 'frequencies'?"),
         ({"outputs": {"f": {"quantity": "frequencies", "cont": 3}}}, "did you mean 'count'?"),
+        (
+            {"sampling": "sobl"},
+            "sampling = 'sobl': must be 'sobol', 'latin_hypercube' or 'random'; did you mean 'sobol'?",
+        ),
         ({"outputs": {"f": {"quantity": "frequencies", "count": 3.5}}}, "must be a whole number"),
         ({"outputs": {"f": {"quantity": "nearest_frequency"}}}, "near_Hz: this option is missing"),
         ({"output": {}}, "did you mean 'outputs'?"),

@@ -56,7 +56,7 @@ def nearest(**options):
         ({"outputs": nearest(near_Hz=math.nan)}, "outputs.f.near_Hz = nan: must be finite"),
         (
             {"parameters": {"a": {"path": "housing.factor", "range": {"first": math.nan, "last": 1.0, "count": 3}}}},
-            "parameters.a.range.first = nan: should be a finite number",
+            "parameters.a.range.first = nan: must be a finite number",
         ),
         ({"outputs": nearest(near_Hz=-1.0)}, "outputs.f.near_Hz = -1.0: must be finite, and lie between 0"),
         (

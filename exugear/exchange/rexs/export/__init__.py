@@ -1,1 +1,1 @@
-"""Results of a gearbox put back into the REXS file that it was imported from."""
+"""Export of results into the REXS file from which a gearbox was imported."""

@@ -1,4 +1,4 @@
-"""Results of a gearbox put back into the REXS file that it was imported from."""
+"""Export of results into the REXS file from which a gearbox was imported."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ from fe_ste.tools.files import FileError
 from fe_ste.transmission_error.mean_contact import face_load_factor, load_along_face
 from fe_ste.transmission_error.table import MeshTable, TableError
 
-# Results in a folder that belong to a gearbox: what was computed from another input is left out, and told
+# Results in a folder that belong to a gearbox; files computed from other input are skipped and reported
 
 Result = TypeVar("Result")
 _UNFIT = (GearboxFileError, MeshError, VariantError, BearingError, BalanceError, FileError, KeyError, ValueError)
-"""What a file, or the case for the choice that it was computed of, may say."""
+"""Errors of reading a result file or of assembling the gearbox with its model settings."""
 
 
 @dataclass
 class StoredResults:
-    """What lies in a results folder."""
+    """Results stored in a results folder."""
 
     gearbox: Gearbox
     folder: Path
@@ -74,27 +74,27 @@ class StoredResults:
         return found
 
     def modes(self) -> dict[Choice, xr.Dataset]:
-        """Modes by what they were computed of."""
+        """Modes by model settings."""
         return dict(self._each("*/*/modes.nc", self._modes))
 
     def runs(self) -> dict[Choice, xr.Dataset]:
-        """Mesh forces of finished runs by what was run, the load case included."""
+        """Mesh forces of finished runs by model settings, including the load case."""
         return dict(self._each(f"*/*/{FINAL_NAME}", self._run))
 
     def duties(self) -> list[Mapping[str, Any]]:
-        """Return what bearings bear, from the most complete variant that was asked."""
+        """Return the bearing loads of the most complete variant for which they were computed."""
         found = dict(self._each("*/*/bearings.json", self._duties))
         best = sorted(found, key=lambda choice: choice.variant.is_elastic)[-1:]
         return [duty for choice in best for duty in found[choice]]
 
     @property
     def loaded(self) -> Assembly | None:
-        """The most complete variant with bearings of which results were read."""
+        """The most complete variant with bearings for which results were read."""
         assemblies = [assembly for assembly in self._assemblies.values() if assembly.variant.on_bearings]
         return max(assemblies, key=lambda one: one.variant.is_elastic, default=None)
 
     def _each(self, pattern: str, read: Callable[[Path], tuple[Choice, Result]]) -> Iterator[tuple[Choice, Result]]:
-        """Read files one by one; what does not belong to the gearbox is noted."""
+        """Read files one by one; those that do not belong to the gearbox are recorded in `left_out`."""
         for path in sorted(self.folder.glob(pattern)):
             try:
                 yield read(path)
@@ -122,12 +122,12 @@ class StoredResults:
         return choice, content["bearings"]
 
     def _check(self, choice: Choice, attributes: Mapping[str, Any], load_case: str | None = None) -> None:
-        """Refuse what was computed from another input.
+        """Raise an error if a result was computed from other input.
 
         Raises
         ------
         GearboxFileError
-            It was.
+            The input differs.
         """
         if choice not in self._assemblies:
             bodies: dict[str, ElasticBody] = {}
@@ -143,15 +143,15 @@ def _choice(attributes: Mapping[str, Any]) -> Choice:
     return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
 
 
-# Results on gears and stages: what their geometry gives, their static load, and their transmission error tables
+# Results on gears and stages: geometry, static load and transmission error tables
 
 EQUAL = 1e-9
-"""Largest relative difference of numbers that are the same in both files."""
+"""Largest relative difference at which numbers count as equal in both files."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where results go: the model that was read, its parts, and the load case of the static load (None: the model)."""
+    """Destination of results: the REXS model, its parts, and the load case of the static load (None: the model)."""
 
     model: Model
     origins: Origins
@@ -159,12 +159,12 @@ class Target:
 
 
 def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
-    """Refuse a REXS file of another gearbox; numbers that may have been edited are no matter here.
+    """Raise an error if a REXS file describes another gearbox; editable values may differ.
 
     Raises
     ------
     RexsError
-        Gears or pairs of the case that the file does not have, or that differ in what makes a gear that gear.
+        The file lacks gears or pairs of the gearbox, or gears differ in tooth number, module or type.
     """
     faults = []
     for kind, own, others in (("gears", gearbox.gears, imported.gears), ("pairs", gearbox.pairs, imported.pairs)):
@@ -188,7 +188,7 @@ def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
 
 
 def put_gears(results: Results, gearbox: Gearbox, target: Target) -> None:
-    """Put diameters of gears, and inputs of the case that are not those of the file."""
+    """Add the diameters of gears, and those inputs of the gearbox file that differ from the REXS file."""
     for name, gear in gearbox.gears.items():
         for number in target.origins.gears[name]:
             results.put(number, "reference_diameter", "mm", 2e3 * gear.reference_radius)
@@ -207,13 +207,13 @@ def put_gears(results: Results, gearbox: Gearbox, target: Target) -> None:
                 if stated is None and key == "root_form_diameter":
                     results.put(number, key, "mm", 2e3 * radius)
                 elif stated is None or not math.isclose(abs(stated), 2e3 * radius, rel_tol=EQUAL):
-                    results.put_own(number, key, "mm", 2e3 * radius)  # the file's own is an input and stays
+                    results.put_own(number, key, "mm", 2e3 * radius)  # the value of the file is an input and is kept
             for key, unit, value in _inputs(gear):
                 results.put_own(number, key, unit, value)
 
 
 def _inputs(gear: Gear) -> tuple[tuple[str, str, float], ...]:
-    """Return inputs that a REXS file leaves to assumptions, or that an import may have to replace."""
+    """Return inputs that a REXS file may not specify, or that an import may have replaced."""
     return (
         ("profile_shift", "none", gear.profile_shift),
         ("tooth_thinning", "mm", 1e3 * gear.tooth_thinning),
@@ -223,13 +223,13 @@ def _inputs(gear: Gear) -> tuple[tuple[str, str, float], ...]:
 
 
 def put_pairs(results: Results, gearbox: Gearbox, target: Target) -> None:
-    """Put relations of pairs: contact ratios, working circles, clearances."""
+    """Add results of pairs: contact ratios, working pitch circles, clearances."""
     for name, spec in gearbox.pairs.items():
         pair = spec.pair
         for stage in target.origins.pairs[name]:
             results.put(stage, "gear_ratio", "none", pair.ratio)
             results.put(stage, "transverse_contact_ratio", "none", pair.transverse_contact_ratio)
-            if pair.overlap_ratio > 0.0:  # REXS has none of zero
+            if pair.overlap_ratio > 0.0:  # REXS does not permit zero
                 results.put(stage, "overlap_ratio", "none", pair.overlap_ratio)
             results.put(stage, "total_contact_ratio", "none", pair.total_contact_ratio)
             length = pair.path_end - pair.path_start
@@ -250,7 +250,7 @@ def put_pairs(results: Results, gearbox: Gearbox, target: Target) -> None:
 
 
 def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
-    """Radii at root and tip between which a gear touches its mate, m."""
+    """Active root and tip radius of a gear, between which it contacts its mating gear, m."""
     rolls = [pair.path_start, pair.path_end]
     if gear is pair.gear:
         tangent = pair.base_tangent_length
@@ -262,7 +262,7 @@ def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
 
 
 def _gear_data(target: Target, stage: int, gear: Gear) -> int | None:
-    """Component that holds data of a gear in a stage."""
+    """Component with the data of a gear in a stage."""
     numbers = target.origins.gears[gear.name]
     for relation in target.model.relations_of("stage_gear_data"):
         if relation.roles.get("stage") == stage and relation.roles.get("gear") in numbers:
@@ -271,7 +271,7 @@ def _gear_data(target: Target, stage: int, gear: Gear) -> int | None:
 
 
 def put_static_forces(results: Results, gearbox: Gearbox, target: Target) -> None:
-    """Put the forces that the static load asks of the meshes; equal planets share it evenly."""
+    """Add the static mesh forces, which equal planets share evenly."""
     for mesh, force in gearbox.train.static_mesh_forces().items():
         one = next(each for each in gearbox.meshes if each.name == mesh)
         numbers = target.origins.pairs[one.pair.name]
@@ -282,7 +282,7 @@ def put_static_forces(results: Results, gearbox: Gearbox, target: Target) -> Non
 
 
 def instance_of(name: str, family: str) -> int:
-    """Return the number of a planet, from 0, in the name of what it carries.
+    """Return the number of a planet, from 0, from the name of its part.
 
     Examples
     --------
@@ -296,7 +296,7 @@ def instance_of(name: str, family: str) -> int:
 
 
 def put_tables(results: Results, gearbox: Gearbox, tables: Mapping[str, MeshTable], target: Target) -> None:
-    """Put transmission error, mesh stiffness and load along the face of the static state."""
+    """Add transmission error, mesh stiffness and load distribution along the face width in the static state."""
     for name, table in tables.items():
         data = table.static_state
         pair = gearbox.pairs[name].pair
@@ -309,7 +309,7 @@ def put_tables(results: Results, gearbox: Gearbox, tables: Mapping[str, MeshTabl
             }
             for key, (unit, values) in series.items():
                 if bool(values.isnull().any()):
-                    continue  # REXS has no sign for a value that is missing
+                    continue  # REXS has no symbol for a missing value
                 results.put(stage, key, unit, tuple(values.to_numpy().tolist()), case)
             error = data["ste"]
             results.put_own(stage, "mesh_cycle_positions", "none", positions, case)
@@ -330,15 +330,15 @@ def put_tables(results: Results, gearbox: Gearbox, tables: Mapping[str, MeshTabl
                     results.put(place, "mesh_positions", "deg", turned, case)
 
 
-# Results on shafts: speeds under each load case, and how far they move under the static load
+# Results on shafts: speeds in each load case, and displacements at the static load
 
 SPEED = "rotational_speed"
 
 
 def put_speeds(results: Results, gearbox: Gearbox, target: Target) -> None:
-    """Put the speeds of shafts and gears at which the train rolls, where the file leaves them out.
+    """Add the kinematic speeds of shafts and gears where the file does not specify them.
 
-    Those of planets are left out: REXS does not say whether they count against the carrier.
+    Speeds of planets are omitted, because REXS does not define whether they are relative to the carrier.
     """
     for case in target.model.load_cases or (None,):
         name = "nominal" if case is None else f"load_case_{case.number}"
@@ -356,7 +356,7 @@ def put_speeds(results: Results, gearbox: Gearbox, target: Target) -> None:
 
 
 def put_displacements(results: Results, assembly: Assembly, target: Target) -> None:
-    """Put how far shafts move under the static load, in their own axes, where gears and bearings sit on them."""
+    """Add the displacements of shafts at the static load, in their own axes, at the positions of gears and bearings."""
     q = static_state(assembly).q
     for body in assembly.bodies:
         members = target.origins.bodies.get(body.family, ())
@@ -388,7 +388,7 @@ def _sense(target: Target, number: int) -> int:
 
 
 def _nodes(assembly: Assembly, q: Floats, body: Body) -> Iterator[tuple[float, Floats]]:
-    """Places (m) along a body with a place in space, and displacements (3,) in m of its axis there."""
+    """Yield positions (m) along a body with six degrees of freedom, and displacements (3,) in m of its axis there."""
     seats = dict(body.wheels)
     for support in assembly.supports:
         if body.name in (support.body, support.on):
@@ -410,7 +410,7 @@ def _nodes(assembly: Assembly, q: Floats, body: Body) -> Iterator[tuple[float, F
 
 
 def put_bearings(results: Results, gearbox: Gearbox, duties: Sequence[Mapping[str, Any]], target: Target) -> None:
-    """Put what catalogue bearings bear: loads, stiffness at the operating point, pressure and life."""
+    """Add results of catalogue bearings: loads, stiffness at the operating point, contact stress and life."""
     families = {bearing.name: bearing.family for bearing in gearbox.bearings}
     case = target.load_case
     for duty in duties:
@@ -432,19 +432,19 @@ def put_bearings(results: Results, gearbox: Gearbox, duties: Sequence[Mapping[st
 
 
 def in_axes(stiffness: Floats, axes: Floats) -> Floats:
-    """Return a stiffness (6, 6) over x, y, z and angles about them in a bearing's axes u, v, w, rows of a (3, 3)."""
+    """Transform a stiffness (6, 6) over x, y, z and rotations to a bearing's axes u, v, w, rows of a (3, 3)."""
     turn = np.zeros((6, 6))
     turn[:3, :3] = turn[3:, 3:] = axes
     return np.asarray(turn @ stiffness @ turn.T)
 
 
 def words_of(choice: Choice) -> str:
-    """Choice as part of an attribute's name."""
+    """Model settings as part of an attribute's name."""
     return "_".join(str(part) for part in (choice.variant, choice.mesh_model, choice.inertias)).replace("-", "_")
 
 
 def put_modes(results: Results, modes: Mapping[Choice, xr.Dataset], unit: int, load_case: int | None) -> None:
-    """Put eigenfrequencies and damping of the variants on the gear unit."""
+    """Add eigenfrequencies and damping of the variants to the gear unit."""
     for choice, data in modes.items():
         moving = data["frequency"].to_numpy() > 0.0
         for key, name, sign in (("eigenfrequencies", "frequency", "Hz"), ("damping_ratios", "damping_ratio", "none")):
@@ -453,7 +453,7 @@ def put_modes(results: Results, modes: Mapping[Choice, xr.Dataset], unit: int, l
 
 
 def put_runs(results: Results, gearbox: Gearbox, runs: Mapping[Choice, xr.Dataset], target: Target) -> None:
-    """Put the largest and the mean mesh forces of runs in time on the stages."""
+    """Add the maximum and mean mesh forces of runs to the stages."""
     families = {mesh.name: mesh for mesh in gearbox.meshes}
     numbers = {f"load_case_{case.number}": case.number for case in target.model.load_cases}
     for choice, data in runs.items():
@@ -468,7 +468,7 @@ def put_runs(results: Results, gearbox: Gearbox, runs: Mapping[Choice, xr.Datase
                     results.put_named(stage, f"{OWN}{key}_{ending}", "N", float(value), case)
 
 
-# Results of a gearbox put back into the REXS file that it was imported from
+# Export of results into the REXS file from which a gearbox was imported
 
 
 @dataclass(frozen=True)
@@ -476,34 +476,34 @@ class Exported(ReprMixin, line=": {named} attributes of REXS, {own} of exugear")
     """A REXS file with results."""
 
     content: bytes
-    """The file, of the same kind, version and encoding as the one that was read."""
+    """The file in unchanged format, version and encoding."""
     own: int
-    """Attributes that REXS has no name for; they begin with ``custom_exugear_``."""
+    """Number of attributes for which REXS has no name; they begin with ``custom_exugear_``."""
     named: int
-    """Attributes of REXS."""
+    """Number of attributes with a REXS name."""
     replaced: tuple[str, ...]
-    """Results of another program that these have taken the place of."""
+    """Replaced results of another program."""
     left_out: tuple[str, ...]
     """Files in the results folder that do not belong to the gearbox."""
 
 
 def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules | None = None) -> Exported:
-    """Put what is known of a gearbox into the REXS file that it was imported from.
+    """Return the REXS file from which a gearbox was imported, with results added.
 
-    What its geometry and statics give is always there; tables, modes, bearings and runs as far as the results
-    folder holds them. What belongs to the static load goes into the load case of the file that has its torque.
+    Results of geometry and statics are always added; tables, modes, bearings and runs if the results folder contains
+    them. Results at the static load are added to the load case of the file with the same torque.
 
     Parameters
     ----------
-    gearbox : imported from the file; values may have been edited since, names may not
-    folder : its results
-    path : the REXS file; it is read only
-    rules : those that it was imported with
+    gearbox : imported from the file; its values may have been edited, its names must be unchanged
+    folder : results folder
+    path : the REXS file, which is not changed
+    rules : rules of the import
 
     Raises
     ------
     RexsError
-        The file cannot be read, or is one of another gearbox.
+        The file cannot be read, or describes another gearbox.
     """
     model = read_rexs(path)
     imported = to_case(model, Path(path).name, rules=rules)
@@ -537,7 +537,7 @@ def _version(model: Model) -> tuple[int, int]:
 
 
 def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
-    """Load case of the file whose torque at the input is that of the static load."""
+    """Load case of the file whose input torque equals that of the static load."""
     body = gearbox.case.overall.input
     static = gearbox.case.static_load.torques_N_m.get(body)
     for case in model.load_cases:
@@ -548,7 +548,7 @@ def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
 
 
 def _replaced(model: Model, results: Results) -> tuple[str, ...]:
-    """Results in the file that are replaced by others."""
+    """Results in the file that are replaced."""
     told = []
     for addition in results.additions:
         part = model.components[addition.component]

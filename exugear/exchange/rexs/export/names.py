@@ -1,4 +1,4 @@
-"""What results are called in which version of REXS; what REXS has no name for gets one of our own."""
+"""Names of results in each REXS version; results without a REXS name get a custom one."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ NAMES: Mapping[str, Sequence[tuple[Version, str]]] = {
     ],
     "face_load_factor": [((1, 1), "face_load_factor_flank"), ((2, 0), "face_load_factor_contact_stress")],
     "mesh_stiffness": [((1, 5), "meshing_stiffness_characteristic")],
-    # of bearings; until 1.5 the unit of a life is not told
+    # of bearings; up to 1.5 the unit of a life is not defined
     "basic_rating_life": [((1, 6), "nominal_rating_life_rotations_iso_281_2007")],
     "reference_rating_life": [
         ((1, 6), "nominal_reference_rating_life_rotations_din_26281"),
@@ -67,7 +67,7 @@ NAMES: Mapping[str, Sequence[tuple[Version, str]]] = {
     ],
     "contact_pressure": [((1, 3), "maximum_hertzian_pressure_inner_ring")],
 }
-"""Names by version from which on they hold; found in the lists of attributes of REXS 1.0 to 2.0."""
+"""Names by the version that introduced them, from the attribute lists of REXS 1.0 to 2.0."""
 
 
 def name_in(key: str, version: Version) -> str:
@@ -85,7 +85,7 @@ def name_in(key: str, version: Version) -> str:
 
 
 def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, float]]:
-    """Entries of a bearing's stiffness: name, row and column over (u, v, w) and angles about them, unit, SI to unit."""
+    """Yield entries of a bearing's stiffness: name, row and column over (u, v, w) and rotations, unit, SI to unit."""
     forces = (("f_u", 0), ("f_v", 1), ("f_w", 2), ("m_v", 4), ("m_w", 5))
     motions = (
         ("d_u", 0),
@@ -107,33 +107,33 @@ def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, floa
 
 @dataclass
 class Results(ReprMixin, line=": {additions!n} attributes"):
-    """Attributes gathered for a file."""
+    """Attributes collected for a file."""
 
     version: Version
-    """(int, int) of REXS."""
+    """(int, int) version of REXS."""
     additions: list[Addition] = field(default_factory=list)
 
     def put(
         self, component: int, key: str, unit: str, value: AdditionValue | None, load_case: int | None = None
     ) -> None:
-        """Keep a result under the name that REXS has for it, or one of our own; None is left out."""
+        """Add a result under its REXS name, or a custom one if there is none; None is skipped."""
         if value is not None:
             self.put_named(component, name_in(key, self.version), unit, value, load_case)
 
     def put_own(self, component: int, key: str, unit: str, value: AdditionValue, load_case: int | None = None) -> None:
-        """Keep what REXS has no name for."""
+        """Add a result for which REXS has no name."""
         self.put_named(component, OWN + key, unit, value, load_case)
 
     def put_named(
         self, component: int, name: str, unit: str, value: AdditionValue, load_case: int | None = None
     ) -> None:
-        """Keep a result under a name."""
+        """Add a result under a name."""
         value = tuple(map(float, value)) if isinstance(value, tuple) else value
         value = float(value) if isinstance(value, int | float) else value
         self.additions.append(Addition(component, name, unit_in(unit, self.version), value, load_case))
 
 
-# Which components of a REXS file the parts of the gearbox file come from: the way back for results
+# Components of a REXS file from which the parts of the gearbox file originate, for the export of results
 
 
 @dataclass(frozen=True)
@@ -144,15 +144,15 @@ class Origins(ReprMixin, line=" of {gears!n} gears, {pairs!n} pairs, {bearings!n
     pairs: Mapping[str, tuple[int, ...]]
     bearings: Mapping[str, tuple[int, ...]]
     bodies: Mapping[str, tuple[tuple[int, ...], ...]]
-    """Shafts and gears of each body, of planets one such tuple for each."""
+    """Shafts and gears of each body; for planets one such tuple per planet."""
     axes: Mapping[int, Floats]
-    """(3, 3) axes u, v, w of bearings and shafts as rows, in those of the gearbox file."""
+    """(3, 3) axes u, v, w of bearings and shafts as rows, in the axes of the gearbox file."""
     places: Mapping[int, float]
-    """Origin of bearings, gears and shafts along z, m."""
+    """Axial position of the origin of bearings, gears and shafts, m."""
 
 
 def origins_of(found: Found) -> Origins:
-    """Gather the components behind gears, pairs and bearings."""
+    """Collect the components from which gears, pairs and bearings originate."""
     model = found.model
     places = found.places
     first = first_of_planets(model, places, found.bodies)
@@ -188,7 +188,7 @@ def _shafts_and_gears(parts: Iterable[Component]) -> tuple[int, ...]:
 def _stages(
     model: Model, teeth: Teeth, first: Mapping[int, int], gears: Mapping[str, tuple[int, ...]]
 ) -> dict[str, tuple[int, ...]]:
-    """Stages of each pair, one for each planet."""
+    """Stages of each pair, one per planet."""
     pairs = {frozenset((stage.pinion, stage.gear)): name for name, stage in teeth.stages.items()}
     found: dict[str, list[tuple[int, int]]] = {name: [] for name in teeth.stages}
     for relation in model.relations_of("stage"):
@@ -200,7 +200,7 @@ def _stages(
 
 
 def _bearings(found_in: Found, block: Block) -> tuple[int, ...]:
-    """Bearing of a table, and those of the other planets that stand where it does."""
+    """Bearing of a section, and the bearings at the same position of the other planets."""
     model = found_in.model
     places = found_in.places
     bodies = found_in.bodies

@@ -1,1 +1,1 @@
-"""From the tree of a REXS file to a gearbox file: bodies, gears, shafts, supports, loads, with their sources."""
+"""Conversion of a REXS tree to a gearbox file: bodies, gears, shafts, supports, loads, with their sources."""

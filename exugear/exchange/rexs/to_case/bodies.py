@@ -1,4 +1,4 @@
-"""Which components turn as one body, which of these are planets of a set, and what each is called."""
+"""Bodies of a REXS file: components that rotate together, planets of a set, and their names."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ JOINING = (
     "feather_key_connection",
     "involute_spline_connection",
 )
-"""Types that can join their inner and outer part."""
+"""Types of components that can rigidly connect their inner and outer part."""
 RIGID_TORSION = 1e12
-"""Torsional stiffness (N m/rad) from which on a connection is one piece; the files mean rigid by 1e17."""
+"""Torsional stiffness (N m/rad) from which a connection counts as rigid; files use 1e17 for rigid."""
 RIGID_ABOVE = {"radial_stiffness": 1e14, "axial_stiffness": 1e14, "bending_stiffness": 1e11}
-"""Stiffness (N/m, N m/rad) from which on a file means rigid; no bearing has as much."""
+"""Stiffness (N/m, N m/rad) from which a value counts as rigid; no bearing is as stiff."""
 STIFFNESSES = {
     "radial_stiffness": ("radial_N_per_m", "N / m", 1.0),
     "axial_stiffness": ("axial_N_per_m", "N / m", 1.0),
@@ -32,28 +32,28 @@ STIFFNESSES = {
 }
 """Attributes of bearings and couplings: key of the gearbox file, unit, and factor from it to SI."""
 COAXIAL = 2e-3
-"""Largest distance of axes that count as one, mm."""
+"""Largest distance of axes that count as coaxial, mm."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """Components that move as one."""
+    """Components that move as one rigid body."""
 
     name: str
-    """In the gearbox file."""
+    """Name in the gearbox file."""
     parts: tuple[Component, ...]
     """Shafts, plates and gears."""
     axis: tuple[float, float]
-    """mm."""
+    """Position of the axis, mm."""
     fixed: bool = False
     others: tuple[tuple[Component, ...], ...] = ()
     """Parts of the other planets of a set, in the order of their angles."""
     angles: tuple[float, ...] = ()
-    """Angles of the planets on the carrier, deg; empty for what is no planet."""
+    """Angles of the planets on the carrier, deg; empty for other bodies."""
     orbit: float = 0.0
-    """Their distance from the carrier's axis, mm."""
+    """Distance of the planets from the axis of the carrier, mm."""
     carrier: str = ""
-    """Empty for what is no planet."""
+    """Carrier of the planets; empty for other bodies."""
 
     def of_type(self, *types: str) -> tuple[Component, ...]:
         """Parts of some types."""
@@ -61,7 +61,7 @@ class Body:
 
     @property
     def gears(self) -> tuple[Component, ...]:
-        """Gears of the body, of planets those of the first."""
+        """Gears of the body; for planets those of the first."""
         return self.of_type(*GEARS)
 
 
@@ -77,11 +77,11 @@ class Bodies(ReprMixin):
         return f": {', '.join(body.name for body in self.members)}"
 
     def of(self, part: Component) -> Body | None:
-        """Body of a component; None for what is idle, or a planet that is not the first of its set."""
+        """Body of a component; None for idle components and for planets other than the first of a set."""
         return self._of_part.get(part.number)
 
     def of_any(self, part: Component) -> Body | None:
-        """Body of a component, whichever planet of a set it belongs to."""
+        """Body of a component, for any planet of a set."""
         return self._of_part.get(part.number) or self._of_other.get(part.number)
 
 
@@ -104,7 +104,7 @@ class _Union:
 
 
 def torsional_stiffness(connection: Component) -> float | None:
-    """Torsional stiffness of a coupling or fit, N m/rad; None where the file gives none."""
+    """Torsional stiffness of a coupling or fit, N m/rad; None if the file has no value."""
     value = connection.quantity("rotational_stiffness", "N mm / rad")
     if value is None:
         return None
@@ -112,16 +112,16 @@ def torsional_stiffness(connection: Component) -> float | None:
 
 
 def is_rigid_in_torsion(connection: Component) -> bool:
-    """Tell whether both sides turn as one."""
+    """Return whether both sides rotate together."""
     torsion = torsional_stiffness(connection)
     return torsion is None or torsion >= RIGID_TORSION
 
 
 def is_one_piece(connection: Component) -> bool:
-    """Tell whether a coupling or fit makes one body of both sides: rigid in all that it says something of.
+    """Return whether a coupling or fit rigidly connects both sides in all directions that it specifies.
 
-    A shaft behind a coupling that is stiff in torsion and soft across the axis, such as a floating sun, moves for
-    itself.
+    A shaft behind a coupling that is torsionally stiff and radially compliant, such as a floating sun, is a separate
+    body.
     """
     if not is_rigid_in_torsion(connection) or connection.flag("radial_force_absorption") is False:
         return False
@@ -133,14 +133,14 @@ def is_one_piece(connection: Component) -> bool:
 
 
 def is_engaged(model: Model, connection: Component) -> bool:
-    """Tell whether a switchable coupling is closed in the gear that the file stands in."""
+    """Return whether a switchable coupling is engaged in the selected gear of the file."""
     unit = model.of_type("gear_unit")
     shift = (unit[0].whole("gear_shift_index") if unit else None) or 1
     return connection.type != "switchable_coupling" or connection.flag("is_engaged", shift - 1) is not False
 
 
 def ends(model: Model, connection: Component) -> tuple[Component, Component] | None:
-    """Inner and outer part of a bearing, coupling or fit; None if the file does not say both."""
+    """Inner and outer part of a bearing, coupling or fit; None unless the file specifies both."""
     inner = model.related("side", "assembly", connection.number, "inner_part")
     outer = model.related("side", "assembly", connection.number, "outer_part")
     if inner and outer:
@@ -149,12 +149,12 @@ def ends(model: Model, connection: Component) -> tuple[Component, Component] | N
 
 
 def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
-    """Gather components into bodies.
+    """Group components into bodies.
 
     Raises
     ------
     RexsError
-        Planets that are not equal, or whose carrier cannot be told.
+        Planets are not equal, or their carrier is not defined.
     """
     union = _joined(model, notes)
     held = held_by_speed(model)
@@ -228,7 +228,7 @@ def _joined(model: Model, notes: Notes) -> _Union:
 
 
 def _working(model: Model, union: _Union) -> set[int]:
-    """Roots of what meshes or carries planets, and of what connections with some stiffness tie to it."""
+    """Roots of components that mesh or carry planets, and of those connected to them with some torsional stiffness."""
     numbers = {role for relation in model.relations_of("stage") for role in relation.roles.values()}
     working = {union.root(number) for number in numbers if number in union} | _carriers(model, union)
     ties = []
@@ -242,9 +242,9 @@ def _working(model: Model, union: _Union) -> set[int]:
 
 
 def held_by_speed(model: Model) -> set[int]:
-    """Numbers of the shafts whose speed the file defines as zero, in all load cases, while others turn.
+    """Numbers of the shafts whose speed is defined as zero in all load cases while others rotate.
 
-    Some programs leave a speed of zero out where they say that a shaft defines its speed.
+    Some programs omit the speed zero although they state that a shaft defines its speed.
     """
     speeds: dict[int, set[float]] = {}
     for changes in [case.changes for case in model.load_cases] or [{}]:
@@ -275,7 +275,7 @@ def _axial(parts: Iterable[Component]) -> list[Component]:
 
 
 def _axis(places: Places, parts: Sequence[Component], pins: set[int]) -> tuple[float, float]:
-    """Axis of a body, mm: that of its gears, else of its shafts and plates, pins of planets left out."""
+    """Axis of a body, mm: that of its gears, else of its shafts and plates, without the pins of planets."""
     rank = {"cylindrical_gear": 0, "ring_gear": 0, "shaft": 1, "side_plate": 2}
     own = sorted((p for p in parts if p.type in rank and p.number not in pins), key=lambda part: rank[part.type])
     own = [part for part in own if part.given("support_vector")]
@@ -291,7 +291,7 @@ def _axis(places: Places, parts: Sequence[Component], pins: set[int]) -> tuple[f
 def _planet_sets(
     model: Model, places: Places, union: _Union, groups: Mapping[int, list[Component]]
 ) -> list[list[tuple[int, Component]]]:
-    """Gather sets of equal planets: (root, shaft) of each."""
+    """Group the planets into sets of equal ones: (root, shaft) of each."""
     sets: dict[tuple[object, ...], list[tuple[int, Component]]] = {}
     for relation in model.relations_of("planet_shaft"):
         if not {"shaft", "planetary_stage"} <= relation.roles.keys() or relation.roles["shaft"] not in union:
@@ -345,7 +345,7 @@ def _carrier(
 def _split_by_orbit(
     places: Places, members: Sequence[tuple[int, Component]], carrier: Body
 ) -> Iterator[tuple[Body, list[_Planet]]]:
-    """Split planets into sets equally far from the carrier's axis, in the order of angles: a Ravigneaux set has two."""
+    """Yield sets of planets at equal distance from the carrier axis, ordered by angle; a Ravigneaux set has two."""
     orbits: list[list[_Planet]] = []
     for root, shaft in members:
         x, y, _ = places.position(shaft)
@@ -365,7 +365,7 @@ def _split_by_orbit(
 def _order_by_mating_planets(
     model: Model, groups: Mapping[int, list[Component]], placed: list[_Planet], earlier: Sequence[Body]
 ) -> list[_Planet]:
-    """Turn the order of planets so that each has the number of the one of another set that it meshes with."""
+    """Rotate the order of planets so that each has the number of the planet of another set with which it meshes."""
     mates: dict[int, set[int]] = {}
     for relation in model.relations_of("stage"):
         one, other = (relation.roles.get(role, -1) for role in ("gear_1", "gear_2"))
@@ -398,7 +398,7 @@ def _planet_body(
 
 
 def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[int, str]:
-    """Names of the bodies that are no planets, by role, numbered in the order of the file."""
+    """Names of the bodies other than planets, by role, numbered in the order of the file."""
     roles: dict[str, list[int]] = {}
     for root, parts in groups.items():
         if _is_fixed(parts, ()):

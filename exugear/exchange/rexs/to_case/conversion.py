@@ -1,4 +1,4 @@
-"""A REXS file as a gearbox file: what cannot be imported is said all at once, what is assumed is marked."""
+"""Conversion of a REXS file to a gearbox file; all errors are reported together, and assumptions are marked."""
 
 from __future__ import annotations
 
@@ -71,14 +71,14 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.system.readiness import check_parts
 from fe_ste.tools.display import ReprMixin
 
-# Bodies of a REXS file as tables of the gearbox file: place, inertia, and the shape of shafts
+# Bodies of a REXS file as tables of the gearbox file: position, inertia, and the shape of shafts
 
 INERTIAS = "geometry"
 """Name of the inertia set."""
 
 
 def sections_of_bodies(model: Model, places: Places, bodies: Bodies, notes: Notes) -> dict[str, Sequence[Cylinder]]:
-    """Sections of the shafts of each body, in the order of z."""
+    """Shaft sections of each body, in the order of z."""
     found: dict[str, Sequence[Cylinder]] = {}
     for body in bodies.members:
         pieces: list[Cylinder] = []
@@ -92,7 +92,7 @@ def sections_of_bodies(model: Model, places: Places, bodies: Bodies, notes: Note
 def levelled_under_seats(
     sections: Mapping[str, Sequence[Cylinder]], teeth: Teeth, bearings: Mapping[str, Block], notes: Notes
 ) -> dict[str, Sequence[Cylinder]]:
-    """Sections of each body, of one diameter under its gears and catalogue bearings where it nearly is."""
+    """Shaft sections of each body, with nearly uniform diameters made uniform under gears and catalogue bearings."""
     seats: dict[str, list[tuple[str, float, float]]] = {name: [] for name in sections}
     for number, body in teeth.bodies.items():
         gear = teeth.gears[number]
@@ -186,7 +186,7 @@ def _digits(value: float) -> float:
 
 
 def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
-    """Tell whether the sections of a body make one elastic shaft."""
+    """Return whether the sections of a body form one flexible shaft."""
     shafts = [part for part in body.of_type("shaft") if part.given("support_vector")]
     rigid = any(is_rigid(material_of(model, shaft)) for shaft in shafts)
     plain_shaft = (
@@ -233,7 +233,7 @@ def _blank(tube: Cylinder) -> Entry:
 
 
 def meshes_of_bodies(teeth: Teeth) -> dict[str, int]:
-    """Count the meshes of each turning body that is no planet, in the order of the stages."""
+    """Count the meshes of each rotating body other than planets, in the order of the stages."""
     counts: dict[str, int] = {}
     for stage in teeth.stages.values():
         for number in (stage.pinion, stage.gear):
@@ -246,7 +246,7 @@ def meshes_of_bodies(teeth: Teeth) -> dict[str, int]:
 
 
 def gear_places(teeth: Teeth, bodies: Bodies) -> dict[str, float]:
-    """Middle of the first gear of each body, of a carrier that of its planets, mm."""
+    """Axial middle of the first gear of each body, or of the planets of a carrier, mm."""
     found: dict[str, float] = {}
     for number, body in teeth.bodies.items():
         found.setdefault(body.name, teeth.z[number])
@@ -256,12 +256,12 @@ def gear_places(teeth: Teeth, bodies: Bodies) -> dict[str, float]:
     return {name: z for name, z in found.items() if math.isfinite(z)}
 
 
-# A REXS file as a gearbox file: what cannot be imported is said all at once, what is assumed is marked
+# Conversion of a REXS file to a gearbox file; all errors are reported together, and assumptions are marked
 
 OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
-"""Beginnings of the types of gears that are not cylindrical."""
+"""Prefixes of the types of gears that are not cylindrical."""
 SPEED_TOLERANCE = 1e-3
-"""Largest difference of a speed in the file from the one at which the train rolls, relative."""
+"""Largest relative difference between a speed in the file and the kinematic speed."""
 _SHAPE_FAULT = re.compile(r"bodies\.(\w+)\.shape: (.*)")
 TYPES_OF_ROLES = {
     ("stage", "gear_1"): GEARS,
@@ -275,7 +275,7 @@ TYPES_OF_ROLES = {
     ("planet_carrier_shaft", "planetary_stage"): ("planetary_stage",),
     ("side", "assembly"): (*BEARINGS, *PLAIN_BEARINGS, *JOINING),
 }
-"""What a component must be that has a role in a relation; a wrong id makes another component of it."""
+"""Required type of a component with a role in a relation; a wrong id refers to a component of another type."""
 READ_TYPES = frozenset(
     (
         *GEARS,
@@ -302,7 +302,7 @@ READ_TYPES = frozenset(
         "lubricant",
     )
 )
-"""Types of components of which something is read."""
+"""Types of components from which data are read."""
 
 
 TYPES_WITHOUT_EFFECT = frozenset(
@@ -321,12 +321,12 @@ TYPES_WITHOUT_EFFECT = frozenset(
         "shaft_shoulder_with_undercut",
     )
 )
-"""Types of components that group or rate others: none has mass or stiffness, or carries a load."""
+"""Types of components that group or rate others; they have no mass or stiffness and carry no load."""
 
 
 @dataclass(frozen=True)
 class Found(ReprMixin, line=" in {model!r}: {bodies!r}"):
-    """What an import found in a REXS file, with the names of the gearbox file."""
+    """Content of a REXS file found by an import, with the names of the gearbox file."""
 
     model: Model
     places: Places
@@ -337,40 +337,41 @@ class Found(ReprMixin, line=" in {model!r}: {bodies!r}"):
 
 @dataclass(frozen=True)
 class Imported(ReprMixin, line=" {gearbox!r}: {changed!n} assumptions, {ignored!n} left out"):
-    """Outcome of an import."""
+    """Result of an import."""
 
     text: str
-    """The gearbox file with its comments."""
+    """Text of the gearbox file with its comments."""
     gearbox: Gearbox
-    """What it gives."""
+    """Gearbox of this file."""
     changed: tuple[str, ...]
-    """What was replaced or assumed and matters."""
+    """Values that were replaced, and important assumptions."""
     ignored: tuple[str, ...]
-    """What was left out, in the order of its effect: `lost`, and then all that changes no number here."""
+    """Omitted content in the order of its effect: `lost`, and then content that affects no result here."""
     lost: tuple[str, ...]
-    """What acts on the gearbox, moves or holds in it and was left out."""
+    """Omitted content that loads, moves or supports the gearbox."""
     checked: tuple[str, ...]
-    """What the file says twice, compared."""
+    """Comparisons of values that the file contains twice."""
     found: Found
-    """What parts of the gearbox file stand for which components."""
+    """Components from which the parts of the gearbox file originate."""
     spectrum: str
-    """Table of the loads over the life, which belongs beside the gearbox file under the name
-    `exugear.exchange.rexs.to_case.loads.SPECTRUM`; empty where the file tells too little."""
+    """Table of the life loads, to be stored in the folder of the gearbox file as
+    `exugear.exchange.rexs.to_case.loads.SPECTRUM`; empty if the file has insufficient data.
+    """
 
 
 def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules: Rules | None = None) -> Imported:
-    """Make a gearbox file of a REXS model, and check it as one.
+    """Convert a REXS model to a gearbox file and check it.
 
     Parameters
     ----------
     source : name of the REXS file, for the comments
-    path : where the gearbox file is going to be, for messages
-    rules : what counts where the file contradicts itself
+    path : intended path of the gearbox file, for messages
+    rules : rules for contradictory values
 
     Raises
     ------
     RexsError
-        Why the model cannot be imported, a sentence each.
+        The model cannot be imported; the reasons are one sentence each.
     """
     notes = Notes(rules or Rules())
     model = _without_splines_as_stages(model)
@@ -398,9 +399,9 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
 
 
 def _without_splines_as_stages(model: Model) -> Model:
-    """Leave out relations that pair shaft and hub of a spline as the gears of a stage are paired.
+    """Remove relations that pair shaft and hub of a spline like the gears of a stage.
 
-    The connection itself has two sides, and joins what they name.
+    The spline connection itself specifies the connected parts.
     """
     splines = {part.number for part in model.of_type(*JOINING)}
     relations = tuple(one for one in model.relations if one.type != "stage" or one.roles.get("stage") not in splines)
@@ -408,7 +409,7 @@ def _without_splines_as_stages(model: Model) -> Model:
 
 
 def _refuse_types(model: Model, notes: Notes) -> None:
-    """Refuse what is not a gearbox of cylindrical gears."""
+    """Raise an error for a file that is not a gearbox of cylindrical gears."""
     for begin, words in OTHER_GEARS.items():
         parts = [part for part in model.components.values() if part.type.startswith(f"{begin}_")]
         parts = [part for part in parts if part.type.endswith(("_gear", "_wheel", "_stage"))]
@@ -421,7 +422,7 @@ def _refuse_types(model: Model, notes: Notes) -> None:
 
 
 def _refuse_misplaced(model: Model, notes: Notes) -> None:
-    """Refuse relations with a component of the wrong type in a role, as wrong ids make them."""
+    """Report relations in which a component has the wrong type for its role, as results from wrong ids."""
     for relation in model.relations:
         for role, number in relation.roles.items():
             wanted = TYPES_OF_ROLES.get((relation.type, role))
@@ -433,7 +434,7 @@ def _refuse_misplaced(model: Model, notes: Notes) -> None:
 
 
 class _Draft:
-    """All tables of the gearbox file but the load cases."""
+    """All tables of the gearbox file except the load cases."""
 
     def __init__(self, model: Model, places: Places, notes: Notes) -> None:
         self.model, self.notes = model, notes
@@ -461,12 +462,12 @@ class _Draft:
         self.settings = _settings(model, places, self.ends, self.static, self._output_gear())
 
     def checked(self, text: str, path: str | Path) -> Gearbox:
-        """Read the gearbox file and try its parts; a fault names the components that it is about.
+        """Read the gearbox file and build its parts; errors name the REXS components concerned.
 
         Raises
         ------
         RexsError
-            The gearbox cannot be as the file has it.
+            The gearbox is impossible.
         """
         content: dict[str, Any] = tomllib.loads(text)
         try:
@@ -479,7 +480,7 @@ class _Draft:
         return gearbox
 
     def _with_components(self, fault: str) -> str:
-        """Return a fault of the gearbox file with the components that its parts stand for."""
+        """Return an error of the gearbox file with the REXS components of the named parts."""
         words = set(re.split(r"[^\w.]", fault)) | set(re.split(r"\W", fault))
         blocks = {name: block.comment for _, group in self.groups for name, block in group.items() if block.comment}
         told = [
@@ -490,7 +491,7 @@ class _Draft:
         return fault
 
     def leave_stiff(self, source: str, path: str | Path) -> None:
-        """Take bodies as rigid in all variants whose shape has no place for its seats, and say why."""
+        """Set bodies to rigid in all variants if their shape cannot contain the seats, and record the reason."""
         try:
             self.checked(self.text(source, {}), path)
         except RexsError as error:
@@ -504,7 +505,7 @@ class _Draft:
             blocks[f"bodies.{body}"].entries["flexibility"] = assumed("none", "its sections define no seats, see above")
 
     def rated_gears(self) -> dict[str, tuple[Component, bool]]:
-        """Gears by name, and whether their teeth bend both ways: those with several mates do."""
+        """Gears by name, and whether their teeth are loaded in reversed bending, as with several mating gears."""
         met = [number for stage in self.teeth.stages.values() for number in (stage.pinion, stage.gear)]
         return {name: (self.model.components[n], met.count(n) > 1) for n, name in self.teeth.names.items()}
 
@@ -527,7 +528,7 @@ class _Draft:
 
 
 def _placed(model: Model, places: Places, notes: Notes) -> tuple[Bodies, Teeth]:
-    """Bodies and gears where the centre distances that count want them."""
+    """Bodies and gears at positions that agree with the selected centre distances."""
     first = Notes(notes.rules)
     bodies = find_bodies(model, places, first)
     teeth = teeth_of(model, places, bodies, first)
@@ -554,8 +555,11 @@ def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str
             {"torques_N_m": static, "locked": derived([ends.output], "the output balances the input")},
         ),
         "damping": Block(
-            "assumed, percent of critical damping; measured gearboxes have 1 to 4",
-            {"modal_percent": Entry(2.0), "modal_band_percent": Entry([1.0, 4.0])},
+            "percent of critical damping; measured gearboxes have 1 to 4",
+            {
+                "modal_percent": assumed(2.0, "usual value"),
+                "modal_band_percent": assumed([1.0, 4.0], "usual range"),
+            },
         ),
     }
     for unit in model.of_type("gear_unit")[:1]:
@@ -570,7 +574,7 @@ def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str
 
 
 def _head(model: Model, source: str, notes: Notes) -> list[str]:
-    """Comment at the beginning: origin, what marks mean, and all that a reader must know."""
+    """Comment at the beginning: origin, meaning of the marks, and essential information for the reader."""
     lines = [
         f"Imported from {plain(Path(source).name)}: REXS {model.version}, written by {plain(model.program)}.",
         "The comment after each value is its attribute, the comment after each table its component.",
@@ -588,7 +592,7 @@ def _head(model: Model, source: str, notes: Notes) -> list[str]:
 
 
 def _note_ignored(model: Model, notes: Notes) -> None:
-    """List the types of components of which nothing was read, and the attributes of others that nothing asked for."""
+    """List the component types that were not read, and the unused attributes of the others."""
     kinds = sorted({part.type for part in model.components.values()})
     for kind in kinds:
         if kind not in READ_TYPES:
@@ -603,7 +607,7 @@ def _note_ignored(model: Model, notes: Notes) -> None:
 
 
 def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes: Notes) -> None:
-    """Compare speeds that the file gives for several bodies with those at which the train rolls."""
+    """Compare the speeds that the file specifies for several bodies with the kinematic speeds."""
     if gearbox.train.degrees_of_freedom != 1:
         return
     mode = dict(zip(gearbox.spinning, gearbox.train.kinematic_modes[:, 0].tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""Stages, gears and pairs of a REXS file as tables of the gearbox file, planets of a set taken once."""
+"""Stages, gears and pairs of a REXS file as tables of the gearbox file; equal planets have one table."""
 
 from __future__ import annotations
 
@@ -33,36 +33,37 @@ from exugear.exchange.rexs.to_case.toothing import (
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 
 FACE_TOLERANCE = 1e-3
-"""Largest difference of face widths that needs no word, mm."""
+"""Largest difference of face widths that is not reported, mm."""
 LEAST_RIM = 1.0
-"""Least height of a rim between root circle and seat, in normal modules; with less the gear is one with its shaft."""
+"""Minimum rim thickness between root circle and seat, in normal modules; below it the gear is integral with its shaft.
+"""
 ANGLE_TOLERANCE = 0.01
-"""Largest difference of two statements on a direction that needs no word, deg."""
+"""Largest difference of two values of a direction that is not reported, deg."""
 HELD_SHARE = 0.6
-"""Held diameter assumed for a gear that is one with its shaft, over its root diameter."""
+"""Assumed fixed diameter of a gear that is integral with its shaft, divided by its root diameter."""
 
 
 @dataclass(frozen=True)
 class Teeth:
-    """All gears that mesh, with their names, stages and bodies; of equal planets the first."""
+    """All meshing gears, with their names, stages and bodies; of equal planets only the first."""
 
     gears: Mapping[int, Toothing]
-    """By the number of their component."""
+    """Gears by the number of their component."""
     names: Mapping[int, str]
     stages: Mapping[str, Stage]
-    """By the name of their pair."""
+    """Stages by the name of their pair."""
     bodies: Mapping[int, Body]
     z: Mapping[int, float]
-    """Middle of the gear, mm."""
+    """Axial position of the middle of each gear, mm."""
 
 
 def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teeth:
-    """Gather gears and stages.
+    """Collect gears and stages.
 
     Raises
     ------
     RexsError
-        All that keeps stages from being gear pairs.
+        Stages cannot be converted to gear pairs; all reasons are reported.
     """
     first = first_of_planets(model, places, bodies)
     met: dict[frozenset[int], tuple[Component, list[Component]]] = {}
@@ -107,7 +108,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
 
 
 def first_of_planets(model: Model, places: Places, bodies: Bodies) -> dict[int, int]:
-    """Map each planet's gear to that of the first planet which is like it, by their numbers."""
+    """Map the gear of each planet to the equal gear of the first planet, by their numbers."""
 
     def ordered(parts: Iterable[Component]) -> list[int]:
         gears = [part for part in parts if part.type == "cylindrical_gear"]
@@ -130,10 +131,10 @@ def _stage(model: Model, roles: Mapping[str, int]) -> tuple[Component, list[Comp
 
 
 def _check_direction(places: Places, stage: Component, gears: Sequence[Component], notes: Notes) -> None:
-    """Compare the direction of the line of centres with positions."""
+    """Compare the direction of the line of centres with the positions."""
     one, other = (places.position(gear) for gear in gears)
     stated = stage.quantity("rotating_angle_around_neg_u_axis", "deg")
-    # From v over w, with u: the angle of the second gear's centre as seen from the first, zero along w.
+    # Angle of the second gear's centre as seen from the first, zero along w and positive towards v.
     angle = math.degrees(math.atan2(other[0] - one[0], other[1] - one[1]))
     if stated is not None and abs(math.remainder(stated - angle, 360.0)) > ANGLE_TOLERANCE:
         notes.checked.append(
@@ -165,7 +166,7 @@ def _ordered(
 
 
 def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Toothing) -> Entry | None:
-    """Face width that the gears share, where that is less than the narrower face."""
+    """Return the common face width of the gears, if it is less than the narrower face width."""
     least = min(pinion.face_width.value, gear.face_width.value)
     low = -math.inf
     high = math.inf
@@ -203,14 +204,14 @@ def _check_equal_planets(
 def axes_to_move(
     teeth: Teeth, bodies: Bodies, places: Places
 ) -> list[tuple[tuple[Component, ...], tuple[float, float]]]:
-    """Parts and how far (mm) they have to move for the centre distances that count; none where all stand so.
+    """Parts and the displacements (mm) that produce the selected centre distances; empty if all positions agree.
 
-    The first body of a train stays. Bodies on one axis move together, planets along their own radii.
+    The first body of a train is not moved. Coaxial bodies move together, planets along their own radii.
 
     Raises
     ------
     RexsError
-        Moving one gear for its stage would take it out of another.
+        Moving a gear for one stage would change the centre distance of another.
     """
     if all(abs(stage.distance.value - stage.apart) <= PLACE_TOLERANCE for stage in teeth.stages.values()):
         return []
@@ -246,7 +247,7 @@ def _names_of(teeth: Teeth, stage: Stage) -> set[str]:
 
 
 def _coaxial(bodies: Bodies, body: Body) -> list[str]:
-    """Names of the bodies that stand on one axis; planets stand for themselves."""
+    """Names of the coaxial bodies; a planet forms its own group."""
     if body.carrier:
         return [body.name]
     return [
@@ -259,7 +260,7 @@ def _coaxial(bodies: Bodies, body: Body) -> list[str]:
 def _moves(
     places: Places, bodies: Bodies, body: Body, axes: Mapping[str, tuple[float, float]]
 ) -> Iterator[tuple[tuple[Component, ...], tuple[float, float]]]:
-    """How far the parts of a body move, each planet of a set along its own radius."""
+    """Yield the displacements of the parts of a body; each planet of a set moves along its own radius."""
     new = axes[body.name]
     if not body.carrier:
         yield body.parts, (new[0] - body.axis[0], new[1] - body.axis[1])
@@ -275,7 +276,7 @@ def _moves(
 
 
 def _gear_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, Body]) -> dict[int, str]:
-    """Role of each gear; several of one role are numbered in the order of the stages."""
+    """Role of each gear; several gears of one role are numbered in the order of the stages."""
     central = {
         number
         for stage in stages
@@ -312,7 +313,7 @@ def _pair_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: 
 def gear_blocks(
     model: Model, teeth: Teeth, sections: Mapping[str, Sequence[Cylinder]], notes: Notes
 ) -> dict[str, Block]:
-    """Tables of the gears; `sections` are those of the shafts of each body."""
+    """Tables of the gears; `sections` are the shaft sections of each body."""
     return {
         teeth.names[number]: Block(
             str(gear.part),
@@ -369,7 +370,7 @@ def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder
 
 
 def _held(gear: Toothing, z: float, sections: Sequence[Cylinder]) -> Entry:
-    """Diameter at which the tooth model is held: the seat, if enough rim is left."""
+    """Return the fixed diameter of the tooth model: the seat, if the remaining rim is thick enough."""
     root = 2e3 * unchecked("", gear).root_radius
     seat = seat_diameter(sections, z, gear.face_width.value, gear.internal)
     rim = 0.0 if seat is None else 0.5 * abs(root - seat)
@@ -401,7 +402,7 @@ def pair_blocks(teeth: Teeth) -> dict[str, Block]:
 
 
 def mesh_blocks(teeth: Teeth) -> dict[str, Block]:
-    """Tables of the meshes: of each pair one, for a set of planets all."""
+    """Tables of the meshes: one for each pair, also for all planets of a set."""
     return {
         name: Block(
             "",

@@ -1,4 +1,4 @@
-"""Torques and speeds of a REXS file, at rest, by load case and over the life, and what withstands them."""
+"""Torques and speeds of a REXS file, static, by load case and over the life, and the strength of the gears."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, Re
 FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
 MOMENTS = ("torque_around_v_axis", "torque_around_w_axis")
 UNKNOWN_TORQUE = 100.0
-"""Torque where the file gives none, N m."""
+"""Torque if the file has no value, N m."""
 SPECTRUM = "load_spectrum.csv"
-"""Name of the table of loads beside the gearbox file."""
+"""Name of the table of life loads in the folder of the gearbox file."""
 HOURS_PER_YEAR = 8766.0
 USUAL_YEARS, USUAL_VISCOSITY, USUAL_DYNAMIC_FACTOR, USUAL_ROUGHNESS, USUAL_ROOT_FACTOR, BOTH_WAYS = (
     20.0,
@@ -28,7 +28,7 @@ USUAL_YEARS, USUAL_VISCOSITY, USUAL_DYNAMIC_FACTOR, USUAL_ROUGHNESS, USUAL_ROOT_
     0.95,
     0.7,
 )
-"""What is assumed for a life: years, viscosity at 40 degrees (mm2/s), K_v, Rz (um), Y_drelT Y_RrelT Y_X, Y_M."""
+"""Assumptions for a life: years, viscosity at 40 degrees (mm2/s), K_v, Rz (um), Y_drelT Y_RrelT Y_X, Y_M."""
 ROUGHNESSES = (
     (
         "roughness_Rz_um",
@@ -51,36 +51,40 @@ ROUGHNESSES = (
         6.0,
     ),
 )
-"""Keys of the gearbox file, attributes that give them, and factors: Rz is six times Ra (ISO 6336-2)."""
+"""Keys of the gearbox file, attributes with their values, and factors; Rz is taken as six times Ra (ISO 6336-2)."""
 ROUGHNESS_RANGE = (0.1, 100.0)
-"""Roughnesses of a gear, um."""
+"""Range of accepted roughness of a gear, um."""
+DENSITIES = (500.0, 2000.0)
+"""Range of accepted densities of an oil, kg/m3."""
+TEMPERATURES = (-50.0, 250.0)
+"""Range of accepted temperatures of an oil, degrees Celsius."""
 TOLERANCE_CLASSES = (1, 11)
 """Flank tolerance classes of ISO 1328-1:2013."""
 HARD_FLANK = 1100.0
-"""Endurance limit of flanks (MPa) from which on they are case hardened, if nothing else is said (ISO 6336-5)."""
+"""Endurance limit of flanks (MPa) from which they count as case hardened if no treatment is specified (ISO 6336-5)."""
 _NITRIDED = (((1e5, 1.3), (2e6, 1.0), (1e10, 0.85)), ((1e3, 1.6), (3e6, 1.0), (1e10, 0.85)))
 CURVES = {
     "nitrided": _NITRIDED,
     "grey_cast": _NITRIDED,
     "through_hardened": (((1e5, 1.6), (5e7, 1.0), (1e10, 0.85)), ((1e4, 2.5), (3e6, 1.0), (1e10, 0.85))),
 }
-"""Life factors for contact and bending over load cycles, by words in the heat treatment; case hardened else."""
+"""Life factors for contact and bending over load cycles, by words in the heat treatment; by default case hardened."""
 LEAST_SHARE = 0.1
-"""Speed at the start of a run-up over that at its end."""
+"""Speed at the start of a run-up divided by that at its end."""
 
 
 @dataclass(frozen=True)
 class PointForce:
-    """Force (N) and moment (N m) on a body at a place along its axis, in the axes of the gearbox file."""
+    """Force (N) and moment (N m) on a body at an axial position, in the axes of the gearbox file."""
 
     part: Component
     body: str
     z: float
-    """In mm."""
+    """Axial position, mm."""
     force: tuple[float, ...]
-    """(3,) along x, y, z."""
+    """(3,) force along x, y, z."""
     moment: tuple[float, ...]
-    """(2,) about x, y."""
+    """(2,) moment about x, y."""
 
 
 @dataclass(frozen=True)
@@ -88,20 +92,20 @@ class Loads:
     """Torques (N m) and speeds (rpm) on bodies, positive about +z."""
 
     name: str
-    """Of the load case."""
+    """Name of the load case."""
     description: str
     torques: Mapping[str, float]
     speeds: Mapping[str, float]
-    """By body name."""
+    """Speeds by body name."""
     forces: Mapping[int, PointForce] = field(default_factory=dict)
-    """By the number of the component."""
+    """Forces by the number of the component."""
     share: float | None = None
-    """Of the operating time, %; None where the file gives none."""
+    """Fraction of the operating time, %; None if the file has no value."""
 
 
 @dataclass(frozen=True)
 class Ends:
-    """Bodies at which the gearbox is driven and loaded, and why these."""
+    """Input and output bodies of the gearbox, and the reasons for their selection."""
 
     input: str
     output: str
@@ -109,7 +113,7 @@ class Ends:
 
 
 def loads_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> list[Loads]:
-    """Gather the loads of each load case, or of the file itself if it has none."""
+    """Collect the loads of each load case, or of the file itself if it has none."""
     return [_loads(model, places, bodies, case, notes) for case in model.load_cases or (None,)]
 
 
@@ -139,9 +143,9 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, 
 
 
 def _point_force(model: Model, places: Places, bodies: Bodies, load: Component, notes: Notes) -> PointForce | None:
-    """Force and moment of a load across and along its shaft, in the axes of the gearbox file; None for none.
+    """Radial and axial force and moment of a load, in the axes of the gearbox file; None if there is none.
 
-    What acts on a planet turns with its carrier and is left out; the casing takes any.
+    A load on a planet rotates with its carrier and is omitted; the casing can carry any load.
     """
     force = np.array([load.quantity(key, "N") or 0.0 for key in FORCES])
     moment = np.array([0.0, *(load.quantity(key, "N m") or 0.0 for key in MOMENTS)])
@@ -184,7 +188,7 @@ def _owner(model: Model, bodies: Bodies, load: Component) -> Body | None:
 
 
 def _torque(model: Model, places: Places, load: Component, speeds: Mapping[str, float], bodies: Bodies) -> float | None:
-    """Torque of a load about +z, N m; from its power and the speed of its body where the file gives no torque."""
+    """Torque of a load about +z, N m; computed from its power and the speed of its body if the file has no torque."""
     shaft = _shaft(model, load)
     body = _owner(model, bodies, load)
     if shaft is None or body is None:
@@ -200,16 +204,16 @@ def _torque(model: Model, places: Places, load: Component, speeds: Mapping[str, 
 
 
 def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping[str, int]) -> Ends:
-    """Tell input and output of the gearbox.
+    """Determine input and output of the gearbox.
 
     Parameters
     ----------
-    links : by body name, number of meshes of each body that turns
+    links : by body name, number of meshes of each rotating body
 
     Raises
     ------
     RexsError
-        The file does not tell them.
+        The file does not define them.
     """
     turning = [body for body in bodies.members if not body.fixed and not body.carrier]
     links = {body.name: links[body.name] for body in turning if body.name in links}
@@ -239,7 +243,7 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
 
 
 def static_load(loads: Sequence[Loads], ends: Ends) -> Entry:
-    """Torque of the static state: the largest of all load cases at the input."""
+    """Torque of the static state: the largest input torque of all load cases."""
     torques = [load.torques[ends.input] for load in loads if load.torques.get(ends.input)]
     if not torques:
         return assumed({ends.input: UNKNOWN_TORQUE}, "no torque in the file: SET IT")
@@ -248,9 +252,9 @@ def static_load(loads: Sequence[Loads], ends: Ends) -> Entry:
 
 
 def force_blocks(loads: Sequence[Loads], ends: Ends, notes: Notes) -> dict[str, Block]:
-    """Tables of the constant forces: those of the load case that gives the static load, as weight acts in all others.
+    """Tables of the constant forces of the load case with the static load, which act in all load cases.
 
-    Where load cases have other forces, this is told.
+    If forces differ between load cases, this is reported.
     """
     static = max(loads, key=lambda one: abs(one.torques.get(ends.input, 0.0)))
     blocks = {}
@@ -274,12 +278,12 @@ def force_blocks(loads: Sequence[Loads], ends: Ends, notes: Notes) -> dict[str, 
 
 
 def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: float) -> dict[str, Block]:
-    """Tables of the load cases: each at its speed with balanced torques, and a run-up to the fastest.
+    """Tables of the load cases, each at its speed with balanced torques, and of a run-up to the highest speed.
 
     Parameters
     ----------
     static : torque of the static state at the input, N m
-    ratio : speed of the output over that of the input
+    ratio : speed ratio output / input
     """
     blocks = {}
     fastest = 0.0
@@ -329,15 +333,15 @@ def _rounded(torque: float) -> float:
     return float(f"{torque:.8g}") + 0.0
 
 
-# -- loads over the life, and what withstands them -----------------------------------------------------------
+# -- life loads and strength ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class LifeLoads:
-    """Loads of a life as a table, and the sections of the gearbox file on them."""
+    """Life loads as a table, and the corresponding sections of the gearbox file."""
 
     spectrum: str
-    """Text of the table `SPECTRUM`, which lies beside the gearbox file; empty where the file tells too little."""
+    """Text of the table `SPECTRUM` in the folder of the gearbox file; empty if the file has insufficient data."""
     blocks: Mapping[str, Block]
     """Sections by name."""
 
@@ -345,12 +349,12 @@ class LifeLoads:
 def life_blocks(
     model: Model, loads: Sequence[Loads], ends: Ends, ratio: float, gears: Mapping[str, tuple[Component, bool]]
 ) -> LifeLoads:
-    """Sections on service, loads and rating, as far as the file has what `life` needs.
+    """Sections on operation, loads and rating, as far as the file has the data that `life` requires.
 
     Parameters
     ----------
-    ratio : speed of the output over that of the input
-    gears : gears by name, and whether their teeth bend both ways
+    ratio : speed ratio output / input
+    gears : gears by name, and whether their teeth are loaded in reversed bending
     """
     rated = max(loads, key=lambda one: abs(one.torques.get(ends.input, 0.0)))
     speed = abs(_input_speed(rated, ends, ratio))
@@ -358,6 +362,9 @@ def life_blocks(
     if speed:
         source = "rotational_speed at the torque of the static state"
         blocks["operation"] = Block("", {"rated_speed_rpm": read(tidy(speed), source)})
+    lubricant = _lubricant(model)
+    if lubricant is not None:
+        blocks["lubricant"] = lubricant
     rows = _spectrum(model, loads, ends, ratio)
     if rows is None:
         return LifeLoads("", blocks)
@@ -367,15 +374,13 @@ def life_blocks(
     source_block = Block("", {"file": file, "hours_per_year": assumed(HOURS_PER_YEAR, "always active")})
     blocks["loads"] = Block("", of_life, {"sources.load_spectrum": source_block})
     blocks["rating"] = _rating(model, gears)
-    lubricant = _lubricant(model)
     if lubricant is not None:
-        blocks["lubricant"] = lubricant
         del blocks["rating"].entries["viscosity_40_mm2_per_s"]
     return LifeLoads("torque_N_m,speed_rpm,hours\n" + "".join(lines), blocks)
 
 
 def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) -> tuple[str, Entry, list[str]] | None:
-    """Body that is loaded, years, and lines of torque, speed and hours; None where the file does not tell them."""
+    """Return the loaded body, years, and rows of torque, speed and hours; None if the file has insufficient data."""
     body = next((end for end in (ends.input, ends.output) if all(load.torques.get(end) for load in loads)), None)
     shares = [100.0] if len(loads) == 1 else [load.share or 0.0 for load in loads]
     speeds = [_input_speed(load, ends, ratio) * (ratio if body == ends.output else 1.0) for load in loads]
@@ -394,24 +399,33 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
 
 
 def _lubricant(model: Model) -> Block | None:
-    """Section on the oil where the file gives its viscosity at both temperatures: of several the thinnest."""
+    """Section on the oil if the file specifies its viscosity at both temperatures; for several oils, the thinnest."""
     oils = {}
     for oil in model.of_type("lubricant"):
         cold, hot = (oil.quantity(f"viscosity_at_{t}_degree_celsius", "mm^2 / s") for t in (40, 100))
         if cold and hot and hot < cold:
-            oils[cold] = hot
+            oils[cold] = hot, oil.quantity("density_at_15_degree_celsius", "kg / m^3")
     if not oils:
         return None
     cold = min(oils)
+    hot, density = oils[cold]
     entries = {
         "viscosity_40_mm2_per_s": read(tidy(cold), "viscosity_at_40_degree_celsius of the lubricant"),
-        "viscosity_100_mm2_per_s": read(tidy(oils[cold]), "viscosity_at_100_degree_celsius"),
+        "viscosity_100_mm2_per_s": read(tidy(hot), "viscosity_at_100_degree_celsius"),
     }
+    if density and DENSITIES[0] <= density <= DENSITIES[1]:
+        entries["density_15_kg_per_m3"] = read(tidy(density), "density_at_15_degree_celsius")
+    casings = model.of_type("gear_casing")
+    stated = [_changed(casings, changes) for changes in ({}, *(case.changes for case in model.load_cases))]
+    temperatures = [casing.quantity("temperature_lubricant", "C") for parts in stated for casing in parts]
+    hottest = max((t for t in temperatures if t is not None), default=math.nan)
+    if TEMPERATURES[0] <= hottest <= TEMPERATURES[1]:
+        entries["temperature_C"] = read(tidy(hottest), "temperature_lubricant of the casing (hottest load case)")
     return Block("", entries)
 
 
 def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
-    """Tell what gears withstand by their materials, and the oil; gears without both endurance limits are not rated."""
+    """Section on the rating: strength of gears by their materials, unless a limit is missing, and viscosity."""
     viscosities = [
         one for oil in model.of_type("lubricant") if (one := oil.quantity("viscosity_at_40_degree_celsius", "mm^2 / s"))
     ]
@@ -437,7 +451,7 @@ def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
 
 
 def _strength(material: Component | None, parts: Sequence[Component], both_ways: bool) -> Block | None:
-    """Tell what a gear withstands; None without both of its endurance limits. `parts` are the gear and its flank."""
+    """Strength of a gear; None without both of its endurance limits. `parts` are the gear and its flank."""
     limits = {
         ours: material.quantity(key, "MPa") if material else None
         for ours, key in (("sigma_H_lim_MPa", "endurance_limit_flank"), ("sigma_F_lim_MPa", "endurance_limit_root"))
@@ -460,13 +474,13 @@ def _strength(material: Component | None, parts: Sequence[Component], both_ways:
 
 
 def _roughnesses(parts: Sequence[Component]) -> dict[str, Entry]:
-    """Roughness of flanks and roots: Rz where the file gives it, else from Ra; of roots six times as much."""
+    """Roughness of flanks and roots: Rz if specified, else from Ra, for roots as six times Ra."""
     entries: dict[str, Entry] = {}
     for ours, keys, factor in ROUGHNESSES:
         stated = next(((key, one) for key in keys for part in parts if (one := part.quantity(key, "mum"))), None)
         if stated is not None and ROUGHNESS_RANGE[0] <= factor * stated[1] <= ROUGHNESS_RANGE[1]:
             entries.setdefault(ours, read(tidy(factor * stated[1]), stated[0]))
-    if "roughness_Ra_um" in entries:  # as before; a file that gives both means the same by them
+    if "roughness_Ra_um" in entries:  # unchanged priority; a file that specifies both means the same surface
         entries.pop("roughness_Rz_um", None)
     elif "roughness_Rz_um" not in entries:
         entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "not in the file")

@@ -1,4 +1,4 @@
-"""Stages of a REXS file as gear pairs: profile shifts that follow from centre distances, and what must fit."""
+"""Stages of a REXS file as gear pairs: profile shifts that follow from centre distances, and consistency checks."""
 
 from __future__ import annotations
 
@@ -22,45 +22,47 @@ from fe_ste.geometry.involute import PinionCutter, involute
 from fe_ste.geometry.pair_relations import UncheckedPair
 
 SHIFT_TOLERANCE = 1e-3
-"""Largest difference of the sum of profile shifts from what the centre distance asks for: digits of a file."""
+"""Largest difference between the sum of profile shifts and the value from the centre distance; covers rounding in
+files.
+"""
 RACK_TOLERANCE = 1e-6
 """Largest relative difference of modules and pressure angles of one rack."""
 PITCH_TOLERANCE = 2e-4
-"""Largest relative difference of base pitches that are one, in files that give four digits."""
+"""Largest relative difference of equal base pitches, in files with four digits."""
 PLACE_TOLERANCE = 0.02
-"""Largest difference of a centre distance and the positions of the gears, mm."""
+"""Largest difference between a centre distance and the positions of the gears, mm."""
 MARGIN = 1e-4
-"""Rounding allowed for where a tool or a tip is replaced, in normal modules."""
+"""Allowance for rounding if a tool or a tip is replaced, in normal modules."""
 FORM_TOLERANCE = 1e-3
-"""Difference of form diameters that says nothing, in normal modules."""
+"""Difference of form diameters that is neglected, in normal modules."""
 CURVE_SAMPLES = 2001
-"""Points of the curve that the rounded tip of a tool cuts."""
+"""Number of points of the curve that the rounded tip of a tool cuts."""
 
 
 @dataclass(frozen=True)
 class Stage:
-    """Two gears in mesh: the pinion is the smaller, against a ring the external one."""
+    """Two meshing gears; the pinion is the smaller gear, or the external one if the other is a ring gear."""
 
     part: Component
-    """The first of the stages that are alike, one for each planet."""
+    """First of the equal stages, one of which exists for each planet."""
     pinion: int
     gear: int
-    """Numbers of the gears' components."""
+    """Centre distance, mm: the specified one, or that of the positions, according to the rules of the import."""
     distance: Entry
-    """Centre distance, mm; that of the positions where these do not count."""
+    """Centre distance, mm; that of the positions, or the selected one if they differ."""
     apart: float
-    """Distance of the axes as they stand, mm."""
+    """Distance of the axes from their positions, mm."""
     common_face: Entry | None = None
-    """Face width that the gears share, where that is less than the narrower face, mm."""
+    """Common face width of the gears if less than the narrower face width, mm."""
 
 
 def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothing], notes: Notes) -> Entry:
-    """Centre distance of a stage whose gears stand so far apart (mm), by the rules of the import.
+    """Centre distance of a stage with a given distance of the axes (mm), according to the rules of the import.
 
     Raises
     ------
     RexsError
-        The file says two different distances, and neither profile shifts nor rules tell which one counts.
+        The file has two different distances, and neither profile shifts nor rules decide between them.
     """
     stated = stage.quantity("center_distance", "mm")
     if apart <= PLACE_TOLERANCE:
@@ -92,7 +94,7 @@ def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothi
 def _confirmed(
     pair: tuple[Toothing, Toothing], stated: float, apart: float
 ) -> Literal["agreeing", "positions", "file"]:
-    """Tell which of two distances the profile shifts of both gears agree with: one alone, or none."""
+    """Return which of two distances agrees with the profile shifts of both gears; "agreeing" for both or neither."""
     pinion, gear = pair
     if pinion.shift is None or gear.shift is None:
         return "agreeing"
@@ -107,12 +109,12 @@ def _confirmed(
 
 
 def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
-    """Profile shifts that leave no backlash at a centre distance (mm), see `fe_ste.geometry.pair_relations.shift_sum`.
+    """Sum of profile shifts for zero backlash at a distance (mm), see `fe_ste.geometry.pair_relations.shift_sum`.
 
     Raises
     ------
     RexsError
-        No working pressure angle belongs to the distance.
+        No working pressure angle exists for the distance.
     """
     total = pair_relations.shift_sum(unchecked("", pinion), unchecked("", gear), MM * distance)
     if total is None:
@@ -123,7 +125,7 @@ def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
 
 
 def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
-    """Complete the profile shifts: a file may give one of a pair, or none, and leave the rest to the centre distance.
+    """Complete the profile shifts that a file omits for one or both gears of a pair, from the centre distance.
 
     Raises
     ------
@@ -146,7 +148,7 @@ def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: N
 
 
 def _reopened(gears: Mapping[int, Toothing], stages: Sequence[Stage], numbers: Sequence[int]) -> dict[int, Toothing]:
-    """Give every gear a profile shift, some gears one that follows from their stages."""
+    """Give every gear a profile shift; those of the listed gears are derived from their stages."""
     open_shifts = {number: dataclasses.replace(gears[number], shift=None) for number in numbers}
     return _solved({**gears, **open_shifts}, stages)
 
@@ -154,10 +156,10 @@ def _reopened(gears: Mapping[int, Toothing], stages: Sequence[Stage], numbers: S
 def _zeros_with_followers(
     gears: Mapping[int, Toothing], stages: Sequence[Stage], wrong: Sequence[Stage], notes: Notes
 ) -> list[int]:
-    """Gears with a shift of zero in stages that contradict it, and mates that follow, where the file leaves the choice.
+    """Gears with a shift of zero in contradictory stages, and dependent mating gears, if the rules permit replacement.
 
-    A planet of shift zero may agree with its ring and contradict its sun: its shift then follows from the sun, and that
-    of the ring from the planet.
+    The zero shift of a planet may agree with its ring gear and contradict its sun. Its shift then follows from the sun,
+    and that of the ring gear from the planet.
     """
     if notes.rules.shifts != "centre-distance":
         return []
@@ -187,13 +189,13 @@ def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int,
 
 
 def _contradicts_distance(gears: Mapping[int, Toothing], stage: Stage) -> bool:
-    """Tell whether the shifts of a stage contradict its centre distance."""
+    """Return whether the shifts of a stage contradict its centre distance."""
     stated, total = _shift_sums(gears, stage)
     return abs(stated - total) > SHIFT_TOLERANCE
 
 
 def _shift_sums(gears: Mapping[int, Toothing], stage: Stage) -> tuple[float, float]:
-    """Sum of the shifts as they are, and that which the centre distance asks for."""
+    """Sum of the existing shifts, and the sum that the centre distance requires."""
     pinion = gears[stage.pinion]
     gear = gears[stage.gear]
     assert pinion.shift is not None and gear.shift is not None
@@ -204,9 +206,10 @@ def _shift_sums(gears: Mapping[int, Toothing], stage: Stage) -> tuple[float, flo
 def _replaceable(
     gears: Mapping[int, Toothing], stages: Sequence[Stage], wrong: Sequence[Stage], notes: Notes
 ) -> list[int]:
-    """Gears whose shift may be none at all: zeros that fit to none of their stages, one in each of these.
+    """Gears whose shift of zero may mean no value: zeros that contradict all of their stages, one in each of these.
 
-    Programs write 0 for a shift that they derive. Where both gears of a stage have one, or neither, the rules decide.
+    Programs write 0 for a shift that they derive. If both gears of a stage have such a zero, or neither, the rules
+    decide.
     """
     found: list[int] = []
     for stage in wrong:
@@ -233,7 +236,7 @@ def _given(gears: Mapping[int, Toothing], stage: Stage) -> bool:
 
 
 def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
-    """Give both gears of a stage a shift; where neither has one the gear gets none and the pinion all."""
+    """Give both gears of a stage a shift; if neither has one, the gear gets zero and the pinion the whole sum."""
     pinion = gears[stage.pinion]
     gear = gears[stage.gear]
     sign = -1.0 if gear.internal else 1.0
@@ -265,10 +268,10 @@ def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> 
 
 
 def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
-    """Describe gears by the rack of their mates, where theirs is another one with the same base pitch.
+    """Describe gears by the rack of their mating gears if their own is a different one with the same base pitch.
 
-    Involutes mesh if their base pitches are equal, whatever racks they were cut with. Base circle, base helix and tooth
-    thickness stay, and so do diameters; the fillet is that of the other rack, which differs a little.
+    Involutes mesh if their base pitches are equal, even if they were cut with different racks. Base circle, base helix,
+    tooth thickness and diameters are unchanged. The fillet is that of the other rack, which differs slightly.
     """
     same = dict(gears)
     open_stages = list(stages)
@@ -308,7 +311,7 @@ def _have_one_base_pitch(toothing: Toothing, other: Toothing) -> bool:
 
 
 def _relative_to_mating_rack(mate: Toothing, gear: Toothing) -> Toothing:
-    """Describe a gear by the rack of its mate."""
+    """Describe a gear by the rack of its mating gear."""
     before = unchecked("", gear)
     angle = math.radians(mate.pressure_angle.value)
     sine = math.sin(before.helix_angle) * math.cos(before.normal_pressure_angle) / math.cos(angle)
@@ -346,7 +349,7 @@ def _relative_to_mating_rack(mate: Toothing, gear: Toothing) -> Toothing:
 
 
 def unchecked(name: str, gear: Toothing) -> GearInputs:
-    """Build the gear with the relations of its geometry."""
+    """Build the gear with its geometric relations."""
     plain = GearInputs(
         name=name,
         teeth=gear.teeth,
@@ -370,7 +373,7 @@ def unchecked(name: str, gear: Toothing) -> GearInputs:
 
 
 def _cutter(gear: Toothing) -> PinionCutter | None:
-    """Build the cutter of a ring."""
+    """Build the cutter of a ring gear."""
     if gear.cutter is None:
         return None
     given = gear.cutter.value
@@ -383,7 +386,7 @@ def _cutter(gear: Toothing) -> PinionCutter | None:
 
 @contextmanager
 def told_if_impossible(*gears: Toothing) -> Iterator[None]:
-    """Tell numbers of gears that no geometry follows from: their relations have no solution there."""
+    """Convert errors of geometric relations without a solution to errors that name the gears."""
     try:
         yield
     except RexsError:
@@ -396,7 +399,7 @@ def told_if_impossible(*gears: Toothing) -> Iterator[None]:
 
 
 def with_possible_cutter(gear: Toothing, notes: Notes) -> Toothing:
-    """Leave out a cutter that cannot make the ring as the file describes it, and say why."""
+    """Remove a cutter that cannot produce the specified ring gear, and record the reason."""
     if gear.cutter is None:
         return gear
     made = unchecked("", gear)
@@ -410,7 +413,7 @@ def with_possible_cutter(gear: Toothing, notes: Notes) -> Toothing:
 
 
 def with_fitting_tool(gear: Toothing, notes: Notes) -> Toothing:
-    """Let the corner of the tool be as round as fits on it: at large pressure angles that is less than usual."""
+    """Limit the corner radius of the tool to the largest possible one; large pressure angles require this."""
     made = unchecked("", gear)
     if gear.internal or made.rack_tip_half_land >= 0.0:
         return gear
@@ -427,7 +430,7 @@ def with_fitting_tool(gear: Toothing, notes: Notes) -> Toothing:
 
 
 def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
-    """Keep a root form diameter where it ends the flank before the fillet does; undercut ends it by itself."""
+    """Keep a root form diameter if it ends the flank before the fillet does; undercut is computed separately."""
     bare = unchecked("", dataclasses.replace(gear, root_form=None))
     if bare.is_undercut:
         notes.checked.append(f"{gear.part}: undercut by its tool; root form diameter {2e3 * bare.form_radius:.4f} mm")
@@ -446,10 +449,10 @@ def with_form_circles(gear: Toothing, notes: Notes) -> Toothing:
 
 
 def _flank_end(gear: Toothing, bare: GearInputs) -> Entry | None:
-    """Root form diameter (mm) that the tools leave: none where one tool without protuberance makes flank and root.
+    """Root form diameter (mm) that the tools produce; None if one tool without protuberance makes flank and root.
 
-    The tool that comes last finishes the flank as far as its straight part reaches. A tool before it that reaches
-    deeper ends the flank where its protuberance, less what it leaves for finishing, cuts into it.
+    The last tool finishes the flank down to the end of its straight part. An earlier tool that cuts deeper ends the
+    flank where its protuberance, minus its machining allowance, cuts into it.
     """
     if not gear.tools:
         return None
@@ -471,7 +474,7 @@ def _flank_end(gear: Toothing, bare: GearInputs) -> Entry | None:
 
 
 def _generated_radius(gear: GearInputs, depth: float) -> float:
-    """Radius down to which a rack that is straight to a depth in normal modules generates the flank, m."""
+    """Radius (m) down to which a rack that is straight to a depth in normal modules generates the flank."""
     angle = gear.transverse_pressure_angle
     below = (depth - gear.profile_shift) * gear.normal_module
     roll = gear.base_radius * math.tan(angle) - below / math.sin(angle)
@@ -479,16 +482,16 @@ def _generated_radius(gear: GearInputs, depth: float) -> float:
 
 
 def _cut_by_protuberance(gear: GearInputs, tool: Tool, relief: float) -> float:
-    """Largest radius at which protuberance and rounded tip of a tool cut into the finished flank, m; 0 for nowhere.
+    """Largest radius at which the protuberance and tip rounding of a tool cut into the finished flank, m; 0 if none.
 
-    `relief` is how far the protuberance reaches beyond the line of the finished flank, in normal modules. A point of
+    `relief` is the distance of the protuberance beyond the line of the finished flank, in normal modules. A point of
     the tool cuts where its normal passes through the pitch point, as in `fe_ste.geometry.involute.RackTipCut`.
     """
     module = gear.normal_module
     angle = tool.protuberance_angle
     rounding = tool.tip_radius * module
     middle = gear.rack_tip_half_land + relief * module / math.cos(gear.normal_pressure_angle)
-    # The straight part, from the rounding to where it meets the line of the flank.
+    # The straight part extends from the rounding to the intersection with the line of the flank.
     beyond = (rounding - relief * module) / math.cos(gear.normal_pressure_angle) - rounding / math.cos(angle)
     height = beyond / (math.tan(angle) - math.tan(gear.normal_pressure_angle)) + rounding * math.sin(angle)
     along = np.linspace(max(height, 0.0) / math.cos(angle), 0.0, CURVE_SAMPLES)
@@ -508,9 +511,9 @@ def _cut_by_protuberance(gear: GearInputs, tool: Tool, relief: float) -> float:
 
 
 def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
-    """Move back tips that would touch their mate below its form circle, where it has no involute.
+    """Shorten tips that would contact the mating gear below its root form diameter, where it has no involute.
 
-    A tip that the file gives is left alone as long as it does not; one that it does not give keeps a clearance.
+    A specified tip diameter is changed only in this case; an unspecified one also gets a clearance.
     """
     cleared = dict(gears)
     for stage in stages:
@@ -530,7 +533,7 @@ def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: 
 
 
 def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float | None:
-    """Tip diameter (mm) at which a gear keeps clear of its mate's form circle; None if it does so already."""
+    """Tip diameter (mm) of a gear that clears the form diameter of its mating gear; None if it already does."""
     pinion = unchecked("pinion", gears[stage.pinion])
     gear = unchecked("gear", gears[stage.gear])
     pair = UncheckedPair(name="", pinion=pinion, gear=gear, centre_distance=MM * stage.distance.value)
@@ -545,7 +548,7 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
     diameter = 1e3 * pair_relations.clear_tip_diameter(pair, tip, margin)
     if pair_relations.root_margin(pair, tip) >= margin:
         return None
-    # Rounded to the side that clears.
+    # Rounded towards more clearance.
     return round((math.floor if tip.outward > 0 else math.ceil)(1e4 * diameter) / 1e4, 4)
 
 
@@ -565,13 +568,13 @@ MODIFICATIONS = (
     "topographical_modification",
 )
 UNSIGNED = {"helix_slope": "helix_slope_um", "profile_slope": "profile_slope_um", "profile_twist": "twist_um"}
-"""Modifications by the attribute of their amount, and the key that it would be.
+"""Modifications with undefined sign, by the attribute of their amount, and the corresponding key.
 
-Database and schema of REXS (1.2 to 2.0.0) allow both signs and call it an amount; which end of the flank a positive one
-takes material off, no public text says. The wrong sign would be worse than none.
+Database and schema of REXS (1.2 to 2.0.0) permit both signs and call it an amount. No public text defines at which end
+of the flank a positive value removes material. A wrong sign would be worse than no value.
 """
 SHAPES = {"linear": "linear", "parabolic": "parabolic", "circular": "parabolic"}
-"""Shapes of a relief, REXS to ours; a circle and its parabola differ by the square of depth over length."""
+"""Shapes of a relief, REXS to exugear; a circle and its parabola differ by the square of depth over length."""
 
 
 def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Entry]:
@@ -604,7 +607,7 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
 def _blanks(
     gear: Toothing, left: dict[str, Component], right: dict[str, Component], notes: Notes
 ) -> Iterator[tuple[str, Entry]]:
-    """Slopes that the file gives, as zeros to be set: their signs are not known. Those of zero need no word."""
+    """Yield slopes of the file as zeros to be completed, since their signs are not defined; skip zero slopes."""
     for kind, key in UNSIGNED.items():
         part = left.get(kind) or right.get(kind)
         amounts = [one[kind].quantity(kind, "mm") for one in (left, right) if kind in one]
@@ -642,7 +645,7 @@ def _entries(gear: Toothing, part: Component, notes: Notes) -> Iterator[tuple[st
 
 
 def _lead_crowning(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry]]:
-    """Crowning along the face, scaled to its ends: it grows with the square of the distance from the middle."""
+    """Lead crowning scaled to the ends of the face, with the square of the distance from the middle."""
     sides = ("datum_face", "non_datum_face")
     amounts = [part.quantity(f"helix_crowning_amount_{side}", "mm") for side in sides]
     quantities = [part.quantity(f"coordinate_where_helix_crowning_is_specified_{side}", "mm") for side in sides]
@@ -656,7 +659,7 @@ def _lead_crowning(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry
 
 
 def _relief(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry]]:
-    """Relief from its datum diameter on, scaled to the end of the flank where its depth is stated elsewhere."""
+    """Relief from its datum diameter, scaled to the end of the flank if its depth is specified elsewhere."""
     kind = part.type.removesuffix("_relief")
     depth, datum = (part.quantity(f"{part.type}_{key}", "mm") for key in ("depth", "datum_diameter"))
     shape = SHAPES.get(part.text("shape_of_relief"))
@@ -676,5 +679,5 @@ def _relief(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry]]:
 
 
 def _um(length: float) -> float:
-    """Millimetres to micrometres, without the digits that arithmetic made."""
+    """Convert millimetres to micrometres without round-off digits."""
     return tidy(round(1e3 * length, 6))

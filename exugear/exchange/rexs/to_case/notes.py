@@ -1,4 +1,4 @@
-"""Values of the gearbox file with their sources, how they are written, and what an import notes beside them."""
+"""Values of the gearbox file with their sources, their notation in TOML, and the notes of an import."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from fe_ste.tools.display import ReprMixin
 ASSUMED = "A"
 DERIVED = "D"
 COMMENT_COLUMN = 44
-"""Column in which comments begin, where the value is not longer."""
+"""Column in which comments begin after short values."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A value of the gearbox file, and where it comes from."""
+    """A value of the gearbox file with its source."""
 
     value: Any
-    """As TOML has it."""
+    """Value in a type that TOML supports."""
     source: str = ""
-    """Component and attribute that give it; for one that is derived or assumed how."""
+    """Component and attribute of the value; for a derived or assumed value the reason."""
     kind: str = ""
-    """Empty as read, `DERIVED` or `ASSUMED`."""
+    """Empty for a value that was read, else `DERIVED` or `ASSUMED`."""
 
     @property
     def comment(self) -> str:
@@ -39,50 +39,51 @@ class Entry:
 
 
 def read(value: Any, source: str) -> Entry:
-    """Value that stands in the REXS file."""
+    """Value that was read from the REXS file."""
     return Entry(value, source)
 
 
 def derived(value: Any, source: str) -> Entry:
-    """Value that follows from what stands there."""
+    """Value that was derived from values of the REXS file."""
     return Entry(value, source, DERIVED)
 
 
 def assumed(value: Any, source: str) -> Entry:
-    """Value that the file does not give."""
+    """Value that is assumed because the file does not specify it."""
     return Entry(value, source, ASSUMED)
 
 
 @dataclass(frozen=True)
 class Rules:
-    """Which of two statements counts where a file contradicts itself."""
+    """Rules that decide between contradictory values of a file."""
 
     shifts: Literal["file", "centre-distance"] = "file"
-    """Profile shifts that do not fit to the centre distance: refused, or replaced by those that it asks for."""
+    """Profile shifts that contradict the centre distance: refused, or replaced by those that it requires."""
     distances: Literal["agreeing", "positions", "file"] = "agreeing"
-    """Centre distances unlike the positions of the gears: that with which the profile shifts agree, that of the
-    positions, or that of ``center_distance``, to which axes are moved."""
+    """Centre distances that contradict the positions of the gears: use that with which the profile shifts agree, that
+    of the positions, or that of ``center_distance``, to which axes are moved.
+    """
 
 
 @dataclass
 class Notes:
-    """Lines gathered on the way."""
+    """Notes collected during an import."""
 
     rules: Rules = Rules()
     faults: Faults = field(default_factory=Faults)
-    """Why the file cannot be imported."""
+    """Errors because of which the file cannot be imported."""
     changed: list[str] = field(default_factory=list)
-    """Values of the file that were replaced, and assumptions that matter."""
+    """Values of the file that were replaced, and important assumptions."""
     checked: list[str] = field(default_factory=list)
-    """Comparisons of what the file says twice."""
+    """Comparisons of values that the file contains twice."""
     lost: list[str] = field(default_factory=list)
-    """What acts on the gearbox, moves or holds in it and is left out: the first thing to tell."""
+    """Omitted content that loads, moves or supports the gearbox, which is reported first."""
     ignored: list[str] = field(default_factory=list)
-    """Other things that the file holds and the gearbox file does not."""
+    """Other content of the file that the gearbox file does not have."""
 
 
 def tidy(value: float) -> float:
-    """Return a number without the last digits, which arithmetic made; never minus zero.
+    """Return a number without round-off digits; never minus zero.
 
     Examples
     --------
@@ -93,12 +94,12 @@ def tidy(value: float) -> float:
 
 
 def needed(value: float | None, part: object, key: str) -> float:
-    """Return the value, or say that it is missing.
+    """Return a value, or raise an error if it is missing.
 
     Raises
     ------
     RexsError
-        There is none.
+        The value is None.
     """
     if value is None:
         raise RexsError(f"{part}: {key} is missing")
@@ -106,12 +107,12 @@ def needed(value: float | None, part: object, key: str) -> float:
 
 
 def within(value: float, part: object, key: str, low: float, high: float) -> float:
-    """Return the value, or say that no gear can have it.
+    """Return a value, or raise an error if it is impossible for a gear.
 
     Raises
     ------
     RexsError
-        It lies outside of low and high.
+        The value is below `low` or above `high`.
     """
     if not low <= value <= high:
         raise RexsError(f"{part}: {key} = {value:g} is impossible; expected {low:g} to {high:g}")
@@ -123,15 +124,15 @@ class Block:
     """Table of the gearbox file with its entries and the tables inside it."""
 
     comment: str = ""
-    """After its head: the component that it stands for."""
+    """Comment after its heading: the component from which it originates."""
     entries: dict[str, Entry] = field(default_factory=dict)
     blocks: dict[str, Block] = field(default_factory=dict)
     number: int = 0
-    """Of the component; 0 where nobody asks for it."""
+    """Number of the component; 0 if it is not needed."""
 
 
 def toml_text(head: Sequence[str], top: Mapping[str, Entry], groups: Sequence[tuple[str, Mapping[str, Block]]]) -> str:
-    """Gearbox file with comments.
+    """Text of the gearbox file with comments.
 
     Parameters
     ----------
@@ -170,7 +171,7 @@ def _with_comment(text: str, comment: str) -> str:
 
 
 def toml_value(value: Any) -> str:
-    """Write a value as TOML.
+    """Return a value in TOML notation.
 
     Examples
     --------
@@ -190,26 +191,26 @@ def toml_value(value: Any) -> str:
     return "[" + ", ".join(toml_value(entry) for entry in value) + "]"
 
 
-# Where components stand: positions and directions in the axes of the gearbox file, z along the shafts
+# Positions and directions of components in the axes of the gearbox file, z along the shafts
 
 PARALLEL = 1e-6
 """Largest sine of the angle between axes that count as parallel."""
 LONGEST_CHAIN = 100
-"""Most components placed by each other in a row."""
+"""Maximum number of components whose positions refer to each other in a chain."""
 TURNING = ("shaft", "cylindrical_gear", "ring_gear", "side_plate")
-"""Types whose u axis is an axis that something turns about."""
+"""Types of components whose u axis is an axis of rotation."""
 
 
 class Places(ReprMixin):
-    """Positions (mm) and senses of components.
+    """Positions (mm) and directions of components.
 
-    REXS places a component in the frame (u, v, w) of another, most often of the gear unit. Here x, y, z are the
-    gear unit's v, w, u where the shafts lie along its u, and turned so that z lies along them elsewhere.
+    REXS positions a component in the frame (u, v, w) of another, mostly of the gear unit. The axes x, y, z are the gear
+    unit's v, w, u if the shafts are parallel to its u. Otherwise they are rotated so that z is along the shafts.
 
     Raises
     ------
     RexsError
-        Axes that are not parallel, vectors that are not three numbers: all at once.
+        Axes are not parallel or vectors do not have three numbers; all such errors are reported together.
     """
 
     def __init__(self, model: Model) -> None:
@@ -233,12 +234,12 @@ class Places(ReprMixin):
         return f" along {np.round(self._axes[2], 3).tolist()}"
 
     def position(self, part: Component) -> tuple[float, float, float]:
-        """Origin of a component, mm: the left end of a shaft or plate, the middle of all else.
+        """Origin of a component, mm: the left end of a shaft or plate, the middle of all others.
 
         Raises
         ------
         RexsError
-            It has no position.
+            The component has no position.
         """
         if not part.given("support_vector"):
             raise RexsError(f"{part}: support_vector is missing, so its position is unknown")
@@ -249,7 +250,7 @@ class Places(ReprMixin):
         return tidy(round(x, 9)), tidy(round(y, 9)), tidy(round(z, 9))
 
     def move(self, parts: Iterable[Component], by: tuple[float, float]) -> None:
-        """Let components stand elsewhere by x and y, mm: where other statements of the file count more."""
+        """Move components by x and y, mm, if other values of the file have priority."""
         for part in parts:
             self._moved[part.number] = by
 
@@ -264,11 +265,11 @@ class Places(ReprMixin):
         return np.asarray((self._axes @ self._frame(part, 0)[1]).T)
 
     def turned(self, vector: Floats) -> Floats:
-        """Return a vector of the gear unit's axes in those of the gearbox file."""
+        """Transform a vector from the axes of the gear unit to those of the gearbox file."""
         return np.asarray(self._axes @ vector)
 
     def _outermost(self, parts: list[Component]) -> Floats:
-        """Axes u, v, w of the gear unit as columns; of the first part in a file without one."""
+        """Axes u, v, w of the gear unit as columns; those of the first part in a file without a gear unit."""
         first = [*self._model.of_type("gear_unit"), *parts][:1]
         if first:
             return self._frame(first[0], 0)[1]
@@ -294,7 +295,7 @@ class Places(ReprMixin):
 
 
 def _refuse_lost_vectors(model: Model) -> None:
-    """Refuse a file whose vectors are no vectors: some programs lost them all in writing JSON."""
+    """Raise an error for a file with invalid vectors; some programs lost all of them when writing JSON."""
     keys = ("support_vector", "u_axis_vector", "w_axis_vector")
     lost = [part for part in model.components.values() if any(part.has_lost_vector(key) for key in keys)]
     if lost:

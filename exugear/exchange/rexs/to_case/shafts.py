@@ -16,20 +16,20 @@ from exugear.gearbox.units import MM
 from fe_ste.geometry.cylinders import Tube, mass_properties
 
 STEEL = 7850.0
-"""Density assumed where the file gives none, kg/m3."""
+"""Density if the file has no value, kg/m3."""
 LEVELLED = 0.1
-"""Largest step of the diameter under a seat that is filled, over the diameter."""
+"""Largest diameter step under a seat that is filled, relative to the diameter."""
 OVERHANG = 0.2
-"""Part of a seat's width by which it may reach beyond the end of its shaft, which is lengthened then."""
+"""Largest overhang of a seat beyond the end of its shaft, relative to its width; the shaft is then lengthened."""
 TOUCHING = 1e-4
-"""Largest gap or overlap of sections that follow each other, mm."""
+"""Largest gap or overlap of adjacent sections, mm."""
 
 
 @dataclass(frozen=True)
 class Cylinder:
     """Hollow cylinder or cone about the z axis, mm and kg/m3, `aside` from the axis of its body (mm).
 
-    A cone has diameters at its end that are others than where it begins.
+    For a cone, the diameters at its end differ from those at its beginning.
     """
 
     start: float
@@ -43,7 +43,7 @@ class Cylinder:
 
     @property
     def tube(self) -> Tube:
-        """The same in m."""
+        """The same piece in m."""
         outer_end, inner_end = (None if end is None else MM * end for end in (self.outer_end, self.inner_end))
         return Tube(
             start=MM * self.start,
@@ -73,11 +73,11 @@ class Cylinder:
 
     @property
     def is_cone(self) -> bool:
-        """Whether a diameter changes along it."""
+        """Whether a diameter changes along the piece."""
         return self.outer_end is not None or self.inner_end is not None
 
     def part(self, start: float, stop: float) -> Cylinder:
-        """Return what lies between two places, mm."""
+        """Return the part between two axial positions, mm."""
         if not self.is_cone:
             return dataclasses.replace(self, start=start, length=tidy(stop - start))
         shares = [(place - self.start) / self.length for place in (start, stop)]
@@ -90,7 +90,7 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Inertia:
-    """Mass (kg), moments about the centre of mass (kg m2) and its place (mm)."""
+    """Mass (kg), moments of inertia about the centre of mass (kg m2) and its axial position (mm)."""
 
     mass: float
     axial: float
@@ -99,7 +99,7 @@ class Inertia:
 
 
 def inertia_of(cylinders: Iterable[Cylinder]) -> Inertia:
-    """Inertia of cylinders together; what lies aside is taken as spread evenly around the axis.
+    """Total inertia of cylinders; eccentric ones are treated as evenly distributed around the axis.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def sections_of(model: Model, places: Places, shaft: Component, body: Body, note
     Raises
     ------
     RexsError
-        A section without length or diameter.
+        A section has no length or diameter.
     """
     owned = [
         one
@@ -147,7 +147,7 @@ _Ends = tuple[float, float | None]
 
 
 def _pieces(section: Component, count: int, notes: Notes) -> list[tuple[float, float, _Ends, _Ends]]:
-    """(start, length, outer, inner) of a section along u, mm: diameters at its beginning, of a cone at its end, too."""
+    """(start, length, outer, inner) of pieces of a section along u, mm; diameters at the beginning and end."""
     if not section.attributes:
         notes.ignored.append(f"{section}: has no values")
         return []
@@ -170,7 +170,7 @@ def _pieces(section: Component, count: int, notes: Notes) -> list[tuple[float, f
 
 
 def _density(model: Model, part: Component, notes: Notes) -> float:
-    """Density of a component, kg/m3; of none if its material stands for 'rigid' and has no density."""
+    """Density of a component, kg/m3; zero if its material represents a rigid body and has no density."""
     material = material_of(model, part)
     density = material.quantity("density", "kg / m^3") if material else None
     if density is not None:
@@ -185,7 +185,7 @@ def _density(model: Model, part: Component, notes: Notes) -> float:
 
 
 def seat_diameter(sections: Sequence[Cylinder], z: float, width: float, internal: bool) -> float | None:
-    """Diameter that a gear sits on, mm: the largest of the shaft under it, of a ring the bore around it."""
+    """Seat diameter of a gear, mm: the largest shaft diameter under it; for a ring gear the bore around it."""
     low = z - 0.5 * width
     high = z + 0.5 * width
     under = [
@@ -221,11 +221,11 @@ def plate(model: Model, places: Places, part: Component, notes: Notes) -> Cylind
 
 
 def levelled(sections: Sequence[Cylinder], seats: Iterable[tuple[str, float, float]], notes: Notes) -> list[Cylinder]:
-    """Fill grooves and small shoulders under seats, which the elastic shaft wants on one cylinder or cone.
+    """Fill grooves and small shoulders under seats, because a seat of a flexible shaft must be one cylinder or cone.
 
     Parameters
     ----------
-    seats : name, middle and width of what sits there, mm
+    seats : name, middle and width of each seat, mm
     """
     pieces = list(sections)
     for name, z, width in seats:
@@ -245,7 +245,7 @@ def levelled(sections: Sequence[Cylinder], seats: Iterable[tuple[str, float, flo
 
 
 def _lengthened(pieces: list[Cylinder], name: str, seat: tuple[float, float], notes: Notes) -> list[Cylinder]:
-    """Let the ends of a shaft reach as far as a seat that lies a little beyond them."""
+    """Lengthen the ends of a shaft to include a seat slightly beyond them."""
     first = pieces[0]
     last = pieces[-1]
     most = OVERHANG * (seat[1] - seat[0])
@@ -263,7 +263,7 @@ def _lengthened(pieces: list[Cylinder], name: str, seat: tuple[float, float], no
 
 
 def _cut(piece: Cylinder, places: Sequence[float]) -> Iterator[Cylinder]:
-    """Cut a piece at the places that lie inside it."""
+    """Cut a piece at those positions that are inside it."""
     end = piece.start + piece.length
     inside = [place for place in places if piece.start + TOUCHING < place < end - TOUCHING]
     for start, stop in itertools.pairwise([piece.start, *inside, end]):
@@ -271,7 +271,7 @@ def _cut(piece: Cylinder, places: Sequence[float]) -> Iterator[Cylinder]:
 
 
 def _merged(pieces: Sequence[Cylinder]) -> list[Cylinder]:
-    """Join neighbours of equal diameters."""
+    """Join adjacent pieces of equal diameters."""
     joined: list[Cylinder] = []
     for piece in pieces:
         last = joined[-1] if joined else None
@@ -284,6 +284,6 @@ def _merged(pieces: Sequence[Cylinder]) -> list[Cylinder]:
 
 
 def is_continuous(sections: Sequence[Cylinder]) -> bool:
-    """Tell whether sections make one piece, each beginning where the last one ends."""
+    """Return whether sections form one piece, each beginning at the end of the previous one."""
     ends = itertools.pairwise(sections)
     return bool(sections) and all(abs(a.start + a.length - b.start) <= TOUCHING for a, b in ends)

@@ -1,4 +1,4 @@
-"""Bearings and couplings of a REXS file as those of the gearbox file, and the ideal joints of the variant `rigid`."""
+"""Bearings and couplings of a REXS file as those of the gearbox file, and ideal joints of the variant `rigid`."""
 
 from __future__ import annotations
 
@@ -38,23 +38,23 @@ ROLLING_TYPES = {
     "radial_spherical_roller_bearing": "spherical_roller",
     "radial_tapered_roller_bearing": "tapered_roller",
 }
-"""Types of rolling bearings, REXS to ours."""
+"""Types of rolling bearings, REXS to exugear."""
 CYLINDERS = TYPES_OF_KEYS["ribs"][0]
-"""Types whose rollers hold a shaft along the axis by ribs alone."""
+"""Types of roller bearings that locate a shaft axially only by ribs."""
 ARRANGED = TYPES_OF_KEYS["axial_preload_um"][0]
-"""Types of which two rows stand in X, O or tandem."""
+"""Types whose two rows are arranged in X, O or tandem."""
 GROOVE_RATIOS, OSCULATIONS = (0.501, 0.6), (0.5, 0.9999)
-"""Ratios of radii that rolling bearings can have."""
+"""Possible ratios of groove radii and osculations of rolling bearings."""
 LEAST_RADIUS = 0.03
-"""Radius (m) that stands for that of gears where two coupled bodies have none."""
+"""Radius (m) used in place of a gear radius if two coupled bodies have no gears."""
 PLACE_TOLERANCE = 0.02
-"""Largest difference of two statements on a place that needs no word, mm."""
+"""Largest difference of two values of a position that is not reported, mm."""
 RIGID = {"radial_stiffness": 1e10, "axial_stiffness": 1e10, "bending_stiffness": 1e7}
-"""What stands for rigid: stiffer than teeth and bearings, and no more, for the step's sake."""
+"""Stiffness used for rigid: above that of teeth and bearings, but not higher, because of the time step."""
 
 
 def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -> dict[str, Block]:
-    """Tables of all bearings by name, and of connections that hold without joining."""
+    """Tables of all bearings by name, and of connections that support a body without joining it rigidly."""
     blocks: dict[str, Block] = {}
     for part in model.of_type(*BEARINGS, *PLAIN_BEARINGS):
         with notes.faults.gathered():
@@ -71,7 +71,7 @@ def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -
 
 
 def coupling_blocks(model: Model, bodies: Bodies, bearings: Mapping[str, Block]) -> dict[str, Block]:
-    """Tables of the connections that turn two bodies together, by name; `bearings` hold them in other directions."""
+    """Tables of the connections that couple the rotation of two bodies, by name; `bearings` act in other directions."""
     blocks: dict[str, Block] = {}
     seats = {block.number: name for name, block in bearings.items()}
     for part, body, on in _flexible_connections(model, bodies):
@@ -92,7 +92,7 @@ def coupling_blocks(model: Model, bodies: Bodies, bearings: Mapping[str, Block])
 
 
 def _stiff_torsion(*bodies: Body) -> float:
-    """Find what stands for rigid in torsion, N m/rad: at the largest reference circle as in other directions."""
+    """Torsional stiffness used for rigid, N m/rad: the rigid radial stiffness at the largest reference circle."""
     diameters = [
         (gear.whole("number_of_teeth") or 0) * (gear.quantity("normal_module", "mm") or 0.0)
         for body in bodies
@@ -121,7 +121,7 @@ def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[s
 
 
 def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Component, Body, Body]]:
-    """Couplings and fits between two bodies that are not one piece, one of equal planets."""
+    """Yield couplings and fits between two separate bodies, once for equal planets."""
     for part in model.of_type(*JOINING):
         both = ends(model, part)
         if both is None or is_one_piece(part) or not is_engaged(model, part):
@@ -138,7 +138,7 @@ def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, note
         raise RexsError(f"{part}: no relation 'side' defines the supported and the supporting body")
     inner, outer = (None if end.type == "gear_casing" else bodies.of_any(end) for end in both)
     if any(body is not None and bodies.of(end) is None for end, body in zip(both, (inner, outer), strict=True)):
-        return None  # of a planet that is like the first
+        return None  # on a planet equal to the first
     inner, outer = (None if body is not None and body.fixed else body for body in (inner, outer))
     if inner is outer:
         notes.lost.append(f"{part}: supports no rotating body, or both of its rings are on one body")
@@ -159,7 +159,7 @@ def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, note
 
 
 def _check_place(places: Places, part: Component, both: tuple[Component, Component], notes: Notes) -> None:
-    """Compare the place of a bearing with its coordinate on the shafts that it joins."""
+    """Compare the position of a bearing with its coordinate on the connected shafts."""
     for side, shaft in zip(("inner", "outer"), both, strict=True):
         along = part.quantity(f"u_coordinate_on_shaft_{side}_side", "mm")
         if along is None or shaft.type != "shaft" or not shaft.given("support_vector"):
@@ -181,7 +181,7 @@ def _placed(places: Places, part: Component, body: Body, on: Body | None, inside
 
 
 def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[str, Block]:
-    """Return the stiffness or catalogue of a bearing, or its designation alone."""
+    """Return the stiffness or catalogue data of a bearing, or only its designation."""
     if part.type == "concept_bearing":
         entries = _stiffness(part, notes)
         if not entries:
@@ -211,11 +211,11 @@ def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[st
 
 
 def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:
-    """Tell how two rows stand to each other, by the way that each holds the inner ring; empty where a row is silent.
+    """Arrangement of two rows, from the direction in which each locates the inner ring; empty if a row has no value.
 
-    Rows follow each other along the u axis of the shaft. A first row that holds a ring pushed against u, with a second
-    one that holds it along u, is an X: the pressure lines meet towards the middle. A shaft that points the other way
-    turns the order and both senses, so that X stays X.
+    The order of rows is along the u axis of the shaft. If the first row supports a ring pushed against u, and the
+    second one a ring pushed along u, the arrangement is X: the pressure lines converge towards the middle. For a shaft
+    of opposite direction the order and both directions are reversed, so that X remains X.
     """
     rows = _parts_of(model, part, "rolling_bearing_row")
     held = [row.text("axial_force_absorption_of_row") for row in rows]
@@ -239,7 +239,7 @@ def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:
 
 
 def _rib_stiffness(part: Component, catalogue: Mapping[str, Entry]) -> dict[str, Block]:
-    """Stiffness that the file gives to ribs of cylindrical rollers, beside the catalogue, which leaves that free."""
+    """Axial stiffness of the ribs of cylindrical rollers from the file, which catalogue data do not cover."""
     value = part.quantity("axial_stiffness", "N / m")
     if not value or catalogue["type"].value not in CYLINDERS or "ribs" in catalogue:
         return {}
@@ -253,7 +253,7 @@ def _axial_stiffness(value: float) -> Entry:
 
 
 def _sizes(part: Component, kind: str | None, notes: Notes) -> dict[str, Entry]:
-    """Boundary dimensions: those of the file, or those that its designation stands for; empty if neither tells."""
+    """Boundary dimensions from the file, or else from the designation; empty if neither defines them."""
     keys = {"inner_diameter": "bore_mm", "outer_diameter": "outer_diameter_mm", "width": "width_mm"}
     given = {ours: part.quantity(key, "mm") for key, ours in keys.items()}
     if all(given.values()):
@@ -281,7 +281,7 @@ def _catalogue(
     notes: Notes,
     arrangement: Mapping[str, Entry],
 ) -> dict[str, Entry]:
-    if arrangement:  # the catalogue section has the width of one of two bearings
+    if arrangement:  # the catalogue section has the width of one of the two bearings
         sizes = {**sizes, "width_mm": derived(tidy(0.5 * sizes["width_mm"].value), "width, for each of two rows")}
     entries = {
         "type": read(kind, f"bearing_type {part.text('bearing_type')}"),
@@ -322,7 +322,7 @@ def _catalogue(
 
 
 def _tell_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry], notes: Notes) -> None:
-    """Say which way a bearing holds the shaft, where the law of its type does not already."""
+    """Add the axial locating direction of a bearing, or a note if the model of its type locates in both directions."""
     absorbed = part.text("axial_force_absorption")
     if kind in TYPES_OF_KEYS["locates_towards"][0] and absorbed in ("positive", "negative"):
         towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
@@ -340,7 +340,7 @@ def _tell_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry
 
 
 def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
-    """Count and sizes of the rolling elements, as far as the file gives them; no more of them than fit."""
+    """Return number and dimensions of the rolling elements, as far as specified; at most as many as fit."""
     entries = {}
     count = row.whole("number_of_rolling_elements")
     if count:
@@ -365,7 +365,7 @@ def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str
 
 
 def _grooves(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
-    """Radii of grooves over the diameter of the balls, of barrels that of their outline over that of the raceway."""
+    """Groove radii divided by the ball diameter, or the profile radius of barrel rollers divided by the raceway's."""
     element = next(iter(_parts_of(model, row, "rolling_element")), None)
     radii = {ring: row.quantity(f"raceway_radius_of_{ring}_ring", "mm") for ring in ("inner", "outer")}
     entries: dict[str, Entry] = {}
@@ -409,12 +409,12 @@ def _parts_of(model: Model, owner: Component, kind: str) -> Sequence[Component]:
 
 
 def _was_rigid(part: Component) -> bool:
-    """Tell whether a connection is rigid in torsion: what it says nothing of is then rigid, too."""
+    """Return whether a connection is torsionally rigid; directions without a value then count as rigid, too."""
     return part.type in JOINING and is_rigid_in_torsion(part)
 
 
 def _stiffness(part: Component, notes: Notes) -> dict[str, Entry]:
-    """Isotropic stiffness of a concept bearing or coupling; what is meant as rigid gets a bound."""
+    """Isotropic stiffness of a concept bearing or coupling; values that mean rigid are limited."""
     entries = {}
     for key, (ours, unit, factor) in STIFFNESSES.items():
         value = part.quantity(key, unit)

@@ -1,4 +1,4 @@
-"""Gears as a REXS file gives them: one set of numbers for each gear, flanks and tool included."""
+"""Gears of a REXS file: one set of data for each gear, including flanks and tool."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, needed, r
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 
 PLAUSIBLE_TIP = (0.5, 2.0)
-"""Tip diameters over the reference diameter beyond which a tip diameter is taken as a placeholder."""
+"""Range of tip diameter divided by reference diameter outside of which a tip diameter counts as a placeholder."""
 THINNING = 0.02
-"""Tooth thinning assumed where the file gives none, in normal modules: half of a usual backlash."""
+"""Tooth thinning if the file has no value, in normal modules: half of a usual backlash."""
 LENGTHS, PRESSURE_ANGLES, HELIX_ANGLES = (1e-3, 1e5), (1.0, 45.0), (-60.0, 60.0)
-"""Modules and face widths (mm), pressure and helix angles (deg) that a cylindrical gear can have."""
+"""Possible modules and face widths (mm), pressure and helix angles (deg) of a cylindrical gear."""
 EQUAL = 1e-6
-"""Largest difference of numbers on equal flanks or planets."""
+"""Largest difference of equal values on flanks or planets."""
 LEAST_RADIUS = 0.2
-"""Least radius of a tool's corner that the tooth model can have in all cases, in normal modules."""
+"""Minimum corner radius of a tool that the tooth model supports in all cases, in normal modules."""
 USUAL_PROTUBERANCE_ANGLE = 10.0
-"""Angle of a protuberance where the file gives none, deg."""
+"""Angle of a protuberance if the file has no value, deg."""
 RIGID_MODULUS = 1e6
-"""Young's modulus (MPa) above which a material stands for 'rigid'; the stiffest there are have less."""
+"""Young's modulus (MPa) above which a material represents a rigid body; real materials are below."""
 
 
 @dataclass(frozen=True)
@@ -31,19 +31,19 @@ class Tool:
 
     part: Component
     depth: float
-    """From its reference line to its tip: the dedendum of a gear whose root it cuts."""
+    """Distance from its reference line to its tip: the dedendum of a gear whose root it cuts."""
     tip_radius: float
     protuberance: float
-    """Distance of a line parallel to its flank that touches its tip rounding from its flank, 0 for none."""
+    """Protuberance amount: distance between the flank and a parallel line that touches the tip rounding; 0 for none."""
     protuberance_angle: float
     """Pressure angle of the protuberance, rad."""
     allowance: float
-    """Material that it leaves on each flank for the tools after it, along the normal."""
+    """Machining allowance that it leaves on each flank for the following tools, normal to the flank."""
 
 
 @dataclass(frozen=True)
 class Toothing:
-    """A gear in the units and signs of the gearbox file: mm, deg, the shift of a ring positive for a larger ring."""
+    """A gear in the units and signs of the gearbox file: mm, deg; the shift of a larger ring gear is positive."""
 
     part: Component
     teeth: int
@@ -52,33 +52,33 @@ class Toothing:
     helix_angle: Entry
     face_width: Entry
     shift: Entry | None
-    """None where the file gives none: it follows from the centre distance."""
+    """Profile shift; None if the file has no value, so that it follows from the centre distance."""
     tip: Entry | None
     root: Entry | None
-    """Diameters as far as they are given."""
+    """Tip and root diameter, if specified."""
     dedendum: Entry
     tip_radius: Entry
     thinning: Entry
     allowances: Entry | None
-    """Table of the tooth thickness's allowances, where the file gives them; `thinning` is then their mean."""
+    """Allowances of the tooth thickness, if specified; `thinning` is then their mean."""
     cutter: Entry | None
-    """Table of the cutter of a ring, as far as the file gives one."""
+    """Cutter of a ring gear, as far as it is specified."""
     chamfer: float
-    """Radial, mm."""
+    """Radial height of the tip chamfer, mm."""
     root_form: Entry | None
-    """Diameter at which the flank ends towards the root, as far as it is given."""
+    """Root form diameter, if specified."""
     tools: tuple[Tool, ...]
-    """Racks that make an external gear, one after the other."""
+    """Racks that generate an external gear, in the order of manufacture."""
     internal: bool
 
 
 def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes: Notes) -> Toothing:
-    """Gather the numbers of a gear; `mates` are the gears that it meshes with.
+    """Collect the data of a gear; `mates` are its mating gears.
 
     Raises
     ------
     RexsError
-        A number is missing, or left and right flanks differ.
+        A value is missing, or left and right flanks differ.
     """
     internal = gear.type == "ring_gear"
     module = _length(gear, "normal_module")
@@ -115,12 +115,12 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
 
 
 def _length(gear: Component, key: str) -> float:
-    """Length that a gear must have, mm."""
+    """Return a required length of a gear, mm."""
     return within(needed(gear.quantity(key, "mm"), gear, key), gear, key, *LENGTHS)
 
 
 def _chamfer(gear: Component, stated: float) -> float:
-    """Height of the tip's chamfer, mm: as stated, or from the tip form diameter."""
+    """Height of the tip chamfer, mm: specified, or from the tip form diameter."""
     tip = gear.quantity("tip_diameter", "mm")
     form = gear.quantity("tip_form_diameter", "mm")
     if stated or not tip or not form:
@@ -129,7 +129,7 @@ def _chamfer(gear: Component, stated: float) -> float:
 
 
 def _flank(model: Model, gear: Component) -> Component | None:
-    """Left flank of a gear, equal to the right one."""
+    """Left flank of a gear, which must equal the right one."""
     left, right = (model.related("flank", "gear", gear.number, side) for side in ("left", "right"))
     if not left or not right:
         return (left or right or (None,))[0]
@@ -149,9 +149,9 @@ def _flank(model: Model, gear: Component) -> Component | None:
 
 
 def _steps(model: Model, gear: Component) -> list[tuple[Component, Component | None]]:
-    """Tools of a gear in their order with their settings: by the steps of its manufacture (1.3 on), or by references.
+    """Tools of a gear in order with their settings, from manufacturing steps (1.3 and later) or from references.
 
-    A flank may have them in the place of its gear.
+    They may belong to a flank instead of the gear.
     """
     for part in (gear, *model.related("flank", "gear", gear.number, "left")):
         relations = [
@@ -171,7 +171,7 @@ def _steps(model: Model, gear: Component) -> list[tuple[Component, Component | N
 
 
 def _root_tool(steps: Sequence[tuple[Component, Component | None]], internal: bool) -> Component | None:
-    """Tool that makes the root: the one that reaches deepest, the first of equal ones; of a ring its cutter."""
+    """Tool that generates the root: the first of those with the largest depth; for a ring gear its cutter."""
     tools = [tool for tool, _ in steps]
     if internal:
         tools = [tool for tool in tools if tool.type == "cutter_wheel_tool"] or tools
@@ -179,7 +179,7 @@ def _root_tool(steps: Sequence[tuple[Component, Component | None]], internal: bo
 
 
 def _racks(steps: Sequence[tuple[Component, Component | None]], module: float) -> Iterator[Tool]:
-    """Racks of known depth among the tools of an external gear."""
+    """Yield the racks of known depth among the tools of an external gear."""
     for tool, settings in steps:
         depth = tool.quantity("addendum_coefficient_reference_profile")
         if tool.type != "rack_shaped_tool" or not depth or depth < 0.0:
@@ -196,7 +196,7 @@ def _racks(steps: Sequence[tuple[Component, Component | None]], module: float) -
 
 
 def _allowance(settings: Component | None) -> float:
-    """Material that a tool leaves on each flank, mm."""
+    """Machining allowance of a tool on each flank, mm."""
     if settings is None:
         return 0.0
     return settings.quantity("machining_allowance", "mm") or 0.0
@@ -212,7 +212,7 @@ def _pressure_angle(gear: Component, flank: Component | None) -> Entry:
 
 
 def _helix_angle(gear: Component, mates: Sequence[Component]) -> Entry:
-    """Helix angle, right hand positive; of a ring that of its mates, as programs differ in its sign."""
+    """Helix angle, right hand positive; for a ring gear from its mating gears, since programs differ in its sign."""
     key = "helix_angle_reference_diameter"
     if gear.type == "ring_gear" and mates:
         angle = _helix(mates[0], key)
@@ -249,7 +249,7 @@ def _tip(gear: Component, reference: float, notes: Notes) -> Entry | None:
 
 
 def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | None:
-    """Cutter of a ring; its tip counts where the file gives the ring no root diameter."""
+    """Cutter of a ring gear; its tip is used if the file specifies no root diameter of the ring gear."""
     teeth = tool.whole("number_of_teeth") if tool else None
     if tool is None or tool.type != "cutter_wheel_tool" or not teeth:
         return None
@@ -271,7 +271,7 @@ def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | N
 
 
 def _tool_factor(tool: Component | None, internal: bool, key: str, usual: float) -> Entry:
-    """Factor of the tool that makes the root: of a rack, which an internal gear has none of."""
+    """Rack factor of the tool that generates the root; an assumption for an internal gear, which has no rack."""
     value = tool.quantity(key) if tool else None
     if tool is None or value is None or value < 0.0:
         return assumed(usual, "no tool in the file")
@@ -281,17 +281,17 @@ def _tool_factor(tool: Component | None, internal: bool, key: str, usual: float)
 
 
 def _rounded(radius: Entry) -> Entry:
-    """Return the radius of the tool's corner; a sharp one gets a radius, as the tooth model wants a fillet."""
+    """Return the corner radius of the tool; a sharp corner gets a radius, because the tooth model requires a fillet."""
     if radius.value >= LEAST_RADIUS:
         return radius
     return assumed(LEAST_RADIUS, f"{radius.value:g} in the file, too small a radius for the tooth model")
 
 
 def _allowances(gear: Component, angle: float, helix: float, internal: bool) -> Entry | None:
-    """Give the tooth thickness's allowances in the normal section, um: of a thickness or of the base tangent length.
+    """Return the tooth thickness allowances in the normal section, um, from a thickness or the base tangent length.
 
     DIN 3967: A_sn = A_st cos(beta), and A_W = A_sn cos(alpha_n) for external gears; chords and arcs differ by less than
-    a part in a thousand. `angle` and `helix` in rad. None if they are not given, or would thicken the teeth.
+    a part in a thousand. `angle` and `helix` in rad. None if they are not specified, or would thicken the teeth.
     """
     sources = {
         "chordal_tooth_thickness_{}_deviation": 1.0,
@@ -308,7 +308,7 @@ def _allowances(gear: Component, angle: float, helix: float, internal: bool) -> 
 
 
 def _thinning(gear: Component, module: float, allowances: Entry | None, helix: float) -> Entry:
-    """Thinning in the transverse section, mm."""
+    """Tooth thinning in the transverse section, mm."""
     if allowances is not None:
         mean = 0.5e-3 * sum(allowances.value.values())
         return read(tidy(-mean / math.cos(helix)), "mean of the tooth thickness allowances")
@@ -324,13 +324,13 @@ def material_of(model: Model, part: Component) -> Component | None:
 
 
 def is_rigid(material: Component | None) -> bool:
-    """Tell whether a material stands for 'rigid'."""
+    """Return whether a material represents a rigid body."""
     modulus = material.quantity("elastic_modulus", "MPa") if material else None
     return modulus is not None and modulus > RIGID_MODULUS
 
 
 def material_table(material: Component | None) -> Entry | None:
-    """Inline table of a material, as far as it says anything and is none that stands for 'rigid'."""
+    """Inline table of a material with its specified values; None if it represents a rigid body."""
     if material is None or is_rigid(material):
         return None
     values = {

@@ -1,1 +1,1 @@
-"""The gearbox file described: every key with unit, range, default and meaning."""
+"""Description of the gearbox file: every key with unit, range, default and meaning."""

@@ -1,7 +1,7 @@
-"""Every key of the gearbox file, read from the models themselves: unit, type, range, default, meaning.
+"""Description of every key of the gearbox file, read from the models: unit, type, range, default, meaning.
 
-What a key means stands as a text below it in :mod:`exugear.gearbox.sections`. It is read from the source when it is
-asked for, so that it costs nothing at the start of a program.
+The meaning of a key is the docstring below it in :mod:`exugear.gearbox.sections`. It is read from the source on demand,
+so that it does not delay the start of a program.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ UNITS = {
     "kg": "kg",
     "kg_m2": "kg m²",
     "kg_per_m3": "kg/m³",
+    "W_per_K": "W/K",
     "N": "N",
     "kN": "kN",
     "N_m": "N m",
@@ -49,8 +50,9 @@ UNITS = {
     "years": "years",
     "rpm": "rpm",
     "Hz": "Hz",
+    "percent": "%",
 }
-"""Units by the end of a key."""
+"""Units by the suffix of a key."""
 
 
 @dataclass(frozen=True)
@@ -58,23 +60,23 @@ class Key:
     """A key of the gearbox file."""
 
     table: str
-    """Table that it stands in, such as ``gears.NAME``; empty at the top."""
+    """Table of the key, such as ``gears.NAME``; empty at the top level."""
     name: str
     unit: str
-    """Empty for numbers without one and for what is no number."""
+    """Unit; empty for dimensionless numbers and for values that are not numbers."""
     kind: str
-    """What it holds, in words."""
+    """Type of the value as text."""
     range: str
-    """What can be; empty for all."""
+    """Possible values; empty if all are possible."""
     default: str
     """Value if the key is omitted; "required" if there is none."""
     meaning: str
     example: object
-    """A value that can be, as TOML has it."""
+    """A possible value in TOML notation."""
 
 
 def unit_of(name: str) -> str:
-    """Return the unit that the end of a key names.
+    """Return the unit that the suffix of a key indicates.
 
     Examples
     --------
@@ -87,12 +89,12 @@ def unit_of(name: str) -> str:
 
 
 def tables() -> dict[str, type[BaseModel]]:
-    """Tables of the file by their place, such as ``bearings.NAME.catalogue``, in the order of the file."""
+    """Tables of the file by their path, such as ``bearings.NAME.catalogue``, in the order of the file."""
     return dict(_tables(GearboxFile, ""))
 
 
 def keys() -> Iterator[Key]:
-    """All keys, table by table; a key that holds a table is told by that table alone."""
+    """All keys, table by table; keys that hold a table are omitted because the table is listed."""
     examples = tomllib.loads(files(__package__).joinpath("examples.toml").read_text(encoding="utf-8"))
     for table, model in tables().items():
         texts = meanings(model)
@@ -104,7 +106,7 @@ def keys() -> Iterator[Key]:
 
 @cache
 def meanings(model: type[BaseModel]) -> Mapping[str, str]:
-    """Texts below the keys of a table, by key."""
+    """Docstrings below the keys of a table, by key."""
     body = ast.parse(inspect.getsource(model)).body[0]
     assert isinstance(body, ast.ClassDef)
     texts = {}
@@ -126,7 +128,7 @@ def _tables(model: type[BaseModel], place: str) -> Iterator[tuple[str, type[Base
 
 
 def _model_within(kind: Any) -> type[BaseModel] | None:
-    """Table that a key holds one or several of; a list of tables is a table, too."""
+    """Table that a key holds, once or several times; a list of tables counts as a table."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         return kind
     return next((found for part in get_args(kind) if (found := _model_within(part)) is not None), None)
@@ -145,7 +147,7 @@ def _bare(kind: Any) -> Any:
 
 
 def _example_of_table(examples: dict[str, Any], table: str) -> dict[str, Any]:
-    """Return the example of a table; of a list of tables the first."""
+    """Return the example of a table; for a list of tables, of the first one."""
     found: Any = examples
     for part in filter(None, table.split(".")):
         found = found[part]
@@ -166,7 +168,7 @@ def _range(kind: Any) -> Range | None:
 
 
 def _kind(kind: Any) -> str:
-    """Say in words what a type holds."""
+    """Return the type of a value as text."""
     bare = _bare(kind)
     simple = {bool: "true or false", int: "whole number", float: "number", str: "text"}
     if bare in simple:
@@ -180,7 +182,7 @@ def _kind(kind: Any) -> str:
     if origin is tuple:
         count = "" if parts[-1] is Ellipsis else f"{len(parts)} of "
         return f"list: {count}{_kind(parts[0])}"
-    return " or ".join(_kind(part) for part in parts)
+    return " or ".join(_kind(part) for part in parts if part is not NoneType)
 
 
 def _default(field: FieldInfo) -> str:
@@ -192,7 +194,7 @@ def _default(field: FieldInfo) -> str:
 
 
 def written(value: object) -> str:
-    """Write a value as a gearbox file has it.
+    """Return a value in the notation of a gearbox file.
 
     Examples
     --------
@@ -215,13 +217,13 @@ def written(value: object) -> str:
     return str(value)
 
 
-# The JSON schema of the gearbox file, for editors: it tells keys and ranges while one types
+# The JSON schema of the gearbox file, with which editors show keys and ranges during typing
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema() -> dict[str, Any]:
-    """Describe the whole file; keys have their meaning, numbers their range.
+    """Return the JSON schema of the file; keys have descriptions, numbers have ranges.
 
     Examples
     --------
@@ -237,7 +239,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def _remove_nulls(node: Any) -> Any:
-    """Leave out what a TOML file cannot say: null, and titles that repeat the keys."""
+    """Remove content that TOML cannot express, which is null, and titles that repeat the keys."""
     if isinstance(node, list):
         return [_remove_nulls(entry) for entry in node]
     if not isinstance(node, dict):
@@ -251,7 +253,7 @@ def _remove_nulls(node: Any) -> Any:
     return {key: _remove_nulls(value) for key, value in kept.items() if not (key == "default" and value is None)}
 
 
-# The page of the documentation that describes every key of the gearbox file
+# Page of the documentation that describes every key of the gearbox file
 
 _HEAD = """# The gearbox file
 
@@ -265,7 +267,7 @@ _HEADINGS = "| Key | Type, unit | Range | Default | Meaning | Example |"
 
 
 def page() -> str:
-    """Page in Markdown."""
+    """Return the page in Markdown."""
     parts = [_HEAD]
     for table, entries in groupby(keys(), lambda key: key.table):
         parts.append(_section(table, list(entries)))

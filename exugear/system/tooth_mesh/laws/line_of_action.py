@@ -28,6 +28,7 @@ from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import fitting_table, table_path, wanted_table
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
+from fe_ste.transmission_error.sliding import friction_over_cycle
 from fe_ste.transmission_error.surface import GapError, SteSurface, complete_cycle
 from fe_ste.transmission_error.table import TableError
 
@@ -53,7 +54,8 @@ class LineOfAction(Law):
         if pair in gearbox.stated_stiffness:
             return np.array(gearbox.stated_stiffness[pair])
         try:
-            point = complete_cycle(fitting_table(gearbox, pair, directory).static_state)
+            table = fitting_table(gearbox, pair, directory)
+            point = complete_cycle(table.static_state)
         except TableError as error:
             raise MeshError(f"pair {pair}: {error} (exugear ste)") from None
         except GapError as error:
@@ -64,8 +66,9 @@ class LineOfAction(Law):
         tangent = np.asarray(point["tangent_stiffness"].to_numpy(), dtype=np.float64)
         computed_from = wanted_table(gearbox, pair, len(stiffness))
         force = float(point["line_of_action_force"].mean())
-        centres = (np.asarray(point[name].to_numpy(), dtype=np.float64) for name in _CENTRES)
-        return MeshCurve(stiffness, tangent, force, computed_from, *centres)
+        centres = {name: np.asarray(point[name].to_numpy(), dtype=np.float64) for name in _CENTRES}
+        friction = friction_over_cycle(computed_from.pair, table.static_state)
+        return MeshCurve(stiffness, tangent, force, computed_from, friction=friction, **centres)
 
     def samples(self, data: MeshData, mesh: Mesh, static_force: float) -> tuple[Floats, Floats]:
         """Secant and tangent stiffness along the line of action, as `Law.samples`."""

@@ -1,12 +1,12 @@
-"""Forces of all meshes in one pass, each in the form of its model: plain, and in loops over time.
+"""Forces of all meshes in one pass, each in the form of its model, in a plain version and one for loops over time.
 
-Forms are numbered (`MeshArrays.form`). All except the model `table` depend on the deflection along a row and are in
-`exugear.system.tooth_mesh.laws.mesh_forces`; a table also depends on the positions of the gears.
+Forms are numbered (`MeshArrays.form`). All except the model `table` depend on the deflection along a row and are
+implemented here; the model `table` also depends on the positions of the gears.
 
 The model itself is implemented once, in `row_law`: a model with its own force is a branch there. The other functions
 implement common parts: damping, resistance of teeth to misalignment, shuttling of the load. `row_force` with
-`add_row_tangent` is the plain form, on coordinates as they are; `add_row_mesh` is the form of loops over time, on the
-geometry that is arranged for speed (`exugear.system.kernels.meshes`). Tests check that they agree.
+`add_row_tangent` is the plain version, on unmodified coordinates. `add_row_mesh` is the version for loops over time, on
+the geometry that is optimised for speed (`exugear.system.kernels.meshes`). Tests check that they agree.
 """
 
 from __future__ import annotations

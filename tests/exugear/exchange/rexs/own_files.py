@@ -9,6 +9,8 @@ from exugear.exchange.rexs.parsing import parse_model
 from exugear.exchange.rexs.tree import Model
 
 UNITS = {
+    "density_at_15_degree_celsius": "kg / dm^3",
+    "temperature_lubricant": "C",
     "support_vector": "mm",
     "u_axis_vector": "none",
     "w_axis_vector": "none",

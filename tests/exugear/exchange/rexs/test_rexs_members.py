@@ -121,11 +121,13 @@ def test_data_of_a_rating_that_have_keys_are_used() -> None:
         given = {"averaged_peak_to_valley_height_root": 0.02, "tolerance_class_according_to_iso_1328_2013": 7}
         file.give(gear.number, **given)
     oil = {"viscosity_at_40_degree_celsius": 100.0, "viscosity_at_100_degree_celsius": 11.0}
-    file.add("lubricant", **oil)
+    file.add("lubricant", **oil, density_at_15_degree_celsius=0.88)
+    file.add("gear_casing", temperature_lubricant=72.0)
     case = imported(file).gearbox.case
     assert case.rating is not None and case.lubricant is not None
     for strength in case.rating.gears.values():
         assert (strength.tolerance_class, strength.root_roughness_Rz_um, strength.root_factor) == (7, 20.0, None)
     assert len(case.rating.gears) == 2
     assert (case.lubricant.viscosity_40_mm2_per_s, case.lubricant.viscosity_100_mm2_per_s) == (100.0, 11.0)
+    assert (case.lubricant.density_15_kg_per_m3, case.lubricant.temperature_C) == (880.0, 72.0)
     assert case.rating.viscosity_40_mm2_per_s is None

@@ -87,7 +87,7 @@ def test_schema_prints_or_writes_the_same(tmp_path: Path) -> None:
 
 def test_the_unit_of_a_key_is_that_at_the_end_of_its_name():
     """Also of rates such as `..._per_s`, stresses and temperatures."""
-    spelled = {"µ": "u", "²": "2", "³": "3", "°": "", "/": "_per_", " ": "_"}
+    spelled = {"µ": "u", "²": "2", "³": "3", "°": "", "%": "percent", "/": "_per_", " ": "_"}
     ends = {"mm", "um", "deg", "rad", "m", "s", "s2", "GPa", "MPa", "C", "kg", "m2", "m3", "N", "kN", "rpm", "Hz"}
     for key in keys():
         end = "".join(spelled.get(letter, letter) for letter in key.unit).replace("__", "_")

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.templates.kinds import KINDS
+from exugear.gearbox.templates.kinds import KINDS, template
 
 from ...cases.command import exugear
 from ...cases.spur import COARSE_INPUT
@@ -102,6 +102,26 @@ def test_a_file_that_is_there_is_not_written_over(tmp_path: Path) -> None:
     assert refused.exit_code == 2 and "not overwritten" in refused.stderr
     assert mine.read_text(encoding="utf-8") == "mine"
     assert exugear("new", tmp_path / "mine.txt", "--kind", "pair").exit_code == 2
+
+
+def test_the_template_without_an_option_is_that_of_parallel_stages(tmp_path: Path) -> None:
+    path = tmp_path / "gearbox.toml"
+    assert exugear("new", path).exit_code == 0
+    assert path.read_text(encoding="utf-8") == template("parallel")
+
+
+def test_a_report_of_the_folder_of_the_gearbox_file_is_that_of_its_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert exugear("new", "my/gearbox.toml").exit_code == 0
+    refused = exugear("report", "my")
+    assert refused.exit_code == 2 and "my: contains no results" in refused.stderr
+    assert exugear("modes", "my/gearbox.toml", "--variant", "bushing", "--mesh-model", "iso6336").exit_code == 0
+    written = exugear("report", "my")
+    assert written.exit_code == 0 and "its results are in results/my" in written.stderr
+    assert (tmp_path / "results" / "my" / "report.html").is_file()
+    assert exugear("report", tmp_path / "nothing").exit_code == 2
 
 
 def test_a_place_where_no_file_can_be_is_bad_input(tmp_path: Path) -> None:

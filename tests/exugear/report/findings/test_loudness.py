@@ -41,8 +41,15 @@ def response(operation, carried=False):
             "amplitude": (("point", "line", "signal"), amplitude),
             "index": (("line", "base"), np.array([[0], [1], [2]])),
             "order": ("line", np.array([0.0, 10.0, 20.0])),
+            # Of two peaks: the force of the second line is the higher one, and with little damping that of the first.
+            "band_point": ("peak", [int(np.argmax(hill(2.0, 1.0))), int(np.argmax(hill(3.99, 1.0)))]),
+            "band_line": ("peak", [1, 2]),
+            "band_amplitude": (
+                ("peak", "quantity", "damping_limit"),
+                np.array([[[9e-6, 3e-6], [80.0, 6.0], [0.0, 0.0]], [[1e-6, 1e-6], [70.0, 30.0], [9.0, 4.0]]]),
+            ),
         },
-        {"signal": list(SIGNALS), "base": ["mesh"]},
+        {"quantity": ["error", "force", "acceleration"], "signal": list(SIGNALS), "base": ["mesh"]},
         {"operating_range": json.dumps(operation), "carried_seats": json.dumps({"brg": carried})},
     )
 
@@ -58,6 +65,10 @@ def test_three_quantities_stand_side_by_side_and_the_best_place_in_any_comes_fir
     assert second.loudness["force"].amplitude == pytest.approx(50.0, rel=1e-6)  # 30, 40 and 50: Pythagoras
     assert {name: own.place for name, own in second.loudness.items()} == {"error": 3, "force": 1, "acceleration": 1}
     assert (third.line, third.best, third.speed) == ("2 x mesh", 2, pytest.approx(-1.5))
+    low, high = first.loudness["force"].limits
+    assert (low.amplitude, low.place, high.amplitude, high.place) == (80.0, 1, 6.0, 2)
+    assert first.loudness["force"].places == second.loudness["force"].places == (1, 2)
+    assert third.loudness["error"].limits is None and third.loudness["error"].places is None
 
 
 def test_only_speeds_of_operation_are_ranked_and_all_where_none_of_them_was_computed():

@@ -9,7 +9,7 @@ import scipy.optimize
 
 from exugear.steady.harmonics.branches import Scales, exponents, kicks_needed, trace
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError
-from exugear.steady.harmonics.lines import lattice, line_set
+from exugear.steady.harmonics.lines import line_set, rank1_lattice
 
 DAMPING, SHARES, BACKLASH, LOAD = 0.03, (0.1, 0.05), 1.0, 2.0
 """Gear pair with backlash: x'' + 2 z x' + k(t) f(x) = F, f = x in contact, zero in the backlash behind it."""
@@ -30,7 +30,7 @@ def touching(x):
 def oscillator(harmonics):
     """Residual x - H(w) (F - k f(x) + x) of the lines."""
     lines = line_set([1.0], harmonics)
-    samples = lattice(lines, line_set([1.0], 4 * harmonics))
+    samples = rank1_lattice(lines, line_set([1.0], 4 * harmonics))
     k = stiffness(samples.angles[:, 0])
 
     def residual(x, frequency):

@@ -10,7 +10,7 @@ import pytest
 import scipy.integrate
 
 from exugear.steady.harmonics.linear_solvers import HarmonicBalanceError, solve_lines
-from exugear.steady.harmonics.lines import Coupling, Group, Modulator, beside, joined, lattice, line_set
+from exugear.steady.harmonics.lines import Coupling, Group, Modulator, beside, joined, line_set, rank1_lattice
 
 BASES = (1.0, 0.5 * (1.0 + 5.0**0.5))
 
@@ -77,7 +77,7 @@ def test_signals_of_a_group_are_mixed_as_their_functions_say_at_every_angle():
 @pytest.mark.parametrize("base", [0, 1])
 def test_a_function_of_one_base_on_the_lattice_is_its_series_at_the_angles(base):
     lines = line_set(BASES, 3, 2)
-    found = lattice(lines, line_set(BASES, 6, 4))
+    found = rank1_lattice(lines, line_set(BASES, 6, 4))
     harmonics = np.array([[2.0, 0.3 + 0.1j, 0.2j], [0.0, 1.0j, -0.5]])
     turns = np.exp(1j * found.angles[:, base])
     series = [own[0].real + 2.0 * np.real(own[1] * turns + own[2] * turns**2) for own in harmonics]
@@ -191,7 +191,7 @@ def test_a_product_of_bases_that_share_lines_is_that_in_time():
 
 def test_samples_of_bases_that_share_lines_give_their_lines_back():
     lines = line_set([2.0, 1.0, 17.4], 5, 3)
-    samples = lattice(lines, line_set([2.0, 1.0, 17.4], 10, 6))
+    samples = rank1_lattice(lines, line_set([2.0, 1.0, 17.4], 10, 6))
     signal = np.arange(1.0, len(lines.orders) + 1) + 0j
     np.testing.assert_allclose(samples.coefficients(samples.values(signal)), signal, atol=1e-9)
     np.testing.assert_allclose(lines.values(signal, samples.angles), samples.values(signal), atol=1e-8)

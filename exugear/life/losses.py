@@ -1,0 +1,320 @@
+"""Where the power goes: friction of teeth and bearings at one operating point, efficiency, and oil temperature.
+
+Meshes lose P mu_m H_V (`fe_ste.standards.mesh_loss`). Bearings have the frictional moment M = mu P d / 2 with the
+constant coefficients of friction that SKF prints for loads near a tenth of the basic dynamic rating, normal speeds and
+good lubrication (SKF, Rolling bearings, 2016, "Estimating the frictional moment", table 1). Churning, windage, seals
+and auxiliary pumps are not included.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import scipy.optimize
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases import summarise_loads
+from exugear.gearbox.parts import Mesh
+from exugear.gearbox.units import RPM, UM
+from exugear.life.gear_life import RZ_OF_RA, roughness_of
+from exugear.system.bearings.duty import BearingLoadState
+from exugear.system.bearings.rolling.life import viscosity_at
+from fe_ste.standards.mesh_loss import MeshOperation, friction_schlenk, helical_loss_factor, loss_factor
+from fe_ste.transmission_error.sliding import table_friction, table_loss_factor
+from fe_ste.transmission_error.table import MeshTable
+
+BEARING_FRICTION = {
+    "deep_groove_ball": 0.0015,
+    "angular_contact_ball": 0.0020,
+    "four_point_ball": 0.0024,
+    "self_aligning_ball": 0.0010,
+    "cylindrical_roller": 0.0011,
+    "needle_roller": 0.0020,
+    "tapered_roller": 0.0018,
+    "spherical_roller": 0.0018,
+    "thrust_spherical_roller": 0.0018,
+}
+"""Coefficient of friction by type of bearing, with a cage and without contact seals."""
+FULL_COMPLEMENT_FRICTION = 0.0020
+"""The same of cylindrical roller bearings without a cage."""
+EXPONENTS = {"ball": 3.0, "roller": 10.0 / 3.0}
+"""Exponents of the basic rating life (ISO 281)."""
+USUAL_ROUGHNESS = 0.5 * UM
+"""Roughness Ra of ground flanks, where the file states none, m."""
+USUAL_DENSITY = 890.0
+"""Density of mineral oil at 15 degrees Celsius, kg/m3."""
+EXPANSION = 0.7
+"""Decrease of the density, kg/(m3 K)."""
+RMS_OF_RA = 1.11
+"""Root mean square roughness of ground flanks over Ra (Gaussian heights: sqrt(pi / 2) = 1.25; sine: 1.11)."""
+HELICAL_FROM = 0.9
+"""Overlap ratio from which contact lines carry a constant load per length rather than tooth pairs an equal load."""
+HOTTEST = 250.0
+"""Oil temperature (degrees Celsius) up to which the balance of heat is sought."""
+
+
+@dataclass(frozen=True)
+class MeshLoss:
+    """Loss of all meshes of a family."""
+
+    family: str
+    count: int
+    power: float
+    """Through all meshes, relative to their frame, W."""
+    loss_factor: float
+    from_table: bool
+    """Whether the loss factor is that of the line loads of a transmission error table."""
+    friction: float
+    """Mean coefficient of friction by Schlenk."""
+    other_friction: float | None
+    """The same by Xu and Kahraman from the table; None without one."""
+
+    @property
+    def loss(self) -> float:
+        """Of all meshes, W."""
+        return self.power * self.friction * self.loss_factor
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Smallest and largest loss by the methods of friction, W."""
+        other = self.other_friction or self.friction
+        scale = self.power * self.loss_factor
+        return scale * min(self.friction, other), scale * max(self.friction, other)
+
+
+@dataclass(frozen=True)
+class BearingLoss:
+    """Loss of all bearings of a family."""
+
+    family: str
+    count: int
+    load: float
+    """Equivalent dynamic load, of several bearings the largest, N."""
+    load_ratio: float
+    """This load over the basic dynamic rating."""
+    speed: float
+    """Of the inner ring relative to the outer ring, rad/s."""
+    friction: float
+    loss: float
+    """Of all bearings, W."""
+
+
+@dataclass(frozen=True)
+class Losses:
+    """Power balance of a gearbox at one operating point."""
+
+    speed: float
+    """Of the overall input, rad/s."""
+    input_power: float
+    """W."""
+    oil_temperature: float
+    """Degrees Celsius."""
+    viscosity: float
+    """Kinematic viscosity at that temperature, m2/s."""
+    meshes: tuple[MeshLoss, ...]
+    bearings: tuple[BearingLoss, ...]
+    without_data: tuple[str, ...]
+    """Bearings without catalogue data, whose friction is not included."""
+    assumed_roughness: bool
+    """Whether the roughness of any gear is the usual one."""
+
+    @property
+    def total(self) -> float:
+        """All losses that are included, W."""
+        return sum(mesh.loss for mesh in self.meshes) + sum(bearing.loss for bearing in self.bearings)
+
+    @property
+    def band(self) -> tuple[float, float]:
+        """Smallest and largest sum of losses by the methods of friction, W."""
+        bearings = sum(bearing.loss for bearing in self.bearings)
+        return bearings + sum(m.band[0] for m in self.meshes), bearings + sum(m.band[1] for m in self.meshes)
+
+    @property
+    def output_power(self) -> float:
+        """Input power less the losses, W."""
+        return self.input_power - self.total
+
+    @property
+    def efficiency(self) -> float:
+        """Output power over input power; zero without power."""
+        if self.input_power > 0.0:
+            return self.output_power / self.input_power
+        return 0.0
+
+
+def losses_of(
+    gearbox: Gearbox, duties: tuple[BearingLoadState, ...], tables: Mapping[str, MeshTable], speed: float
+) -> Losses:
+    """Compute the losses under the static load.
+
+    Parameters
+    ----------
+    duties : loads of the catalogue bearings under the static load
+    tables : transmission error tables by gear pair, those that exist
+    speed : of the overall input, rad/s
+
+    Raises
+    ------
+    GearboxFileError
+        Viscosity or temperature of the oil are missing, or the losses heat the oil beyond all limits.
+    """
+    lubricant = gearbox.case.lubricant
+    if lubricant is None or lubricant.viscosity_100_mm2_per_s is None:
+        raise gearbox.fault(
+            "lubricant: viscosity_40_mm2_per_s and viscosity_100_mm2_per_s are required for losses; add them to "
+            "[lubricant]"
+        )
+    if lubricant.temperature_C is not None:
+        return _at_temperature(gearbox, duties, tables, speed, lubricant.temperature_C)
+    ambient = lubricant.ambient_C
+    conductance = lubricant.conductance_W_per_K
+    if ambient is None or conductance is None:
+        raise gearbox.fault(
+            "lubricant: the temperature of the oil is required for losses; set temperature_C, or ambient_C and "
+            "conductance_W_per_K"
+        )
+
+    def excess(temperature: float) -> float:
+        return temperature - ambient - _at_temperature(gearbox, duties, tables, speed, temperature).total / conductance
+
+    if excess(HOTTEST) < 0.0:
+        raise gearbox.fault(
+            f"lubricant.conductance_W_per_K = {conductance:g}: the losses heat the oil above {HOTTEST:g} degrees "
+            "Celsius; set a larger conductance (cooler), or temperature_C"
+        )
+    temperature = float(scipy.optimize.brentq(excess, ambient, HOTTEST, xtol=1e-6))
+    return _at_temperature(gearbox, duties, tables, speed, temperature)
+
+
+def _at_temperature(
+    gearbox: Gearbox,
+    duties: tuple[BearingLoadState, ...],
+    tables: Mapping[str, MeshTable],
+    speed: float,
+    temperature: float,
+) -> Losses:
+    """Compute the losses at a temperature of the oil, degrees Celsius."""
+    lubricant = gearbox.case.lubricant
+    assert lubricant is not None
+    assert lubricant.viscosity_100_mm2_per_s is not None
+    kinematic = 1e-6 * viscosity_at(temperature, gearbox.viscosity_40, lubricant.viscosity_100_mm2_per_s)
+    density = (lubricant.density_15_kg_per_m3 or USUAL_DENSITY) - EXPANSION * (temperature - 15.0)
+    speeds = gearbox.train.rolling_speeds(gearbox.case.overall.input, speed)
+    listed = {support.name for support in gearbox.bearings}
+    known = {duty.name for duty in duties}
+    stated = [torque * speeds[body] for body, torque in gearbox.case.static_load.torques_N_m.items()]
+    return Losses(
+        speed=speed,
+        # The torques of the file, and those that balance them.
+        input_power=sum(max(power, 0.0) for power in (*stated, -sum(stated))),
+        oil_temperature=temperature,
+        viscosity=kinematic,
+        meshes=_mesh_losses(gearbox, tables, speeds, kinematic * density),
+        bearings=_bearing_losses(gearbox, duties, speeds),
+        without_data=tuple(dict.fromkeys(b.family for b in gearbox.bearings if b.name in listed - known)),
+        assumed_roughness=any(_roughness(gearbox, name) is None for name in _gears_in_mesh(gearbox)),
+    )
+
+
+def _gears_in_mesh(gearbox: Gearbox) -> list[str]:
+    return list(dict.fromkeys(g.name for mesh in gearbox.meshes for g in (mesh.pair.pinion, mesh.pair.gear)))
+
+
+def _roughness(gearbox: Gearbox, gear: str) -> float | None:
+    """Roughness Ra of a gear that the file states, m."""
+    rating = gearbox.case.rating
+    if rating is None or gear not in rating.gears:
+        return None
+    return roughness_of(rating.gears[gear]) / RZ_OF_RA
+
+
+def _mesh_losses(
+    gearbox: Gearbox, tables: Mapping[str, MeshTable], speeds: Mapping[str, float], viscosity: float
+) -> tuple[MeshLoss, ...]:
+    forces = gearbox.train.static_mesh_forces()
+    families: dict[str, list[Mesh]] = {}
+    for mesh in gearbox.meshes:
+        families.setdefault(mesh.family, []).append(mesh)
+    found = []
+    for family, meshes in families.items():
+        first = meshes[0]
+        pair = first.pair
+        relative = abs(speeds[first.pinion] - speeds.get(first.frame, 0.0))
+        mean = sum(abs(forces[mesh.name]) for mesh in meshes) / len(meshes)
+        power = len(meshes) * mean * relative * pair.pinion.base_radius
+        table = tables.get(pair.name)
+        friction = 0.0
+        other = None
+        if table is not None:
+            factor = table_loss_factor(pair, table.static_state)
+        elif pair.overlap_ratio >= HELICAL_FROM:
+            factor = helical_loss_factor(pair)
+        else:
+            factor = loss_factor(pair)
+        if relative > 0.0 and mean > 0.0:
+            stated = (_roughness(gearbox, gear.name) for gear in (pair.pinion, pair.gear))
+            roughness = 0.5 * sum(value or USUAL_ROUGHNESS for value in stated)
+            friction = friction_schlenk(MeshOperation.of(pair, mean, relative, viscosity, roughness))
+            if table is not None:
+                other = table_friction(pair, table.static_state, relative, viscosity, RMS_OF_RA * roughness)
+        found.append(MeshLoss(family, len(meshes), power, factor, table is not None, friction, other))
+    return tuple(found)
+
+
+def _bearing_losses(
+    gearbox: Gearbox, duties: tuple[BearingLoadState, ...], speeds: Mapping[str, float]
+) -> tuple[BearingLoss, ...]:
+    supports = {support.name: support for support in gearbox.bearings}
+    families: dict[str, list[BearingLoadState]] = {}
+    for duty in duties:
+        if duty.name in supports:
+            families.setdefault(duty.family, []).append(duty)
+    found = []
+    for family, members in families.items():
+        loads = [_equivalent_load(duty) for duty in members]
+        support = supports[members[0].name]
+        section = support.catalogue
+        assert section is not None
+        relative = abs(speeds.get(support.body, 0.0) - speeds.get(support.on, 0.0))
+        friction = BEARING_FRICTION[section.type]
+        if section.type == "cylindrical_roller" and section.full_complement:
+            friction = FULL_COMPLEMENT_FRICTION
+        loss = 0.5 * friction * sum(loads) * 1e-3 * section.bore_mm * relative
+        ratio = max(loads) / members[0].ratings.dynamic
+        found.append(BearingLoss(family, len(members), max(loads), ratio, relative, friction, loss))
+    return tuple(found)
+
+
+def _equivalent_load(duty: BearingLoadState) -> float:
+    """Equivalent dynamic load, N: the one that gives the basic rating life."""
+    if math.isinf(duty.basic_life):
+        return 0.0
+    exponent = EXPONENTS[duty.kind.rpartition("_")[2]]
+    return float(duty.ratings.dynamic * duty.basic_life ** (-1.0 / exponent))
+
+
+def operating_speed(gearbox: Gearbox, stated: float | None = None) -> float:
+    """Speed of the overall input (rad/s) at which losses are computed: a stated one (rpm), or that of the file.
+
+    The file's is the rated speed, or else the highest one of the first load case that turns the train.
+
+    Raises
+    ------
+    GearboxFileError
+        The file has neither.
+
+    Examples
+    --------
+    >>> round(operating_speed(Gearbox.from_toml("cases/grc750/gearbox.toml")) / RPM, 6)
+    22.1
+    """
+    chosen = stated or gearbox.case.operation.rated_speed_rpm
+    if chosen is not None:
+        return chosen * RPM
+    for case in gearbox.load_cases.values():
+        loads = summarise_loads(gearbox, case)
+        if loads.fastest_speed > 0.0:
+            return math.copysign(loads.fastest_speed, loads.end_speed)
+    raise gearbox.fault("operation.rated_speed_rpm: is required for losses; set it, or use --speed RPM")

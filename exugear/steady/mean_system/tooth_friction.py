@@ -1,0 +1,79 @@
+"""Friction of the teeth as forces that the mesh cycle varies: across the line of action, and moments on the gears.
+
+Under the static mesh force F, friction has the forces and moments mu F times those of
+`fe_ste.transmission_error.sliding.friction_over_cycle`. Friction excites the gearbox in addition to the transmission
+error. Vibration changes neither the load nor the sense of sliding here: the effect of friction on disturbances, of the
+order of mu times the mesh stiffness, is neglected.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from exugear.steady.harmonics.lines import Coupling, LineSet, fourier_coefficients
+from exugear.steady.mean_system.mesh_places import MeshInterface, coupled, families, group_of
+from exugear.steady.mean_system.mesh_waves import MeshWaves
+from exugear.steady.mean_system.rotating_frame import SteadyError
+from fe_ste.tools.arrays import Complexes
+
+PARTS = 3
+"""Force across the line of action, moment about the gear axes, moment about the line of action."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionResponse:
+    """Response to friction at one speed; n orders."""
+
+    loads: Complexes
+    """(n, size) generalized forces of friction in the rotating frame, N and N m."""
+    motion: Complexes
+    """(n, size) motion under them."""
+    torque: float
+    """Mean torque of the drive that overcomes them, N m."""
+
+
+def tooth_friction(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed: float, harmonics: int) -> Complexes:
+    """Return the generalized forces (n, size) of the friction of all meshes at a speed of the input (rad/s).
+
+    Parameters
+    ----------
+    ports : of the meshes at this speed
+    harmonics : of each mesh frequency that the forces have
+
+    Raises
+    ------
+    SteadyError
+        The sliding of a pair is unknown: its stiffness is not from a table.
+    """
+    assembly = waves.assembly
+    coefficient = assembly.gearbox.case.damping.tooth_friction
+    static = assembly.gearbox.train.static_mesh_forces()
+    turns = waves.system.frame.speeds
+    elements = [assembly.elements[wave.first] for wave in waves.waves]
+    cycles = np.zeros((PARTS, len(elements), harmonics + 1), dtype=complex)
+    for m, element in enumerate(elements):
+        if element.friction is None:
+            raise SteadyError(
+                f"damping.tooth_friction = {coefficient:g}: pair {element.mesh.pair.name} has no line loads over the "
+                "mesh cycle; use --mesh-model line_of_action with a table of exugear ste, or remove the key"
+            )
+        # Friction opposes the sliding of gear 1 on gear 2.
+        sliding = turns.get(element.mesh.pinion, 0.0) - turns.get(element.mesh.gear, 0.0)
+        size = -coefficient * math.copysign(1.0, speed * sliding) * abs(static[element.mesh.name])
+        for part, samples in enumerate(element.friction):
+            found = fourier_coefficients(size * samples, harmonics)
+            cycles[part, m, : len(found)] = found
+    rows = np.array([element.friction_rows for element in assembly.elements])
+    gradients = np.stack([waves.gradients(rows[:, part], speed) for part in range(PARTS)], axis=1)
+    weighted = gradients * waves.weights[:, None, None]
+    spectra = {(part, 0): own for part, own in enumerate(cycles)}
+    everywhere = np.zeros((len(lines.index), len(elements), PARTS), dtype=complex)
+    everywhere[0, :, 0] = [wave.wave == 0 for wave in waves.waves]
+    kinds = families(waves)
+    coupling = Coupling(lines, tuple(group_of(own, harmonics, PARTS, lines.index.shape[1]) for own in kinds))
+    functions = [coupled(waves, own, spectra, ports, speed, PARTS) for own in kinds]
+    forces = coupling.of(functions, everywhere.reshape(len(everywhere), -1))
+    return np.asarray(forces @ weighted.reshape(-1, weighted.shape[2]))
