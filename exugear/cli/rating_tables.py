@@ -17,9 +17,9 @@ _BLOCKS: Mapping[str, tuple[str, ...]] = {
     "root": ("f_eps", "Y_F", "Y_S", "Y_beta", "Y_B", "Y_DT", "sigma_F0", "sigma_F"),
     "broken": ("sigma_Flim", "Y_NT", "Y_deltarelT", "Y_RrelT", "Y_X", "Y_rel", "Y_M", "sigma_FG", "S_F"),
 }
-_WORDS = {"torque": "torque of the gear", "load_torque": "torque of the load"}
+_WORDS = {"torque": "torque of the gear", "load_torque": "torque of the loaded body"}
 _OF_2019 = ("f_ZCa", "f_eps")
-"""Factors that only helical gears have, by the edition of 2019: no rows of dashes without them."""
+"""Factors of helical gears in the edition of 2019; their rows are omitted for other gears."""
 GEAR_COLUMN = 14
 """Width in characters at which the heading of a gear is wrapped."""
 _DIGITS = {

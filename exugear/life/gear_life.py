@@ -136,7 +136,7 @@ def check_strengths(
     ):
         faults += gearbox.fault(
             f"rating.f_ZCa = {rating.f_ZCa:g}: no helical gear has a modification; add [gears.NAME.modification], or "
-            f"remove the key: f_ZCa is {UNMODIFIED:g} then"
+            f"remove the key (f_ZCa = {UNMODIFIED:g})"
         ).faults
     if faults:
         raise GearboxFileError(*faults)
@@ -152,7 +152,7 @@ def is_modified(gearbox: Gearbox, pair: GearPair) -> bool:
 
 
 def auxiliary_factor(gearbox: Gearbox, rating: RatingSection, pair: GearPair) -> float:
-    """Return f_ZCa of ISO 6336-2:2019: as stated where flanks are modified, that of unmodified flanks otherwise."""
+    """Return f_ZCa of ISO 6336-2:2019: the value of the file for modified flanks, otherwise 1.2."""
     if rating.f_ZCa is not None and is_modified(gearbox, pair):
         return rating.f_ZCa
     return UNMODIFIED

@@ -83,7 +83,7 @@ def mesh_stiffness(
 
     Parameters
     ----------
-    pair : the pair. An internal gear counts as one of infinitely many teeth, with the profile shift that it has.
+    pair : gear pair. For an internal gear the tooth number is infinite; its profile shift is included.
     tangential_force
         F_t at the reference circle, N. Below 100 N/mm of face width the stiffness falls with the fourth root of the
         load; without a force that correction is omitted.
@@ -140,8 +140,8 @@ def mesh_stiffness(
 def _flexibility(pair: GearPair) -> float:
     """q', flexibility of one pair of teeth per unit of face width, mm um/N.
 
-    Only the tooth number of an internal gear is infinite. Its profile shift stays, with the sign of ISO 21771, which
-    is the opposite of that in `Gear`.
+    For an internal gear only the tooth number is infinite. Its profile shift has the sign of ISO 21771, opposite to
+    that of `Gear`.
     """
     x_1 = pair.pinion.profile_shift
     x_2 = pair.gear.profile_shift * pair.gear.outward
@@ -199,8 +199,8 @@ def _outside_validity(pair: GearPair, line_load: float | None) -> tuple[str, ...
 Hardening = Literal["case_hardened", "through_hardened"]
 """Steels that the standard has constants of."""
 Edition = Literal["ISO 6336:2019", "ISO 6336:2006"]
-"""Editions of the standard: they differ in Z_B and Z_D (`fe_ste.standards.pitting`) and in Y_F and Y_beta
-(`fe_ste.standards.tooth_root`) of helical gears. The load factors here are those of 2006 in both."""
+"""Editions of the standard. They differ in Z_B and Z_D (`fe_ste.standards.pitting`) and in Y_F and Y_beta
+(`fe_ste.standards.tooth_root`) of helical gears. Both use the load factors of 2006."""
 
 _RESONANCE, _ABOVE = 1.15, 1.5
 """Speed ratios where the main resonance ends, and where the supercritical range begins."""
@@ -258,19 +258,17 @@ def helix_running_in(misalignment: float, hardening: Hardening, limit: float, ve
 
 
 def reduced_mass(pair: GearPair, meshes: tuple[int, int] = (1, 1), ring_held: bool = True) -> float:
-    """m_red: mass of both gears that vibrates along the line of action, over the face width, kg/m.
+    """m_red: reduced mass of both gears on the line of action per unit of face width, kg/m.
 
     Parameters
     ----------
-    pair
-        Gears that are solid between the held diameter and the middle of the teeth; of an internal gear that is its
-        rim.
-    meshes : teeth in mesh at once around gear 1 and gear 2: a sun has as many as planets
-    ring_held : whether an internal gear is held by the housing: then the mass of gear 1 alone vibrates
+    pair : gears that are solid between the held diameter and the middle of the teeth; for an internal gear, its rim
+    meshes : simultaneous meshes of gear 1 and gear 2; for a sun, the number of planets
+    ring_held : whether the housing holds an internal gear, which then has infinite mass
 
     Notes
     -----
-    Of a sun and p planets: ``J_p J_s / (p r_bs^2 J_p + r_bp^2 J_s)``; of a planet in a held ring: ``J_p / r_bp^2``.
+    Sun and p planets: ``J_p J_s / (p r_bs^2 J_p + r_bp^2 J_s)``. Planet and held ring: ``J_p / r_bp^2``.
     """
     masses = [_mass_on_base_circle(gear) for gear in (pair.pinion, pair.gear)]
     if pair.gear.internal and ring_held:
@@ -286,7 +284,7 @@ def _mass_on_base_circle(gear: Gear) -> float:
 
 
 def resonance_speed(pair: GearPair, mesh_stiffness: float, mass: float) -> float:
-    """n_E1: speed of gear 1 against its frame at which the mesh frequency is that of the main resonance, rad/s.
+    """n_E1: speed of gear 1 relative to its frame at the main resonance, rad/s.
 
     Parameters
     ----------

@@ -3,8 +3,8 @@
 Checked against the first worked example of ISO/TR 6336-30:2017. Case-hardened and through-hardened steels.
 
 The edition of 2019 has the auxiliary factor f_ZCa in Z_B and Z_D of helical gears. Source: F. Mehlan, MADE4WIND
-drivetrain optimizer, 2025, https://github.com/FelixMehlan/MADE4WIND-drivetrain-optimizer, module `gearopt.safety`
-(f_ZCa = 1.2 without flank modification, 1 of rings), and the results of a rating program that its tests quote.
+drivetrain optimizer, https://github.com/FelixMehlan/MADE4WIND-drivetrain-optimizer, package `gearopt.safety` (1.2
+without flank modification, 1 for rings). The results of a rating program that its tests quote confirm both values.
 """
 
 from __future__ import annotations
@@ -64,12 +64,13 @@ def single_contact_factors(pair: GearPair, auxiliary_factor: float = 1.0) -> tup
 
     Parameters
     ----------
-    auxiliary_factor : f_ZCa of helical gears by the edition of 2019; 1 by the edition of 2006
+    auxiliary_factor : f_ZCa of helical gears in the edition of 2019; 1 in the edition of 2006
 
     Notes
     -----
-    From an overlap ratio of 1 on, Z_B and Z_D of external gears are the root of f_ZCa; Z_D of an internal gear is 1.
-    Below, they are interpolated linearly between that value and the spur gear's, as in the edition of 2006.
+    For overlap ratios of at least 1, Z_B and Z_D of external gears are the square root of f_ZCa; Z_D of an internal
+    gear is 1. For smaller overlap ratios they are interpolated linearly to the value of a spur gear, as in the edition
+    of 2006; the source does not cover this range.
     """
     overlap = pair.overlap_ratio
     slope = math.tan(pair.working_pressure_angle)

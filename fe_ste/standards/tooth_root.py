@@ -1,8 +1,8 @@
-"""Nominal tooth root stress to ISO 6336-3 method B, editions of 2019 and 2006, for comparison with the finite elements.
+"""Nominal tooth root stress to ISO 6336-3 method B, editions of 2019 and 2006.
 
-The edition of 2019 has the load distribution influence factor f_epsilon in Y_F, and Y_beta over cos^3(beta). Source:
-F. Mehlan, MADE4WIND drivetrain optimizer, 2025, https://github.com/FelixMehlan/MADE4WIND-drivetrain-optimizer, module
-`gearopt.safety`; the results of a rating program that its tests quote confirm both factors.
+The edition of 2019 has the load distribution influence factor f_epsilon in Y_F, and divides Y_beta by cos^3(beta).
+Source: F. Mehlan, MADE4WIND drivetrain optimizer, https://github.com/FelixMehlan/MADE4WIND-drivetrain-optimizer,
+package `gearopt.safety`. The results of a rating program that its tests quote confirm both factors.
 
 Gears without protuberance and undercut, tooth thinning neglected; internal gears to Corrigendum 1 of 2007, with their
 pinion-type cutter. Lengths in the formulas are in normal modules of the virtual spur gear in the normal section; an
@@ -42,7 +42,7 @@ class RootStressFactors:
     helix: float
     """Y_F (with f_epsilon) and Y_S with the load at the outer point of single contact, Y_beta."""
     load_distribution: float
-    """f_epsilon of the edition of 2019; 1 by that of 2006."""
+    """f_epsilon of the edition of 2019; 1 in the edition of 2006."""
     rim: float
     deep_tooth: float
     """Y_B of thin rims, Y_DT of deep teeth of high accuracy."""
@@ -105,7 +105,7 @@ def root_stress_factors(
 
 
 def load_distribution_factor(overlap: float, contact_ratio: float) -> float:
-    """f_epsilon of ISO 6336-3:2019: part of the load at the outer point of single contact that the form factor has.
+    """f_epsilon of ISO 6336-3:2019: load distribution influence factor in Y_F.
 
     Parameters
     ----------
@@ -114,8 +114,9 @@ def load_distribution_factor(overlap: float, contact_ratio: float) -> float:
 
     Notes
     -----
-    1 of spur gears (0.7 from a contact ratio of 2 on), ``eps_alpha_n^-0.5`` from an overlap ratio of 1 on. Between, it
-    is the root of what is interpolated linearly: only so do the ends meet. The source leaves that root out.
+    1 for spur gears (0.7 for contact ratios of at least 2), ``eps_alpha_n^-0.5`` for overlap ratios of at least 1. In
+    between, the square is interpolated linearly, which makes the factor continuous; the source interpolates the factor
+    itself to ``1 / eps_alpha_n`` and is discontinuous there.
 
     Examples
     --------

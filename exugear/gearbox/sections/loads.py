@@ -190,11 +190,11 @@ class RatingSection(Section):
     """Rating settings and the strength of the gears."""
 
     edition: Literal["ISO 6336:2019", "ISO 6336:2006"] = "ISO 6336:2019"
-    """Edition of the standard, named in every output; its year alone is enough. The rating sheet shows what differs by
-    more than 1 % in the other edition."""
+    """Edition of the standard, listed in every output; the year (2019, 2006) is also accepted. The rating sheet also
+    lists values that differ by more than 1 % in the other edition."""
     f_ZCa: q.AuxiliaryFactor | None = None
-    """Auxiliary factor of the contact stress of helical gears (ISO 6336-2:2019), of pairs of which a gear has a
-    `modification`: less than 1.2 where that suits load and deformation. Others have 1.2."""
+    """Auxiliary factor of the contact stress of helical gears (ISO 6336-2:2019) for pairs with a `modification`; less
+    than 1.2 requires a modification that suits load and deflection. Other helical gears have 1.2."""
     dynamic_factor: q.LoadFactorK | None = None
     """Specified K_v of all meshes; or one of the next two keys together with `minimum_dynamic_factor`."""
     dynamic_factor_run: Name | None = None
@@ -233,7 +233,7 @@ class RatingSection(Section):
     def _edition(self) -> RatingSection:
         if self.f_ZCa is not None and self.edition == "ISO 6336:2006":
             raise ValueError(
-                f"f_ZCa = {self.f_ZCa:g}: {self.edition} does not have this factor; remove the key, or set edition"
+                f"f_ZCa = {self.f_ZCa:g}: {self.edition} does not have this factor; remove the key or set edition"
             )
         return self
 

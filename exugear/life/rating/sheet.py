@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 OTHER_EDITION: Mapping[Edition, Edition] = {"ISO 6336:2019": "ISO 6336:2006", "ISO 6336:2006": "ISO 6336:2019"}
-"""Edition that stands beside the one of the file."""
+"""Edition that is compared with the edition of the file."""
 TOLD_DIFFERENCE = 0.01
-"""Relative difference from which on the value by the other edition is shown."""
+"""Relative difference above which the value of the other edition is listed."""
 LEAST_FORCE = 1.0
 """Tangential force, N, below which a mesh counts as unloaded and is not rated."""
 FINITE_ELEMENTS = ("sigma_H", "sigma_F", "K_Hbeta", "S_H", "S_F")
@@ -92,7 +92,7 @@ class FlankSheet:
     sense: int = 1
     """Sign of the loaded body's torque: 1, or -1 for reversed load."""
     other_edition: Mapping[str, float] = field(default_factory=dict)
-    """Values by the other edition that differ by more than 1 %, SI."""
+    """Values of the other edition that differ by more than 1 %, SI."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
     assumptions: tuple[str, ...]
     left_out: tuple[str, ...] = LEFT_OUT
     other_edition: str = ""
-    """Edition of which the flanks show what differs by more than 1 %."""
+    """Edition of the values in `FlankSheet.other_edition`."""
 
     def summary(self) -> dict[str, Any]:
         """Return the values for JSON, with units in the keys; NaN is omitted, infinite values are text."""
@@ -309,15 +309,11 @@ def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
     if rating.edition == "ISO 6336:2019":
         unstated = rating.f_ZCa is None and any(is_modified(gearbox, mesh.pair) for mesh in gearbox.meshes)
         yield (
-            f"f_ZCa = {UNMODIFIED:g} of helical gears without flank modification (Z_B, Z_D)"
-            + (
-                "; the file has modifications: if they suit load and deformation, state f_ZCa of [rating]"
-                if unstated
-                else ""
-            )
+            f"f_ZCa = {UNMODIFIED:g} for helical gears without flank modification (Z_B, Z_D)"
+            + ("; the file has flank modifications: if they suit the load, set f_ZCa of [rating]" if unstated else "")
         )
-        yield "K factors, life factors and Z_L, Z_v, Z_R are those of ISO 6336:2006 in both editions"
-    yield "m_red: a ring is its rim, and vibrates unless the housing holds it"
+        yield "K factors, life factors, Z_L, Z_v and Z_R are taken from ISO 6336:2006 in both editions"
+    yield "m_red includes the rim of ring gears, except of those held by the housing"
     yield "Y_B: rim thickness of rings and planets; other gears are solid on shafts. Z_W = Z_X = 1"
     if gearbox.case.loads is None:
         if rating.nominal_hours is None:

@@ -91,14 +91,14 @@ class FlankRules:
     free_bore: bool
     """Whether the gear's bore is free, as for a planet."""
     ring_held: bool = True
-    """Whether an internal gear 2 is held by the housing."""
+    """Whether the housing holds an internal gear 2."""
     edition: Edition = "ISO 6336:2019"
     f_ZCa: float = UNMODIFIED
-    """Of helical gears by the edition of 2019."""
+    """Auxiliary factor of helical gears, edition of 2019."""
 
     @property
     def auxiliary_factor(self) -> float:
-        """f_ZCa by the edition: 1 by that of 2006."""
+        """Auxiliary factor in Z_B and Z_D: f_ZCa, or 1 in the edition of 2006."""
         return self.f_ZCa if self.edition == "ISO 6336:2019" else 1.0
 
     @property
@@ -148,8 +148,8 @@ def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
 
     Returns
     -------
-    stresses in Pa, F_t in N, v in m/s; unrated values are NaN. ``torque`` is that of the gear itself, over all its
-    meshes of the family at once and without factors, ``load_torque`` that of the loaded body.
+    stresses in Pa, F_t in N, v in m/s; unrated values are NaN. ``torque`` is the torque of the gear from all its
+    meshes of the family, without factors; ``load_torque`` is the torque of the loaded body.
     """
     factors = [_load_factors(rules, loads, place) for place in range(len(loads.force))]
     stresses = [_stresses(rules, factor) for factor in factors]

@@ -362,7 +362,21 @@ def test_the_verb_prints_all_factors_and_ends_with_1_where_a_safety_is_short(tmp
     before = sorted(tmp_path.rglob("*"))
     good = run(path)
     assert good.exit_code == 0, good.output
-    for name in ("torque of the gear", "m_red", "n_E1", "K_A", "K_gamma", "K_v", "K_Hbeta", "K_Halpha", "K_Fbeta", "K_Falpha", "Z_BD", "Y_deltarelT", "S_F"):
+    for name in (
+        "torque of the gear",
+        "m_red",
+        "n_E1",
+        "K_A",
+        "K_gamma",
+        "K_v",
+        "K_Hbeta",
+        "K_Halpha",
+        "K_Fbeta",
+        "K_Falpha",
+        "Z_BD",
+        "Y_deltarelT",
+        "S_F",
+    ):
         assert name in good.output
     for line in LEFT_OUT:
         assert line.split(":")[0] in " ".join(good.output.split())
