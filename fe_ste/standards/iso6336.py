@@ -146,7 +146,9 @@ def _flexibility(pair: GearPair) -> float:
     x_1 = pair.pinion.profile_shift
     x_2 = pair.gear.profile_shift * pair.gear.outward
     per_tooth_1 = 1.0 / _virtual_teeth(pair.pinion)
-    per_tooth_2 = 0.0 if pair.gear.internal else 1.0 / _virtual_teeth(pair.gear)
+    per_tooth_2 = 1.0 / _virtual_teeth(pair.gear)
+    if pair.gear.internal:
+        per_tooth_2 = 0.0
     return (
         0.04723
         + 0.15551 * per_tooth_1

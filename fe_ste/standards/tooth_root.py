@@ -85,8 +85,9 @@ def root_stress_factors(
     shared = math.pi * math.cos(gear.normal_pressure_angle) * (contact_ratio - 1.0) * gear.outward
     loaded = 2.0 * math.hypot(0.5 * math.sqrt(tip**2 - base**2) - shared, 0.5 * base)
     form, correction, notch = form_and_correction(gear, virtual, loaded)
-    current = edition == "ISO 6336:2019"
-    distribution = load_distribution_factor(pair.overlap_ratio, contact_ratio) if current else 1.0
+    distribution = 1.0
+    if edition == "ISO 6336:2019":
+        distribution = load_distribution_factor(pair.overlap_ratio, contact_ratio)
     remarks = {
         f"notch parameter q_s = {notch:.2f} is outside 1 to 8": not 1.0 <= notch <= 8.0,
         f"virtual contact ratio {contact_ratio:.2f} is not below 2": contact_ratio >= 2.0,
@@ -123,13 +124,14 @@ def load_distribution_factor(overlap: float, contact_ratio: float) -> float:
     >>> [round(load_distribution_factor(eps_beta, 1.5), 3) for eps_beta in (0.0, 0.5, 1.0, 1.5)]
     [1.0, 0.913, 0.816, 0.816]
     """
-    deep = contact_ratio >= 2.0
-    if overlap <= 0.0:
-        return 0.7 if deep else 1.0
     if overlap >= 1.0:
         return 1.0 / math.sqrt(contact_ratio)
-    spur = 0.5 if deep else 1.0
-    return math.sqrt(spur * (1.0 - overlap) + overlap / contact_ratio)
+    spur, spur_squared = (1.0, 1.0)
+    if contact_ratio >= 2.0:
+        spur, spur_squared = (0.7, 0.5)
+    if overlap <= 0.0:
+        return spur
+    return math.sqrt(spur_squared * (1.0 - overlap) + overlap / contact_ratio)
 
 
 def helix_factor(helix_angle: float, overlap: float, edition: Edition = "ISO 6336:2019") -> float:

@@ -307,11 +307,10 @@ def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
         "C_R = 1: gears are solid discs; helix and profile modifications are not included in K_v, K_Hbeta and K_Halpha"
     )
     if rating.edition == "ISO 6336:2019":
-        unstated = rating.f_ZCa is None and any(is_modified(gearbox, mesh.pair) for mesh in gearbox.meshes)
-        yield (
-            f"f_ZCa = {UNMODIFIED:g} for helical gears without flank modification (Z_B, Z_D)"
-            + ("; the file has flank modifications: if they suit the load, set f_ZCa of [rating]" if unstated else "")
-        )
+        text = f"f_ZCa = {UNMODIFIED:g} for helical gears without flank modification (Z_B, Z_D)"
+        if rating.f_ZCa is None and any(is_modified(gearbox, mesh.pair) for mesh in gearbox.meshes):
+            text += "; the file has flank modifications: if they suit the load, set f_ZCa of [rating]"
+        yield text
         yield "K factors, life factors, Z_L, Z_v and Z_R are taken from ISO 6336:2006 in both editions"
     yield "m_red includes the rim of ring gears, except of those held by the housing"
     yield "Y_B: rim thickness of rings and planets; other gears are solid on shafts. Z_W = Z_X = 1"

@@ -99,7 +99,9 @@ class FlankRules:
     @property
     def auxiliary_factor(self) -> float:
         """Auxiliary factor in Z_B and Z_D: f_ZCa, or 1 in the edition of 2006."""
-        return self.f_ZCa if self.edition == "ISO 6336:2019" else 1.0
+        if self.edition == "ISO 6336:2006":
+            return 1.0
+        return self.f_ZCa
 
     @property
     def strength(self) -> StrengthSection | None:
@@ -282,8 +284,9 @@ def _stresses(rules: FlankRules, of: dict[str, float]) -> dict[str, float]:
     single = single_contact_factors(pair, rules.auxiliary_factor)[member]
     of_2019 = {}
     if rules.edition == "ISO 6336:2019" and pair.overlap_ratio > 0.0:
-        internal = (pair.pinion, pair.gear)[member].internal
-        of_2019 = {"f_ZCa": 1.0 if internal else rules.f_ZCa, "f_eps": root.load_distribution}
+        of_2019 = {"f_ZCa": rules.f_ZCa, "f_eps": root.load_distribution}
+        if (pair.pinion, pair.gear)[member].internal:
+            of_2019["f_ZCa"] = 1.0
     common = of["K_A"] * of["K_gamma"] * of["K_v"]
     nominal = nominal_contact_stress(pair, of["F_t"])
     nominal_root = of["F_t"] / (pair.face_width * pair.pinion.normal_module) * root.product

@@ -228,7 +228,7 @@ def test_f_zca_counts_for_modified_flanks_alone(tmp_path):
     del content["rating"]["f_ZCa"]
     sheet = project_of(content, tmp_path).rating()
     assert sheet.flanks[0].standard["f_ZCa"] == 1.2
-    assert any("state f_ZCa" in line for line in sheet.assumptions)
+    assert any("set f_ZCa" in line for line in sheet.assumptions)
     content["gears"]["pinion"]["modification"] = {"lead_crowning_um": 0.0}
     content["rating"]["f_ZCa"] = 1.05
     with pytest.raises(GearboxFileError, match="no helical gear has a modification"):
@@ -311,6 +311,10 @@ def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_li
         assert one.finite_elements["sigma_H"] == pytest.approx(float(data["flank_contact_stress"][place]))
     page = project.report().path.read_text("utf-8")
     assert '"rating"' in page and '"sigma_FG_MPa"' in page
+    content["rating"]["edition"] = "ISO 6336:2006"
+    before = Project(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")), project.folder, project.choice)
+    assert not before.rating().flanks[0].finite_elements, "a life of another edition is not used"
+    del content["rating"]["edition"]
     content["rating"]["dynamic_factor"] = 1.2
     other = Project(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")), project.folder, project.choice).rating()
     assert not other.flanks[0].finite_elements
