@@ -23,8 +23,8 @@ from exugear.results.folder import (
     bearings_path,
     bodies_folder,
     keep_case,
-    kept_case,
     modes_path,
+    read_stored_gearbox,
     run_directory,
     time_noted,
     write_duties,
@@ -128,7 +128,7 @@ class Project(ReprMixin):
         GearboxFileError
             The folder holds no results, or its stored gearbox file is invalid.
         """
-        return cls(kept_case(Path(folder), permissions), Path(folder), choice or Choice())
+        return cls(read_stored_gearbox(Path(folder), permissions), Path(folder), choice or Choice())
 
     def chosen(self, **changes: Any) -> Project:
         """Return the same gearbox and folder with other settings: `variant`, `mesh_model`, `inertias`, `load_case`."""
@@ -449,7 +449,7 @@ class Project(ReprMixin):
 
     def _rated_by_life(self, counted: CountedLoads) -> tuple[Figures, tuple[str, ...]]:
         """Return values of a stored life, preferably of the selected variant; otherwise none, with the reason."""
-        from exugear.life.rating.sheet import of_life
+        from exugear.life.rating.sheet import life_results
 
         missing = "no finite element results: compute them by `exugear life`"
         reasons: list[str] = []
@@ -457,7 +457,7 @@ class Project(ReprMixin):
             other = self.chosen(variant=variant)
             data, reason = other._fitting_life(counted)
             if data is not None:
-                return of_life(data), (f"by finite elements, variant {variant}: {other.life_path}",)
+                return life_results(data), (f"by finite elements, variant {variant}: {other.life_path}",)
             reasons += [reason] * bool(reason)
         return {}, ("; ".join([missing, *reasons]),)
 

@@ -14,6 +14,11 @@ TREES = [
 ]
 MOST_PAIRS = 400
 MOST_CONDITIONAL_EXPRESSIONS = 1095
+PREPOSITIONS = (
+    *("about", "after", "along", "around", "before", "behind", "beside", "between", "by", "in", "near", "of", "on"),
+    *("over", "per", "under"),
+)
+"""A function with such a first word is no verb and names no result; `from_`, `to_`, `with_`, `at_` are idioms."""
 VAGUE = {"own", "one", "found", "told", "said", "place", "places", "whole", "words"}
 
 
@@ -30,6 +35,11 @@ def bound_names() -> list[str]:
 def test_few_names_are_vague():
     names = bound_names()
     assert sum(name in VAGUE for name in names) < 0.032 * len(names)
+
+
+def test_no_function_begins_with_a_preposition():
+    names = [node.name for kind in (ast.FunctionDef, ast.AsyncFunctionDef) for node in nodes(kind)]
+    assert not [name for name in names if name.lstrip("_").split("_")[0] in PREPOSITIONS and "_" in name.strip("_")]
 
 
 def test_values_are_assigned_one_by_one():

@@ -14,7 +14,7 @@ from spellchecker import SpellChecker
 ROOT = Path(__file__).parent.parent.parent
 WORDS = ROOT / "docs" / "words.txt"
 GENERATED = ("elsewhere", "gallery", "rooms")
-LEFT_OUT = re.compile(
+NOT_PROSE = re.compile(
     r"^(`{3,}|~{3,}).*?^\1"  # fenced blocks
     r"|^(?: {4}|\t).*?$"  # indented blocks
     r"|<!--.*?-->"
@@ -42,7 +42,7 @@ def prose(file: Path) -> str:
     if file.suffix == ".py":
         comments = re.findall(r"^# ?(.*)$", text, re.MULTILINE)
         text = "\n".join([*text.split('"""')[1:2], *comments])
-    return LEFT_OUT.sub(" ", text)
+    return NOT_PROSE.sub(" ", text)
 
 
 def unknown_words(file: Path, dictionary: SpellChecker) -> list[str]:

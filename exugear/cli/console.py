@@ -277,13 +277,13 @@ def model_errors() -> Iterator[None]:
     try:
         yield
     except Exception as error:
-        user = _told_to_the_user(error)
+        user = _user_error(error)
         if user is None:
             raise
         raise user from error
 
 
-def _told_to_the_user(error: Exception) -> Exception | None:
+def _user_error(error: Exception) -> Exception | None:
     """Return the command-line error for an error of the model; None for any other error."""
     if not type(error).__module__.startswith("exugear."):
         return None
@@ -371,7 +371,7 @@ def files_read(row: Row) -> Callable[[int, int], None]:
 # Messages about tables of the transmission error
 
 
-def tell_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
+def table_warnings(tables: Mapping[str, MeshTable]) -> list[str]:
     """Print warnings about missing or truncated values of tables; return the reasons why tables are invalid."""
     from exugear.system.tooth_mesh.tables import doubts_about_table, remarks_about_table
 

@@ -35,12 +35,12 @@ _DIGITS = {
 }
 
 
-def tell_rating(sheet: RatingSheet) -> None:
+def print_rating(sheet: RatingSheet) -> None:
     """Print a rating sheet with its assumptions and neglected effects."""
     print_text(f"Rating to {sheet.edition}, method B; {sheet.load}")
     for title, flanks in _meshes(sheet):
         print_table(f"Mesh {title}", [*_rows(flanks, sheet.other_edition)])
-        for line in dict.fromkeys(line for flank in flanks for line in _told(flank)):
+        for line in dict.fromkeys(line for flank in flanks for line in _remarks(flank)):
             note(line, style="yellow")
     for line in sheet.assumptions:
         note(line)
@@ -89,6 +89,6 @@ def _number(value: float, form: str) -> str:
     return format(value, form)
 
 
-def _told(sheet: FlankSheet) -> Iterator[str]:
+def _remarks(sheet: FlankSheet) -> Iterator[str]:
     yield from (f"{sheet.family}: {name} {reason}" for name, reason in sheet.lacking.items())
     yield from (f"{sheet.gear} in {sheet.family}: {remark}" for remark in sheet.remarks)

@@ -15,7 +15,7 @@ from exugear.cli.console import (
     files_read,
     make_results_folder,
     note,
-    tell_of_tables,
+    table_warnings,
 )
 from exugear.gearbox.reading import GearboxFileError
 from exugear.project import Project
@@ -62,7 +62,7 @@ class WatchedProject(Project):
         with time_noted(self.folder, "tables, computed before dynamics") if requests else nullcontext():
             self.computed(requests)
         # Mesh models themselves refuse tables that they cannot use.
-        for doubt in tell_of_tables(self.tables_at_work()):
+        for doubt in table_warnings(self.tables_at_work()):
             note(f"Warning: {doubt}", style="yellow")
 
     def computed(
@@ -156,7 +156,7 @@ class WatchedProject(Project):
         """Life of gears and bearings."""
         with self.bars.row() as row:
             row("tooth stresses")
-            return super().life(*_of_life(row), counted)
+            return super().life(*_life_progress(row), counted)
 
     def rating(
         self, begin: Callable[[str], None] | None = None, progress: Callable[[int, int], None] | None = None
@@ -164,10 +164,10 @@ class WatchedProject(Project):
         """Rating of all gears according to the standard."""
         with self.bars.row() as row:
             row("static balance")
-            return super().rating(*_of_life(row))
+            return super().rating(*_life_progress(row))
 
 
-def _of_life(row: Row) -> tuple[Callable[[str], None], Callable[[int, int], None]]:
+def _life_progress(row: Row) -> tuple[Callable[[str], None], Callable[[int, int], None]]:
     """Return functions that show the pair whose root stress is computed, and the number of computed static states."""
     return (
         lambda pair: row(f"{pair}: root stress by finite elements"),

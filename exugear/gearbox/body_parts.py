@@ -298,7 +298,7 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
         A joint supports the ground or an unknown body, or connects sets of different size.
     """
 
-    def of_section(name: str, section: JointSection) -> tuple[Joint, ...]:
+    def convert_section(name: str, section: JointSection) -> tuple[Joint, ...]:
         key = f"joints.{name}"
         if section.body == GROUND:
             raise origin.fault(
@@ -311,7 +311,7 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
             for suffix, body, on in origin.instances(key, section.body, section.on)
         )
 
-    return parts_of_each(of_section, origin.case.joints or dict(_usual_joints(origin)))
+    return parts_of_each(convert_section, origin.case.joints or dict(_usual_joints(origin)))
 
 
 def _usual_joints(origin: Origin) -> Iterator[tuple[str, JointSection]]:
@@ -334,7 +334,7 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
         A bearing supports the ground or an unknown body, or connects sets of different size.
     """
 
-    def of_section(name: str, section: BearingSection) -> tuple[Bearing, ...]:
+    def convert_section(name: str, section: BearingSection) -> tuple[Bearing, ...]:
         key = f"bearings.{name}"
         if section.body == GROUND:
             raise origin.fault(
@@ -364,7 +364,7 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
             for suffix, body, on in origin.instances(key, section.body, section.on)
         )
 
-    return (*parts_of_each(of_section, origin.case.bearings), *_couplings_on_fixed_bodies(origin, bodies))
+    return (*parts_of_each(convert_section, origin.case.bearings), *_couplings_on_fixed_bodies(origin, bodies))
 
 
 def _holds_on_a_fixed_body(origin: Origin, section: CouplingSection) -> bool:
@@ -420,7 +420,7 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
         The supported body is not an enabled body with a position of its own.
     """
 
-    def of_section(name: str, section: MountSection) -> tuple[Bearing, ...]:
+    def convert_section(name: str, section: MountSection) -> tuple[Bearing, ...]:
         key = f"mounts.{name}"
         if _stands_aside(origin, key, section):
             return ()
@@ -443,7 +443,7 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
         )
         return (mount,)
 
-    return parts_of_each(of_section, origin.case.mounts)
+    return parts_of_each(convert_section, origin.case.mounts)
 
 
 def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce, ...]:
@@ -455,7 +455,7 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
         A force acts on the ground, on a planet, on a body without a position, or on an unknown body.
     """
 
-    def of_section(name: str, section: ForceSection) -> tuple[PointForce, ...]:
+    def convert_section(name: str, section: ForceSection) -> tuple[PointForce, ...]:
         key = f"forces.{name}"
         if section.body == GROUND:
             raise origin.fault(f"{key}.body = {GROUND!r}: a force on the ground has no effect; set a moving body")
@@ -470,7 +470,7 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
         position = _position(bodies[section.body], section.z_mm)
         return (PointForce(name, section.body, position, (*section.force_N, *section.moment_N_m)),)
 
-    return parts_of_each(of_section, origin.case.forces)
+    return parts_of_each(convert_section, origin.case.forces)
 
 
 def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[str]) -> tuple[Coupling, ...]:
@@ -487,7 +487,7 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
         A coupled body does not rotate, or the seat of a coupling is not a bearing.
     """
 
-    def of_section(name: str, section: CouplingSection) -> tuple[Coupling, ...]:
+    def convert_section(name: str, section: CouplingSection) -> tuple[Coupling, ...]:
         key = f"couplings.{name}"
         if _stands_aside(origin, key, section) or not origin.are_enabled(key, *section.bodies):
             return ()
@@ -507,7 +507,7 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
             damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad
         return (Coupling(name, *section.bodies, section.seat, section.stiffness_N_m_per_rad, damping),)
 
-    return parts_of_each(of_section, origin.case.couplings)
+    return parts_of_each(convert_section, origin.case.couplings)
 
 
 def _stands_aside(origin: Origin, key: str, section: MountSection | CouplingSection) -> bool:

@@ -245,15 +245,15 @@ def faults_of_planets(
 ) -> Iterator[str]:
     """Yield errors for planets of one carrier that collide, in a set or between sets, and for impossible assembly."""
     planets = [body for body in bodies if body.planet_of is not None]
-    told = set()
+    reported = set()
     for planet, other in itertools.combinations(planets, 2):
-        if (planet.family, other.family) in told or planet.planet_of != other.planet_of:
+        if (planet.family, other.family) in reported or planet.planet_of != other.planet_of:
             continue
         if any({mesh.pinion, mesh.gear} == {planet.name, other.name} for mesh in meshes):
             continue
         collision = next(_collisions(case, planet, other, gears), None)
         if collision is not None:
-            told.add((planet.family, other.family))
+            reported.add((planet.family, other.family))
             yield collision
     for family in case.bodies:
         others = {body.name for body in planets if body.family != family}

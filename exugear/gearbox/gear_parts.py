@@ -70,7 +70,7 @@ def gears(origin: Origin) -> dict[str, Gear]:
 
     fitted |= _without_rounded_overlaps(origin, fitted)
 
-    def of_section(name: str, section: GearSection) -> Gear:
+    def convert_section(name: str, section: GearSection) -> Gear:
         gear = fitted[name]
         if section.tip_chamfer_mm:
             height = gear.outward * section.tip_chamfer_mm * MM
@@ -79,7 +79,7 @@ def gears(origin: Origin) -> dict[str, Gear]:
             f"gears.{name}", Gear, **{field.name: getattr(gear, field.name) for field in fields(gear)}
         )
 
-    return part_of_each(of_section, origin.case.gears)
+    return part_of_each(convert_section, origin.case.gears)
 
 
 def with_usual_rounding(section: GearSection, gear: GearInputs) -> GearInputs:
@@ -292,7 +292,7 @@ def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankM
         A modification does not fit its gear, or a topography cannot be read.
     """
 
-    def of_section(name: str, section: GearSection) -> FlankModification:
+    def convert_section(name: str, section: GearSection) -> FlankModification:
         key = f"gears.{name}.modification"
         amounts = {} if section.modification is None else dict(section.modification)
         _check_depth(origin, key, amounts, section.normal_module_mm)
@@ -303,7 +303,7 @@ def modifications(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, FlankM
             _check_depth(origin, key, {"topography, removed_um": removed}, section.normal_module_mm)
         return modification
 
-    return part_of_each(of_section, origin.case.gears)
+    return part_of_each(convert_section, origin.case.gears)
 
 
 def _modification(gear: Gear, section: GearSection, find: Callable[[str], Path]) -> FlankModification:
@@ -357,7 +357,7 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
         A pair has an unknown gear, or its gears cannot run together.
     """
 
-    def of_section(name: str, section: PairSection) -> GearPair:
+    def convert_section(name: str, section: PairSection) -> GearPair:
         for key in ("pinion", "gear"):
             if getattr(section, key) not in gears:
                 raise origin.fault(
@@ -377,7 +377,7 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
             common_face_width=(None if section.common_face_width_mm is None else section.common_face_width_mm * MM),
         )
 
-    return part_of_each(of_section, origin.case.pairs)
+    return part_of_each(convert_section, origin.case.pairs)
 
 
 def _is_turned_over(pinion: Gear, gear: Gear) -> bool:
@@ -428,7 +428,7 @@ def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
         A stiffness is zero or negative somewhere in the cycle.
     """
 
-    def of_section(name: str, section: PairSection) -> tuple[float, ...]:
+    def convert_section(name: str, section: PairSection) -> tuple[float, ...]:
         assert section.stiffness is not None
         values = _stiffness_over_cycle(section.stiffness)
         if values.min() <= 0.0:
@@ -439,7 +439,7 @@ def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
         return tuple(values.tolist())
 
     return part_of_each(
-        of_section, {name: pair for name, pair in origin.case.pairs.items() if pair.stiffness is not None}
+        convert_section, {name: pair for name, pair in origin.case.pairs.items() if pair.stiffness is not None}
     )
 
 
@@ -465,7 +465,7 @@ def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, B
         A pair or body is unknown, a body lacks the gear, faces do not overlap, or angles contradict positions.
     """
 
-    def of_section(name: str, section: MeshSection) -> tuple[Mesh, ...]:
+    def convert_section(name: str, section: MeshSection) -> tuple[Mesh, ...]:
         key = f"meshes.{name}"
         for end in ("pinion_body", "gear_body"):
             if getattr(section, end) == GROUND:
@@ -478,7 +478,7 @@ def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, B
             raise origin.fault(f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(pairs)}")
         return tuple(_meshes_of_section(origin, name, section, pairs[section.pair], bodies))
 
-    return parts_of_each(of_section, origin.case.meshes)
+    return parts_of_each(convert_section, origin.case.meshes)
 
 
 def _meshes_of_section(
@@ -557,7 +557,7 @@ def deviations(
         A body or gear is unknown, the number of values differs from the teeth, or values exceed the tooth depth.
     """
 
-    def of_section(name: str, section: DeviationSection) -> tuple[tuple[str, str], WheelDeviation]:
+    def convert_section(name: str, section: DeviationSection) -> tuple[tuple[str, str], WheelDeviation]:
         key = f"deviations.{name}"
         if section.body not in bodies:
             raise origin.fault(f"{key}.body = {section.body!r}: no such body; bodies are {', '.join(bodies)}")
@@ -567,7 +567,7 @@ def deviations(
             raise origin.fault(f"{key}.gear = {section.gear!r}: choose one of {', '.join(wheels) or 'no gears'}")
         return (section.body, gear), _deviation(origin, key, gears[gear], section)
 
-    return dict(part_of_each(of_section, origin.case.deviations).values())
+    return dict(part_of_each(convert_section, origin.case.deviations).values())
 
 
 def _deviation(origin: Origin, key: str, gear: Gear, section: DeviationSection) -> WheelDeviation:

@@ -248,7 +248,7 @@ def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) ->
         if bearing.catalogue is not None and bearing.catalogue.radial_load_kN is None and bearing.model == "linear"
     ]
     light = {family: share for family, share in loads.least_shares.items() if share < LEAST_SHARE}
-    if not led or not light or not Variant.of(variant).on_bearings:
+    if not led or not light or not Variant.of(variant).has_bearings:
         return ""
     turned = [family for family, share in light.items() if share < 0.0]
     least = min(light.values())
@@ -259,12 +259,12 @@ def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) ->
     )
 
 
-def other_load_warning(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool = True) -> str:
+def other_load_warning(gearbox: Gearbox, loads: LoadSummary, uses_single_load: bool = True) -> str:
     """Return a warning that names meshes with another load than the static one of their STE tables; empty if none.
 
     Parameters
     ----------
-    of_one_load : whether the mesh model evaluates tables at the static load only
+    uses_single_load : whether the mesh model evaluates tables at the static load only
 
     Examples
     --------
@@ -273,16 +273,16 @@ def other_load_warning(gearbox: Gearbox, loads: LoadSummary, of_one_load: bool =
     >>> other_load_warning(half, summarise_loads(half, half.load_cases["reference"]))
     'other load: sun_planet 50 %, ring_planet 50 %, intermediate 50 %, high_speed 50 % of the static load ...
     """
-    told = []
+    entries = []
     for family, least in loads.least_shares.items():
         greatest = loads.greatest_shares[family]
         if least < 1.0 - OTHER_LOAD or greatest > 1.0 + OTHER_LOAD:
             shares = dict.fromkeys(f"{100.0 * share:.0f}" for share in (least, greatest))
-            told.append(f"{family} {' to '.join(shares)} %")
-    if not told or not of_one_load:
+            entries.append(f"{family} {' to '.join(shares)} %")
+    if not entries or not uses_single_load:
         return ""
     return (
-        f"other load: {', '.join(told)} of the static load ({static_load_in_words(gearbox)}), at which transmission "
+        f"other load: {', '.join(entries)} of the static load ({static_load_in_words(gearbox)}), at which transmission "
         "error and stiffness are computed; add --at-load-case to the command run, or use --mesh-model table, which "
         "covers a range of loads"
     )

@@ -15,7 +15,7 @@ class Trait(Flag):
 
     none = 0
     spins_only = auto()
-    on_bearings = auto()
+    has_bearings = auto()
     elastic = auto()
     constrained = auto()
 
@@ -44,8 +44,8 @@ class Variant(StrEnum):
 
     rigid = "rigid", "on ideal joints", Trait.spins_only
     jointed = "jointed", "on joints kept as constraints", Trait.constrained
-    bushing = "bushing", "on bearings", Trait.on_bearings
-    flexible = "flexible", "with flexible bodies", Trait.on_bearings | Trait.elastic
+    bushing = "bushing", "on bearings", Trait.has_bearings
+    flexible = "flexible", "with flexible bodies", Trait.has_bearings | Trait.elastic
 
     def __repr__(self) -> str:
         """Return the name as files have it."""
@@ -57,9 +57,9 @@ class Variant(StrEnum):
         return Trait.spins_only in self.traits
 
     @property
-    def on_bearings(self) -> bool:
+    def has_bearings(self) -> bool:
         """Whether bearings support the shafts, which then also translate and tilt."""
-        return Trait.on_bearings in self.traits
+        return Trait.has_bearings in self.traits
 
     @property
     def is_elastic(self) -> bool:

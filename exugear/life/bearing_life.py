@@ -37,7 +37,7 @@ from exugear.system.bearings.rolling.rows import (
     BearingOfRows,
     RollerRow,
     RollingRow,
-    on_raceways,
+    raceway_rows,
 )
 from fe_ste.tools.arrays import Floats
 
@@ -121,7 +121,7 @@ class _Case:
         worst = np.concatenate([self.balance.at(carried, *self.acting.worst(sense)) for sense in (1, -1)])
         section = self.support.catalogue
         assert section is not None
-        rows = tuple(_sliced(row) for row in on_raceways(catalogue_rows(section)))
+        rows = tuple(_sliced(row) for row in raceway_rows(catalogue_rows(section)))
         ratings = ratings_of(section)
         revolutions = points.revolutions * turns
         share = revolutions[:, None] / loads.shape[1]
@@ -172,8 +172,8 @@ class _Case:
             static_safety=ratings.static / static if static else math.inf,
             ratings=ratings,
             remarks=tuple(remarks),
-            by_bin=self.acting.by_bin(by_bin),
-            reference_by_bin=self.acting.by_bin(by_reference),
+            by_bin=self.acting.sum_by_bin(by_bin),
+            reference_by_bin=self.acting.sum_by_bin(by_reference),
         )
 
     def _life_factor(

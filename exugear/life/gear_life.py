@@ -269,8 +269,8 @@ class _Case:
         by_point = np.zeros((2, len(points.torque)))
         by_point[:, worn] = rated.pop("by_point")
         return FlankLife(
-            contact_by_bin=acting.by_bin(by_point[0]),
-            root_by_bin=acting.by_bin(by_point[1]),
+            contact_by_bin=acting.sum_by_bin(by_point[0]),
+            root_by_bin=acting.sum_by_bin(by_point[1]),
             gear=tooth.gear,
             family=tooth.family,
             flank=FLANKS[self.sense * tooth.flank],

@@ -36,7 +36,7 @@ UNTRUSTED_REACH = 3.0
 """Limit of the same ratio with load sharing, rotor loads and K_v included; above it, safeties are invalid."""
 TOLD_REACH = 1.001
 """Ratio above which the extrapolation is reported."""
-LEFT_OUT = (
+NOT_RATED = (
     "scuffing (ISO/TS 6336-20, -21): not rated by this program",
     "micropitting (ISO/TS 6336-22): not rated by this program",
     "tooth flank fracture (ISO/TS 6336-4): not rated by this program",
@@ -368,7 +368,7 @@ def _unrated(assembly: Assembly, counted: CountedLoads, stresses: Mapping[str, M
         lines.append(f"{support}: defined by its stiffness only; add a [.catalogue] table for a rating life")
     if not assembly.supports:
         lines.append(f"bearings: the variant {assembly.variant} has none")
-    return [*lines, *LEFT_OUT]
+    return [*lines, *NOT_RATED]
 
 
 def _assumptions(

@@ -191,7 +191,7 @@ def static_balance(
     wrenches = _wrenches(assembly, body, sizes)
     found: list[States] = []
     for number, turn in enumerate(turns):
-        count = partial(_told, progress, number * len(solved), len(turns) * len(solved))
+        count = partial(_report_progress, progress, number * len(solved), len(turns) * len(solved))
         states = None if store is None else store.stored(number)
         if states is None:
             states = _solve_angle(assembly, body, solved, float(turn), wrenches, count)
@@ -205,7 +205,7 @@ def static_balance(
     return StaticBalance(solved, turns, force, misalignment, load, tilt, linear, outside)
 
 
-def _told(progress: Callable[[int, int], None] | None, before: int, total: int, done: int) -> None:
+def _report_progress(progress: Callable[[int, int], None] | None, before: int, total: int, done: int) -> None:
     if progress is not None:
         progress(before + done, total)
 
@@ -417,7 +417,7 @@ class ActingLoads:
         own = torque * sense > 0.0
         return torque[own], hub[own]
 
-    def by_bin(self, values: Floats) -> Floats:
+    def sum_by_bin(self, values: Floats) -> Floats:
         """Sum values of points (points,) into the bins of the distribution, (bins,)."""
         return np.asarray(np.bincount(self.points.bin, values, self.bins), dtype=np.float64)
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import choice_of, words_of
+from exugear.report.findings.context import choice_of, model_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
 from exugear.report.material import Part, ReportData, only_for
@@ -25,27 +25,27 @@ from exugear.system.statics import BalanceError
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState
 
-LIFTS = 1.0
+CONTACT_LOSS_RATIO = 1.0
 """Dynamic over mean force above which a linear bearing model would lose contact; the page warns then."""
 NOISE = 1e-3
 """Fraction of the mean transverse force below which an axial force is shown as zero."""
 NOISE_OF_ALL = 1e-5
 """Fraction of the largest force of all bearings below which a force is shown as zero."""
-MEANS = (
-    "Mean force over the middle third of the run-up, and largest zero-to-peak amplitude along an order (root sum "
-    "square of both transverse directions). For planet sets, the bearing with the largest amplitude. Axial force: of "
+RUN_UP_NOTE = (
+    "Mean radial force over the middle third of the run-up, and largest zero-to-peak amplitude along an order (root "
+    "sum square of both radial directions). For planet sets, the bearing with the largest amplitude. Axial force: of "
     "the shaft on the bearing or joint, positive along +z."
 )
 """Note above the table of forces in run-ups."""
-WAVES = (
-    "Largest zero-to-peak amplitude along an order at constant speed (root sum square of both transverse "
+STEADY_NOTE = (
+    "Largest zero-to-peak amplitude along an order at constant speed (root sum square of both radial "
     "directions). Planet bearing forces are multi-blade components (mean, cosine, sine). Static loads are listed "
     "below."
 )
 """Note above the table of forces at constant speed."""
 SEATS = 12
 """Maximum number of seats in the table of accelerations."""
-QUIET = 1e-3
+MIN_RELATIVE_ACCELERATION = 1e-3
 """Fraction of the largest acceleration below which a seat is not listed."""
 
 
@@ -79,20 +79,20 @@ def _forces(material: ReportData, data: Mapping[str, Any], group: RunGroup, vari
         for name, figures in loudest.items()
     }
     rows = [_force_row(group, variant, name, figures, largest) for name, figures in loudest.items()]
-    caption = f"Transverse forces {Variant.of(variant).label}, {group.source}"
+    caption = f"Radial forces {Variant.of(variant).label}, {group.source}"
     lifting = [
         f"{figures['words']}: dynamic force amplitude {100.0 * figures['amplitude'] / figures['mean']:.0f} % of the "
         "mean force. A linear bearing model neglects loss of contact."
         for figures in loudest.values()
-        if figures["mean"] and figures["amplitude"] > LIFTS * figures["mean"]
+        if figures["mean"] and figures["amplitude"] > CONTACT_LOSS_RATIO * figures["mean"]
     ]
-    words = WAVES if group.responses else MEANS
+    words = STEADY_NOTE if group.responses else RUN_UP_NOTE
     table = pieces.table(
         rows,
         ("dominant order",),
         caption=caption,
         name=f"forces-{group.name}-{variant}",
-        hidden=("axial / kN",),
+        hidden=("mean axial force / kN",),
         sortable=True,
     )
     warned = pieces.element("div", pieces.bullets(lifting), class_="warning") if lifting else ""
@@ -108,11 +108,11 @@ def _force_row(
     share = amplitude / mean if mean else math.inf
     named = Cell(f"{figures['words']}{copies}", choice=f"channel:{group.name}:{variant}:{name}")
     swings = Cell(figure_text(1e-3 * amplitude), amplitude, bar=amplitude / largest)
-    measures = {"amplitude ± / kN": swings}
+    measures = {"amplitude / kN": swings}
     if not group.responses:
         measures = {
-            "mean / kN": Cell(figure_text(1e-3 * mean), mean),
-            "axial / kN": Cell(figure_text(_without_noise(1e-3 * figures["axial"], mean)), figures["axial"]),
+            "mean radial force / kN": Cell(figure_text(1e-3 * mean), mean),
+            "mean axial force / kN": Cell(figure_text(_without_noise(1e-3 * figures["axial"], mean)), figures["axial"]),
             **measures,
             ("amplitude over mean / %"): Cell(
                 figure_text(100.0 * share, 2) if math.isfinite(share) else "–", min(share, 1e9)
@@ -122,8 +122,8 @@ def _force_row(
         "bearing or joint": named,
         **measures,
         "dominant order": figures["line"],
-        "at / rpm": Cell(figure_text(figures["speed"], 4), figures["speed"]),
-        "at / Hz": Cell(f"{figures['frequency']:.0f}", figures["frequency"]),
+        "speed / rpm": Cell(figure_text(figures["speed"], 4), figures["speed"]),
+        "frequency / Hz": Cell(f"{figures['frequency']:.0f}", figures["frequency"]),
     }
 
 
@@ -151,7 +151,7 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
     order = np.argsort(-amplitude.max(axis=(0, 1)))[:SEATS]
     rows = []
     for seat in order:
-        if not amplitude[..., seat].max() > QUIET * amplitude.max():
+        if not amplitude[..., seat].max() > MIN_RELATIVE_ACCELERATION * amplitude.max():
             break
         point, line = np.unravel_index(int(np.argmax(amplitude[..., seat])), amplitude.shape[:2])
         speed = abs(float(data["speed"][point]))
@@ -162,12 +162,12 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
                     figure_text(float(amplitude[point, line, seat])), float(amplitude[point, line, seat])
                 ),
                 "order": _line_words(material, data, int(line) + 1),
-                "at / rpm": Cell(figure_text(speed / RPM, 4), speed),
-                "at / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
+                "speed / rpm": Cell(figure_text(speed / RPM, 4), speed),
+                "frequency / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
             }
         )
     title = (
-        f"Accelerations at bearings: steady-state response of {words_of(choice_of(data.attrs))}, method "
+        f"Accelerations at bearings: steady-state response of {model_label(choice_of(data.attrs))}, method "
         f"{data.attrs['method']}"
     )
     words = (
@@ -180,7 +180,7 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
 
 def _line_words(material: ReportData, data: xr.Dataset, line: int) -> str:
     bases = tuple(str(name) for name in data["base"].to_numpy())
-    return material.words.told(line_name(tuple(int(n) for n in data["index"][line].to_numpy()), bases))
+    return material.words.labelled(line_name(tuple(int(n) for n in data["index"][line].to_numpy()), bases))
 
 
 def _seat_words(material: ReportData, signal: str) -> str:
@@ -190,9 +190,9 @@ def _seat_words(material: ReportData, signal: str) -> str:
 
 
 def _duties(material: ReportData, assembly: Assembly) -> str:
-    if not assembly.variant.on_bearings or not any(support.catalogue for support in assembly.supports):
+    if not assembly.variant.has_bearings or not any(support.catalogue for support in assembly.supports):
         return ""
-    name = words_of(assembly.choice)
+    name = model_label(assembly.choice)
     try:
         duties = bearing_duties(assembly)
     except (BalanceError, BearingError) as error:
@@ -219,12 +219,13 @@ def _meshes(material: ReportData, assembly: Assembly) -> str:
     """Tabulate mesh misalignment and face load distribution under static load; empty without solved tooth contact."""
     if not assembly.contacts.contacts:
         return ""
-    name = words_of(assembly.choice)
+    name = model_label(assembly.choice)
     duties = mesh_duties(assembly)
     rows = [_mesh_row(material, duty) for duty in duties]
     words = (
-        "Gear misalignment and load distribution under the static load (finite element contact). Gap: opening at the "
-        "+z end over the common face width; K_Hbeta: maximum over mean line load along the face width."
+        "Gear misalignment and load distribution under the static load (finite element contact). Gap at +z "
+        "end: opening of the flanks there due to misalignment, over the common face width; negative: at the -z end. "
+        "K_Hbeta: maximum over mean line load along the face width."
     )
     table = pieces.table(
         rows, (), caption=f"Meshes at the static load, {name}", name=f"meshes-{'-'.join(name.split())}"
@@ -242,7 +243,7 @@ def _mesh_row(material: ReportData, duty: MeshLoadState) -> dict[str, object]:
         "mesh": material.words.of(duty.name),
         "force / kN": f"{1e-3 * duty.force:.4g}",
         "misalignment / mrad": f"{1e3 * duty.misalignment:.3f}",
-        "opens / µm": f"{1e6 * duty.opening:.1f}",
+        "gap at +z end / µm": f"{1e6 * duty.opening:.1f}",
         "load centroid / mm": shown(1e3 * duty.load_centroid, ".1f"),
         "K_Hbeta": shown(duty.face_load_factor, ".2f"),
         "contact stress / MPa": shown(1e-6 * duty.pressure, ".0f"),

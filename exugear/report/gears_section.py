@@ -44,7 +44,7 @@ def gears_section(material: ReportData) -> Part:
         ]
     content.append(pieces.folded("Gears", pieces.table(_gear_rows(material), caption="Gears", name="gears")))
     html = pieces.section("Static transmission error and gears", *content, name="gears-section")
-    return Part(html, {"charts": charts}, "Excitation", "gears-section")
+    return Part(html, {"charts": charts}, "Static transmission error", "gears-section")
 
 
 def _swing(excitation: PairExcitation) -> float:

@@ -15,8 +15,8 @@ import xarray as xr
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import VariantError
 from exugear.life.life_file import draw_life, limits, stored_lives
-from exugear.life.rating.sheet import RATED_AS, FlankKey, balanced, of_life, rated, rated_loads
-from exugear.report.findings.context import choice_of, words_of
+from exugear.life.rating.sheet import RATED_AS, FlankKey, balanced, life_results, rated, rated_loads
+from exugear.report.findings.context import choice_of, model_label
 from exugear.report.findings.words import figure_text
 from exugear.report.material import Part, ReportData
 from exugear.report.web import html as pieces
@@ -32,7 +32,8 @@ WORDS = (
     "(ISO 281) includes lubricant and cleanliness.",
     "σ_H: largest contact stress; σ_F: largest root stress; σ_H0, σ_F0: nominal stresses of ISO 6336-2 and -3. S_H, "
     "S_F: factors on stress at which the damage is 1; static: for extreme loads. Outside the path: fraction of the "
-    "load in tip-edge contact. +: flank facing the sense of +z rotation. S_0: static rating over the largest load.",
+    "load carried by tip edges, outside the path of contact. +: flank that faces the direction of positive rotation "
+    "about z. S_0: static load safety factor of the bearing, static load rating over the largest load.",
 )
 
 LEAST_DAMAGE = 1e-6
@@ -53,14 +54,15 @@ def life_section(material: ReportData) -> Part:
             context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
         else:
             content.append(_variant_section(material, stored.data))
-            found = found or of_life(stored.data)
+            found = found or life_results(stored.data)
             worst = limits(stored.data)
             if worst:
                 part, kind, damage = worst[0]
                 size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
                 context.notes.statements.append(
-                    f"{words_of(choice_of(stored.data.attrs))}: largest fatigue damage in "
-                    f"{float(stored.data.attrs['life_years']):g} years: {material.words.told(part)}, {size} ({kind})."
+                    f"{model_label(choice_of(stored.data.attrs))}: largest fatigue damage in "
+                    f"{float(stored.data.attrs['life_years']):g} years: "
+                    f"{material.words.labelled(part)}, {size} ({kind})."
                 )
     data = _rating(material, found)
     if not content:
@@ -84,23 +86,25 @@ def _rating(material: ReportData, beside: Mapping[FlankKey, Mapping[str, float]]
 
 
 def _variant_section(material: ReportData, data: xr.Dataset) -> str:
-    told = material.words.told
-    data = data.assign_coords({key: [told(str(own)) for own in data[key].to_numpy()] for key in ("flank", "bearing")})
-    name = words_of(choice_of(data.attrs))
+    labelled = material.words.labelled
+    data = data.assign_coords(
+        {key: [labelled(str(own)) for own in data[key].to_numpy()] for key in ("flank", "bearing")}
+    )
+    name = model_label(choice_of(data.attrs))
     label = f"life-{data.attrs['variant']}-{data.attrs['mesh_model']}"
     rested = [line for key in ("assumptions", "unrated") for line in json.loads(data.attrs[key])]
     return (
         pieces.element("h3", pieces.text(f"{name[0].upper()}{name[1:]}, gears to {data.attrs['edition']}"))
-        + "".join(pieces.paragraph(f"Fails: {told(line)}.") for line in json.loads(data.attrs["failures"]))
+        + "".join(pieces.paragraph(f"Fails: {labelled(line)}.") for line in json.loads(data.attrs["failures"]))
         + "".join(
-            pieces.paragraph(f"Required life not reached: {told(line)}.")
+            pieces.paragraph(f"Required life not reached: {labelled(line)}.")
             for line in json.loads(data.attrs["shortfalls"])
         )
-        + "".join(pieces.paragraph(f"{told(line)}.") for line in json.loads(data.attrs["reliefs"]))
+        + "".join(pieces.paragraph(f"{labelled(line)}.") for line in json.loads(data.attrs["reliefs"]))
         + _picture(data, f"Limiting parts, {name}")
         + pieces.table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True)
         + pieces.table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True)
-        + pieces.folded("Assumptions, and parts without rating", pieces.bullets(map(told, rested)))
+        + pieces.folded("Assumptions, and parts without rating", pieces.bullets(map(labelled, rested)))
     )
 
 
@@ -152,12 +156,12 @@ def _rows(
     data: xr.Dataset, name: str, first: str, columns: dict[str, tuple[str, float, str]]
 ) -> list[dict[str, object]]:
     return [
-        {first: label, **{title: _told(data, name, place, *column) for title, column in columns.items()}}
+        {first: label, **{title: _cell(data, name, place, *column) for title, column in columns.items()}}
         for place, label in enumerate(data[name].to_numpy().tolist())
     ]
 
 
-def _told(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> Cell | str:
+def _cell(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> Cell | str:
     value = factor * float(data[f"{name}_{key}"][place])
     if math.isnan(value):
         return "–"
@@ -190,9 +194,9 @@ def _study(study: StoredStudy) -> str:
         f", {count} {word}" for count, word in ((study.failed, "failed"), (study.missing, "missing")) if count
     )
     old = "" if study.fits else pieces.paragraph("The gearbox file has changed; run the study again.", "warning")
-    told = f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}"
+    text = f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}"
     shown = [_picture_of_studies(path) for path in study.pictures if path.stat().st_size <= LARGEST_PICTURE]
-    return pieces.section(study.title, pieces.paragraph(told), old, *shown, level=3)
+    return pieces.section(study.title, pieces.paragraph(text), old, *shown, level=3)
 
 
 def _picture_of_studies(path: Path) -> str:

@@ -78,14 +78,14 @@ def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
     """Return a short label that identifies a group: source, and mesh model and inertia set where these differ."""
     parts = [own.source]
     if len({group.mesh_model for group in groups}) > 1:
-        parts.append(f"law {own.mesh_model}")
+        parts.append(f"mesh model {own.mesh_model}")
     if len({group.inertias for group in groups}) > 1:
-        parts.append(f"inertias {own.inertias}")
+        parts.append(f"inertia set {own.inertias}")
     words = ", ".join(parts)
     return words[0].upper() + words[1:]
 
 
-def told_groups(groups: Sequence[RunGroup]) -> list[RunGroup]:
+def summary_groups(groups: Sequence[RunGroup]) -> list[RunGroup]:
     """List the groups that the command line reports: run-ups, or steady-state responses if there are none."""
     return [group for group in groups if not group.responses] or list(groups)
 

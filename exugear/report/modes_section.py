@@ -13,10 +13,10 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, words_of
-from exugear.report.findings.facts import best_words, levers_of, shift_text
+from exugear.report.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, model_label
+from exugear.report.findings.facts import best_words, sensitivities_of, shift_text
 from exugear.report.findings.groups import RunGroup
-from exugear.report.findings.verdicts import ModelVariations, best_change, guarded
+from exugear.report.findings.verdicts import ModelVariations, best_change, track_mode
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name, only_for
 from exugear.report.web import html as pieces
@@ -39,7 +39,7 @@ def modes_section(material: ReportData) -> Part:
     for model, data in modes.items():
         growth = float(data.attrs["growth_rate"])
         if growth > 0.0:
-            unstable = f"{words_of(model)}: unstable, disturbances grow at up to {growth:.3g} 1/s."
+            unstable = f"{model_label(model)}: unstable, disturbances grow at up to {growth:.3g} 1/s."
             material.context.notes.statements.append(unstable)
     models = {model_name(model): _model(material, model, data) for model, data in modes.items()}
     campbell = pieces.figure(
@@ -67,12 +67,12 @@ def _stage_alone() -> str:
 
 
 def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, Any]:
-    material.context.tell(f"bodies and modes of {words_of(model)}")
+    material.context.tell(f"bodies and modes of {model_label(model)}")
     assembly = material.context.assembled(model)
     reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
     labels = material.words.labels
     return {
-        "words": words_of(model),
+        "words": model_label(model),
         "variant": model.variant,
         "stage": stage_data(
             assembly, data["shape"].to_numpy(), labels, material.arrays, _deformed(material, model, data)
@@ -133,11 +133,11 @@ def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> str:
             "Amplification": Cell(f"{mode.amplification:.2f}", mode.amplification),
             "by mesh": material.words.of(mode.mesh) if mode.amplification >= 0.01 else "–",
             "Mode shape": material.words.moves(data, mode.index),
-            "Strain energy": percentages(material.words.gives(data, mode.index)),
+            "Strain energy": percentages(material.words.strain_energy(data, mode.index)),
         }
         for mode in reports
     ]
-    title = f"All {len(rows)} modes of {words_of(model)}"
+    title = f"All {len(rows)} modes of {model_label(model)}"
     table = pieces.table(
         rows,
         ("by mesh", "Mode shape", "Strain energy"),
@@ -210,7 +210,7 @@ def _row(material: ReportData, model: Choice, data: xr.Dataset, index: int, targ
 
 def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: ModeReport, target: float) -> str:
     factor = float(data.attrs["housing_factor"])
-    subject = f"Variant {words_of(model)}, housing stiffness factor {factor:g}"
+    subject = f"Variant {model_label(model)}, housing stiffness factor {factor:g}"
     if visible.is_near(target):
         return (
             f"{subject}: mode at {visible.frequency:.0f} Hz near {target:.0f} Hz, TE participation "
@@ -240,13 +240,13 @@ def _matches(material: ReportData, target: float) -> Iterator[str]:
             f"No value within the varied ranges shifts a mode with TE participation to {target:.0f} Hz."
         )
         return
-    told = "; ".join(
-        f"{modelmatch.assumption} instead of {modelmatch.match.parameter.default:g} ({words_of(modelmatch.model)}: "
+    entries = "; ".join(
+        f"{modelmatch.assumption} instead of {modelmatch.match.parameter.default:g} ({model_label(modelmatch.model)}: "
         f"{modelmatch.match.frequency:.0f} Hz)"
         for modelmatch in modelmatchs
     )
     material.context.notes.statements.append(
-        f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {told}."
+        f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
     )
     rows = [_match_row(material, modelmatch, target) for modelmatch in modelmatchs]
     yield pieces.table(rows, ("inertia set", "assumption", "mode shape"), caption="Assumptions", name="matches")
@@ -286,7 +286,7 @@ def _reference_frequency(material: ReportData, found: ModelMatch, target: float)
 
 # Section "Design sensitivity": first-order shifts of the mode with the highest resonance, and full variations
 
-LEVERS = 8
+SHOWN_SENSITIVITIES = 8
 """Maximum number of parameters of each kind in the table."""
 
 
@@ -317,24 +317,27 @@ def _group(material: ReportData, group: RunGroup, charts: dict[str, Any]) -> str
     )
     own = next((variation for variation in material.variations if variation.choice == group.choice(group.main)), None)
     full = _variations(material, group, own, frequency, charts) if own and own.variations else ""
-    return pieces.paragraph(scope, "note") + _levers(material, group, mode) + full
+    return pieces.paragraph(scope, "note") + _sensitivity_table(material, group, mode) + full
 
 
-def _levers(material: ReportData, group: RunGroup, mode: int) -> str:
+def _sensitivity_table(material: ReportData, group: RunGroup, mode: int) -> str:
     modes = group.runs[group.main].modes
     assert modes is not None
-    levers = levers_of(material.words, modes, mode)
-    largest = max((abs(lever.shift) for lever in levers), default=1.0)
-    kinds = [[lever for lever in levers if lever.kind == kind][:LEVERS] for kind in ("stiffness", "inertia")]
+    sensitivities = sensitivities_of(material.words, modes, mode)
+    largest = max((abs(sensitivity.shift) for sensitivity in sensitivities), default=1.0)
+    kinds = [
+        [sensitivity for sensitivity in sensitivities if sensitivity.kind == kind][:SHOWN_SENSITIVITIES]
+        for kind in ("stiffness", "inertia")
+    ]
     rows = [
         {
-            "10 % more": lever.kind,
-            "of": lever.what,
-            "holds / %": Cell(f"{100.0 * lever.share:.1f}", lever.share),
-            "shift": Cell(shift_text(lever), lever.shift, bar=abs(lever.shift) / largest),
+            "+10 %": sensitivity.kind,
+            "of": sensitivity.what,
+            "energy fraction / %": Cell(f"{100.0 * sensitivity.share:.1f}", sensitivity.share),
+            "frequency shift": Cell(shift_text(sensitivity), sensitivity.shift, bar=abs(sensitivity.shift) / largest),
         }
         for own in kinds
-        for lever in own
+        for sensitivity in own
     ]
     caption = "First-order frequency shifts of the mode with the highest peak"
     table = pieces.table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True)
@@ -349,13 +352,13 @@ def _variations(
     material: ReportData, group: RunGroup, variations: ModelVariations, frequency: float, charts: dict[str, Any]
 ) -> str:
     figures = []
-    told = []
+    entries = []
     for number, variation in enumerate(variations.variations):
         parameter = variation.parameter
-        seen = guarded(variation, frequency)
+        seen = track_mode(variation, frequency)
         best = best_change(variation, frequency)
         label = material.words.parameter(parameter.label)
-        told.append(f"{label.partition(' / ')[0]}: {best_words(material.words, best)}")
+        entries.append(f"{label.partition(' / ')[0]}: {best_words(material.words, best)}")
         values = np.array(parameter.values)
         html, data = chart(
             f"variation-{group.name}-{number}",
@@ -369,7 +372,7 @@ def _variations(
             ],
             [Axis(label, parameter.logarithmic), Axis("Hz"), Axis("amplification")],
             material.arrays,
-            [(parameter.default, "used")],
+            [(parameter.default, "value used")],
         )
         figures.append(html)
         charts.update(data)
@@ -382,7 +385,7 @@ def _variations(
         pieces.element("h3", "Parameter variation")
         + pieces.paragraph(words, "note")
         + pieces.element("div", "".join(figures), class_="grid")
-        + pieces.bullets(told)
+        + pieces.bullets(entries)
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, channels_of, loudest_order
+from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, channels_of, dominant_order
 from exugear.report.findings.loudness import TOP, ConstantSpeed
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.material import ReportData, group_words, model_name
@@ -240,7 +240,7 @@ def axial_of_shaft(gearbox: Gearbox, channel: Channel) -> float:
 
 def _loudest(material: ReportData, channel: Channel) -> dict[str, Any] | None:
     """Return the values of a bearing for its table."""
-    order = loudest_order(channel.spectra, material.lines)
+    order = dominant_order(channel.spectra, material.lines)
     return {
         "words": channel.words,
         "copies": channel.copies,
@@ -300,7 +300,7 @@ def _mode_facts(material: ReportData, group: RunGroup, run: VariantRun, resonanc
     mode = resonance.finding.mode
     modes = run.modes
     if resonance.finding.mode_name and modes is None:
-        moves = material.words.told(resonance.finding.mode_name)
+        moves = material.words.labelled(resonance.finding.mode_name)
         return [["Mode", f"{resonance.finding.mode_frequency:.1f} Hz at this speed"], ["Mode shape", moves]]
     if modes is None and not group.responses:
         return [["Mode", "no modes computed; run `exugear modes`"]]
@@ -310,5 +310,5 @@ def _mode_facts(material: ReportData, group: RunGroup, run: VariantRun, resonanc
     return [
         ["Mode", f"{resonance.finding.mode_frequency:.1f} Hz, damping {figure_text(damping, 2)} %"],
         ["Mode shape", material.words.moves(modes, mode)],
-        ["Strain energy", percentages(material.words.gives(modes, mode))],
+        ["Strain energy", percentages(material.words.strain_energy(modes, mode))],
     ]

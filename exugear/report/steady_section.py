@@ -13,7 +13,7 @@ from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import Context, choice_of, words_of
+from exugear.report.findings.context import Context, choice_of, model_label
 from exugear.report.findings.words import figure_text
 from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name
 from exugear.report.web import html as pieces
@@ -28,12 +28,12 @@ from fe_ste.tools.arrays import Floats
 
 SHOWN = 20
 """Number of peaks in the table."""
-LEAST_SHARE, MOST_TOLD = 0.05, 3
+LEAST_SHARE, SHOWN_CONTRIBUTIONS = 0.05, 3
 """Minimum listed contribution to a resonance, and maximum number of contributions."""
 STRONG = 0.1
 """Fraction of the largest peak from which a crossing counts as strong."""
-TELL_FAST = "too fast"
-EXPLAINED, BESIDE = 5, 6
+TOO_FAST = "too fast"
+SIDEBAND_PEAKS, SHOWN_SIDEBANDS = 5, 6
 """Number of peaks with listed sidebands (the highest of each order), and maximum number of sidebands of each kind."""
 OTHER_KIND = "other"
 """Legend for modes that belong to no planet set."""
@@ -60,17 +60,17 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
     choice = choice_of(data.attrs)
     level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
-    label = f"{words_of(choice)}, method {level}"
+    label = f"{model_label(choice)}, method {level}"
     context.tell(f"steady-state response, {label}")
     found = peaks(data)[:SHOWN]
     rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
     rows = [_row(material, peak, data, rates) for peak in found]
-    lost = [row for row in rows if any(value == TELL_FAST for value in row.values())]
+    lost = [row for row in rows if any(value == TOO_FAST for value in row.values())]
     note = ""
     if lost:
-        told = f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
-        context.notes.statements.append(f"Steady-state response, {label}: {told}")
-        note = pieces.paragraph(f"Warning: {told}", "warning")
+        message = f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
+        context.notes.statements.append(f"Steady-state response, {label}: {message}")
+        note = pieces.paragraph(f"Warning: {message}", "warning")
     growth = float(data.attrs["growth_rate"])
     others = [_other_load(run) for run in runs if run.attributes.get("table_doubt")]
     context.notes.statements.extend(f"Steady-state response, {label}: {other}" for other in others)
@@ -96,7 +96,7 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
         pieces.paragraph(
             f"Slowest decay rate of a disturbance: {-growth:.3g} 1/s. A run-up is too fast for a resonance if the "
             f"sweep-rate ratio f′ / (2π ζ² f²) is above {MAX_SWEEP_RATIO:g}: the peak does not build up. f: peak "
-            "frequency; f′: its rate in the run-up; ζ: damping ratio of the mode; –: no mode known.",
+            "frequency; f′: its rate of change in the run-up; ζ: damping ratio of the mode; –: no mode known.",
             "note",
         ),
     ]
@@ -106,8 +106,8 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
 def _other_load(run: VariantRun) -> str:
     """State that the run-up shown with a response has another load."""
     return (
-        f"the run-up of the load case {run.attributes['load_case']} is at another load, {run.attributes['load']}; its "
-        "levels also differ for that reason."
+        f"the run-up of the load case {run.attributes['load_case']} has another load ({run.attributes['load']}), which "
+        "also changes its levels."
     )
 
 
@@ -116,9 +116,9 @@ def _shared_lines(material: ReportData, data: xr.Dataset) -> str:
     shared = str(data.attrs["shared_lines"])
     if not shared:
         return ""
-    told = material.words.told(shared)
+    orders = material.words.labelled(shared)
     return pieces.paragraph(
-        f"Note: coinciding orders of several meshes: {told}. Each is named after the simplest of them; its level is "
+        f"Note: coinciding orders of several meshes: {orders}. Each is named after the simplest of them; its level is "
         "the sum of all.",
         "warning",
     )
@@ -129,13 +129,13 @@ def _remarks(data: xr.Dataset, name: str) -> str:
     speeds = data["speed"].to_numpy()
     said = [(abs(float(speed)), str(words)) for speed, words in zip(speeds, data["remark"].to_numpy(), strict=True)]
     lost = [
-        (abs(float(load["speed"])), f"left out: {load['reason']}")
+        (abs(float(load["speed"])), f"not converged: {load['reason']}")
         for load in json.loads(str(data.attrs["not_converged"]))
     ]
-    told = sorted([own for own in said if own[1]] + lost)
-    if not told:
+    entries = sorted([own for own in said if own[1]] + lost)
+    if not entries:
         return ""
-    rows: list[dict[str, object]] = [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in told]
+    rows: list[dict[str, object]] = [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in entries]
     table = pieces.table(rows, ("remark",), caption="Warnings by speed", name=name)
     return pieces.folded(f"Warnings at {len(rows)} of {len(speeds) + len(lost)} speeds", table)
 
@@ -160,7 +160,7 @@ def _order_charts(
         figures.append(html)
         charts.update(spec)
     words = "Order cuts of the overall transmission error: at constant speed"
-    words += ", and in the run-ups, with the window that suits their sweep rate." if runs else "."
+    words += ", and in the run-ups, with a window length matched to their sweep rate." if runs else "."
     if settings_of(data.attrs).branches:
         words += " Continuation curves turn back at turning points; dashed parts are unstable."
     return pieces.paragraph(words, "note") + pieces.element("div", "".join(figures), class_="grid")
@@ -168,7 +168,7 @@ def _order_charts(
 
 def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> str:
     """Tabulate the contributions to the strongest resonances (method `linear`)."""
-    told = material.words.told
+    labelled = material.words.labelled
     bases = tuple(str(name) for name in data["base"].to_numpy())
     index = data["index"].to_numpy()
     rows = []
@@ -177,25 +177,25 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> s
         speed = abs(float(load["speed"]))
         rows.append(
             {
-                "order": told(line_name(tuple(int(n) for n in index[line]), bases)),
+                "order": labelled(line_name(tuple(int(n) for n in index[line]), bases)),
                 "speed / rpm": f"{speed / RPM:.2f}",
-                "excited by": told(_shares(load["meshes"].items())),
-                "carried by": _shares((f"{frequency:.1f} Hz", share) for frequency, share in load["modes"]),
-                "per stiffness of": told(_slopes_of(load["supports"])),
-                "per inertia of": told(_slopes_of(load["bodies"])),
+                "excited by": labelled(_shares(load["meshes"].items())),
+                "responding modes": _shares((f"{frequency:.1f} Hz", share) for frequency, share in load["modes"]),
+                "sensitivity to stiffness of": labelled(_slopes_of(load["supports"])),
+                "sensitivity to inertia of": labelled(_slopes_of(load["bodies"])),
             }
         )
     if not rows:
         return ""
     said = (
-        "Contributions to resonances: fractions of the amplitude, and relative change per relative change of a "
-        "parameter"
+        "Contributions to resonances: fractions of the amplitude; sensitivity: relative change of the amplitude per "
+        "relative change of the parameter"
     )
     return pieces.folded(
         said,
         pieces.table(
             rows,
-            ("order", "excited by", "carried by", "per stiffness of", "per inertia of"),
+            ("order", "excited by", "responding modes", "sensitivity to stiffness of", "sensitivity to inertia of"),
             caption="Contributions to resonances",
             name=name,
         ),
@@ -225,11 +225,12 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
             x = np.array([abs(c["speed"]) / RPM for c in own])
             curves.append(Curve(f"{strength} crossings", x, [c["frequency"] for c in own], "points"))
     caption = (
-        f"Modes over speed in the fixed frame, {label}; dots: mesh orders and harmonics cross modes that they excite."
+        f"Natural frequencies over speed in the fixed frame, {label}; dots: crossings of modes and mesh harmonics that "
+        "excite them."
     )
     html, spec = chart(
         name,
-        "Modes over speed",
+        "Natural frequencies over speed",
         "Horizontal lines: modes, by type. Dashed: mesh orders. Dots: excited crossings.",
         caption,
         curves,
@@ -242,7 +243,7 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
         html
         + _speed_ranges(material.context)
         + pieces.folded(
-            "Modes over speed and their strongest crossing: fraction of the largest peak of a signal",
+            "Modes over speed, each with its strongest order crossing; fraction: of the largest peak of the signal",
             pieces.table(
                 rows, ("type", "strongest crossing", "mode shape"), caption=caption, name=f"{name}-modes", sortable=True
             ),
@@ -252,9 +253,9 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
 
 def _speed_ranges(context: Context) -> str:
     """List the speed ranges of the load cases as text."""
-    told = [f"{name}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm" for name, (slow, fast) in _ranges(context).items()]
-    if told:
-        return pieces.paragraph(f"Speeds of the load cases. {'; '.join(told)}.", "note")
+    entries = [f"{name}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm" for name, (slow, fast) in _ranges(context).items()]
+    if entries:
+        return pieces.paragraph(f"Speeds of the load cases. {'; '.join(entries)}.", "note")
     return ""
 
 
@@ -292,18 +293,18 @@ def _mode_rows(
         whirl = float(diagram.whirl[known[-1], mode])
         row: dict[str, object] = {
             "mode": mode + 1,
-            "slow / Hz": f"{slow:.1f}",
-            "fast / Hz": f"{fast:.1f}",
+            "at lowest speed / Hz": f"{slow:.1f}",
+            "at highest speed / Hz": f"{fast:.1f}",
             "damping / %": f"{100.0 * diagram.damping[known[-1], mode]:.3f}",
             "type": diagram.kinds[mode],
             "whirl": _whirl_text(whirl),
             "strongest crossing": "",
             "fraction / %": "",
-            "mode shape": material.words.told(diagram.names[mode]),
+            "mode shape": material.words.labelled(diagram.names[mode]),
         }
         if met is not None:
             line = line_name(tuple(int(n) for n in index[int(met["line"])]), bases)
-            row["strongest crossing"] = f"{material.words.told(line)} at {abs(met['speed']) / RPM:.1f} rpm"
+            row["strongest crossing"] = f"{material.words.labelled(line)} at {abs(met['speed']) / RPM:.1f} rpm"
             row["fraction / %"] = f"{100.0 * met['share']:.1f}"
         rows.append(row)
     return rows
@@ -312,25 +313,25 @@ def _mode_rows(
 def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Peak]) -> str:
     """Tabulate the sidebands of the highest peaks, each with its cause."""
     context = material.context
-    told = material.words.told
+    labelled = material.words.labelled
     carriers = _carriers(context)
     loudest: dict[str, Peak] = {}
     for peak in found:
         loudest.setdefault(peak.line, peak)
     rows = []
-    for peak in list(loudest.values())[:EXPLAINED]:
-        bands = (*sidebands(data, peak)[:BESIDE], *planet_sidebands(data, peak, carriers)[:BESIDE])
+    for peak in list(loudest.values())[:SIDEBAND_PEAKS]:
+        bands = (*sidebands(data, peak)[:SHOWN_SIDEBANDS], *planet_sidebands(data, peak, carriers)[:SHOWN_SIDEBANDS])
         for band in bands:
             rows.append(
                 {
-                    "peak": f"{told(peak.line)} at {abs(peak.speed) / RPM:.1f} rpm",
+                    "peak": f"{labelled(peak.line)} at {abs(peak.speed) / RPM:.1f} rpm",
                     "peak / Hz": f"{peak.frequency:.1f}",
-                    "sideband": told(band.line.replace("mesh_force ", "force of mesh ")),
+                    "sideband": labelled(band.line.replace("mesh_force ", "force of mesh ")),
                     "at / Hz": f"{band.frequency:.1f}",
                     "offset / Hz": f"{band.frequency - peak.frequency:+.2f}",
                     "amplitude": _amplitude(band.line, band.amplitude),
                     "fraction / %": f"{100.0 * band.share:.1f}",
-                    "cause": told(band.cause),
+                    "cause": labelled(band.cause),
                 }
             )
     if not rows:
@@ -339,22 +340,22 @@ def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Pea
         "Sidebands of the highest peaks and their causes: orders at the speed of the peak due to other meshes or the "
     )
     table = pieces.table(rows, ("sideband", "cause"))
-    return pieces.folded(f"{said}rotating planets", pieces.paragraph(told(_passages(context, carriers))) + table)
+    return pieces.folded(f"{said}rotating planets", pieces.paragraph(labelled(_passages(context, carriers))) + table)
 
 
 def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> str:
     """State the planet passing order at the housing, and the ratio of the mesh order to it."""
     gearbox = context.gearbox
     orders = {mesh.family: gearbox.train.mesh_frequencies(2.0 * np.pi)[mesh.name] for mesh in gearbox.meshes}
-    told = []
+    entries = []
     for family, (carrier, ratio) in carriers.items():
         count = sum(mesh.family == family for mesh in gearbox.meshes)
         passage = count * abs(ratio)
-        told.append(
-            f"{family}: {count} planets of {carrier} pass a point of the housing at order {passage:g}, "
-            f"{orders[family] / passage:g} times contained in the mesh order {orders[family]:g}."
+        entries.append(
+            f"{family}: {count} planets of {carrier} pass a point of the housing at order {passage:g}; the mesh order "
+            f"{orders[family]:g} is {orders[family] / passage:g} times this."
         )
-    return " ".join(told)
+    return " ".join(entries)
 
 
 def _amplitude(line: str, amplitude: float) -> str:
@@ -372,12 +373,12 @@ def _carriers(context: Context) -> dict[str, tuple[str, float]]:
 
 
 def _shares(parts: Iterable[tuple[str, float]]) -> str:
-    told = [f"{name} {100.0 * share:.0f} %" for name, share in parts if abs(share) >= LEAST_SHARE]
-    return ", ".join(told[:MOST_TOLD])
+    entries = [f"{name} {100.0 * share:.0f} %" for name, share in parts if abs(share) >= LEAST_SHARE]
+    return ", ".join(entries[:SHOWN_CONTRIBUTIONS])
 
 
 def _slopes_of(slopes: Mapping[str, float]) -> str:
-    strongest = sorted(slopes.items(), key=lambda item: -abs(item[1]))[:MOST_TOLD]
+    strongest = sorted(slopes.items(), key=lambda item: -abs(item[1]))[:SHOWN_CONTRIBUTIONS]
     return ", ".join(f"{name} {slope:+.2f}" for name, slope in strongest)
 
 
@@ -452,7 +453,7 @@ def _whirl_text(whirl: float) -> str:
 def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, float]) -> dict[str, object]:
     damping = _damping(peak, data)
     row: dict[str, object] = {
-        "order": material.words.told(peak.line),
+        "order": material.words.labelled(peak.line),
         "speed / rpm": f"{abs(peak.speed) / RPM:.2f}",
         "frequency / Hz": f"{peak.frequency:.1f}",
         "amplitude / µm": figure_text(1e6 * peak.amplitude),
@@ -463,7 +464,7 @@ def _row(material: ReportData, peak: Peak, data: xr.Dataset, rates: dict[str, fl
         if damping is None:
             row[f"run-up {load_case}"] = "–"
         elif too_fast:
-            row[f"run-up {load_case}"] = TELL_FAST
+            row[f"run-up {load_case}"] = TOO_FAST
         else:
             row[f"run-up {load_case}"] = "slow enough"
     return row

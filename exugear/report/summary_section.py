@@ -11,26 +11,26 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.facts import SummaryCard, facts_of, facts_of_response
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.loudness import Resonance
-from exugear.report.findings.verdicts import CheckResult, verdicts_of
+from exugear.report.findings.verdicts import CheckResult, validity_checks
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Part, ReportData, group_words, only_for, told_groups
+from exugear.report.material import Part, ReportData, group_words, only_for, summary_groups
 from exugear.report.web import html as pieces
 from exugear.report.web.html import Cell
 from exugear.report.web.stage import stage_figure
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun
 
 
-def short_section(material: ReportData) -> Part:
+def summary_section(material: ReportData) -> Part:
     """Show the findings of each result group as cards; the command line prints the same sentences.
 
     It prints findings of steady-state responses only if there is no run-up; otherwise those of run-ups include them.
     """
     context = material.context
-    groups = told_groups(material.groups)
+    groups = summary_groups(material.groups)
     content = []
     for group in material.groups:
         facts = facts_of(context, material.words, group, material.variations)
-        verdicts = verdicts_of(context, group)
+        verdicts = validity_checks(context, group)
         if group in groups:
             several = f"{group_words(groups, group)}: " if len(groups) > 1 else ""
             context.notes.statements.append(f"{several}Load: {_load_of(material, group)}.")
@@ -52,7 +52,7 @@ def _group(material: ReportData, group: RunGroup, facts: Sequence[SummaryCard], 
     return (
         pieces.paragraph(scope, "note")
         + pieces.element("div", "".join(map(_card, facts)), class_="cards")
-        + verdict_list(verdicts)
+        + check_list(verdicts)
     )
 
 
@@ -83,7 +83,7 @@ def _card(fact: SummaryCard) -> str:
     )
 
 
-def verdict_list(verdicts: Sequence[CheckResult]) -> str:
+def check_list(verdicts: Sequence[CheckResult]) -> str:
     """List passed checks and warnings; hidden text distinguishes them in addition to colour."""
     entries = []
     for verdict in verdicts:
@@ -102,7 +102,7 @@ def verdict_list(verdicts: Sequence[CheckResult]) -> str:
 NO_MODES = "No modes computed; run `exugear modes` to show mode shapes."
 
 
-def rings_section(material: ReportData) -> Part:
+def waterfall_section(material: ReportData) -> Part:
     """Draw the waterfalls of all run-ups and steady-state responses; the ranking has the same text."""
     if not material.groups:
         return Part("")
@@ -139,8 +139,10 @@ def _without_scripts(words: str) -> str:
 def _groups_text(groups: Sequence[RunGroup]) -> str:
     group = groups[0]
     loudest = [own for own in group.ranked[group.main] if own.steady][:3]
-    told = [f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.loudness)} dB" for own in loudest]
-    return f"Highest resonances, {Variant.of(group.main).label}, {group.source}: {'; '.join(told) or 'none found'}."
+    entries = [
+        f"{own.frequency:.0f} Hz at {own.speed / RPM:.1f} rpm, {figure_text(own.ranking_level)} dB" for own in loudest
+    ]
+    return f"Highest resonances, {Variant.of(group.main).label}, {group.source}: {'; '.join(entries) or 'none found'}."
 
 
 # Section "Resonance ranking": exciting mesh, comparison of variants, and mode shape of each resonance
@@ -169,7 +171,7 @@ def ranking_section(material: ReportData) -> Part:
         for group in material.groups
         for variant in reversed(list(group.runs))
     ]
-    for group in told_groups(material.groups):
+    for group in summary_groups(material.groups):
         _note_comparisons(material, group)
     if not tables:
         return Part("")
@@ -182,7 +184,7 @@ def ranking_section(material: ReportData) -> Part:
         pieces.paragraph(_rules(), "note"),
         name="ranking",
     )
-    return Part(html, {}, "Ranking", "ranking")
+    return Part(html, {}, "Resonance ranking", "ranking")
 
 
 def _operating_resonances(material: ReportData, group: RunGroup) -> str:
@@ -192,28 +194,32 @@ def _operating_resonances(material: ReportData, group: RunGroup) -> str:
         return ""
     low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
     which = "all speeds" if ranking.whole else "operating speed range"
-    rows = [_loud_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
-    title = f"At constant speed, {Variant.of(group.main).label}, {which}, {low} to {high} rpm: the first {len(rows)}"
-    table = pieces.table(rows, ("Excited by", "At"), caption=title, name=f"in-operation-{group.name}", sortable=True)
+    rows = [_operating_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
+    label = Variant.of(group.main).label
+    title = f"Highest {len(rows)} resonances at constant speed, {label}, {which} ({low} to {high} rpm)"
+    table = pieces.table(
+        rows, ("Excited by", "Bearing"), caption=title, name=f"in-operation-{group.name}", sortable=True
+    )
     note = (
-        "Zero-to-peak amplitudes, (rank) within each quantity; sorted by the best rank. Accelerations: of the "
-        f"{ranking.accelerates} at bearings. Planets: root mean square over the planets."
+        "Zero-to-peak amplitudes, with the (rank) in each quantity; sorted by the best rank. Force: the bearing with "
+        f"the largest amplitude. Accelerations: of the {ranking.accelerates} at bearings. Planets: root mean square "
+        "over the planets."
     )
     return pieces.element("h3", pieces.text(title)) + table + pieces.paragraph(note, "note")
 
 
-def _loud_row(material: ReportData, resonance: Resonance) -> dict[str, object]:
+def _operating_row(material: ReportData, resonance: Resonance) -> dict[str, object]:
     row: dict[str, object] = {
-        "Excited by": material.words.told(resonance.line),
+        "Excited by": material.words.labelled(resonance.line),
         "Speed / rpm": Cell(figure_text(abs(resonance.speed) / RPM, 4), abs(resonance.speed) / RPM),
         "Frequency / Hz": Cell(f"{resonance.frequency:.1f}", resonance.frequency),
     }
-    for name, loudness in resonance.loudness.items():
+    for name, peak in resonance.amplitudes.items():
         title, factor = QUANTITIES[name]
-        place = "" if loudness.place is None else f" ({loudness.place})"
-        row[title] = Cell(f"{figure_text(factor * loudness.amplitude)}{place}", loudness.amplitude)
+        place = "" if peak.place is None else f" ({peak.place})"
+        row[title] = Cell(f"{figure_text(factor * peak.amplitude)}{place}", peak.amplitude)
         if name == "force":
-            row["At"] = material.words.of(loudness.at)
+            row["Bearing"] = material.words.of(peak.at)
     return row
 
 
@@ -234,7 +240,7 @@ def _filters() -> str:
         + pieces.element("input", type="range", id="limit")
         + pieces.element("output", "", id="limit-shown"),
     )
-    rated = pieces.element("button", "Around rated", type="button", id="rated", hidden=True)
+    rated = pieces.element("button", "Near rated speed", type="button", id="rated", hidden=True)
     return only + text + limit + rated
 
 
@@ -242,9 +248,9 @@ def _rules() -> str:
     factors = ", ".join(f"{factor:g}" for factor in WINDOW_FACTORS)
     return (
         "A resonance is a peak with a prominence of at least 6 dB along an order; peaks of several orders at one "
-        f"frequency are one resonance. Absent, at its highest peak: {AbsenceRule().description}, with every window. "
-        f"Window-dependent (run-ups): not found with all window lengths, {factors} times the diagram length. With "
-        "a steady-state response, levels at constant speed are ranked: a run-up that is too fast underestimates a "
+        f"frequency are one resonance. Absent in a model: {AbsenceRule().description}, with every window length. "
+        f"Window-dependent (run-ups): not found with all window lengths, {factors} times the window of the diagram. "
+        "With a steady-state response, levels at constant speed are ranked: a run-up that is too fast underestimates a "
         f"resonance and is marked if {BUILT_UP:g} dB or more are missing. At constant speed ± is half the width of a "
         "peak 3 dB below its maximum."
     )
@@ -279,7 +285,7 @@ def _row(
 ) -> dict[str, object]:
     finding = resonance.finding
     peak = resonance.peak
-    loudest = group.ranked[run.variant][0].loudness
+    loudest = group.ranked[run.variant][0].ranking_level
     frequency = f"{finding.resonance.frequency:.0f} ± {figure_text(finding.resonance.resolution, 1)}"
     choice = f"resonance:{group.name}:{run.variant}:{number - 1}"
     matched = math.isfinite(finding.mode_frequency)
@@ -292,7 +298,7 @@ def _row(
     }
     if run.variant in group.constant:
         row[AT_CONSTANT] = _constant_speed_cell(resonance, loudest)
-    row["± µm"] = Cell(figure_text(10.0 ** (resonance.loudness / 20.0), 2), resonance.loudness)
+    row["± µm"] = Cell(figure_text(10.0 ** (resonance.ranking_level / 20.0), 2), resonance.ranking_level)
     row["Prominence / dB"] = Cell(figure_text(peak.prominence, 2), peak.prominence)
     for name, key in zip((n for n in group.runs if n != run.variant), _others(group, run.variant), strict=True):
         level = resonance.elsewhere[name]
@@ -303,7 +309,7 @@ def _row(
     row["Mode / Hz"] = Cell(
         f"{finding.mode_frequency:.1f}" if matched else "–", finding.mode_frequency if matched else -1.0
     )
-    row["Mode shape; strain energy"] = _story(material, group, run, resonance)
+    row["Mode shape; strain energy"] = _mode_text(material, group, run, resonance)
     if group.responses:
         return row
     row["Windows"] = Cell(
@@ -332,19 +338,19 @@ def _constant_speed_cell(resonance: RankedResonance, loudest: float) -> Cell:
     return Cell(f"{at.level:.1f}, {at.frequency:.0f} Hz", at.level, bar=1.0 - (loudest - at.level) / SHOWN_SPAN)
 
 
-def _story(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> str:
+def _mode_text(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> str:
     mode = resonance.finding.mode
     modes = run.modes
     if resonance.finding.mode_name and modes is None:
-        return material.words.told(resonance.finding.mode_name)
+        return material.words.labelled(resonance.finding.mode_name)
     if modes is None:
         if group.responses:
             return NOT_NEAR
         return "no modes computed"
     if mode is None:
         return NOT_NEAR
-    gives = percentages(material.words.gives(modes, mode))
-    return f"{material.words.moves(modes, mode)}; {gives}"
+    energies = percentages(material.words.strain_energy(modes, mode))
+    return f"{material.words.moves(modes, mode)}; {energies}"
 
 
 def _note_comparisons(material: ReportData, group: RunGroup) -> None:

@@ -13,7 +13,7 @@ import xarray as xr
 
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import choice_of, words_of
+from exugear.report.findings.context import choice_of, model_label
 from exugear.report.findings.verdicts import run_figures
 from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name
 from exugear.report.web import html as pieces
@@ -40,21 +40,20 @@ GLOSSARY = {
     "mesh cycle": "Rotation by one angular pitch.",
     "order": "Periods per revolution of the overall input.",
     "level": "20 log10 of an amplitude over a reference: 0 dB = 1 µm, or 1 N for forces; 6 dB are a factor of 2.",
-    "prominence": "Height of a peak above the higher of the two adjacent minima.",
+    "prominence": "Height of a peak above the higher of the two adjacent minima, dB.",
     "± Hz": "Frequency resolution of the run-up: the larger of 1 / window length and the square root of the sweep rate "
     "of the order.",
     "amplification": "Overall transmission error at resonance per static transmission error of one mesh.",
-    "share": (
-        "Participation of a mode in the overall transmission error (squared, mass-normalised); fraction of strain or "
-        "kinetic energy."
-    ),
+    "TE participation": "Participation of a mode in the overall transmission error, squared and mass-normalised.",
+    "energy fraction": "Part of the strain or kinetic energy of a mode that is in one element or body.",
     "variant": "Support of the shafts: ideal joints (rigid), elastic bearings (bushing), flexible bodies (flexible).",
     "first-order shift": "Change of a frequency for a small parameter change, mode shape unchanged.",
     "inertia set": "One of the sets of masses and inertias in the gearbox file.",
     "mesh model": "Mesh force as a function of gear motion; line_of_action: along the line of action, time-varying "
     "stiffness.",
-    "housing stiffness factor": "Bearing stiffness with housing over bearing stiffness alone; 1: rigid housing.",
-    "window-dependent": "Of a resonance: found with one window length but not with others.",
+    "housing stiffness factor": "Stiffness of a bearing with the housing, over the stiffness of the bearing alone; 1: "
+    "rigid housing.",
+    "window-dependent": "Of a resonance: found with some window lengths of the analysis but not with all.",
     "steady-state response": "Vibration at constant speed, the limit of an infinitely slow run-up.",
     "Campbell diagram": "Eigenfrequencies over speed, with the orders that can excite them.",
     "whirl": "Orbital motion of a shaft axis, forward or backward relative to its rotation.",
@@ -82,7 +81,7 @@ def trust_section(material: ReportData) -> Part:
     if compared:
         parts.insert(2, pieces.folded("Comparison with Exudyn", compared))
     html = pieces.section("Assumptions and checks", *parts, name="trust")
-    return Part(html, {"charts": charts}, "Trust", "trust")
+    return Part(html, {"charts": charts}, "Assumptions and checks", "trust")
 
 
 def _assumptions(material: ReportData) -> str:
@@ -94,13 +93,13 @@ def _assumptions(material: ReportData) -> str:
         f"Housing stiffness factor of bearings in the housing: {case.housing.factor:g}.",
         f"Damping: {damping_in_words(case.damping)}.",
         f"Gravity {'off' if acceleration == 0.0 else f'{acceleration:.2f} m/s²'}.",
-        f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral, the time with "
-        "tensile mesh force is recorded.",
+        f"Mesh stiffness at the static load, {static_load_in_words(gearbox)}; meshes are bilateral (they transmit "
+        "tension); the time with tensile mesh force is recorded.",
         "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
         *_elastic_words(material),
     ]
     return pieces.bullets(listed) + pieces.paragraph(
-        f"Sources of all inputs: comments of {material.file_words} and files in its folder.", "note"
+        f"The sources of the inputs are in the comments of {material.file_words} and in files of its folder.", "note"
     )
 
 
@@ -128,7 +127,7 @@ def _runs(material: ReportData) -> str:
     steady = [_response_row(data) for data in material.results.steady]
     tables = []
     if rows:
-        tables.append(pieces.table(rows, ("run", "load", "solver", "analysis"), caption="What was run", name="runs"))
+        tables.append(pieces.table(rows, ("run", "load", "solver", "analysis"), caption="Runs", name="runs"))
     if steady:
         tables.append(
             pieces.table(steady, ("steady-state response",), caption=("Steady-state responses"), name="responses")
@@ -151,7 +150,7 @@ def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, 
     own, other = (1e6 * (values - middle) for values in found.overall)
     html, data = chart(
         f"exudyn-{model_name(choice_of(run.attributes))}",
-        f"Overall transmission error by both solvers, {words_of(choice_of(run.attributes))}",
+        f"Overall transmission error by both solvers, {model_label(choice_of(run.attributes))}",
         "Deviation from the mean of the Exudyn result.",
         found.words,
         [Curve("compiled solver", found.time, own), Curve("Exudyn", found.time, other, "dashed")],
@@ -165,12 +164,12 @@ def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, 
 def _response_row(data: xr.Dataset) -> dict[str, object]:
     speed = np.abs(data["speed"].to_numpy()) / RPM
     return {
-        "steady-state response": f"{words_of(choice_of(data.attrs))}, method {data.attrs['method']}",
+        "steady-state response": f"{model_label(choice_of(data.attrs))}, method {data.attrs['method']}",
         "speeds": data.sizes["point"],
-        "slowest / rpm": f"{speed.min():.1f}",
-        "fastest / rpm": f"{speed.max():.1f}",
-        "lines": data.sizes["line"] - 1,
-        "left out": len(json.loads(data.attrs["not_converged"])),
+        "lowest speed / rpm": f"{speed.min():.1f}",
+        "highest speed / rpm": f"{speed.max():.1f}",
+        "orders": data.sizes["line"] - 1,
+        "not converged": len(json.loads(data.attrs["not_converged"])),
         "largest error of the power balance": f"{float(np.nanmax(data['energy_error'])):.1e}",
         "largest growth rate of a disturbance / (1/s)": f"{float(data.attrs['growth_rate']):.3g}",
     }
@@ -186,7 +185,7 @@ def _run_row(material: ReportData, run: VariantRun) -> dict[str, object]:
         "solver": run.attributes["solver"],
         "step / µs": f"{1e6 * float(run.attributes['step']):g}",
         "simulated / s": f"{figures.end:.2f}" + ("" if int(run.attributes["complete"]) else " (stopped)"),
-        "fastest / rpm": f"{float(run.spectra.speed.max()) / RPM:.1f}",
+        "highest speed / rpm": f"{float(run.spectra.speed.max()) / RPM:.1f}",
         "error of the energy balance": f"{figures.residual:.1e}",
         **{f"{what} / s": f"{time:.3g}" for what, time in times},
         "analysis": run.spectra.description,
@@ -219,10 +218,10 @@ def _provenance(material: ReportData) -> str:
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
     hashes |= {
-        f"steady-state response {words_of(choice_of(data.attrs))}, {data.attrs['method']}": data.attrs["input_hash"]
+        f"steady-state response {model_label(choice_of(data.attrs))}, {data.attrs['method']}": data.attrs["input_hash"]
         for data in results.steady
     }
-    hashes |= {f"modes {words_of(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
+    hashes |= {f"modes {model_label(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
     rows = [{"result": name, "SHA-256 of its input": sha256} for name, sha256 in hashes.items()]
     versions = [f"Python {platform.python_version()}", *(f"{name} {_version(name)}" for name in PACKAGES)]
     carried = [f"{library.name} {library.version}" for library in libraries()]

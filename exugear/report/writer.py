@@ -23,11 +23,11 @@ from exugear.report.material import Part, ReportData, lines_of
 from exugear.report.modes_section import change_section, modes_section, target_frequency_section
 from exugear.report.run_data import run_data
 from exugear.report.steady_section import steady_section
-from exugear.report.summary_section import ranking_section, rings_section, short_section
+from exugear.report.summary_section import ranking_section, summary_section, waterfall_section
 from exugear.report.trust_section import trust_section
 from exugear.report.web import html
 from exugear.report.web.document import ArrayStore, whole_page
-from exugear.results.folder import REPORT_FILE, kept_case
+from exugear.results.folder import REPORT_FILE, read_stored_gearbox
 from fe_ste.tools.files import write_file
 
 # Page elements outside the sections: head, table of contents, controls of the whole page, footer
@@ -42,11 +42,11 @@ def page_body(material: ReportData, parts: Sequence[Part]) -> str:
         _headline(material) + _tools() + _contents(parts),
         class_="top",
     )
-    above = html.alert(warning, notes.distrusted) if notes.distrusted else ""
+    above = html.alert(warning, notes.invalid_runs) if notes.invalid_runs else ""
     left_out = html.section("Skipped", html.bullets(notes.left_out), name="left-out") if notes.left_out else ""
     main = html.element("main", above + _sets(material) + "".join(part.html for part in parts) + left_out, id="content")
-    told = f"Created by exugear from {material.file_words}. This page makes no network requests."
-    foot = html.element("footer", html.paragraph(told))
+    text = f"Created by exugear from {material.file_words}. This page makes no network requests."
+    foot = html.element("footer", html.paragraph(text))
     skip = html.element("a", "Skip to the content", class_="skip", href="#content")
     live = html.element("p", "", id="said", class_="toast", role="status", aria_live="polite")
     tip = html.element("p", "", id="tip", class_="tip", hidden=True)
@@ -58,8 +58,8 @@ def _headline(material: ReportData) -> str:
     shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
     line = f"Resonance report. Speed ratio output/input {gearbox.train.ratio:.6f}"
     steady = ", ".join(dict.fromkeys(str(data.attrs["variant"]) for data in material.results.steady))
-    line += f"; run-ups {shown}" if shown else ""
-    line += f"; constant speeds {steady}." if steady else "."
+    line += f"; run-ups: {shown}" if shown else ""
+    line += f"; constant speed: {steady}." if steady else "."
     return html.element("div", f"<h1>{html.text(gearbox.name)}</h1>{html.paragraph(line)}", class_="brand")
 
 
@@ -94,8 +94,8 @@ def _sets(material: ReportData) -> str:
 # The report of a results folder as a self-contained web page
 
 SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
-    short_section,
-    rings_section,
+    summary_section,
+    waterfall_section,
     ranking_section,
     change_section,
     bearings_section,
@@ -157,7 +157,7 @@ def write_report(
         None of its tables, modes and runs belongs to its gearbox file.
     """
     folder = Path(folder)
-    gearbox = kept_case(folder, Permissions(below=allow_dir))
+    gearbox = read_stored_gearbox(folder, Permissions(below=allow_dir))
     reference = gearbox.case.report.reference_frequency_Hz if target is None else target
     context = Context(folder, gearbox, reference, tell or (lambda what: None))
     material = _material(context, executor)

@@ -44,7 +44,7 @@ def _checksum(kept: dict[str, Any]) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-def kept_case(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
+def read_stored_gearbox(folder: Path, permissions: Permissions = NOTHING_MORE) -> Gearbox:
     """Read the gearbox that the results in a folder belong to.
 
     Parameters

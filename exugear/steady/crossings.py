@@ -97,7 +97,9 @@ def crossings(
     `forcing` gives the forces of the meshes (lines, m, f), N, that vary in the static state. Between the speeds
     `operation` (rad/s, without sign) peaks are held against the largest of those there.
     """
-    lines = _looked_at(model)
+    index = model.lines.index[:, : len(model.waves.base_orders)]
+    # Orders of a single mesh frequency, and their sidebands.
+    lines = [int(line) for line in np.flatnonzero(np.count_nonzero(index, axis=1) == 1)]
     forces = forcing(model.at(float(model.system.speeds[1])))[lines]
     met = _passages(tracks, model.lines.orders[lines])
     if not met:
@@ -188,12 +190,6 @@ def missed_tops(
             if new and height > (1.0 + GAIN) * highest[point, line]:
                 tops.append(top)
     return np.sort(np.array(tops))
-
-
-def _looked_at(model: HarmonicBalanceModel) -> list[int]:
-    """Orders of a single mesh frequency, and their sidebands."""
-    index = model.lines.index[:, : len(model.waves.base_orders)]
-    return [int(line) for line in np.flatnonzero(np.count_nonzero(index, axis=1) == 1)]
 
 
 def _passages(tracks: ModeTracks, orders: Floats) -> list[tuple[int, int, float]]:

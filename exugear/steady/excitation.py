@@ -108,7 +108,7 @@ class Interface:
         return np.asarray(found.view(np.complex128).reshape(lines, len(rows), *loads))
 
     @cached_property
-    def along_forces(self) -> Complexes:
+    def deflection_per_force(self) -> Complexes:
         """What laws along a row read along what they push along, (n, m f, m f), under a unit of each force."""
         lines, waves, forces = self.motion.shape[0], *self.motion.shape[2:]
         read = self.readings[:, :waves, :forces]
@@ -363,8 +363,8 @@ class HarmonicBalanceModel:
         other = self._one_by_one[more]._copied()
         slow = [own for _, own in other.waves.carriers]
         other._one_by_one, other._lattices, other._reach = self._one_by_one, self._lattices, self._reach
-        loud = self.lines.part(strong).of_first(bases)
-        whole = self.larger.of_first(bases)
+        loud = self.lines.part(strong).select_bases(bases)
+        whole = self.larger.select_bases(bases)
         known = self.lines if waves.passing else beside(self.lines, slow, 0)
         other.lines = joined(known, beside(loud, slow, more))
         # Of products that lie farther off in both senses little is left.

@@ -148,7 +148,7 @@ class HarmonicResidual:
                 continue
             # All angles are zero at the first sample.
             own = spectra[n] * np.exp(2j * np.pi * positions[0, u] * np.arange(spectra.shape[2]))
-            out[:, :, u] = self.sampling.along_base(waves[n].base, own if forward[n] else own.conj())
+            out[:, :, u] = self.sampling.sample_along_base(waves[n].base, own if forward[n] else own.conj())
         return out
 
     def _sample(self, readings: Floats, rates: Floats, places: MeshPlaces, stiffness: Floats) -> LawSamples:
@@ -290,7 +290,9 @@ class HarmonicResidual:
         moving = there @ lines.values(rates, angles)
         along = self._sample(values, moving, places, self._stiffness(places))
         everywhere = self.forces(readings)[1].sampled
-        varies = np.array([self._varies(n, base) for n in means])[:, None, None]
+        # Bearings vary with all bases.
+        waves = self.model.waves.waves
+        varies = np.array([n >= self.meshes or waves[n].base == base for n in means])[:, None, None]
         parts = []
         for name in ("slope", "damping"):
             own = getattr(along, name)
@@ -302,10 +304,6 @@ class HarmonicResidual:
             self._less_mean(whole, name == "damping")
             parts.append(whole.reshape(samples, back.shape[0] * found.shape[2], -1))
         return np.concatenate(parts, axis=2)
-
-    def _varies(self, wave: int, base: int) -> bool:
-        """Return whether the model of a component varies with a base: bearings vary with all of them."""
-        return wave >= self.meshes or self.model.waves.waves[wave].base == base
 
     def _mean_slopes(self, change: Complexes) -> Complexes:
         """Find the forces (n, m, f) of the mean stiffness under changes of the readings (n, m, r)."""

@@ -29,7 +29,7 @@ HEARD = 1e-4
 """Share of the static force below which a line plays no part in whether teeth pull."""
 STRAINED = 0.3
 """Dynamic over static load of a bearing from which it is reported to be outside the linear range."""
-BESIDE = 0.03
+SWEEP_SHIFT = 0.03
 """Share of the speed within which a run-up's peak is looked for: sweeps shift it."""
 
 
@@ -399,5 +399,5 @@ def compared_peaks(
 
 def _amplitude_near(cut: OrderCut, speed: float) -> float:
     """Largest amplitude of a cut near a speed, zero where it does not pass."""
-    passed = np.abs(np.abs(cut.speed) / speed - 1.0) <= BESIDE
+    passed = np.abs(np.abs(cut.speed) / speed - 1.0) <= SWEEP_SHIFT
     return float(np.abs(cut.amplitude[passed]).max(initial=0.0))

@@ -38,7 +38,7 @@ from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Complexes, Floats
 
-LEFT_OUT = 2e-4
+MAX_NEGLECTED_NORM = 2e-4
 """Maximum norm of all neglected orders, relative to the vibration."""
 ALIASED = 2e-4
 """The same of the residual on other samples, up to which those of the balance do where something parts."""
@@ -398,7 +398,7 @@ def _lacking(balance: HarmonicResidual, readings: Complexes) -> LineSet | None:
     missing = tangent.alone(ahead.answer(excess) + ahead.static - start)
     new = np.linalg.norm(missing[..., DEFLECTION], axis=1)
     new[balance.model.places_in(whole)[0]] = 0.0
-    wanted = largest(new, LEFT_OUT * size)
+    wanted = largest(new, MAX_NEGLECTED_NORM * size)
     if wanted.any():
         return whole.lines.part(wanted)
     return None

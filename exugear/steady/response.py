@@ -20,7 +20,7 @@ import numpy as np
 
 from exugear.steady.excitation import HarmonicBalanceModel, Interface
 from exugear.steady.harmonics.linear_solvers import solve_lines
-from exugear.steady.harmonics.lines import Group, add_answered, flat
+from exugear.steady.harmonics.lines import add_answered, flat
 from exugear.steady.mean_system.mesh_places import DEFLECTION, MISALIGNMENT, MeshInterface, Spectra
 from fe_ste.tools.arrays import Complexes, Floats
 from fe_ste.tools.inner_kernels import cached_struct
@@ -128,10 +128,11 @@ def parametric_response(model: HarmonicBalanceModel, interface: Interface) -> Re
     shape = len(model.lines.index), *interface.ports.forces.shape[:2]
     functions = _slopes_beyond_mean(model, interface)
     lengths = model.lengths[: shape[1], : shape[2]].ravel()
-    answers = lengths[:, None] * interface.along_forces
+    answers = lengths[:, None] * interface.deflection_per_force
     coupling = model.coupling
     scaled = [
-        function / _group_values(lengths, group) for function, group in zip(functions, coupling.groups, strict=True)
+        function / lengths[group.begin : group.begin + group.size]
+        for function, group in zip(functions, coupling.groups, strict=True)
     ]
     parts = *flat(scaled), *flat([answers])
     memory = coupling.memory()
@@ -161,11 +162,6 @@ def _slopes_beyond_mean(model: HarmonicBalanceModel, interface: Interface) -> li
     return functions
 
 
-def _group_values(values: Floats, group: Group) -> Floats:
-    """Values (k,) of all signals for those of a group."""
-    return values[group.begin : group.begin + group.size]
-
-
 def given_forces(model: HarmonicBalanceModel, interface: Interface) -> Complexes:
     """Return the forces (n, m, f) of tangents at zero deflection in addition to the averaged system: of curves only."""
     waves = model.waves
@@ -185,7 +181,7 @@ def _answer(interface: Interface, excess: Complexes) -> Complexes:
     """Find the readings -G F (n, m, f) that laws along a row push along, under their forces (n, m, f)."""
     if excess.shape[2] == 1:
         return np.asarray(-np.einsum("nij,nj->ni", interface.deflection[..., 0], excess[..., 0]))[..., None]
-    return np.asarray(-(interface.along_forces @ excess.reshape(len(excess), -1, 1))).reshape(excess.shape)
+    return np.asarray(-(interface.deflection_per_force @ excess.reshape(len(excess), -1, 1))).reshape(excess.shape)
 
 
 def _response(

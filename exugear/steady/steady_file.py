@@ -146,7 +146,7 @@ def _attributes(response: SteadyResponse) -> dict[str, Any]:
         "housing_factor": assembly.housing_factor,
         "bearing_laws": assembly.bearing_laws,
         "bearing_static_loads": json.dumps(_static_loads(assembly)),
-        "mesh_contact": assembly.contacts.in_words,
+        "mesh_contact": assembly.contacts.description,
         "bearings_in_time": ", ".join(response.bearing_names),
         "growth_rate": response.growth_rate,
         "near_unconverged_states": ", ".join(meshes_near_unconverged(assembly)),

@@ -269,7 +269,7 @@ class SteadyResponse(ReprMixin):
 
 CHECKED, MORE = 10, 1.5
 """Number of highest peaks that are recomputed, and the factor on the number of harmonics."""
-EXPLAINED = 20
+PEAKS_WITH_CONTRIBUTIONS = 20
 """Crossings whose peaks are taken apart."""
 ROUNDS = 5
 """Times that tops are looked for between speeds, at most."""
@@ -304,7 +304,7 @@ def response_of(
     even = settings.speeds.values
     model = harmonic_balance_model(assembly, even, settings.harmonics, settings.combinations)
     solver = PointSolver(model, settings.method)
-    told = progress or (lambda done, total: None)
+    report = progress or (lambda done, total: None)
     tracks = _tracks(model, even)
     operation = operating_range(assembly.gearbox)
     looked_for = settings.at_resonances and (model.loses_contact or model.waves.varies)
@@ -312,13 +312,15 @@ def response_of(
     folds: tuple[float, ...] = ()
     ended = ""
     if settings.branches:
-        solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, told)
+        solved, folds, ended = _follow_branch(solver, settings.speeds.first, settings.speeds.last, report)
     else:
-        solved = _solve(solver, even, found, looked_for, _Work(known, told, keep, keep_every))
+        solved = _solve(solver, even, found, looked_for, _Work(known, report, keep, keep_every))
     there = np.isfinite(solved.drive_torque)
     if not there.any():
         raise HarmonicBalanceError(str(solved.remark[0]))
-    explained, growth, campbell = _evaluate_mean_system(solver, even, found, tracks)
+    linear = solver.linear
+    explained = () if linear.loses_contact else _contributions(linear, found)
+    growth = solver.growth(float(even.min()), float(even.max()))
     return SteadyResponse(
         assembly=model.waves.assembly,
         settings=settings,
@@ -341,7 +343,7 @@ def response_of(
         left_out=model.waves.left_out(model.usual_harmonics),
         change_with_more=math.nan if settings.branches else _change_with_more(solver, solved.part(there)),
         band=_band(solver, solved.part(there)),
-        campbell=campbell,
+        campbell=campbell_of(linear.system, tracks),
     )
 
 
@@ -351,15 +353,6 @@ def _band(solver: PointSolver, solved: SolvedPoints) -> DampingBand:
     if solver.method == "nonlinear" or model.loses_contact:
         return no_band(tuple(quantity.name for quantity in quantities_of([s.name for s in model.signal_names])))
     return damping_band(model, solver.method, solved.speed, np.abs(solved.amplitude).astype(np.float64))
-
-
-def _evaluate_mean_system(
-    solver: PointSolver, speeds: Floats, found: tuple[Crossing, ...], tracks: ModeTracks
-) -> tuple[tuple[tuple[int, Contributions], ...], float, Campbell]:
-    """Find what makes the lines at the strongest crossings, the fastest growth, and the Campbell diagram."""
-    model = solver.linear
-    explained = () if model.loses_contact else _contributions(model, found)
-    return explained, solver.growth(float(speeds.min()), float(speeds.max())), campbell_of(model.system, tracks)
 
 
 def _tracks(model: HarmonicBalanceModel, speeds: Floats) -> ModeTracks:
@@ -408,10 +401,10 @@ def _with_tops(solver: PointSolver, solved: SolvedPoints, work: _Work) -> Solved
         solved = solved.joined_with(_empty(solver.model, more))
         solved = _continued(solved, count, lambda: PointSolver(solver.linear, solver.method), work)
         # A speed that nobody asked for and that has no state is none to tell of.
-        told = np.isfinite(solved.drive_torque)
-        told[:count] = True
-        if not told.all():
-            solved = solved.part(told)
+        solved_speeds = np.isfinite(solved.drive_torque)
+        solved_speeds[:count] = True
+        if not solved_speeds.all():
+            solved = solved.part(solved_speeds)
     return solved
 
 
@@ -499,7 +492,7 @@ def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
 def _contributions(model: HarmonicBalanceModel, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
     """Find the contributions to the orders at the strongest crossings, each at its maximum."""
     explained = []
-    for crossing in found[:EXPLAINED]:
+    for crossing in found[:PEAKS_WITH_CONTRIBUTIONS]:
         speed = loudest_near(model, crossing.speed, 2.0 * crossing.damping, crossing.line)
         explained.append((crossing.line, contributions(model, speed, crossing.line)))
     return tuple(explained)

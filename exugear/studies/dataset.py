@@ -247,7 +247,7 @@ class Criteria:
             return self.percentile
         return 100.0 - self.percentile
 
-    def over_draws(self, values: Floats, side: Side) -> Floats:
+    def reduce_draws(self, values: Floats, side: Side) -> Floats:
         """Reduce an output (..., draws) to one value; a failed draw counts as the worst."""
         filled = np.where(np.isnan(values), np.inf if side == "high" else -np.inf, values)
         if filled.shape[-1] == 1:
@@ -256,14 +256,14 @@ class Criteria:
 
     def minimised(self, quantity: Quantity, points: Sequence[EvaluatedPoint]) -> Floats:
         """Return the outputs (points, outputs) to be minimised; infinite where a point failed."""
-        found = [[float(self.over_draws(quantity(point, name), "high")) for name in self.outputs] for point in points]
+        found = [[float(self.reduce_draws(quantity(point, name), "high")) for name in self.outputs] for point in points]
         return np.array(found).reshape(len(points), len(self.outputs))
 
     def violations(self, quantity: Quantity, points: Sequence[EvaluatedPoint]) -> Floats:
         """Return the violations of limits (points, limits), relative to the absolute limit; negative within limits."""
         found = [
             [
-                beyond(float(self.over_draws(quantity(point, name), side)), side, limit)
+                beyond(float(self.reduce_draws(quantity(point, name), side)), side, limit)
                 for name, side, limit in self.limits
             ]
             for point in points
@@ -343,7 +343,7 @@ def _judged(dataset: xr.Dataset, study: Study, criteria: Criteria, name: str, si
     told = f"{criteria.percent(side):g}th percentile of {name} over {values.shape[1]} draws of the tolerances"
     told += f" ({study.file.sampling}, seed {study.file.seed}, the same at every point)"
     attributes = {"units": dataset[name].attrs["units"], "long_name": told}
-    return xr.DataArray(criteria.over_draws(values, side), dims=(EVALUATION,), attrs=attributes)
+    return xr.DataArray(criteria.reduce_draws(values, side), dims=(EVALUATION,), attrs=attributes)
 
 
 def _design(study: Study, points: Sequence[EvaluatedPoint]) -> Design:

@@ -95,12 +95,12 @@ def _record(line: str) -> Record | None:
         return None
 
 
-def told_in_json(value: float) -> float | str | None:
+def json_number(value: float) -> float | str | None:
     """Return a number in the form used in records.
 
     Examples
     --------
-    >>> [told_in_json(value) for value in (2.0, float("inf"), float("nan"))]
+    >>> [json_number(value) for value in (2.0, float("inf"), float("nan"))]
     [2.0, 'infinite', None]
     """
     if math.isnan(value):
@@ -265,7 +265,7 @@ def compute_point(task: Task, work: Work) -> Record:
     try:
         gearbox = _built(task, work)
         results = PointResults(gearbox, task.choice, task.settings, Shared(task.folder / SHARED_FOLDER), folder)
-        values = {name: _told(kept.of(results)) for name, kept in task.outputs.items()}
+        values = {name: _journal_form(kept.of(results)) for name, kept in task.outputs.items()}
         doubts = list(results.doubts)
         results.clear()
     except StoppedError:
@@ -291,11 +291,11 @@ def _built(task: Task, work: Work) -> Gearbox:
         raise GearboxFileError(*("; ".join([*own[:SHOWN_VALUES], *more]) for _ in own[:1]), *error.faults) from None
 
 
-def _told(values: Values) -> Any:
+def _journal_form(values: Values) -> Any:
     """Return values in the form used in a journal."""
     if isinstance(values, Mapping):
-        return {name: told_in_json(float(value)) for name, value in values.items()}
-    return told_in_json(float(values))
+        return {name: json_number(float(value)) for name, value in values.items()}
+    return json_number(float(values))
 
 
 # Executors: this process, worker processes, a Dask cluster, or any executor of that protocol

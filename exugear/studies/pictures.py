@@ -100,7 +100,7 @@ def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
         draw = _draw_bars
     for axes, rows, label in zip(grid.flat, stacked, labels, strict=False):
         draw(axes, values, along, rows, _combinations(values, by))
-        _tell_of_infinite(axes, rows)
+        _mark_infinite(axes, rows)
         axes.set_title(f"{', '.join(panels)} {label}" if panels else "")
     for axes in grid.flat[len(labels) :]:
         axes.set_visible(False)
@@ -109,7 +109,7 @@ def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
         figure.legend(handles, names, title=by[0], loc="outside right upper")
 
 
-def _tell_of_infinite(axes: Axes, rows: Floats) -> None:
+def _mark_infinite(axes: Axes, rows: Floats) -> None:
     """State the number of infinite values, which the scale cannot show."""
     count = int(np.isinf(rows).sum())
     if count:
@@ -226,9 +226,9 @@ def _draw_front(axes: Axes, dataset: xr.Dataset, first: str, second: str) -> Non
     kept = _keeps_limits(dataset)
     axes.plot(x[~front & kept], y[~front & kept], ".", color="#BBBBBB", label="evaluated")
     if not kept.all():
-        axes.plot(x[~kept], y[~kept], "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
+        axes.plot(x[~kept], y[~kept], "x", color="#DDBBBB", markersize=3.5, label="limits violated")
     axes.plot(x[front][order], y[front][order], "o-", color=COLOURS[0], markersize=4, label="Pareto-optimal")
-    axes.plot(x[0], y[0], "s", color=COLOURS[1], label="as it is")
+    axes.plot(x[0], y[0], "s", color=COLOURS[1], label="unchanged gearbox")
     near = [np.nanquantile(values, 0.9) for values in (x, y)]
     axes.set_xlim(0.95 * np.nanmin(x), 1.05 * max(near[0], x[0]))
     axes.set_ylim(0.95 * np.nanmin(y), 1.05 * max(near[1], y[0]))
@@ -243,7 +243,7 @@ def _draw_search(axes: Axes, dataset: xr.Dataset, name: str) -> None:
     kept = _keeps_limits(dataset)
     axes.plot(np.where(kept, values, np.nan), ".", color="#BBBBBB")
     if not kept.all():
-        axes.plot(np.where(kept, np.nan, values), "x", color="#DDBBBB", markersize=3.5, label="beyond limits")
+        axes.plot(np.where(kept, np.nan, values), "x", color="#DDBBBB", markersize=3.5, label="limits violated")
         axes.legend()
     axes.plot(np.fmin.accumulate(np.where(kept, values, np.nan)), color=COLOURS[0])
     low = float(np.nanmin(values))

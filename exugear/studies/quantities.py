@@ -165,11 +165,11 @@ def misalignments(results: PointResults) -> dict[str, float]:
 
 def load_sharing(results: PointResults, *, meshes: str) -> float:
     """Mesh load factor: the largest force among the planets' meshes over their mean, under the static load."""
-    forces = of_planets(results, meshes, results.static.mesh_force)
+    forces = planet_values(results, meshes, results.static.mesh_force)
     return float(forces.max() / forces.mean())
 
 
-def of_planets(results: PointResults, family: str, values: Floats) -> Floats:
+def planet_values(results: PointResults, family: str, values: Floats) -> Floats:
     """Return the values of the meshes of a family, one for each planet.
 
     Raises
@@ -219,7 +219,7 @@ def final_speed(results: PointResults) -> float:
 
 def dynamic_load_sharing(results: PointResults, *, meshes: str) -> float:
     """Largest mean force among the planets' meshes over the mean of all, in a run."""
-    forces = of_planets(results, meshes, _settled(results, "mesh_force")).mean(axis=0)
+    forces = planet_values(results, meshes, _settled(results, "mesh_force")).mean(axis=0)
     return float(forces.max() / forces.mean())
 
 

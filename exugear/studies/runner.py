@@ -189,7 +189,7 @@ class _Evaluated:
         """Evaluate parameters (points, parameters); known points are reused."""
         return self._seen([self._looked(row, self._changes(row)) for row in values])
 
-    def of_case(self) -> Floats:
+    def unchanged_outputs(self) -> Floats:
         """Return the outputs (outputs,) to be minimised of the unchanged gearbox.
 
         Raises
@@ -238,11 +238,11 @@ class _Evaluated:
             self.records |= read_journals(self.task.folder, set(unknown))
         missing = [Work(name, draws[name]) for name in unknown if name not in self.records]
         if missing:
-            self.records |= compute_points(self.task, missing, self.opens, self._told)
+            self.records |= compute_points(self.task, missing, self.opens, self._report_record)
         self.computed += len(missing)
         return wanted
 
-    def _told(self, record: Record) -> None:
+    def _report_record(self, record: Record) -> None:
         if self.tell is not None:
             failed = sum(bool(own.error) for own in self.records.values()) + bool(record.error)
             self.tell(len(self.records), failed, self.expected)
@@ -287,7 +287,7 @@ def optimise(
         raise OptimisationError("the study has no section [optimise]")
     with PersistentPool(opens or processes()) as workers:
         seen = _Evaluated(study, task_of(study, folder), workers.opened, progress)
-        reference = seen.of_case()
+        reference = seen.unchanged_outputs()
         pair = len(wanted.minimise) == 2
         weights = np.linspace(1.0, 0.0, wanted.weightings) if pair and wanted.weightings > 1 else np.array([0.5])
         for number, first in enumerate(weights):

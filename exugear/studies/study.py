@@ -211,7 +211,7 @@ def faults_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearb
         needs = output.quantity.needs
         if needs == "steady" and study.steady is None:
             yield f"outputs.{name}: requires a steady-state response; add a section [steady] with speeds"
-        if needs == "bearings" and (not Variant.of(study.choice.variant).on_bearings or not _rated_bearings(gearbox)):
+        if needs == "bearings" and (not Variant.of(study.choice.variant).has_bearings or not _rated_bearings(gearbox)):
             yield (
                 f"outputs.{name}: requires bearings with a section catalogue, which the variant "
                 f"{study.choice.variant!r} of this gearbox does not have"
@@ -262,7 +262,7 @@ def _names(gearbox: Gearbox, choice: Choice) -> dict[str, Sequence[str]]:
     families = list(dict.fromkeys(mesh.family for mesh in gearbox.meshes))
     law = LAWS.get(choice.mesh_model)
     elements = [mesh.name for mesh in gearbox.meshes] if law is None or law.has_force else []
-    if choice.variant.on_bearings:
+    if choice.variant.has_bearings:
         elements += [bearing.name for bearing in gearbox.bearings]
     if choice.variant.is_elastic:
         elements += [mount.name for mount in mounts_at_work(gearbox)]

@@ -94,8 +94,8 @@ def assemble(
     for name, shaft in flexible.items():
         size = _take_seats(name, shaft, size, coordinates, nodes)
     travelling = _travelling(gearbox, flexible, size, coordinates, nodes)
-    supports = _supports(gearbox, flexible) if variant.on_bearings else ()
-    displaced = gearbox.pin_offsets if not variant.on_bearings else {}  # bearings carry the planets along
+    supports = _supports(gearbox, flexible) if variant.has_bearings else ()
+    displaced = gearbox.pin_offsets if not variant.has_bearings else {}  # bearings carry the planets along
     settings = (inertias, flanks, angles, displaced, nodes, contact)
     elements = () if only_rolls else mesh_elements(gearbox, stiffness, law_of(law), *settings)
     assembly = Assembly(

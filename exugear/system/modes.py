@@ -122,12 +122,12 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
         family = families.get(name, name)
         strained[family] = strained.get(family, 0.0) + float(share)
     words = []
-    told = 0.0
+    described = 0.0
     for what, share in sorted(moving.items(), key=lambda item: -item[1]):
-        if told >= 0.8 or share < 0.05:
+        if described >= 0.8 or share < 0.05:
             break
         words.append(f"{what} {100 * share:.0f} %")
-        told += share
+        described += share
     most = max(strained, key=lambda name: strained[name])
     itself = most.removesuffix("_body")
     what = f"{itself} itself" if itself != most and itself in assembly.elastic_bodies else most
@@ -229,7 +229,7 @@ class Modes(ReprMixin):
             "method_version": MODES,
             "housing_factor": assembly.housing_factor,
             "bearing_laws": assembly.bearing_laws,
-            "mesh_contact": assembly.contacts.in_words,
+            "mesh_contact": assembly.contacts.description,
             "growth_rate": self.growth_rate,
             "near_unconverged_states": ", ".join(meshes_near_unconverged(assembly)),
         }

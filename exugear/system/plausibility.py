@@ -62,15 +62,15 @@ def doubts_about_parts(gearbox: Gearbox) -> Iterator[str]:
 
 def _masses(gearbox: Gearbox) -> Iterator[str]:
     """Compare mass and moments of inertia of bodies with gears with a steel cylinder around these."""
-    told = set()
+    reported = set()
     for inertias in gearbox.inertia_sets:
         for body in gearbox.bodies(inertias):
             reach = _reach(gearbox, body)
             key = f"bodies.{body.family}.inertia.{inertias}"
-            if reach is None or body.fixed or key in told:
+            if reach is None or body.fixed or key in reported:
                 continue
             for doubt in _doubts_about_mass(body, *reach):
-                told.add(key)
+                reported.add(key)
                 yield f"{key}.{doubt}"
 
 
@@ -124,24 +124,24 @@ def _bores(gearbox: Gearbox) -> Iterator[str]:
 
 def _seats(gearbox: Gearbox) -> Iterator[str]:
     """Yield bores of mounted gears narrower than the shaft on either side of them, or than the shaft under them."""
-    told = set()
+    reported = set()
     for body in gearbox.bodies():
         for name, wheel in body.wheels.items():
             gear = gearbox.gears[name]
-            if gear.internal or body.planet_of is not None or name in told:
+            if gear.internal or body.planet_of is not None or name in reported:
                 continue
             beside = _bores_beside(gearbox, body, wheel)
             under = _shaft_under(gearbox, body, gear, wheel)
             root = 2.0 * gear.root_radius
             key = f"gears.{name}.held_diameter_mm = {1e3 * gear.held_diameter:g}"
             if under is not None and root >= WHEEL * under and gear.held_diameter < LEAST_OVER_SHAFT * under:
-                told.add(name)
+                reported.add(name)
                 yield (
                     f"{key}: the diameter of bodies.{body.family}.shape is {1e3 * under:g} mm there; set the bore of "
                     "the gear on that shaft"
                 )
             elif beside and root >= WHEEL * max(beside) and gear.held_diameter < LEAST_SEAT * min(beside):
-                told.add(name)
+                reported.add(name)
                 yield (
                     f"{key}: the bearings on both sides have bores of {1e3 * beside[0]:g} and {1e3 * beside[1]:g} mm; "
                     "the bore of a gear between them must pass the thinner end"
@@ -202,13 +202,13 @@ def _bearings(gearbox: Gearbox) -> Iterator[str]:
 def _faces(gearbox: Gearbox) -> Iterator[str]:
     """Yield gears in mesh with an axial offset of a part of their face width."""
     bodies = gearbox.named_bodies
-    told = set()
+    reported = set()
     for mesh in gearbox.meshes:
         places = [
             bodies[body].wheels.get(gear.name)
             for body, gear in ((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear))
         ]
-        if None in places or mesh.family in told:
+        if None in places or mesh.family in reported:
             continue
         gears = (mesh.pair.pinion, mesh.pair.gear)
         low = max(place - 0.5 * gear.face_width for place, gear in zip(places, gears, strict=True) if place is not None)
@@ -216,7 +216,7 @@ def _faces(gearbox: Gearbox) -> Iterator[str]:
             place + 0.5 * gear.face_width for place, gear in zip(places, gears, strict=True) if place is not None
         )
         if high - low < LEAST_OVERLAP * mesh.pair.face_width:
-            told.add(mesh.family)
+            reported.add(mesh.family)
             family = bodies[mesh.gear].family
             yield (
                 f"bodies.{family}.gears_z_mm.{gears[1].name} = {1e3 * (places[1] or 0.0):g}: {mesh.family} has "
@@ -255,14 +255,14 @@ def _backlashes(gearbox: Gearbox) -> Iterator[str]:
 
 def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
     """Yield shafts with gears that are supported by only one bearing, of a type that is compliant in tilting."""
-    told = set()
+    reported = set()
     for body in gearbox.bodies():
         bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
-        if len(bearings) != 1 or body.fixed or body.planet_of is not None or body.family in told or not body.wheels:
+        if len(bearings) != 1 or body.fixed or body.planet_of is not None or body.family in reported or not body.wheels:
             continue
         catalogue = bearings[0].catalogue
         if catalogue is not None and catalogue.type in TILTING and catalogue.arrangement == "single":
-            told.add(body.family)
+            reported.add(body.family)
             yield (
                 f"bearings.{bearings[0].family}: the only bearing of {body.family}; one "
                 f"{catalogue.type.replace('_', ' ')} bearing has almost no tilting stiffness; is a bearing missing?"
@@ -271,14 +271,14 @@ def _shafts_on_one_bearing(gearbox: Gearbox) -> Iterator[str]:
 
 def _faces_in_bearings(gearbox: Gearbox) -> Iterator[str]:
     """Yield gears that overlap a bearing of their own body."""
-    told = set()
+    reported = set()
     for body in gearbox.bodies():
         bearings = [bearing for bearing in gearbox.bearings if body.name in (bearing.body, bearing.on)]
         for name, wheel in body.wheels.items():
             for bearing in bearings:
                 depth = _clash(gearbox.gears[name], wheel, bearing)
-                if depth > 0.0 and (name, bearing.family) not in told:
-                    told.add((name, bearing.family))
+                if depth > 0.0 and (name, bearing.family) not in reported:
+                    reported.add((name, bearing.family))
                     yield (
                         f"bodies.{body.family}.gears_z_mm.{name} = {1e3 * wheel:g}: the face width overlaps by "
                         f"{1e3 * depth:.3g} mm with bearings.{bearing.family} at z_mm = {1e3 * bearing.position[2]:g}"

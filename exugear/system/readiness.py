@@ -191,7 +191,7 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     """
     chosen = Variant.of(variant)
     lack = unsupported(gearbox, variant)
-    if lack or not chosen.on_bearings:
+    if lack or not chosen.has_bearings:
         return lack
     return _misfits(gearbox, chosen) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, chosen)
 

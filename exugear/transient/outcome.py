@@ -65,7 +65,7 @@ class ProgressMeter:
 
     def __init__(self, begin: float, end: float, tell: Callable[[Progress], None] | None) -> None:
         self._begin, self._end = begin, end
-        self._tell = tell
+        self._report_progress = tell
         self._wall_start = time.perf_counter()
 
     @property
@@ -75,12 +75,12 @@ class ProgressMeter:
 
     def reach(self, now: float) -> None:
         """Report that the run has reached a simulated time, s."""
-        if self._tell is None:
+        if self._report_progress is None:
             return
         wall = self.wall
         done = now - self._begin
         remaining = wall * (self._end - now) / done if done > 0.0 else math.inf
-        self._tell(Progress(now, self._end, wall, remaining))
+        self._report_progress(Progress(now, self._end, wall, remaining))
 
 
 @dataclass(frozen=True)
@@ -139,15 +139,15 @@ LARGEST, SINCE, WHERE = range(3)
 """Columns of these: largest value so far; time (s) and number of the body or mesh first beyond a limit."""
 AT_START, SCALE = range(2)
 """Columns of the row `ACCOUNT`: energy that the account began with, and the largest so far, J."""
-FIGURES = (5, 3)
+MONITOR_SHAPE = (5, 3)
 """Shape of the monitored values."""
 WORK_OF_LOADS, KINETIC, ELASTIC = map(BALANCE_TERMS.index, ("work_of_loads", "kinetic_energy", "elastic_energy"))
 """Terms of the account that say how much energy there is; what varying stiffness pumps in shows up in them."""
 EXPLAINING = [number for number, term in enumerate(BALANCE_TERMS) if term != "work_of_loads"]
 """Terms of the account that explain where the work of the loads went."""
-PULLING = MESH_TIMES.index("tensile_time")
+TENSILE_ROW = MESH_TIMES.index("tensile_time")
 """Row of the times of meshes in which they pull."""
-UNSOLVED = MESH_TIMES.index("interpolation_time")
+NOT_CONVERGED_ROW = MESH_TIMES.index("interpolation_time")
 """Row of the times in which they read a table next to states that have not converged."""
 WHOLLY = 0.9
 """Part of a run with tensile mesh force from which it is load on the other flank, not oscillation about zero load."""
@@ -223,14 +223,14 @@ class ValidityMonitor:
 
     Attributes
     ----------
-    figures : array of the shape `FIGURES`
+    figures : array of the shape `MONITOR_SHAPE`
         The complete state of the monitor: a resumed run takes it over.
     """
 
     def __init__(self, assembly: Assembly, loads: LoadSummary, limits: Limits = LIMITS) -> None:
         radii = rim_radii(assembly.gearbox)
         self.limits = limits
-        self.figures = np.full(FIGURES, np.nan)
+        self.figures = np.full(MONITOR_SHAPE, np.nan)
         self.figures[:ACCOUNT, LARGEST] = 0.0
         self._law = assembly.mesh_model
         self._bodies = tuple(radii)
@@ -314,8 +314,8 @@ class ValidityMonitor:
             *self._energy_words(),
             *self._speed_words(),
             *self._deflection_words(),
-            *self._pulling_words(mesh_times[PULLING] / max(simulated, 1e-300)),
-            *self._unsolved_words(mesh_times[UNSOLVED]),
+            *self._tensile_warning(mesh_times[TENSILE_ROW] / max(simulated, 1e-300)),
+            *self._not_converged_warning(mesh_times[NOT_CONVERGED_ROW]),
         )
 
     def _energy_words(self) -> Iterator[str]:
@@ -361,7 +361,7 @@ class ValidityMonitor:
                 f"{_percent(limit)} of its tooth height, beyond breakage; maximum {_percent(largest)}"
             )
 
-    def _pulling_words(self, share: Floats) -> Iterator[str]:
+    def _tensile_warning(self, share: Floats) -> Iterator[str]:
         limit = self.limits.pulling_marked
         names = [name for name, part in zip(self._meshes, share, strict=True) if part >= limit]
         if names:
@@ -372,7 +372,7 @@ class ValidityMonitor:
                 f"{_percent(limit)}); model {self._law} neglects contact loss; {cause}, or use --mesh-model table"
             )
 
-    def _unsolved_words(self, times: Floats) -> Iterator[str]:
+    def _not_converged_warning(self, times: Floats) -> Iterator[str]:
         names = [name for name, time in zip(self._meshes, times, strict=True) if time > 0.0]
         if names:
             yield (

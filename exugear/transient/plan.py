@@ -238,7 +238,7 @@ class RunPlan:
             "method_version": RUN,
             "housing_factor": assembly.housing_factor,
             "bearing_laws": assembly.bearing_laws,
-            "mesh_contact": assembly.contacts.in_words,
+            "mesh_contact": assembly.contacts.description,
             "ratio": gearbox.train.ratio,
             "output_base_radius": gearbox.output_radius,
             "highest_order": max(gearbox.train.mesh_frequencies(2.0 * math.pi).values(), default=1.0),

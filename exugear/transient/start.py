@@ -144,7 +144,7 @@ def prepare_start(plan: RunPlan, resume: bool) -> RunStart:
         state = _first_state(assembly, case, series, layout, judge)
         (plan.directory / EARLIER_PARTIAL_NAME).unlink(missing_ok=True)
         doubt = bearing_range_warning(gearbox, summary, assembly.variant)
-        other = other_load_warning(gearbox, summary, LAWS[assembly.mesh_model].of_one_load)
+        other = other_load_warning(gearbox, summary, LAWS[assembly.mesh_model].uses_single_load)
         load = load_in_words(case)
         beyond = band_warning(summary, plan.band)
         doubts = {"bearing_doubt": doubt, "table_doubt": other, "band_doubt": beyond}

@@ -193,7 +193,7 @@ class _KernelCache(FunctionCache):
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         kernel = self._found(sig, target_context)
         if kernel is None:
-            _tell_of_compiling(self._py_func.__module__.partition(".")[0])
+            _announce_compilation(self._py_func.__module__.partition(".")[0])
             if process := _compiled_ahead.pop((self._py_func, sig), None):
                 process.wait()
                 kernel = self._found(sig, target_context)
@@ -222,17 +222,17 @@ class _KernelCache(FunctionCache):
         try:
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
         except OSError as error:
-            _tell_unkept(self.cache_path, error.strerror)
+            _warn_not_stored(self.cache_path, error.strerror)
 
 
 @cache
-def _tell_of_compiling(package: str) -> None:
+def _announce_compilation(package: str) -> None:
     """Say what is compiled and for how long, before the first kernel of a package is."""
     _log.info("Compiling kernels%s; once per installation or update", _COMPILED.get(package, ""))
 
 
 @cache
-def _tell_unkept(folder: str, reason: str) -> None:
+def _warn_not_stored(folder: str, reason: str) -> None:
     _log.warning("%s: compiled kernels cannot be stored (%s); they are compiled at each start", folder, reason)
 
 

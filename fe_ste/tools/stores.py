@@ -357,7 +357,7 @@ class Store:
                 return unpack(arrays)
             return None
         except (OSError, ValueError, TypeError, LookupError, AttributeError) as error:
-            self._tell_of(error)
+            self._warn_of_error(error)
             return None
 
     def write(self, arrays: Mapping[str, Any], *, compressed: bool = False) -> None:
@@ -377,7 +377,7 @@ class Store:
         except VersionError:
             return None
         except OSError as error:
-            self._tell_of(error)
+            self._warn_of_error(error)
             return None
         if dataset.attrs.get("input_hash") == self.key:
             return dataset
@@ -391,7 +391,7 @@ class Store:
         """Remove the file: what it was kept for is done."""
         self.path.unlink(missing_ok=True)
 
-    def _tell_of(self, error: Exception) -> None:
+    def _warn_of_error(self, error: Exception) -> None:
         """Log why an existing file is not read."""
         if os.path.exists(self.path):
             reason = str(error) if isinstance(error, OSError) else f"{self.path}: is damaged ({error!r})"
@@ -451,7 +451,7 @@ class Cache(ReprMixin, Generic[Value]):
                 store.write(arrays)
                 self._remove_oldest(store.path.parent)
             except OSError as error:
-                _tell_unkept(self._name, str(store.path.parent), str(error.strerror))
+                _warn_not_stored(self._name, str(store.path.parent), str(error.strerror))
 
     def forget(self) -> None:
         """Drop all values from memory."""
@@ -488,7 +488,7 @@ class Cache(ReprMixin, Generic[Value]):
 
 
 @functools.cache
-def _tell_unkept(name: str, folder: str, reason: str) -> None:
+def _warn_not_stored(name: str, folder: str, reason: str) -> None:
     _log.warning("%s: each %s cannot be stored (%s); the next process recomputes it", folder, name, reason)
 
 

@@ -284,7 +284,7 @@ def _compliance(pair: GearPair, mesh: MeshSettings, contact: ContactSettings) ->
 
 #: Each takes 4 kB.
 _contacts = Cache[MeanContact]("contact", in_memory=1000, in_files=20_000_000)
-_told: ContextVar[Callable[[int, int], None] | None] = ContextVar("_told", default=None)
+_progress: ContextVar[Callable[[int, int], None] | None] = ContextVar("_progress", default=None)
 
 
 @contextmanager
@@ -297,11 +297,11 @@ def contacts_told(progress: Callable[[int, int], None]) -> Iterator[None]:
         Called with the number of finished contacts, and of all that have to be solved. An exception that it raises,
         such as Ctrl-C, ends the work.
     """
-    token = _told.set(progress)
+    token = _progress.set(progress)
     try:
         yield
     finally:
-        _told.reset(token)
+        _progress.reset(token)
 
 
 def known_contacts(wanted: Sequence[TableInput]) -> list[MeanContact | ContactError]:
@@ -319,7 +319,7 @@ def known_contacts(wanted: Sequence[TableInput]) -> list[MeanContact | ContactEr
     stored = {key: _contacts.get(key, _unpacked) for key in asked}
     found: dict[str, MeanContact | ContactError] = {key: kept for key, kept in stored.items() if kept is not None}
     missing = [key for key in asked if key not in found]
-    progress = _told.get()
+    progress = _progress.get()
 
     def solve(key: str) -> MeanContact | ContactError:
         try:

@@ -241,7 +241,7 @@ class _Search:
         gap = {index: removed + self.misalignments[index] * gap_per_misalignment for index in pending}
         near = {index: g - g.min() < _GAP_REACH * self.starts[index].depth for index, g in gap.items()}
         address = self._addresses(cells)
-        expected = self._expected(pending, margin)[address] | _around_least(cells, removed)
+        expected = self._expected(pending, margin)[address] | _smallest_gap_cells(cells, removed)
         return _Window(cells, address, gap, near, expected)
 
     def _expected(self, pending: list[int], margin: int) -> Booleans:
@@ -403,7 +403,7 @@ def _ends(cells: Cells, looked: Booleans) -> tuple[Booleans, Booleans]:
     return np.asarray((first | last) & ~cells.cut), np.asarray((~first & ~before) | (~last & ~after))
 
 
-def _around_least(cells: Cells, gap: Floats) -> Booleans:
+def _smallest_gap_cells(cells: Cells, gap: Floats) -> Booleans:
     """In each slice the cell of the smallest gap, where contact begins under any misalignment, and its neighbours."""
     group = cells.tooth * (cells.layer.max() + 1) + cells.layer
     starts = np.flatnonzero(np.diff(group, prepend=group[0] - 1))

@@ -369,7 +369,7 @@ class SteSurface(ReprMixin):
         guessed = None if self.guessed is None else np.asarray(self.guessed.any(axis=0, keepdims=True))
         return SteSurface(self.centre_distance, self.misalignment, self.root_force, mean, guessed)
 
-    def near_guesses(self) -> Booleans:
+    def interpolated_intervals(self) -> Booleans:
         """Return where interpolated nodes act: intervals of pmc, centre distance, misalignment, segments of load.
 
         Returns
@@ -394,7 +394,7 @@ class SteSurface(ReprMixin):
     def acting_guesses(self) -> Booleans:
         """Return the intervals, and the nodes between them, at which interpolated nodes have an effect.
 
-        Nodes and intervals alternate along each axis: 2 n + 1 entries for the n intervals of `near_guesses`, node i at
+        Nodes and intervals alternate along each axis: 2 n + 1 entries for n `interpolated_intervals`, node i at
         2 i, the interval behind it at 2 i + 1. Values and slopes are continuous at a node, so an interpolated node that
         acts on only one side of it has no weight there.
 
@@ -402,7 +402,7 @@ class SteSurface(ReprMixin):
         -------
         (2 p + 1, 2 max(1, c - 1) + 1, 2 max(1, a - 1) + 1, 2 l + 1) array
         """
-        acting = self.near_guesses()
+        acting = self.interpolated_intervals()
         for axis in range(acting.ndim):
             intervals = np.moveaxis(acting, axis, 0)
             # The mesh cycle closes; beyond the ends of the other axes the surface goes on as beside them.

@@ -66,7 +66,7 @@ def bearings(
         from exugear.gearbox.choice import Choice
         from exugear.results.folder import duties_summary
 
-        if not variant.on_bearings:
+        if not variant.has_bearings:
             raise BadInputError(f"--variant {variant}: has ideal joints instead of bearings; use bushing or flexible")
         project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
         if not any(bearing.catalogue for bearing in project.gearbox.bearings):

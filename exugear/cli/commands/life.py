@@ -60,7 +60,7 @@ def life(
         if as_json:
             print_json({"case": str(case), **summary(data), "file": str(project.life_path)})
         else:
-            _tell(data)
+            _print_result(data)
             say(f"Results: {project.life_path}; CSV tables and a picture in the same folder")
         _fail_if_short(data, project.life_path)
 
@@ -89,7 +89,7 @@ BEARING_LEGEND = (
 )
 
 
-def _tell(data: xr.Dataset) -> None:
+def _print_result(data: xr.Dataset) -> None:
     from exugear.life.life_file import limits
 
     for line in json.loads(data.attrs["failures"]):
@@ -103,7 +103,9 @@ def _tell(data: xr.Dataset) -> None:
         print_table("Bearings: rating life, static safety", _bearing_rows(data), legend=BEARING_LEGEND)
     worst = [limit for limit in limits(data) if limit[2] > 0.0][:SHOWN_LIMITS]
     if worst:
-        rows = [{"part": part, "failure mode": kind, "damage": _told(damage, ".3g")} for part, kind, damage in worst]
+        rows = [
+            {"part": part, "failure mode": kind, "damage": _number_text(damage, ".3g")} for part, kind, damage in worst
+        ]
         title = f"Parts with the largest fatigue damage in {float(data.attrs['life_years']):g} years"
         print_table(title, rows, ("failure mode",), "Damage: 1 is failure at the design probability.")
     for key, style in (("assumptions", ""), ("unrated", "yellow"), ("reliefs", "yellow")):
@@ -115,14 +117,14 @@ def _contact_rows(data: xr.Dataset) -> list[dict[str, str]]:
     return [
         {
             "gear, flank, mesh": _with_holder(data, label, "contact"),
-            "sigma_H\nMPa": _told(1e-6 * value("contact_stress"), ".0f"),
-            "nominal\nMPa": _told(1e-6 * value("nominal_contact"), ".0f"),
-            "outside\n%": _told(100.0 * value("outside"), ".1f"),
-            "K_Hbeta": _told(value("face_load"), ".3f"),
-            "fatigue\ndamage": _told(value("contact_damage"), ".3g"),
-            "S_H": _told(value("contact_safety"), ".2f"),
-            "S_H\nISO": _told(value("standard_contact_safety"), ".2f"),
-            "S_H\nstat.": _told(value("contact_static"), ".2f"),
+            "sigma_H\nMPa": _number_text(1e-6 * value("contact_stress"), ".0f"),
+            "nominal\nMPa": _number_text(1e-6 * value("nominal_contact"), ".0f"),
+            "outside\n%": _number_text(100.0 * value("outside"), ".1f"),
+            "K_Hbeta": _number_text(value("face_load"), ".3f"),
+            "fatigue\ndamage": _number_text(value("contact_damage"), ".3g"),
+            "S_H": _number_text(value("contact_safety"), ".2f"),
+            "S_H\nISO": _number_text(value("standard_contact_safety"), ".2f"),
+            "S_H\nstat.": _number_text(value("contact_static"), ".2f"),
         }
         for label, value in _entries(data, "flank")
     ]
@@ -132,13 +134,13 @@ def _root_rows(data: xr.Dataset) -> list[dict[str, str]]:
     return [
         {
             "gear, flank, mesh": _with_holder(data, label, "root"),
-            "sigma_F\nMPa": _told(1e-6 * value("root_stress"), ".0f"),
-            "nominal\nMPa": _told(1e-6 * value("nominal_root"), ".0f"),
-            "minimum\nMPa": _told(1e-6 * value("compression"), ".0f"),
-            "fatigue\ndamage": _told(value("root_damage"), ".3g"),
-            "S_F": _told(value("root_safety"), ".2f"),
-            "S_F\nISO": _told(value("standard_root_safety"), ".2f"),
-            "S_F\nstat.": _told(value("root_static"), ".2f"),
+            "sigma_F\nMPa": _number_text(1e-6 * value("root_stress"), ".0f"),
+            "nominal\nMPa": _number_text(1e-6 * value("nominal_root"), ".0f"),
+            "minimum\nMPa": _number_text(1e-6 * value("compression"), ".0f"),
+            "fatigue\ndamage": _number_text(value("root_damage"), ".3g"),
+            "S_F": _number_text(value("root_safety"), ".2f"),
+            "S_F\nISO": _number_text(value("standard_root_safety"), ".2f"),
+            "S_F\nstat.": _number_text(value("root_static"), ".2f"),
         }
         for label, value in _entries(data, "flank")
     ]
@@ -148,14 +150,14 @@ def _bearing_rows(data: xr.Dataset) -> list[dict[str, str]]:
     return [
         {
             "bearing": label,
-            "largest\nkN": _told(1e-3 * value("largest_load"), ".4g"),
-            "equiv.\nkN": _told(1e-3 * value("equivalent"), ".4g"),
-            "L10\nh": _told(value("basic_hours"), ".3g"),
-            "L10r\nh": _told(value("reference_hours"), ".3g"),
-            "L10m\nh": _told(value("modified_hours"), ".3g"),
-            "kappa": _told(value("viscosity_ratio"), ".2g"),
-            "stress\nMPa": _told(1e-6 * value("pressure"), ".0f"),
-            "S_0": _told(value("static_safety"), ".2f"),
+            "largest\nkN": _number_text(1e-3 * value("largest_load"), ".4g"),
+            "equiv.\nkN": _number_text(1e-3 * value("equivalent"), ".4g"),
+            "L10\nh": _number_text(value("basic_hours"), ".3g"),
+            "L10r\nh": _number_text(value("reference_hours"), ".3g"),
+            "L10m\nh": _number_text(value("modified_hours"), ".3g"),
+            "kappa": _number_text(value("viscosity_ratio"), ".2g"),
+            "stress\nMPa": _number_text(1e-6 * value("pressure"), ".0f"),
+            "S_0": _number_text(value("static_safety"), ".2f"),
         }
         for label, value in _entries(data, "bearing")
     ]
@@ -179,7 +181,7 @@ def _figure(data: xr.Dataset, name: str, place: int, key: str) -> float:
     return float(data[f"{name}_{key}"][place])
 
 
-def _told(value: float, form: str) -> str:
+def _number_text(value: float, form: str) -> str:
     if math.isnan(value):
         return ""
     if math.isinf(value):

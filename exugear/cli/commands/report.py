@@ -56,7 +56,7 @@ def report(
                 written = write_report(folder, near, tell, allow_dir, executor)
         except ReportError as error:
             raise BadInputError(error) from error
-        _tell_report(folder, written.path, written.statements, written.left_out, as_json)
+        _print_report(folder, written.path, written.statements, written.left_out, as_json)
 
 
 def _results_of(folder: Path) -> Path:
@@ -80,7 +80,7 @@ def _parallel_worker() -> AbstractContextManager[Executor | None]:
     return nullcontext()
 
 
-def _tell_report(
+def _print_report(
     folder: Path, path: Path, statements: tuple[str, ...], left_out: tuple[str, ...], as_json: bool
 ) -> None:
     from exugear.results.folder import times_spent

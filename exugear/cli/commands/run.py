@@ -144,7 +144,7 @@ def run(
         if not resume:
             project.begin()
         _check_run_directory(project.run_directory, resume)
-        _tell_doubts(project, duration, kept["band"])
+        _warn_before_run(project, duration, kept["band"])
         project.prepare()
         with time_noted(project.folder, _label_of(project, solver, mesh_route)):
             how = {"solver": solver.value, "mesh_route": mesh_route.value, "integrator": integrator, **kept}
@@ -153,7 +153,7 @@ def run(
         if compared is not None and finished.complete:
             with time_noted(project.folder, f"comparison with Exudyn, {choice.variant}"):
                 comparison = _compare(project, compared, kept)
-        _tell_run(case, finished, comparison, resuming(context), as_json)
+        _print_run_result(case, finished, comparison, resuming(context), as_json)
 
 
 def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> SolverComparison:
@@ -259,7 +259,7 @@ def _duration_to_resume(project: Project, duration: float | None) -> float | Non
     return duration
 
 
-def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
+def _warn_before_run(project: Project, duration: float | None, band: float) -> None:
     """Print warnings about probable sign errors of torques, and loads outside the range of bearing or mesh models."""
     from exugear.gearbox.load_cases import (
         band_warning,
@@ -274,7 +274,7 @@ def _tell_doubts(project: Project, duration: float | None, band: float) -> None:
     law = LAWS[project.choice.mesh_model]
     loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
     of_bearings = bearing_range_warning(project.gearbox, loads, project.choice.variant)
-    of_tables = other_load_warning(project.gearbox, loads, law.of_one_load)
+    of_tables = other_load_warning(project.gearbox, loads, law.uses_single_load)
     for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, band_warning(loads, band))):
         note(f"Warning: load_cases.{load_case.name}: {doubt}", style="yellow")
     if friction := project.gearbox.case.damping.tooth_friction:
@@ -305,7 +305,9 @@ def _simulate(project: Project, resume: bool, command: str, **options: Any) -> R
         raise StoppedError(f"results so far are kept in {directory}; resume with:\n{command}") from None
 
 
-def _tell_run(case: Path, finished: Run, comparison: SolverComparison | None, command: str, as_json: bool) -> None:
+def _print_run_result(
+    case: Path, finished: Run, comparison: SolverComparison | None, command: str, as_json: bool
+) -> None:
     """Print the results of a run; end with code 130 if the user stopped it, with 1 if it is invalid."""
     if not finished.complete and not finished.halted:
         so_far = "".join(f"\nInvalid so far: {reason}" for reason in finished.reasons)

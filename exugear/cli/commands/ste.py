@@ -22,7 +22,7 @@ from exugear.cli.console import (
     print_json,
     progress_bar,
     say,
-    tell_of_tables,
+    table_warnings,
 )
 from exugear.cli.tables import print_table
 
@@ -112,11 +112,11 @@ def ste(
             with _curves_beside({**beside, **tables}, folder, requests) as curves:
                 contacts = _draw_contacts(requests, tables, folder)
             pictures = curves.result() + contacts
-        _tell_misalignment(project)
-        _tell_tables(case, folder, requests, tables, pictures, as_json)
+        _print_misalignment(project)
+        _print_tables(case, folder, requests, tables, pictures, as_json)
 
 
-def _tell_misalignment(project: WatchedProject) -> None:
+def _print_misalignment(project: WatchedProject) -> None:
     """Print the misalignment of the gears, which static tables neglect; nothing if bearing data are unknown."""
     from exugear.system.bearings.rolling.rows import BearingError
     from exugear.system.bearings.stiffness import unsupported
@@ -210,7 +210,7 @@ def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -
 
     before = bar.tasks[task].completed
 
-    def at_iteration(done: int, of: int, iteration: Iteration | None) -> None:
+    def report_iteration(done: int, of: int, iteration: Iteration | None) -> None:
         interruption.check()
         text = f"{request.name}: {done} of {of} positions"
         if iteration is not None:
@@ -218,7 +218,7 @@ def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -
         bar.update(task, completed=before + done, description=text)
 
     try:
-        return request.compute(at_iteration)
+        return request.compute(report_iteration)
     except GeometryError as error:
         raise BadInputError(f"pairs.{request.name}: {error}") from error
 
@@ -276,7 +276,7 @@ REFERENCE_LEGEND = (
 )
 
 
-def _tell_tables(
+def _print_tables(
     case: Path,
     folder: Path,
     requests: list[TableRequest],
@@ -292,7 +292,7 @@ def _tell_tables(
     else:
         print_table("Static transmission error", [_ste_row(summary) for summary in summaries], legend=TABLE_LEGEND)
         say(f"Results: {folder / 'tables'}; pictures: {folder / 'pictures'}")
-    doubts = tell_of_tables(tables)
+    doubts = table_warnings(tables)
     if doubts:
         raise FailedError("\n".join(["invalid tables:", *doubts]))
 

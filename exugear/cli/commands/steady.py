@@ -145,10 +145,10 @@ def steady(
         _refuse_what_has_none(project)
         project.begin()
         project.prepare()
-        _tell(project, settings, project.steady(settings), as_json)
+        _print_result(project, settings, project.steady(settings), as_json)
 
 
-def _tell_of_other_loads(gearbox: Gearbox) -> None:
+def _warn_of_other_loads(gearbox: Gearbox) -> None:
     """Print warnings about load cases whose mesh loads differ from the static load used for the response."""
     from exugear.gearbox.load_cases import load_in_words, other_load_warning, static_load_in_words, summarise_loads
 
@@ -181,18 +181,18 @@ def _settings(
     return SteadySettings(asked, method.value, harmonics, branches=branches)
 
 
-def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
+def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
     from exugear.gearbox.load_cases import static_load_in_words
     from exugear.gearbox.units import RPM
     from exugear.report.findings.loudness import ranking_of
     from exugear.system.modal_damping import damping_in_words
 
-    _tell_of_other_loads(project.gearbox)
+    _warn_of_other_loads(project.gearbox)
     growth = float(data.attrs["growth_rate"])
     ranking = ranking_of(data)
-    _tell_of_stability(data, growth)
-    pulling = _tell_of_pulls(data)
-    swinging = _tell_of_bearings(data)
+    _warn_of_instability(data, growth)
+    pulling = _warn_of_tensile_forces(data)
+    swinging = _warn_of_bearing_loads(data)
     if data.attrs["shared_lines"]:
         note(f"Coinciding orders of several meshes, each named after one of them: {data.attrs['shared_lines']}")
     excited = bool((data["amplitude"][:, 1:, 0] > LEAST_AMPLITUDE).any())
@@ -202,9 +202,9 @@ def _tell(project: Project, settings: SteadySettings, data: xr.Dataset, as_json:
             "all amplitudes are zero; use --mesh-model line_of_action"
         )
     else:
-        _tell_of_harmonics(data)
-        _tell_of_range(ranking)
-    wandering = _tell_of_wandering_loads(project) if excited else ()
+        _print_harmonics(data)
+        _print_speed_range(ranking)
+    wandering = _warn_of_shuttling(project) if excited else ()
     if as_json:
         summary = _whole_summary(project, settings, data, ranking, pulling, excited)
         remarks = {
@@ -235,7 +235,7 @@ def _print_bands(gearbox: Gearbox, ranking: Ranking) -> None:
     shown = [
         resonance
         for resonance in ranking.resonances[:SHOWN_RESONANCES]
-        if any(loudness.limits for loudness in resonance.loudness.values())
+        if any(peak.limits for peak in resonance.amplitudes.values())
     ]
     if not shown:
         return
@@ -250,13 +250,13 @@ def _band_row(resonance: Resonance) -> dict[str, str]:
     from exugear.gearbox.units import RPM
 
     found = {"order": resonance.line, "speed\nrpm": significant(resonance.speed / RPM, 5, 2)}
-    for quantity, loudness in resonance.loudness.items():
+    for quantity, peak in resonance.amplitudes.items():
         heading, factor = COLUMNS[quantity]
         found[heading] = "-"
-        if loudness.limits:
-            found[heading] = "–".join(significant(factor * limit.amplitude, 2, 6) for limit in loudness.limits[::-1])
-            if loudness.places is not None and loudness.places[0] != loudness.places[1]:
-                best, worst = loudness.places
+        if peak.limits:
+            found[heading] = "–".join(significant(factor * limit.amplitude, 2, 6) for limit in peak.limits[::-1])
+            if peak.places is not None and peak.places[0] != peak.places[1]:
+                best, worst = peak.places
                 found[heading] += f" ({best}–{worst})"
             found[heading] = found[heading].replace(" ", HARD_SPACE)
     return found
@@ -264,7 +264,7 @@ def _band_row(resonance: Resonance) -> dict[str, str]:
 
 def _legend(ranking: Ranking) -> str:
     text = "Zero-to-peak amplitudes, (rank) within each quantity. TE: transmission error"
-    if "force" not in ranking.resonances[0].loudness:
+    if "force" not in ranking.resonances[0].amplitudes:
         return f"{text}."
     owner = {"shafts": "shaft", "housing": "housing"}.get(ranking.accelerates, ranking.accelerates)
     return f"{text}; force: largest dynamic bearing force; accel.: {owner} at the bearing."
@@ -323,7 +323,7 @@ def _speeds_of(ranking: Ranking) -> str:
     return f"{low:.4g} to {high:.4g} rpm"
 
 
-def _tell_of_range(ranking: Ranking) -> None:
+def _print_speed_range(ranking: Ranking) -> None:
     """Print which speed range is ranked, and notes if all speeds are ranked or no resonance was found."""
     if ranking.whole:
         note(
@@ -346,7 +346,7 @@ def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
         raise FailedError(f"invalid steady-state response: disturbances grow at up to {growth:.3g} 1/s (unstable)")
 
 
-def _tell_of_pulls(data: xr.Dataset) -> tuple[TensileMesh, ...]:
+def _warn_of_tensile_forces(data: xr.Dataset) -> tuple[TensileMesh, ...]:
     """Print which meshes have tensile forces, if the mesh model neglects contact loss."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import pulls
@@ -370,7 +370,7 @@ def _pull_summary(pull: TensileMesh) -> dict[str, Any]:
     return {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
 
 
-def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
+def _warn_of_instability(data: xr.Dataset, growth: float) -> None:
     """Print the speeds without a converged or stable steady state."""
     from exugear.gearbox.units import RPM
 
@@ -385,18 +385,18 @@ def _tell_of_stability(data: xr.Dataset, growth: float) -> None:
         note(f"Warning: unstable: disturbances grow at up to {growth:.3g} 1/s{where}; no steady state", style="yellow")
 
 
-def _tell_of_wandering_loads(project: Project) -> tuple[Shuttling, ...]:
+def _warn_of_shuttling(project: Project) -> tuple[Shuttling, ...]:
     """Print a warning if the shuttling moment is significant but neglected by the mesh model."""
     from exugear.system.tooth_mesh.laws.registry import LAWS
-    from exugear.system.tooth_mesh.tables import wandering_loads
+    from exugear.system.tooth_mesh.tables import shuttling_pairs
 
     law = LAWS[project.choice.mesh_model]
     if law.moves_load or not law.needs_tables or project.choice.variant.spins_only:
         return ()
-    found = wandering_loads(project.gearbox, project.folder)
+    found = shuttling_pairs(project.gearbox, project.folder)
     if found and found[0].over_error > NOTICED_WAY:
         note(
-            f"Warning: {found[0].in_words}. The shuttling moment, {found[0].over_error:.2g} times the excitation by "
+            f"Warning: {found[0].description}. The shuttling moment, {found[0].over_error:.2g} times the excitation by "
             f"the transmission error, is neglected by the mesh model {law.name}; resonances with tilting gears may be "
             "many times higher. Use --mesh-model line_of_action.",
             style="yellow",
@@ -420,7 +420,7 @@ def _known(value: float) -> float | None:
     return None
 
 
-def _tell_of_harmonics(data: xr.Dataset) -> None:
+def _print_harmonics(data: xr.Dataset) -> None:
     """Print the number of harmonics, their truncation error, and the effect of more harmonics."""
     mesh, share = max(_left_out(data).items(), key=lambda own: own[1])
     change = _known(float(data.attrs["change_with_more"]))
@@ -437,7 +437,7 @@ def _tell_of_harmonics(data: xr.Dataset) -> None:
         note(text)
 
 
-def _tell_of_bearings(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
+def _warn_of_bearing_loads(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]:
     """Print how nonlinear bearings were modelled, effects of unequal planet loads, and large dynamic bearing loads."""
     from exugear.gearbox.units import RPM
     from exugear.steady.peaks import STRAINED, bearing_swings
@@ -503,16 +503,16 @@ def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
         "frequency_Hz": resonance.frequency,
         "best_place": resonance.best,
     }
-    for quantity, loudness in resonance.loudness.items():
-        found[f"{quantity}_{KEYS[quantity]}"] = loudness.amplitude
-        found[f"{quantity}_place"] = loudness.place
-        if loudness.at:
-            found[f"{quantity}_at"] = loudness.at
-        if loudness.limits:
-            lowest, highest = loudness.limits
+    for quantity, peak in resonance.amplitudes.items():
+        found[f"{quantity}_{KEYS[quantity]}"] = peak.amplitude
+        found[f"{quantity}_place"] = peak.place
+        if peak.at:
+            found[f"{quantity}_at"] = peak.at
+        if peak.limits:
+            lowest, highest = peak.limits
             found[f"{quantity}_lowest_damping_{KEYS[quantity]}"] = lowest.amplitude
             found[f"{quantity}_highest_damping_{KEYS[quantity]}"] = highest.amplitude
-            found[f"{quantity}_places_over_damping"] = loudness.places
+            found[f"{quantity}_places_over_damping"] = peak.places
     return found
 
 
@@ -524,10 +524,10 @@ def _row(resonance: Resonance) -> dict[str, str]:
         "speed\nrpm": significant(resonance.speed / RPM, 5, 2),
         "freq.\nHz": significant(resonance.frequency, 4, 2),
     }
-    for quantity, loudness in resonance.loudness.items():
+    for quantity, peak in resonance.amplitudes.items():
         heading, factor = COLUMNS[quantity]
-        rank = "" if loudness.place is None else f" ({loudness.place})"
-        found[heading] = significant(factor * loudness.amplitude, 3, 6) + rank
+        rank = "" if peak.place is None else f" ({peak.place})"
+        found[heading] = significant(factor * peak.amplitude, 3, 6) + rank
         if quantity == "force":
-            found["bearing"] = loudness.at
+            found["bearing"] = peak.at
     return found

@@ -92,7 +92,7 @@ def study(
         except (ExecutorError, OptimisationError) as error:
             raise FailedError(error) from error
         pictures = _draw(read, folder, result)
-        _tell(read, file, folder, result, pictures, as_json)
+        _print_result(read, file, folder, result, pictures, as_json)
 
 
 def _shard(text: str | None, merge: bool) -> Shard:
@@ -191,7 +191,9 @@ def _draw(study: Study, folder: Path, swept: StudyResult) -> list[Path]:
     return draw_study(swept.dataset, folder, minimised)
 
 
-def _tell(study: Study, path: Path, folder: Path, swept: StudyResult, pictures: list[Path], as_json: bool) -> None:
+def _print_result(
+    study: Study, path: Path, folder: Path, swept: StudyResult, pictures: list[Path], as_json: bool
+) -> None:
     """Print the results; end with code 1 if points failed, or are missing although all were requested."""
     searched = study.file.optimise is not None
     total = len(swept.records if searched else study.design.points)

@@ -59,11 +59,11 @@ def check(
         if rating:
             _rate(case, out, allow_dir, as_json)
             return
-        from exugear.life.rating.lacks import lacks_of_life
+        from exugear.life.rating.lacks import missing_for_life
         from exugear.system.readiness import lacking, remarks
 
         gearbox = _read(case, allow_dir, as_json)
-        _tell_scripts(gearbox)
+        _print_scripts(gearbox)
         pairs = [_pair_summary(gearbox, name) for name in gearbox.pairs]
         thicknesses = _thickness_summaries(gearbox)
         loads = _load_summaries(gearbox)
@@ -72,7 +72,7 @@ def check(
         steady = _steady_lacks(assemblies)
         bearings, doubts = _bearing_summaries(gearbox, assemblies.get(Variant.bushing))
         warnings = [*remarks(gearbox), *doubts, *_damping_warnings(assemblies)]
-        lives = lacks_of_life(gearbox)
+        lives = missing_for_life(gearbox)
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
             summary["tooth_thickness"] = thicknesses
@@ -152,7 +152,7 @@ def _print_availability(
 
 def _rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -> None:
     """Print the rating of all gears; end with code 1 if a safety factor is below the required one."""
-    from exugear.cli.rating_tables import tell_rating
+    from exugear.cli.rating_tables import print_rating
     from exugear.cli.watched import WatchedProject
     from exugear.gearbox.choice import Choice
     from exugear.project import default_folder
@@ -163,7 +163,7 @@ def _rate(case: Path, out: Path | None, allow_dir: Path | None, as_json: bool) -
     if as_json:
         print_json({"case": str(case), "name": gearbox.name, "rating": sheet.summary()})
     else:
-        tell_rating(sheet)
+        print_rating(sheet)
     if sheet.shortfalls:
         raise FailedError("\n".join(["safety factors below the required minimum:", *sheet.shortfalls]))
 
@@ -212,7 +212,7 @@ def _damping_warnings(assemblies: Mapping[Variant, Assembly | FailedError]) -> l
     return list(filter(None, [unusual_damping(modes_of(assembly))]))
 
 
-def _tell_scripts(gearbox: Gearbox) -> None:
+def _print_scripts(gearbox: Gearbox) -> None:
     """Check the solids, and print which of them require a script."""
     from exugear.system.bodies.of_gearbox import solids_of
 

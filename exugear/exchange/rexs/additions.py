@@ -50,7 +50,7 @@ def edited(text: str, edits: Iterable[Edit]) -> str:
     return "".join([*pieces, text[place:]])
 
 
-def by_place(additions: Iterable[Addition]) -> dict[tuple[int | None, int], dict[str, Addition]]:
+def group_by_place(additions: Iterable[Addition]) -> dict[tuple[int | None, int], dict[str, Addition]]:
     """Additions by load case and component, then by name.
 
     Raises

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from exugear.exchange.rexs import json_additions, xml_additions
-from exugear.exchange.rexs.additions import Addition, by_place
+from exugear.exchange.rexs.additions import Addition, group_by_place
 from exugear.exchange.rexs.parsing import is_json, parse_model
 from exugear.exchange.rexs.tree import Model, RexsError, plain
 from fe_ste.tools.files import FileError, open_regular
@@ -80,7 +80,7 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
     """
     content = _bytes_of(path)
     model = parsed(content, path)
-    placed = by_place(additions)
+    placed = group_by_place(additions)
     cases = {case.number for case in model.load_cases}
     for case, component in placed:
         if component not in model.components or not (case is None or case in cases):
@@ -96,7 +96,7 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
 def _repacked(content: bytes, member: str, new: bytes) -> bytes:
     """Return an archive in which one member is replaced; the packed bytes of all others are unchanged."""
     packed = io.BytesIO()
-    with _damage_told(), zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as target:
+    with _damage_reported(), zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(packed, "w") as target:
         target.comment = old.comment
         members = sorted(old.infolist(), key=lambda one: one.header_offset)
         stops = [*(one.header_offset for one in members[1:]), old.start_dir]
@@ -143,7 +143,7 @@ def _check_size(size: int) -> None:
 
 def _member(content: bytes) -> tuple[str, bytes]:
     """Name and bytes of the single model in an archive."""
-    with _damage_told(), zipfile.ZipFile(io.BytesIO(content)) as archive:
+    with _damage_reported(), zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
         if len(members) > MOST_MEMBERS:
             raise RexsError(f"the archive has {len(members)} members; at most {MOST_MEMBERS} are permitted")
@@ -163,7 +163,7 @@ def _member(content: bytes) -> tuple[str, bytes]:
 
 
 @contextmanager
-def _damage_told() -> Iterator[None]:
+def _damage_reported() -> Iterator[None]:
     """Convert the exceptions of the unpacking modules to an error that describes the damage of an archive."""
     try:
         yield

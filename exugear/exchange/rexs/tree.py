@@ -148,7 +148,7 @@ class Faults(ReprMixin, line=": {_found!n}"):
         except RexsError as error:
             self._found += error.faults
 
-    def of_each(self, attempts: Iterator[Callable[[], object]]) -> None:
+    def gather_each(self, attempts: Iterator[Callable[[], object]]) -> None:
         """Run all attempts and collect the errors of each."""
         for attempt in attempts:
             with self.gathered():
@@ -344,7 +344,7 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
     """Relations; ordered ones in their order."""
     load_cases: tuple[LoadCase, ...] = ()
 
-    def of_type(self, *types: str) -> tuple[Component, ...]:
+    def components_of_type(self, *types: str) -> tuple[Component, ...]:
         """Return all components of some types, in the order of the file."""
         return tuple(component for component in self.components.values() if component.type in types)
 

@@ -22,11 +22,11 @@ from exugear.life.load_spectrum.series import COMPONENTS, RANGE_EXPONENTS
 from exugear.life.load_spectrum.sources import (
     LoadSource,
     Progress,
+    describe_sources,
     distribution,
     load_sources,
     points_of,
     section_of,
-    told,
 )
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
@@ -168,7 +168,7 @@ class CountedLoads(ReprMixin, line=" on {body!r}: {sources!n} sources, {distribu
     @property
     def remarks(self) -> tuple[str, ...]:
         """Skipped times and scale factors, one line each."""
-        return tuple(told(self.sources))
+        return tuple(describe_sources(self.sources))
 
     def equivalents(self) -> dict[float, float]:
         """Constant torque with the same damage in the same number of revolutions, by slope, N m, for both signs."""

@@ -124,7 +124,7 @@ def _speed(gearbox: Gearbox, loads: Loads, body: str, where: str) -> float:
 
 def _share(model: Model, case: LoadCase, where: str) -> float:
     """Return the time fraction in percent; both the old and the new name of the attribute are accepted."""
-    for unit in model.of_type("gear_unit"):
+    for unit in model.components_of_type("gear_unit"):
         share = unit.with_attributes(case.changes.get(unit.number, {})).quantity("operating_time_fraction", "%")
         if share is not None and share >= 0.0:
             return share
@@ -539,7 +539,7 @@ def _wind_seconds(drafts: Sequence[_Draft]) -> dict[float, float]:
     return seconds
 
 
-def told(sources: tuple[LoadSource, ...]) -> Iterator[str]:
+def describe_sources(sources: tuple[LoadSource, ...]) -> Iterator[str]:
     """Describe skipped times and scale factors."""
     for source in sources:
         if source.skipped:

@@ -19,7 +19,7 @@ QUICK = 1 << 20
 COMMANDS = ("loads", "life", "check --rating")
 
 
-def lacks_of_life(gearbox: Gearbox) -> dict[str, tuple[str, ...]]:
+def missing_for_life(gearbox: Gearbox) -> dict[str, tuple[str, ...]]:
     """Return by command all reasons why it cannot run; empty if it can.
 
     Long load files are not read; errors found only in them, such as reversed torques, are left to the commands.
@@ -27,7 +27,7 @@ def lacks_of_life(gearbox: Gearbox) -> dict[str, tuple[str, ...]]:
     Examples
     --------
     >>> gearbox = Gearbox.from_toml("exugear/gearbox/templates/planetary.toml")
-    >>> lacks_of_life(gearbox)["loads"]
+    >>> missing_for_life(gearbox)["loads"]
     ('loads: this section is missing; add [loads] with the loaded body and the load files',)
     """
     checks: tuple[Callable[[Gearbox], object], ...] = (section_of, _checked_by_keys, _checked_by_keys)

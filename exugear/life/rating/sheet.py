@@ -18,7 +18,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.life.dynamic_factors import stated_factors
 from exugear.life.gear_life import auxiliary_factor, check_strengths, flank_lives, is_modified
-from exugear.life.life import LEFT_OUT, checked_loads, rating_of
+from exugear.life.life import NOT_RATED, checked_loads, rating_of
 from exugear.life.load_spectrum.counted import (
     FLANKS,
     CountedLoads,
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 OTHER_EDITION: Mapping[Edition, Edition] = {"ISO 6336:2019": "ISO 6336:2006", "ISO 6336:2006": "ISO 6336:2019"}
 """Edition that is compared with the edition of the file."""
-TOLD_DIFFERENCE = 0.01
+LISTED_DIFFERENCE = 0.01
 """Relative difference above which the value of the other edition is listed."""
 LEAST_FORCE = 1.0
 """Tangential force, N, below which a mesh counts as unloaded and is not rated."""
@@ -104,7 +104,7 @@ class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
     flanks: tuple[FlankSheet, ...]
     shortfalls: tuple[str, ...]
     assumptions: tuple[str, ...]
-    left_out: tuple[str, ...] = LEFT_OUT
+    left_out: tuple[str, ...] = NOT_RATED
     other_edition: str = ""
     """Edition of the values in `FlankSheet.other_edition`."""
 
@@ -213,10 +213,10 @@ def _flank(
 
 
 def _differs(value: float, other: float) -> bool:
-    """Return whether both are numbers that differ by more than `TOLD_DIFFERENCE`."""
+    """Return whether both are numbers that differ by more than `LISTED_DIFFERENCE`."""
     if not (math.isfinite(value) and math.isfinite(other)):
         return False
-    return abs(other - value) > TOLD_DIFFERENCE * abs(value)
+    return abs(other - value) > LISTED_DIFFERENCE * abs(value)
 
 
 def _rules(gearbox: Gearbox, rating: RatingSection, counted: CountedLoads, tooth: ToothExposure) -> FlankRules:
@@ -337,7 +337,7 @@ FlankKey = tuple[str, str, str]
 """Gear, family of meshes and flank."""
 
 
-def of_life(data: xr.Dataset) -> dict[FlankKey, dict[str, float]]:
+def life_results(data: xr.Dataset) -> dict[FlankKey, dict[str, float]]:
     """Return the values of all flanks of a stored rating."""
     found = {}
     for place, label in enumerate(data["flank"].to_numpy().tolist()):

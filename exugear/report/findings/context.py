@@ -47,7 +47,7 @@ def choice_of(attributes: Mapping[str, Any]) -> Choice:
     return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
 
 
-def words_of(choice: Choice) -> str:
+def model_label(choice: Choice) -> str:
     """Return model settings as text for headings."""
     return f"{choice.variant}, mesh model {choice.mesh_model}, inertia set {choice.inertias}"
 
@@ -58,7 +58,7 @@ class Notes:
 
     statements: list[str] = field(default_factory=list)
     """Statements of the summary."""
-    distrusted: list[str] = field(default_factory=list)
+    invalid_runs: list[str] = field(default_factory=list)
     """Invalid runs, with the reason."""
     left_out: list[str] = field(default_factory=list)
     """Skipped files that do not belong to the gearbox file, and results that could not be computed, with the reason."""
@@ -206,7 +206,7 @@ def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] |
         attributes = load_run(path, ()).attrs
         if not _fits(context, path, attributes):
             return None
-        _note_distrust(context, path, attributes)
+        _note_invalid_run(context, path, attributes)
         signals = run_signals(path)
         return signals, signals.suitable_window
     except FileError as error:
@@ -243,12 +243,12 @@ def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
     return False
 
 
-def _note_distrust(context: Context, path: Path, attributes: Mapping[str, Any]) -> None:
+def _note_invalid_run(context: Context, path: Path, attributes: Mapping[str, Any]) -> None:
     """Note an invalid run with the reason stored in its file."""
     verdict = verdict_of(attributes)
     if verdict:
         name = context.name_of(path)
-        context.notes.distrusted.append(f"{name}: {verdict}")
+        context.notes.invalid_runs.append(f"{name}: {verdict}")
         context.notes.statements.append(f"Invalid: {name}: {verdict}")
 
 

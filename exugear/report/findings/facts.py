@@ -12,7 +12,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
-from exugear.report.findings.loudness import Loudness, Ranking
+from exugear.report.findings.loudness import PeakAmplitude, Ranking
 from exugear.report.findings.verdicts import GAIN, BestChange, ModelVariations, best_change
 from exugear.report.findings.words import Labels, figure_text
 from exugear.results.spectra.waterfall import order_lines
@@ -56,18 +56,22 @@ def shift_of(frequency: float, share: float, kind: str, step: float = STEP) -> f
     return frequency * (math.pow(1.0 + step * share, power) - 1.0)
 
 
-def levers_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[Sensitivity, ...]:
+def sensitivities_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[Sensitivity, ...]:
     """List sensitivities of a mode: stiffnesses, then inertias, each by effect; planets of a set vary together."""
     frequency = float(modes["frequency"][index])
     kinetic = modes["kinetic_energy_share"].isel(mode=index).sum("motion").to_numpy()
     bodies = words.gathered(dict(zip(map(str, modes["body"].to_numpy()), map(float, kinetic), strict=True)))
-    parts = [("stiffness", words.gives(modes, index)), ("inertia", bodies)]
-    levers = [
+    parts = [("stiffness", words.strain_energy(modes, index)), ("inertia", bodies)]
+    sensitivities = [
         Sensitivity(what, kind, share, shift_of(frequency, share, kind))
         for kind, shares in parts
         for what, share in shares.items()
     ]
-    return tuple(lever for lever in levers if not math.isclose(lever.shift, 0.0, abs_tol=LEAST_SHIFT * frequency))
+    return tuple(
+        sensitivity
+        for sensitivity in sensitivities
+        if not math.isclose(sensitivity.shift, 0.0, abs_tol=LEAST_SHIFT * frequency)
+    )
 
 
 # Cards of the summary: highest resonance, effect of compliance, sensitivity
@@ -83,7 +87,7 @@ AROUND_RATED = 1.25
 
 MOST_WORDS = 25
 """Maximum number of words in the text of a card."""
-LOUDER = 1.0
+MIN_EXCESS_DB = 1.0
 """Excess (dB) from which a resonance that the run-up does not resolve is reported first."""
 
 
@@ -148,7 +152,7 @@ def facts_of(
     context: Context, words: Labels, group: RunGroup, variations: Sequence[ModelVariations]
 ) -> tuple[SummaryCard, ...]:
     """Return the findings of a result group; findings without data are omitted."""
-    facts = [_loudest(context, words, group), _compliance(group), _lever(words, group, variations)]
+    facts = [_loudest(context, words, group), _compliance(group), _sensitivity(words, group, variations)]
     return tuple(fact for fact in facts if fact is not None)
 
 
@@ -163,9 +167,8 @@ def facts_of_response(words: Labels, response: xr.Dataset) -> tuple[SummaryCard,
     if top is None:
         return ()
     level = 20.0 * math.log10(top.amplitude / 1e-6)
-    said = (
-        f"Order {words.told(top.line)}. Overall TE {amplitude_text(level)} ({figure_text(level)} dB), constant speed."
-    )
+    amplitude = f"{amplitude_text(level)} ({figure_text(level)} dB)"
+    said = f"Order {words.labelled(top.line)}. Overall TE {amplitude}, constant speed."
     beside = f"at {speed_text(top.speed)}, {Variant.of(choice_of(response.attrs).variant).label}"
     return (SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "steady"),)
 
@@ -184,7 +187,7 @@ def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | 
         return unseen
     said = _short(
         f"Order {words.line(top.peak.line)}.",
-        f"Overall TE {amplitude_text(top.loudness)} ({figure_text(top.loudness)} dB){_how(group, top)}.",
+        f"Overall TE {amplitude_text(top.ranking_level)} ({figure_text(top.ranking_level)} dB){_how(group, top)}.",
         *_speed_relative_to_rated(context, group),
         _moves(words, group, top),
     )
@@ -198,7 +201,7 @@ def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
     if resonance.finding.mode is not None and modes is not None:
         return f"Mode: {words.moves(modes, resonance.finding.mode)}."
     if resonance.finding.mode_name:
-        return f"Mode: {words.told(resonance.finding.mode_name)}."
+        return f"Mode: {words.labelled(resonance.finding.mode_name)}."
     return ""
 
 
@@ -209,31 +212,31 @@ def _operating_resonance(words: Labels, group: RunGroup, ranking: Ranking) -> Su
     if not ranking.resonances:
         return SummaryCard("Highest resonance", "none", "found", f"No resonance at {where}.", "ranking")
     top = ranking.resonances[0]
-    parts = [quantity_text(words, name, own, ranking) for name, own in top.loudness.items()]
+    parts = [quantity_text(words, name, own, ranking) for name, own in top.amplitudes.items()]
     near = (own for own in group.ranked[group.main] if abs(own.frequency / top.frequency - 1.0) < SAME_MODE)
-    moves = next((told for told in (_moves(words, group, own) for own in near) if told), "")
-    said = _short(f"Order {words.told(top.line)}.", *(f"{part[:1].upper()}{part[1:]}." for part in parts), moves)
+    moves = next((text for text in (_moves(words, group, own) for own in near) if text), "")
+    said = _short(f"Order {words.labelled(top.line)}.", *(f"{part[:1].upper()}{part[1:]}." for part in parts), moves)
     beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
     return SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "ranking")
 
 
-def quantity_text(words: Labels, name: str, loudness: Loudness, ranking: Ranking) -> str:
+def quantity_text(words: Labels, name: str, peak: PeakAmplitude, ranking: Ranking) -> str:
     """Return the amplitude of a resonance in one of the three quantities as text, with rank and location."""
-    count = sum(other.loudness[name].place is not None for other in ranking.resonances)
-    place = "no peak" if loudness.place is None else f"rank {loudness.place}/{count}"
+    count = sum(other.amplitudes[name].place is not None for other in ranking.resonances)
+    place = "no peak" if peak.place is None else f"rank {peak.place}/{count}"
     if name == "error":
-        return f"overall TE ±{figure_text(1e6 * loudness.amplitude)} µm ({place})"
-    at = words.of(loudness.at)
+        return f"overall TE ±{figure_text(1e6 * peak.amplitude)} µm ({place})"
+    at = words.of(peak.at)
     if name == "force":
-        return f"bearing force ±{figure_text(1e-3 * loudness.amplitude)} kN ({place}), {at}"
-    return f"acceleration ±{figure_text(loudness.amplitude)} m/s² ({place})"
+        return f"bearing force ±{figure_text(1e-3 * peak.amplitude)} kN ({place}), {at}"
+    return f"acceleration ±{figure_text(peak.amplitude)} m/s² ({place})"
 
 
 def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonance) -> SummaryCard | None:
     """Return a resonance that is higher at constant speed than all that the run-up resolves; None if there is none."""
     levels = group.constant.get(group.main)
     found = None if levels is None else levels.highest(order_lines(context.gearbox))
-    if found is None or found[1].level < top.loudness + LOUDER:
+    if found is None or found[1].level < top.ranking_level + MIN_EXCESS_DB:
         return None
     line, at = found
     said = _short(
@@ -267,7 +270,7 @@ def _speed_relative_to_rated(context: Context, group: RunGroup) -> tuple[str, ..
     near = next((own for own in group.ranked[group.main] if own.steady and _is_near_rated(own, rated)), None)
     said = "none"
     if near is not None:
-        said = f"{frequency_text(near.frequency)}, {amplitude_text(near.loudness)}"
+        said = f"{frequency_text(near.frequency)}, {amplitude_text(near.ranking_level)}"
     return compared, f"Up to {AROUND_RATED:g} × rated: {said}."
 
 
@@ -306,27 +309,27 @@ def _resonances(count: int) -> str:
     return f"{count} resonances"
 
 
-def _lever(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]) -> SummaryCard | None:
+def _sensitivity(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]) -> SummaryCard | None:
     """Report the parameters that shift the highest resonance, and whether any change reduces its amplitude."""
     top = group.loudest
     modes = group.runs[group.main].modes
     if top is None or modes is None or top.finding.mode is None:
         return None
-    levers = levers_of(words, modes, top.finding.mode)
-    stiffest = next((lever for lever in levers if lever.kind == "stiffness"), None)
-    heaviest = next((lever for lever in levers if lever.kind == "inertia"), None)
+    sensitivities = sensitivities_of(words, modes, top.finding.mode)
+    stiffest = next((sensitivity for sensitivity in sensitivities if sensitivity.kind == "stiffness"), None)
+    heaviest = next((sensitivity for sensitivity in sensitivities if sensitivity.kind == "inertia"), None)
     if stiffest is None:
         return None
     lighter = "" if heaviest is None else f"Inertia of {heaviest.what} +10 %: {shift_text(heaviest)}."
     said = _short(
         f"Strain energy {100.0 * stiffest.share:.0f} %.",
-        *_quieter(words, group, modes, top.finding.mode, variations),
+        *_amplitude_reductions(words, group, modes, top.finding.mode, variations),
         lighter,
     )
     return SummaryCard("Sensitivity", shift_text(stiffest), f"for +10 % stiffness of {stiffest.what}", said, "change")
 
 
-def shift_text(lever: Sensitivity) -> str:
+def shift_text(sensitivity: Sensitivity) -> str:
     """Return the frequency shift of a sensitivity as text, with sign and unit.
 
     Examples
@@ -334,11 +337,11 @@ def shift_text(lever: Sensitivity) -> str:
     >>> shift_text(Sensitivity("carrier", "inertia", 0.4, -13.8))
     '−14 Hz'
     """
-    sign = "−" if lever.shift < 0.0 else "+"
-    return f"{sign}{figure_text(abs(lever.shift), 2)} Hz"
+    sign = "−" if sensitivity.shift < 0.0 else "+"
+    return f"{sign}{figure_text(abs(sensitivity.shift), 2)} Hz"
 
 
-def _quieter(
+def _amplitude_reductions(
     words: Labels, group: RunGroup, modes: xr.Dataset, mode: int, variations: Sequence[ModelVariations]
 ) -> tuple[str, ...]:
     own = next((one.variations for one in variations if one.choice == group.choice(group.main)), ())
@@ -364,4 +367,4 @@ def best_words(words: Labels, best: BestChange) -> str:
             f"No single change lowers the response within one octave by {GAIN:g} dB; best: {change}, −"
             f"{figure_text(best.gain, 2)} dB."
         )
-    return f"Best change: {change}, −{figure_text(best.gain, 2)} dB within one octave."
+    return f"Best single change: {change}, −{figure_text(best.gain, 2)} dB within one octave."

@@ -26,10 +26,10 @@ from exugear.report.findings.loudness import (
     Ranking,
     highest_drawn,
     is_over_speed,
+    most_complete_levels,
+    most_complete_response,
     ranking_of,
     response_spectra,
-    truest_of,
-    truest_response,
 )
 from exugear.report.findings.words import Labels
 from exugear.results.run_file import read_run
@@ -73,7 +73,7 @@ class RankedResonance:
         return self.finding.strongest
 
     @property
-    def loudness(self) -> float:
+    def ranking_level(self) -> float:
         """Level (dB) used for the ranking: at constant speed where available, otherwise in the run-up."""
         if self.constant is None:
             return self.peak.level
@@ -182,9 +182,9 @@ def _group_runs(
     context.tell(f"other windows, {', '.join(key)}")
     by_variant = {run.variant: run for run in sorted(runs, key=lambda run: OFFERED.index(Variant.of(run.variant)))}
     windows = other_windows(list(by_variant.values()), order_lines(context.gearbox))
-    levels = {variant: truest_of(results.steady, Choice(variant, *key[1:])) for variant in by_variant}
+    levels = {variant: most_complete_levels(results.steady, Choice(variant, *key[1:])) for variant in by_variant}
     constant = {variant: level for variant, level in levels.items() if level is not None}
-    response = truest_response(results.steady, Choice(list(by_variant)[-1], *key[1:]))
+    response = most_complete_response(results.steady, Choice(list(by_variant)[-1], *key[1:]))
     loud = response if response is not None and is_over_speed(response) else None
     return _group(f"run-up {key[0]}", key, by_variant, windows, constant, {}, loud)
 
@@ -251,7 +251,7 @@ def _ranked(
         elif response is not None:
             finding = _named(finding, response) if run.modes is None else run.located(finding, peak.frequency)
         ranked.append(RankedResonance(finding, survives(peak, variant, windows), lacking, elsewhere, level))
-    return tuple(sorted(ranked, key=lambda own: -own.loudness))
+    return tuple(sorted(ranked, key=lambda own: -own.ranking_level))
 
 
 def _named(finding: Finding, data: xr.Dataset) -> Finding:
@@ -311,7 +311,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class LoudestOrder:
+class DominantOrder:
     """Highest peak of a channel along the orders."""
 
     line: OrderLine
@@ -346,8 +346,8 @@ def _supports(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channe
         mean = max(math.hypot(*middle[:, :2].mean(axis=0)), 0.0)
         if copies > 1:
             mean = float(np.hypot(middle[:, 0], middle[:, 1]).mean())
-        told = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
-        yield Channel(names[place], "support", told, copies, mean, float(middle[:, 2].mean()), whole)
+        label = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
+        yield Channel(names[place], "support", label, copies, mean, float(middle[:, 2].mean()), whole)
 
 
 def _meshes(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channel]:
@@ -355,9 +355,9 @@ def _meshes(data: _Signals, run: VariantRun, words: Labels) -> Iterator[Channel]
     names = [str(name) for name in data["mesh"]]
     for place, copies in _standing_for(names, force[::SAMPLED].std(axis=0), words):
         own = np.ascontiguousarray(force[:, place])
-        told = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
+        label = words.of(words.family(names[place])) if copies > 1 else words.of(names[place])
         mean = float(_middle(own).mean(dtype=np.float64))
-        yield Channel(names[place], "mesh", f"mesh {told}", copies, mean, math.nan, _waterfall(own, data, run))
+        yield Channel(names[place], "mesh", f"mesh {label}", copies, mean, math.nan, _waterfall(own, data, run))
 
 
 def _lines(response: xr.Dataset, words: Labels, highest: float) -> Iterator[Channel]:
@@ -374,8 +374,8 @@ def _lines(response: xr.Dataset, words: Labels, highest: float) -> Iterator[Chan
         for place, signals in places.items():
             spectra = response_spectra(response, signals, highest, 1.0, "N")
             name, *wave = place.split(" ")
-            told = " ".join([before + words.of(name), *wave])
-            yield Channel(place, kind, told, 1, math.nan, math.nan, spectra)
+            label = " ".join([before + words.of(name), *wave])
+            yield Channel(place, kind, label, 1, math.nan, math.nan, spectra)
 
 
 def _standing_for(names: Sequence[str], swings: Floats, words: Labels) -> list[tuple[int, int]]:
@@ -402,14 +402,14 @@ def _waterfall(values: Floats, data: _Signals, run: VariantRun) -> Waterfall:
     )
 
 
-def loudest_order(spectra: Waterfall, lines: Sequence[OrderLine]) -> LoudestOrder | None:
+def dominant_order(spectra: Waterfall, lines: Sequence[OrderLine]) -> DominantOrder | None:
     """Find the maximum of a waterfall along its orders; None where no order lies in its frequency band."""
     levels = np.array([spectra.along(line) for line in lines]).reshape(len(lines), spectra.time.size)
     if not np.isfinite(levels).any():
         return None
     line, frame = divmod(int(np.nanargmax(levels)), levels.shape[1])
     speed = float(spectra.speed[frame])
-    return LoudestOrder(
+    return DominantOrder(
         lines[line],
         spectra.reference * 10.0 ** (float(levels[line, frame]) / 20.0),
         speed,

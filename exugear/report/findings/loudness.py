@@ -20,7 +20,7 @@ from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.harmonics.branches import standing_peaks
 from exugear.steady.mean_system.signals import Quantity, quantities_of
-from exugear.steady.peaks import BESIDE, line_name
+from exugear.steady.peaks import SWEEP_SHIFT, line_name
 from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Booleans, Floats
@@ -28,11 +28,11 @@ from fe_ste.tools.arrays import Booleans, Floats
 if TYPE_CHECKING:
     import xarray as xr
 
-ONE = 0.01
+SAME_SPEED_TOLERANCE = 0.01
 """Relative speed difference within which peaks of one order in several quantities are one resonance."""
-LEAST = 1e-9
+MIN_RELATIVE_PEAK = 1e-9
 """Peaks below this fraction of the largest peak of their quantity are round-off."""
-NOTHING = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9}
+MIN_EXCITED = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9}
 """Amplitudes below which nothing is excited, in the units of the quantities."""
 SHAFTS = "shafts"
 HOUSING = "housing"
@@ -50,7 +50,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Loudness:
+class PeakAmplitude:
     """Amplitude and rank of a resonance in one quantity."""
 
     amplitude: float
@@ -83,13 +83,13 @@ class Resonance:
     """Input speed at the peak of the quantity with the best rank, rad/s."""
     frequency: float
     """Hz."""
-    loudness: Mapping[str, Loudness]
+    amplitudes: Mapping[str, PeakAmplitude]
     """By quantity: ``error`` (m), ``force`` (N) and ``acceleration`` (m/s2); the last two only with bearings."""
 
     @property
     def best(self) -> int:
         """Best rank in any quantity."""
-        return min(own.place for own in self.loudness.values() if own.place is not None)
+        return min(own.place for own in self.amplitudes.values() if own.place is not None)
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def ranking_of(data: xr.Dataset) -> Ranking:
     of_line: dict[int, list[dict[str, tuple[int, int, int]]]] = {}
     for place, _, name, point, line in sorted(places):
         others = of_line.setdefault(line, [])
-        group = next((other for other in others if name not in other and _is_one(other, speed, point)), None)
+        group = next((other for other in others if name not in other and _is_same_resonance(other, speed, point)), None)
         if group is None:
             group = {}
             groups.append(group)
@@ -141,7 +141,7 @@ def ranking_of(data: xr.Dataset) -> Ranking:
         group[name] = place, point, line
     limits = _limits(data, quantities, peaks)
     found = tuple(_resonance(data, quantities, sizes, group, limits) for group in groups)
-    return Ranking(found, (low, high), whole, _whose(data))
+    return Ranking(found, (low, high), whole, _accelerating_parts(data))
 
 
 Limits = Mapping[tuple[int, int, str], tuple[Limit, Limit]]
@@ -182,14 +182,14 @@ def _peaks(quantity: Quantity, values: Floats, inside: Booleans) -> list[tuple[i
     """Return point and order indices of the peaks of a quantity (points, orders), the highest first."""
     found = [(int(point), line) for line, own in enumerate(values.T) for point in standing_peaks(own) if inside[point]]
     largest = max((values[peak] for peak in found), default=0.0)
-    least = max(LEAST * largest, NOTHING[quantity.name])
+    least = max(MIN_RELATIVE_PEAK * largest, MIN_EXCITED[quantity.name])
     return sorted((peak for peak in found if values[peak] > least), key=lambda peak: -values[peak])
 
 
-def _is_one(group: Mapping[str, tuple[int, int, int]], speed: Floats, point: int) -> bool:
+def _is_same_resonance(group: Mapping[str, tuple[int, int, int]], speed: Floats, point: int) -> bool:
     """Return whether a peak belongs to a resonance of the same order: both are at practically the same speed."""
     _, first, _ = next(iter(group.values()))
-    return bool(abs(speed[point] - speed[first]) <= ONE * speed[first])
+    return bool(abs(speed[point] - speed[first]) <= SAME_SPEED_TOLERANCE * speed[first])
 
 
 def _resonance(
@@ -200,21 +200,21 @@ def _resonance(
     limits: Limits,
 ) -> Resonance:
     _, first, line = next(iter(group.values()))
-    loudness = {}
+    amplitudes = {}
     for quantity in quantities:
         place, point, _ = group.get(quantity.name, (None, first, line))
         at = sizes[quantity.name][point, line]
-        loudness[quantity.name] = Loudness(
+        amplitudes[quantity.name] = PeakAmplitude(
             float(at.max()), quantity.places[int(at.argmax())], place, limits.get((point, line, quantity.name))
         )
     bases = tuple(str(name) for name in data["base"].to_numpy())
     order = float(data["order"][line + 1])
     speed = float(data["speed"][first])
     name = line_name(tuple(int(n) for n in data["index"].to_numpy()[line + 1]), bases)
-    return Resonance(name, order, speed, order * abs(speed) / (2.0 * np.pi), loudness)
+    return Resonance(name, order, speed, order * abs(speed) / (2.0 * np.pi), amplitudes)
 
 
-def _whose(data: xr.Dataset) -> str:
+def _accelerating_parts(data: xr.Dataset) -> str:
     """Return the parts whose accelerations are given, from the seat data of the file."""
     carried = {bool(load) for load in json.loads(str(data.attrs["carried_seats"])).values()}
     if carried <= {False}:
@@ -226,7 +226,7 @@ def _whose(data: xr.Dataset) -> str:
 
 # Levels at constant speed: a fast run-up underestimates resonances that have no time to build up
 
-FAINTEST = 1e-12
+MIN_AMPLITUDE = 1e-12
 """Smallest amplitude (m) for the conversion to levels."""
 TOP = 1.1
 """Highest drawn frequency over the highest mesh frequency at the highest speed."""
@@ -272,7 +272,7 @@ class ConstantSpeed:
         """
         along = self.along(line)
         frequencies = line.frequency(self.speed)
-        there = np.flatnonzero(np.abs(frequencies - frequency) <= max(BESIDE * frequency, resolution))
+        there = np.flatnonzero(np.abs(frequencies - frequency) <= max(SWEEP_SHIFT * frequency, resolution))
         if along is None or not there.size:
             return None
         # The end of the range may lie on the flank of a neighbouring peak, which does not belong to this resonance.
@@ -305,11 +305,11 @@ def constant_speed_of(response: xr.Dataset) -> ConstantSpeed:
     rising = np.argsort(speed, kind="stable")
     signals = [str(name) for name in response["signal"].to_numpy()]
     amplitude = response["amplitude"].to_numpy()[rising, :, signals.index("overall_dte")].astype(np.float64)
-    level = 20.0 * np.log10(np.maximum(amplitude, FAINTEST) / 1e-6)
+    level = 20.0 * np.log10(np.maximum(amplitude, MIN_AMPLITUDE) / 1e-6)
     return ConstantSpeed(speed[rising], response["order"].to_numpy(), level)
 
 
-def truest_response(responses: Iterable[xr.Dataset], choice: Choice) -> xr.Dataset | None:
+def most_complete_response(responses: Iterable[xr.Dataset], choice: Choice) -> xr.Dataset | None:
     """Return the steady-state response with the most complete method for given settings; None if there is none.
 
     Continuation results are not functions of speed; the section on steady-state responses shows them.
@@ -318,9 +318,9 @@ def truest_response(responses: Iterable[xr.Dataset], choice: Choice) -> xr.Datas
     return max(own, key=lambda data: METHODS.index(data.attrs["method"]), default=None)
 
 
-def truest_of(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
-    """Return the levels of the response that `truest_response` selects."""
-    best = truest_response(responses, choice)
+def most_complete_levels(responses: Iterable[xr.Dataset], choice: Choice) -> ConstantSpeed | None:
+    """Return the levels of the response that `most_complete_response` selects."""
+    best = most_complete_response(responses, choice)
     if best is None:
         return None
     return constant_speed_of(best)

@@ -24,7 +24,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
-from exugear.results.folder import kept_case
+from exugear.results.folder import read_stored_gearbox
 from exugear.results.run_file import read_run, verdict_of
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.steady.peaks import bearing_swings, pulls
@@ -37,7 +37,7 @@ from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.threads import stop_if_asked
 
-LOUDEST = 10
+CHECKED_RESONANCES = 10
 """Number of highest resonances that are checked."""
 ENERGY = 1e-3
 """Permissible relative residual of the energy balance of a run."""
@@ -81,7 +81,7 @@ def run_figures(run: VariantRun) -> RunFigures:
     return RunFigures(energy_residual(data), times, float(data["time"][-1]))
 
 
-def verdicts_of(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
+def validity_checks(context: Context, group: RunGroup) -> tuple[CheckResult, ...]:
     """Check the main variant of a group; passed checks come first."""
     case = context.gearbox.case
     run = group.runs[group.main]
@@ -147,7 +147,8 @@ def _check_response(response: xr.Dataset) -> list[CheckResult]:
             (f"energy balance closed to {100.0 * error:.1g} % (power supplied by the meshes = power dissipated)"),
         ),
         CheckResult(
-            growth <= 0.0, f"disturbances {'decay' if growth <= 0.0 else 'grow: the steady state does not last'}"
+            growth <= 0.0,
+            "the steady state is stable" if growth <= 0.0 else "the steady state is unstable: disturbances grow",
         ),
     ]
     unsolved = json.loads(response.attrs["not_converged"])
@@ -175,25 +176,29 @@ def _check_response(response: xr.Dataset) -> list[CheckResult]:
 
 
 def _check_resonances(group: RunGroup) -> list[CheckResult]:
-    loudest = group.ranked[group.main][:LOUDEST]
+    loudest = group.ranked[group.main][:CHECKED_RESONANCES]
     if not loudest:
         return []
     count = len(loudest)
     steady = sum(own.steady for own in loudest)
     verdicts: list[CheckResult] = []
     if not group.responses:
-        verdicts.append(
-            CheckResult(
-                steady == count, (f"{steady} of the {count} highest resonances are found with all window lengths")
-            )
-        )
+        passed = steady == count
+        found = _fraction(steady, count, passed)
+        verdicts.append(CheckResult(passed, f"{found} are found with all window lengths"))
     if group.runs[group.main].modes is None and not group.responses:
         return [*verdicts, CheckResult(False, "no modes computed; run `exugear modes` for mode shapes")]
     matched = sum(bool(own.finding.mode_name) for own in loudest)
-    return [
-        *verdicts,
-        CheckResult(matched >= MATCHED * count, (f"{matched} of the {count} highest resonances match an eigenmode")),
-    ]
+    passed = matched >= MATCHED * count
+    return [*verdicts, CheckResult(passed, f"{_fraction(matched, count, passed)} are at the frequency of a mode")]
+
+
+def _fraction(number: int, count: int, passed: bool) -> str:
+    """Return how many of the highest resonances a check found, as text."""
+    found = f"{number} of the {count} highest resonances"
+    if passed:
+        return found
+    return f"only {found}"
 
 
 # Variation of assumed parameters over their ranges, and the possible reduction of amplification
@@ -218,7 +223,7 @@ class ModelVariations:
 
 
 @dataclass(frozen=True)
-class Guarded:
+class TrackedMode:
     """Mode over a parameter, with the largest amplification of the modes near it."""
 
     frequency: Floats
@@ -248,7 +253,7 @@ def begin_variations(context: Context, modes: Mapping[Choice, xr.Dataset], execu
 
 def varied_models(folder: Path, allow_dir: Path | None, models: Sequence[Choice]) -> VariedModels:
     """Vary the assumed parameters of models of the gearbox file stored in a folder; for `begin_variations`."""
-    context = Context(folder, kept_case(folder, Permissions(below=allow_dir)), None, lambda what: None)
+    context = Context(folder, read_stored_gearbox(folder, Permissions(below=allow_dir)), None, lambda what: None)
     return {
         model: {parameter.label: _figures(parameter) for parameter in _parameters(context, model)} for model in models
     }
@@ -306,19 +311,19 @@ def default_place(variation: ParameterVariation) -> int:
     return int(np.argmin(np.abs(np.array(variation.parameter.values) - variation.parameter.default)))
 
 
-def guarded(variation: ParameterVariation, frequency: float) -> Guarded:
+def track_mode(variation: ParameterVariation, frequency: float) -> TrackedMode:
     """Track the mode at a frequency (Hz, at the default value), with the largest amplification within an octave."""
     place = default_place(variation)
     mode = int(np.argmin(np.abs(variation.frequency[place] - frequency)))
     centre = float(variation.frequency[place, mode])
     inside = (variation.frequency > centre / OCTAVE) & (variation.frequency < centre * OCTAVE)
     loudest = np.where(inside, variation.amplification, 0.0).max(axis=1)
-    return Guarded(variation.frequency[:, mode], variation.amplification[:, mode], loudest)
+    return TrackedMode(variation.frequency[:, mode], variation.amplification[:, mode], loudest)
 
 
 def best_change(variation: ParameterVariation, frequency: float) -> BestChange:
     """Find the parameter value with the smallest maximum amplification within an octave of a mode."""
-    loudest = guarded(variation, frequency).loudest
+    loudest = track_mode(variation, frequency).loudest
     index = int(np.argmin(loudest))
     gain = 20.0 * np.log10(max(loudest[default_place(variation)], 1e-300) / max(loudest[index], 1e-300))
     parameter = variation.parameter

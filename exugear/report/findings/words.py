@@ -26,7 +26,7 @@ MOTIONS = {
 """Predicates for motions of bodies, singular and plural."""
 DESCRIBED_ENERGY, MIN_ENERGY = 0.8, 0.1
 """Fraction of the kinetic energy that a mode description covers, and the minimum fraction of each listed part."""
-GIVES = 2
+SHOWN_ELEMENTS = 2
 """Maximum number of elements in a strain energy list."""
 _COPY = re.compile(r"^(.*)_(\d+)$")
 _OF = re.compile(r"(?<= of )\w+")
@@ -56,13 +56,13 @@ class Labels:
             return f"{self._labels[copy[1]]} {copy[2]}"
         return name.replace("_", " ")
 
-    def told(self, text: str) -> str:
+    def labelled(self, text: str) -> str:
         """Replace all names of the gearbox file in a text, such as an order or a mode shape, by their labels.
 
         Examples
         --------
         >>> words = Labels(Gearbox.from_toml("cases/grc750/gearbox.toml"))
-        >>> words.told("2 x high_speed"), words.told("lss axial 94 %; strain energy: lss_bc 99 %")
+        >>> words.labelled("2 x high_speed"), words.labelled("lss axial 94 %; strain energy: lss_bc 99 %")
         ('2 × high-speed', 'low-speed shaft axial 94 %; strain energy: low-speed bearing B/C 99 %')
         """
         named = _NAME.sub(lambda found: self.of(found[0]) if self.family(found[0]) in self._named else found[0], text)
@@ -70,7 +70,7 @@ class Labels:
 
     def parameter(self, label: str) -> str:
         """Return the label of a parameter, with the label of its body."""
-        return _OF.sub(lambda found: self.told(found[0]), label)
+        return _OF.sub(lambda found: self.labelled(found[0]), label)
 
     def change(self, label: str, value: float, default: float) -> str:
         """Describe the change of a parameter, such as "mesh damping time 16 instead of 4 µs".
@@ -158,16 +158,16 @@ class Labels:
             name = "planets" if str(body) in carried else self.of(str(body))
             for motion, share in zip(modes["motion"].to_numpy(), of_body, strict=True):
                 shares[name, str(motion)] = shares.get((name, str(motion)), 0.0) + float(share)
-        told = 0.0
+        described = 0.0
         verbs: dict[str, list[str]] = {}
         for (name, motion), share in sorted(shares.items(), key=lambda item: -item[1]):
-            if verbs and (told >= DESCRIBED_ENERGY or share < MIN_ENERGY):
+            if verbs and (described >= DESCRIBED_ENERGY or share < MIN_ENERGY):
                 break
             verbs.setdefault(name, []).append(MOTIONS[motion][name == "planets"])
-            told += share
+            described += share
         return joined(f"{name} {joined(verb)}" for name, verb in verbs.items())
 
-    def gives(self, modes: xr.Dataset, index: int) -> dict[str, float]:
+    def strain_energy(self, modes: xr.Dataset, index: int) -> dict[str, float]:
         """Return fractions of the strain energy by element label, largest first; members of a planet set are summed."""
         shares = modes["strain_energy_share"].isel(mode=index).to_numpy()
         return self.gathered(dict(zip(element_words(modes), map(float, shares), strict=True)))
@@ -183,7 +183,7 @@ class Labels:
         return dict(sorted(gathered.items(), key=lambda item: -item[1]))
 
 
-def percentages(shares: Mapping[str, float], most: int = GIVES, least: float = 0.01) -> str:
+def percentages(shares: Mapping[str, float], most: int = SHOWN_ELEMENTS, least: float = 0.01) -> str:
     """Return the largest fractions as text.
 
     Examples

@@ -274,7 +274,7 @@ SUPPORT, OTHERS = [0, 2, 4], [1, 3]
 """Which of them carry the curve, and which the weights follow from."""
 LOOKED_AT, CLOSER = 64, 3
 """Number of points at which a curve is evaluated between its neighbours, and of refinements around the highest one."""
-BESIDE = 1e-12
+NODE_DISTANCE = 1e-12
 """Share of the neighbours' distance from a place that carries the curve, where its form is 0 / 0."""
 
 
@@ -365,7 +365,7 @@ def _top(places: Floats, values: Complexes, highest: int, first: int) -> tuple[f
 
     def heights(at: Floats) -> Floats:
         apart = at[:, None] - carrying
-        parts = weights / np.where(apart == 0.0, BESIDE, apart)
+        parts = weights / np.where(apart == 0.0, NODE_DISTANCE, apart)
         return np.asarray(np.linalg.norm((parts @ f[SUPPORT]) / parts.sum(axis=1)[:, None], axis=1))
 
     low, high = ((places[highest + side] - middle) / width for side in (-1, 1))

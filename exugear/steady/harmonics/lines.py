@@ -101,7 +101,7 @@ class LineSet(ReprMixin, line=": {index!n} lines of {index.shape[1]} bases"):
         """
         return LineSet(self.index[which | (np.arange(len(which)) == 0)], self.bases, self.units)
 
-    def of_first(self, bases: int) -> LineSet:
+    def select_bases(self, bases: int) -> LineSet:
         """Take the lines of the first bases alone, without the slow ones that come after them."""
         slow = len(self.bases) - bases
         alone = ~self.index[:, bases:].any(axis=1)
@@ -359,7 +359,7 @@ class TorusSampling(ReprMixin, line=": {samples} samples for {lines.index!n} lin
         spectrum[slot[mirrored]] = coefficients[mirrored].conj()
         return np.asarray(np.fft.irfft(spectrum, self.samples, axis=0) * self.samples)
 
-    def along_base(self, base: int, coefficients: Complexes) -> Floats:
+    def sample_along_base(self, base: int, coefficients: Complexes) -> Floats:
         """Sample (..., samples) functions of the angle of one base with harmonics (..., h + 1), fewer than samples / 2.
 
         One transform gives them at all angles that samples have; each sample then takes its own.

@@ -507,7 +507,8 @@ def vibrations(mass: Floats, damping: Floats, stiffness: Floats) -> tuple[Comple
     """
     n = len(mass)
     lower = np.linalg.solve(mass, np.hstack([-stiffness, -damping]))
-    values, left, right = _eig(np.vstack([np.eye(n, 2 * n, n), lower]))
+    found: Any = scipy.linalg.eig(np.vstack([np.eye(n, 2 * n, n), lower]), left=True, right=True)
+    values, left, right = found
     kept = values.imag > 2.0 * np.pi * RIGID_BODY_LIMIT
     kept &= np.abs(values.imag) > np.abs(values.real)
     order = np.flatnonzero(kept)[np.argsort(values[kept].imag)]
@@ -516,10 +517,3 @@ def vibrations(mass: Floats, damping: Floats, stiffness: Floats) -> tuple[Comple
     # Left shapes of a repeated eigenvalue are any basis of their space: they become the partners of the right ones.
     partners: Complexes = np.linalg.solve(left @ right.T, left).astype(np.complex128)
     return values[order], right, partners
-
-
-def _eig(matrix: Floats) -> tuple[Complexes, Complexes, Complexes]:
-    """Eigenvalues, and left and right eigenvectors as columns."""
-    found: Any = scipy.linalg.eig(matrix, left=True, right=True)
-    values, left, right = found
-    return values, left, right

@@ -33,7 +33,7 @@ SAMPLES = 64
 """Samples of each cubic piece of a stiffness for its Fourier coefficients: aliases are below 1e-7 of it."""
 FEWEST, MOST_HARMONICS = 10, 1000
 """Minimum number of harmonics of a mesh frequency, and the largest number permitted."""
-LEFT_OUT = 2e-2
+MAX_NEGLECTED = 2e-2
 """Share of the variation of a mesh's compliance that truncation of harmonics may neglect.
 
 With it the ten highest peaks of the GRC and of a spur planetary gearbox agree within 1e-2 with results for 1.5 times as
@@ -258,13 +258,13 @@ class MeshWaves:
     def needed_harmonics(self) -> int:
         """Count the harmonics of each mesh frequency that the compliance asks for.
 
-        They leave `LEFT_OUT` of its variation out, at most; from `FEWEST` to half of the positions of its table, above
+        They neglect at most `MAX_NEGLECTED` of its variation: `FEWEST` to half of the positions of its table, above
         which a table says nothing.
         """
         needed = FEWEST
         for mesh, tails in self._tails.items():
             most = max(int(self.assembly.meshes.pieces[mesh]) // 2, FEWEST)
-            enough = np.flatnonzero(tails[: most + 1] <= LEFT_OUT)
+            enough = np.flatnonzero(tails[: most + 1] <= MAX_NEGLECTED)
             needed = max(needed, int(enough[0]) if enough.size else most)
         return needed
 

@@ -461,7 +461,7 @@ def unsupported(gearbox: Gearbox, variant: str) -> str:
     """
     chosen = Variant.of(variant)
     elastic = elastic_names(gearbox)
-    if not chosen.on_bearings:
+    if not chosen.has_bearings:
         held = {*gearbox.apart, *(joint.body for joint in gearbox.joints)}
         missing = [b.name for b in gearbox.bodies() if not (b.fixed or b.spin_only or b.name in held)]
         if missing:

@@ -14,7 +14,7 @@ class _AtFirstUse(ModuleType):
         return getattr(import_module(self.__name__), name)
 
 
-def at_first_use(name: str) -> Any:
+def lazy_import(name: str) -> Any:
     """Return a proxy of a library that loads it at first use.
 
     For type checkers the library is also imported under ``TYPE_CHECKING``.
@@ -25,7 +25,7 @@ def at_first_use(name: str) -> Any:
 
     Examples
     --------
-    >>> fractions = at_first_use("fractions")
+    >>> fractions = lazy_import("fractions")
     >>> fractions.Fraction(2, 4)
     Fraction(1, 2)
     """

@@ -122,10 +122,10 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand, start: float = 0.0)
     places = np.concatenate([[0.0], np.cumsum([section.length for section in sections])])
     low = seat.z - seat.width / 2.0
     high = seat.z + seat.width / 2.0
-    told = f"{1e3 * (start + low):.6g}", f"{1e3 * (start + high):.6g}"
+    limits = f"{1e3 * (start + low):.6g}", f"{1e3 * (start + high):.6g}"
     if low < -SAME or high > places[-1] + SAME:
         raise ShaftError(
-            f"seat {seat.name}: extends from z = {told[0]} to {told[1]} mm, the shaft from {1e3 * start:.6g} to "
+            f"seat {seat.name}: extends from z = {limits[0]} to {limits[1]} mm, the shaft from {1e3 * start:.6g} to "
             f"{1e3 * (start + places[-1]):.6g} mm"
         )
     under = [
@@ -135,7 +135,9 @@ def locate(sections: Sequence[ShaftSection], seat: SeatBand, start: float = 0.0)
     ]
     ends = {diameter for one in under for diameter in (sections[one].outer_diameter, sections[one].outer_end)}
     if seat.width > 0.0 and len(under) > 1 and len(ends) > 1:
-        raise ShaftError(f"seat {seat.name}: a shoulder lies between z = {told[0]} and {told[1]} mm; move or narrow it")
+        raise ShaftError(
+            f"seat {seat.name}: a shoulder lies between z = {limits[0]} and {limits[1]} mm; move or narrow it"
+        )
     return max(under, key=lambda one: sections[one].outer_at(seat.z - float(places[one]))), low, high
 
 

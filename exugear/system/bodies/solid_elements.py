@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
-from exugear.system.bodies.lazy import at_first_use
+from exugear.system.bodies.lazy import lazy_import
 from fe_ste.geometry.gears import Material
 from fe_ste.tools.arrays import Floats, Integers, SparseMatrix
 
 if TYPE_CHECKING:
     import skfem
 else:
-    skfem = at_first_use("skfem")
+    skfem = lazy_import("skfem")
 
 
 # Mass and stiffness of meshed solids

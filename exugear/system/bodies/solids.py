@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from exugear.gearbox.versions import REDUCTION
 from exugear.system.bodies.elastic_body import FloatingBody, skew
-from exugear.system.bodies.lazy import at_first_use
+from exugear.system.bodies.lazy import lazy_import
 from exugear.system.bodies.reduction import (
     ELASTIC,
     Blank,
@@ -76,7 +76,7 @@ if TYPE_CHECKING:
 
     from fe_ste.elimination import Backend
 else:
-    skfem = at_first_use("skfem")
+    skfem = lazy_import("skfem")
 
 
 ASYMMETRY_TOLERANCE = 5e-3

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import scipy
 
-from exugear.system.bodies.lazy import at_first_use
+from exugear.system.bodies.lazy import lazy_import
 from exugear.system.bodies.shaft_sections import (
     SAME,
     STANDARD_SIZE,
@@ -47,7 +47,7 @@ from fe_ste.tools.arrays import Booleans, Floats, Integers, SparseMatrix
 if TYPE_CHECKING:
     import skfem
 else:
-    skfem = at_first_use("skfem")
+    skfem = lazy_import("skfem")
 
 
 # Cones of turned shafts: the map from a shaft of cylinders, whose lines are straight, to the radii that it has

@@ -109,7 +109,7 @@ def reduce_shaft(model: ShaftModel) -> ReducedBody:
         seats=tuple(Seat(seat.name, (x, y, z + seat.z)) for seat in model.seats),
         mass=layout.gather({name: component.mass for name, component in components.items()}),
         stiffness=layout.gather({name: component.stiffness for name, component in components.items()}),
-        gyroscopic=layout.between_planes(gyroscopic),
+        gyroscopic=layout.coupling_matrix(gyroscopic),
         spin=spin,
         frame="nonrotating",
         modal_groups=layout.modal_groups,
@@ -201,7 +201,7 @@ class _Layout:
                 matrix[np.ix_(index, index)] = part * np.outer(sign, sign)
         return matrix
 
-    def between_planes(self, doubled: Floats) -> Floats:
+    def coupling_matrix(self, doubled: Floats) -> Floats:
         """Gyroscopic matrix from 2 g of one plane: M qx'' + 2 Omega g qy' and M qy'' - 2 Omega g qx'."""
         matrix = np.zeros((self.size, self.size))
         matrix[np.ix_(self.x, self.y)] = doubled * self.sign_y

@@ -191,7 +191,7 @@ class StaticContacts:
         )
 
     @property
-    def in_words(self) -> str:
+    def description(self) -> str:
         """What resists misalignment, for files."""
         words = []
         if self.contacts:

@@ -509,7 +509,7 @@ class Shuttling:
 
     Examples
     --------
-    >>> Shuttling("helical", 1.8e-3, 4.3).in_words
+    >>> Shuttling("helical", 1.8e-3, 4.3).description
     'helical: load centroid shuttles by ±1.8 mm along the face width in each mesh cycle'
     """
 
@@ -521,7 +521,7 @@ class Shuttling:
     makes of the mean stiffness."""
 
     @property
-    def in_words(self) -> str:
+    def description(self) -> str:
         """Say how far."""
         return (
             f"{self.pair}: load centroid shuttles by ±{1e3 * self.amplitude:.2g} mm along the face width in each mesh "
@@ -529,7 +529,7 @@ class Shuttling:
         )
 
 
-def wandering_loads(gearbox: Gearbox, folder: Path) -> tuple[Shuttling, ...]:
+def shuttling_pairs(gearbox: Gearbox, folder: Path) -> tuple[Shuttling, ...]:
     """Return the shuttling of each pair with a table, at the static load, largest effect first.
 
     Parameters

@@ -76,7 +76,7 @@ class StepHistory(NamedTuple):
         kept[: len(known), : accelerations.shape[1]] = known
         return cls(kept, np.zeros((2, kept.shape[1])), np.array([max(0, len(known) - 1), len(known)]))
 
-    def in_order(self) -> Floats:
+    def chronological(self) -> Floats:
         """Accelerations (n, s) that are known, the latest last."""
         latest, known = self.counts
         rows = len(self.accelerations)

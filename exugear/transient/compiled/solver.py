@@ -328,7 +328,7 @@ class CompiledSystem:
     @property
     def past(self) -> Floats:
         """Accelerations (n, size) from which to continue."""
-        return self._past.in_order()[:, : self._size]
+        return self._past.chronological()[:, : self._size]
 
     def accelerations(self, time: float = 0.0) -> Floats:
         """Accelerations (size,) at the present state and a time (s)."""

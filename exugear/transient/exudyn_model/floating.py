@@ -192,7 +192,7 @@ class FloatingSystem:
         times = []
         motions = []
 
-        def after_step(mbs: Any, t: float) -> bool:
+        def post_step(mbs: Any, t: float) -> bool:
             data = mbs.systemData
             q = np.array(data.GetODE2Coordinates())[self._order]
             v = np.array(data.GetODE2Coordinates_t())[self._order]
@@ -200,7 +200,7 @@ class FloatingSystem:
             motions.append(self.seat_motion(q, v)[0])
             return True
 
-        self.mbs.SetPostStepUserFunction(after_step)
+        self.mbs.SetPostStepUserFunction(post_step)
         try:
             exudyn.MainSolverImplicitSecondOrder().SolveSystem(self.mbs, settings)
         except exudyn.ExudynError as error:

@@ -195,13 +195,13 @@ class ExudynSystem:
         return int(solver.it.currentStepIndex) - 1
 
     def _add_step_observer(self, observe: Observer | None) -> Callable[[Any, float], bool]:
-        def after_step(mbs: Any, t: float) -> bool:
+        def post_step(mbs: Any, t: float) -> bool:
             _, q, v = self.state()
             if self.parts.floating is not None:
                 self.parts.floating.accept(q)
             return observe is None or observe(t, q, v)
 
-        return after_step
+        return post_step
 
     def linearised(self) -> tuple[Floats, Floats, Floats]:
         """Mass, stiffness and damping matrices of Exudyn about the initial state, in the assembly's order.

@@ -23,7 +23,7 @@ from exugear.cli.file_commands import check
 from exugear.gearbox.sections.case import DampingSection
 from exugear.gearbox.variant import Variant
 from exugear.life.rating.sheet import FINITE_ELEMENTS, FlankSheet, RatingSheet
-from exugear.report.findings.loudness import Loudness, Ranking, Resonance
+from exugear.report.findings.loudness import PeakAmplitude, Ranking, Resonance
 from exugear.system.bearings.duty import Ratings
 from tests.exugear.cases.command import exugear
 
@@ -148,7 +148,7 @@ def test_check_rating(printed: Printed) -> None:
         for gear in NAMES[:3]
         for sign in "+-"
     )
-    rating_tables.tell_rating(RatingSheet("ISO 6336:2006", " ".join(NAMES), flanks, (), (), ()))
+    rating_tables.print_rating(RatingSheet("ISO 6336:2006", " ".join(NAMES), flanks, (), (), ()))
     printed.check(1)
 
 
@@ -212,9 +212,9 @@ def test_bearings(printed: Printed) -> None:
 
 def test_steady(printed: Printed) -> None:
     loudness = {
-        "error": Loudness(123.456e-6, "", 1234),
-        "force": Loudness(12345.6, NAMES[1], 2345),
-        "acceleration": Loudness(1234.5, NAMES[1], 3456),
+        "error": PeakAmplitude(123.456e-6, "", 1234),
+        "force": PeakAmplitude(12345.6, NAMES[1], 2345),
+        "acceleration": PeakAmplitude(1234.5, NAMES[1], 3456),
     }
     lines = [f"12 x {name} - 3 x {NAMES[0]} + 2 x {NAMES[1]}" for name in NAMES]
     resonances = tuple(Resonance(line, 123.456, -1234.5678, 12345.678, loudness) for line in lines)
@@ -274,7 +274,7 @@ def test_life(printed: Printed) -> None:
     variables |= {"bearing_damage": ("bearing", np.full(9, 2.0)), "bearing_reference_damage": ("bearing", np.ones(9))}
     lists = dict.fromkeys(("failures", "assumptions", "unrated", "reliefs"), json.dumps([]))
     data = xr.Dataset(variables, {"flank": flanks, "bearing": NAMES}, lists | {"life_years": 20.0})
-    life._tell(data)
+    life._print_result(data)
     printed.check(4)
 
 
@@ -309,7 +309,7 @@ def test_loads(printed: Printed) -> None:
 def test_report(printed: Printed, tmp_path: Any) -> None:
     step = f"comparison with Exudyn, flexible, {', '.join(NAMES)}"
     (tmp_path / "times.jsonl").write_text(json.dumps({"step": step, "seconds": 123456.7, "memory": 1.234e11}) + "\n")
-    report._tell_report(tmp_path, tmp_path.relative_to(tmp_path), (), (), False)
+    report._print_report(tmp_path, tmp_path.relative_to(tmp_path), (), (), False)
     printed.check(1)
 
 

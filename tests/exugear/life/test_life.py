@@ -26,7 +26,7 @@ from exugear.life.gear_life import flank_lives, pair_stresses, warn_beyond_table
 from exugear.life.life import checked_loads, compute_life, needs_of_relief, rating_of, shortfalls
 from exugear.life.life_file import damage_matrix, limits, read_life
 from exugear.life.load_spectrum.counted import count_loads
-from exugear.life.rating.lacks import lacks_of_life
+from exugear.life.rating.lacks import missing_for_life
 from exugear.life.static_balance import StaticBalance, acting_loads, static_balance
 from exugear.project import Project
 from exugear.system.bearings.rolling.life import basic_rating_life
@@ -334,7 +334,7 @@ def test_gears_that_bend_both_ways_need_their_factor(tmp_path):
         checked_loads(gearbox)
     missing = [f"rating.gears.{name}.mean_stress_factor: this key is missing" for name in ("pinion", "wheel")]
     assert len(raised.value.faults) == 2
-    found = lacks_of_life(gearbox)
+    found = missing_for_life(gearbox)
     assert found["loads"] == ()
     for verb in ("life", "check --rating"):
         assert all(reason.startswith(key) for reason, key in zip(found[verb], missing, strict=True))

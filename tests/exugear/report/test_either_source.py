@@ -83,11 +83,15 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
     kinds = ("Highest resonance", "Effect of", "Sensitivity")
     for line in (line for line in report.statements if line.startswith(kinds)):
         assert len(line.split(". ", 1)[1].split()) <= 25, line
-    assert "within each quantity; sorted by the best rank. Accelerations: of the shafts at bearings." in page
+    note = (
+        "in each quantity; sorted by the best rank. Force: the bearing with the largest amplitude. Accelerations: of "
+        "the shafts at bearings."
+    )
+    assert note in page
     for words in (
         "Source: constant speed, method parametric",
         "On bearings, inertia set disc, constant speed, method parametric",
-        "Transverse forces on bearings, constant speed, method parametric",
+        "Radial forces on bearings, constant speed, method parametric",
         "No run-up; run `exugear run`",
         "energy balance closed to",
     ):

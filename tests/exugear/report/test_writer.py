@@ -19,7 +19,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.report.findings.verdicts import begin_variations
 from exugear.report.writer import ReportError, write_report
-from exugear.results.folder import bodies_folder, keep_case, kept_case, modes_path, note_time, times_spent
+from exugear.results.folder import bodies_folder, keep_case, modes_path, note_time, read_stored_gearbox, times_spent
 from exugear.system.modes import eigenmodes
 from exugear.system.signals import energy_residual
 from exugear.system.system import input_hash
@@ -49,7 +49,7 @@ def results(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def gearbox(results) -> Gearbox:
-    return kept_case(results)
+    return read_stored_gearbox(results)
 
 
 @pytest.mark.validation
@@ -187,7 +187,7 @@ def test_a_folder_with_nothing_of_its_case_is_refused(gearbox, tmp_path):
 def test_a_damaged_case_is_one_message(tmp_path):
     (tmp_path / "case.json").write_text('{"source": ', encoding="utf-8")
     with pytest.raises(GearboxFileError, match=r"case\.json: cannot be used"):
-        kept_case(tmp_path)
+        read_stored_gearbox(tmp_path)
 
 
 def test_times_keep_the_last_of_each_step_and_survive_a_cut_line(tmp_path):

@@ -15,7 +15,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.versions import MODES as METHOD
-from exugear.results.folder import kept_case, times_spent
+from exugear.results.folder import read_stored_gearbox, times_spent
 from exugear.results.run_file import load_run, read_run
 from exugear.system.modes import load_modes
 from exugear.system.system import input_hash
@@ -91,11 +91,11 @@ def test_a_report_leaves_damaged_files_out_and_names_them(out: Path) -> None:
 def test_a_case_that_was_changed_since_is_refused(out: Path) -> None:
     path = out / "case.json"
     plain = json.loads(path.read_text(encoding="utf-8"))
-    kept_case(out)
+    read_stored_gearbox(out)
     for damaged in damages(path.read_bytes(), 200):
         path.write_bytes(damaged)
         try:
-            kept = kept_case(out)
+            kept = read_stored_gearbox(out)
         except GearboxFileError as error:
             assert "case.json: cannot be used" in str(error)
         else:  # a blank or an end of line beside what it says
@@ -104,7 +104,7 @@ def test_a_case_that_was_changed_since_is_refused(out: Path) -> None:
     assert softer != json.dumps(plain)
     path.write_text(softer, encoding="utf-8")
     with pytest.raises(GearboxFileError, match="it was changed since it was written"):
-        kept_case(out)
+        read_stored_gearbox(out)
 
 
 @pytest.mark.parametrize(

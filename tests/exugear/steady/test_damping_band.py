@@ -67,13 +67,13 @@ def test_limits_of_the_damping_change_damping_alone(grc: Gearbox, stiffness: dic
 @pytest.mark.validation
 def test_the_ranking_says_where_a_rank_depends_on_the_damping(grc: Gearbox, stiffness: dict) -> None:
     ranking = ranking_of(response(grc.varied({"damping": {"modal_percent": 2.0}}), stiffness, "parametric"))
-    first = ranking.resonances[0].loudness
+    first = ranking.resonances[0].amplitudes
     limits = [own.limits for own in first.values()]
     assert all(found is not None for found in limits)
     for own in first.values():
         assert own.limits is not None
         least, largest = own.limits
         assert least.amplitude > 0.99 * own.amplitude > 0.98 * largest.amplitude
-    places = [own.places for one in ranking.resonances for own in one.loudness.values() if own.places is not None]
+    places = [own.places for one in ranking.resonances for own in one.amplitudes.values() if own.places is not None]
     assert all(best <= worst for best, worst in places)
     assert any(best < worst for best, worst in places)

@@ -126,8 +126,8 @@ def test_a_guess_is_told_wherever_it_acts(axes: str) -> None:
     one = SteSurface.from_nodes(centre, tilt, force, ste, 1.0 / slope, tilting, solved=solved)
     assert one.guessed is not None and one.guessed[lost] and one.guessed.sum() == 1
     whole = SteSurface.from_nodes(centre, tilt, force, ste, 1.0 / slope, tilting)
-    assert whole.guessed is None and not whole.near_guesses().any()
-    near = one.near_guesses()
+    assert whole.guessed is None and not whole.interpolated_intervals().any()
+    near = one.interpolated_intervals()
     assert near.shape == (12, max(1, len(centre) - 1), max(1, len(tilt) - 1), len(force))
     assert 0 < near.sum() < 0.9 * near.size
     acting = one.acting_guesses()
@@ -156,9 +156,9 @@ def test_marks_stay_where_gears_stay_and_in_the_mean() -> None:
     ste, slope, tilting = shape(*np.meshgrid(pmc, CENTRE, TILT, FORCE, indexing="ij"))
     surface = SteSurface.from_nodes(CENTRE, TILT, FORCE, ste, 1.0 / slope, tilting, solved=solved)
     beside, away = surface.at_nominal(float(CENTRE[0]), float(TILT[4])), surface.at_nominal(0.1, 0.0)
-    assert beside.near_guesses().any() and not away.near_guesses().any()
-    assert surface.averaged().near_guesses()[:, 0, 3].any()
-    assert not surface.averaged().near_guesses()[:, 3, 0].any()
+    assert beside.interpolated_intervals().any() and not away.interpolated_intervals().any()
+    assert surface.averaged().interpolated_intervals()[:, 0, 3].any()
+    assert not surface.averaged().interpolated_intervals()[:, 3, 0].any()
 
 
 def test_too_many_unsolved_states_are_refused() -> None:

@@ -90,7 +90,7 @@ class StoredResults:
     @property
     def loaded(self) -> Assembly | None:
         """The most complete variant with bearings for which results were read."""
-        assemblies = [assembly for assembly in self._assemblies.values() if assembly.variant.on_bearings]
+        assemblies = [assembly for assembly in self._assemblies.values() if assembly.variant.has_bearings]
         return max(assemblies, key=lambda one: one.variant.is_elastic, default=None)
 
     def _each(self, pattern: str, read: Callable[[Path], tuple[Choice, Result]]) -> Iterator[tuple[Choice, Result]]:
@@ -426,19 +426,19 @@ def put_bearings(results: Results, gearbox: Gearbox, duties: Sequence[Mapping[st
         results.put(number, "contact_pressure", "MPa", duty["contact_pressure_MPa"], case)
         results.put(number, "basic_rating_life", "MRev", duty["L10_Mrev"], case)
         results.put(number, "reference_rating_life", "MRev", duty["L10r_Mrev"], case)
-        stiffness = in_axes(np.array(duty["stiffness_matrix_N_m_rad"]), target.origins.axes[number])
+        stiffness = rotated_stiffness(np.array(duty["stiffness_matrix_N_m_rad"]), target.origins.axes[number])
         for key, row, column, unit, factor in stiffness_names(results.version):
             results.put_named(number, key, unit, factor * float(stiffness[row, column]), case)
 
 
-def in_axes(stiffness: Floats, axes: Floats) -> Floats:
+def rotated_stiffness(stiffness: Floats, axes: Floats) -> Floats:
     """Transform a stiffness (6, 6) over x, y, z and rotations to a bearing's axes u, v, w, rows of a (3, 3)."""
     turn = np.zeros((6, 6))
     turn[:3, :3] = turn[3:, 3:] = axes
     return np.asarray(turn @ stiffness @ turn.T)
 
 
-def words_of(choice: Choice) -> str:
+def model_suffix(choice: Choice) -> str:
     """Model settings as part of an attribute's name."""
     return "_".join(str(part) for part in (choice.variant, choice.mesh_model, choice.inertias)).replace("-", "_")
 
@@ -449,7 +449,7 @@ def put_modes(results: Results, modes: Mapping[Choice, xr.Dataset], unit: int, l
         moving = data["frequency"].to_numpy() > 0.0
         for key, name, sign in (("eigenfrequencies", "frequency", "Hz"), ("damping_ratios", "damping_ratio", "none")):
             values = tuple(data[name].to_numpy()[moving].tolist())
-            results.put_own(unit, f"{key}_{words_of(choice)}", sign, values, load_case)
+            results.put_own(unit, f"{key}_{model_suffix(choice)}", sign, values, load_case)
 
 
 def put_runs(results: Results, gearbox: Gearbox, runs: Mapping[Choice, xr.Dataset], target: Target) -> None:
@@ -458,7 +458,7 @@ def put_runs(results: Results, gearbox: Gearbox, runs: Mapping[Choice, xr.Datase
     numbers = {f"load_case_{case.number}": case.number for case in target.model.load_cases}
     for choice, data in runs.items():
         case = numbers.get(str(choice.load_case))
-        ending = words_of(choice) if case is not None else f"{words_of(choice)}_{choice.load_case}"
+        ending = model_suffix(choice) if case is not None else f"{model_suffix(choice)}_{choice.load_case}"
         for name in data["mesh"].to_numpy().tolist():
             mesh = families[str(name)]
             stage = target.origins.pairs[mesh.pair.name][instance_of(mesh.name, mesh.family)]
@@ -511,7 +511,7 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     target = Target(model, origins_of(imported.found), _static_load_case(gearbox, model))
     stored = StoredResults(gearbox, folder)
     results = Results(_version(model))
-    unit = next((part.number for part in model.of_type("gear_unit")), next(iter(model.components)))
+    unit = next((part.number for part in model.components_of_type("gear_unit")), next(iter(model.components)))
     results.put_own(unit, "program", "none", f"exugear {exugear.__version__}")
     results.put_own(unit, "case", "none", gearbox.name)
     for body, torque in gearbox.case.static_load.torques_N_m.items():
@@ -549,11 +549,11 @@ def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
 
 def _replaced(model: Model, results: Results) -> tuple[str, ...]:
     """Results in the file that are replaced."""
-    told = []
+    entries = []
     for addition in results.additions:
         part = model.components[addition.component]
         cases = {case.number: case.changes.get(addition.component, {}) for case in model.load_cases}
         there = part.attributes if addition.load_case is None else cases[addition.load_case]
         if tree.ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
-            told.append(f"{part}: {addition.name}")
-    return tuple(told)
+            entries.append(f"{part}: {addition.name}")
+    return tuple(entries)

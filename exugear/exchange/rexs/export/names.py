@@ -210,7 +210,7 @@ def _bearings(found_in: Found, block: Block) -> tuple[int, ...]:
         return (component.number,)
     planets = [[part.number for part in parts] for parts in body.others]
     found: list[tuple[int, int]] = []
-    for part in model.of_type(component.type):
+    for part in model.components_of_type(component.type):
         place = next(
             (n for n, parts in enumerate(planets) for end in ends(model, part) or () if end.number in parts), -1
         )

@@ -55,14 +55,14 @@ class Body:
     carrier: str = ""
     """Carrier of the planets; empty for other bodies."""
 
-    def of_type(self, *types: str) -> tuple[Component, ...]:
+    def parts_of_type(self, *types: str) -> tuple[Component, ...]:
         """Parts of some types."""
         return tuple(part for part in self.parts if part.type in types)
 
     @property
     def gears(self) -> tuple[Component, ...]:
         """Gears of the body; for planets those of the first."""
-        return self.of_type(*GEARS)
+        return self.parts_of_type(*GEARS)
 
 
 class Bodies(ReprMixin):
@@ -80,7 +80,7 @@ class Bodies(ReprMixin):
         """Body of a component; None for idle components and for planets other than the first of a set."""
         return self._of_part.get(part.number)
 
-    def of_any(self, part: Component) -> Body | None:
+    def body_of(self, part: Component) -> Body | None:
         """Body of a component, for any planet of a set."""
         return self._of_part.get(part.number) or self._of_other.get(part.number)
 
@@ -134,7 +134,7 @@ def is_one_piece(connection: Component) -> bool:
 
 def is_engaged(model: Model, connection: Component) -> bool:
     """Return whether a switchable coupling is engaged in the selected gear of the file."""
-    unit = model.of_type("gear_unit")
+    unit = model.components_of_type("gear_unit")
     shift = (unit[0].whole("gear_shift_index") if unit else None) or 1
     return connection.type != "switchable_coupling" or connection.flag("is_engaged", shift - 1) is not False
 
@@ -159,7 +159,7 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
     union = _joined(model, notes)
     held = held_by_speed(model)
     groups: dict[int, list[Component]] = {}
-    for part in model.of_type("shaft", "side_plate", "gear_casing", *GEARS):
+    for part in model.components_of_type("shaft", "side_plate", "gear_casing", *GEARS):
         groups.setdefault(union.root(part.number), []).append(part)
     working = _working(model, union)
     sets = _planet_sets(model, places, union, groups)
@@ -191,7 +191,7 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
 
 
 def _joined(model: Model, notes: Notes) -> _Union:
-    parts = model.of_type("shaft", "side_plate", "gear_casing", *GEARS)
+    parts = model.components_of_type("shaft", "side_plate", "gear_casing", *GEARS)
     union = _Union(part.number for part in parts)
     casings = [part.number for part in parts if part.type == "gear_casing"]
     for casing in casings[1:]:
@@ -206,7 +206,7 @@ def _joined(model: Model, notes: Notes) -> _Union:
             union.join(carriers.setdefault(owner, part), part)
     stiff = [
         (connection, both)
-        for connection in model.of_type(*JOINING)
+        for connection in model.components_of_type(*JOINING)
         if is_rigid_in_torsion(connection)
         and is_engaged(model, connection)
         and (both := ends(model, connection)) is not None
@@ -232,7 +232,7 @@ def _working(model: Model, union: _Union) -> set[int]:
     numbers = {role for relation in model.relations_of("stage") for role in relation.roles.values()}
     working = {union.root(number) for number in numbers if number in union} | _carriers(model, union)
     ties = []
-    for connection in model.of_type(*JOINING):
+    for connection in model.components_of_type(*JOINING):
         both = ends(model, connection)
         if both and torsional_stiffness(connection) != 0.0 and is_engaged(model, connection):
             ties.append({union.root(end.number) for end in both if end.number in union and end.type != "gear_casing"})
@@ -248,7 +248,7 @@ def held_by_speed(model: Model) -> set[int]:
     """
     speeds: dict[int, set[float]] = {}
     for changes in [case.changes for case in model.load_cases] or [{}]:
-        for shaft in model.of_type("shaft"):
+        for shaft in model.components_of_type("shaft"):
             here = shaft.with_attributes(changes.get(shaft.number, {}))
             speed = here.quantity("rotational_speed", "1 / min")
             defined = here.flag("defines_speed")

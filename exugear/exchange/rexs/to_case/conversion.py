@@ -82,7 +82,7 @@ def sections_of_bodies(model: Model, places: Places, bodies: Bodies, notes: Note
     found: dict[str, Sequence[Cylinder]] = {}
     for body in bodies.members:
         pieces: list[Cylinder] = []
-        for shaft in body.of_type("shaft"):
+        for shaft in body.parts_of_type("shaft"):
             with notes.faults.gathered():
                 pieces += sections_of(model, places, shaft, body, notes)
         found[body.name] = sorted(pieces, key=lambda one: one.start)
@@ -133,7 +133,9 @@ def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Seq
         block.entries["fixed"] = read(True, "joined with the casing")
         return block
     tubes = {number: _tube(model, body, teeth, number, sections, notes) for number in wheels}
-    plates = [one for part in body.of_type("side_plate") if (one := plate(model, places, part, notes)) is not None]
+    plates = [
+        one for part in body.parts_of_type("side_plate") if (one := plate(model, places, part, notes)) is not None
+    ]
     inertia = inertia_of([*sections, *tubes.values(), *plates])
     if inertia.mass <= 0.0:
         raise RexsError(f"{body.parts[0]}: inertia is not defined by sections, gears or plates")
@@ -187,10 +189,10 @@ def _digits(value: float) -> float:
 
 def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
     """Return whether the sections of a body form one flexible shaft."""
-    shafts = [part for part in body.of_type("shaft") if part.given("support_vector")]
+    shafts = [part for part in body.parts_of_type("shaft") if part.given("support_vector")]
     rigid = any(is_rigid(material_of(model, shaft)) for shaft in shafts)
     plain_shaft = (
-        not body.carrier and not body.of_type("side_plate") and all(section.aside == 0.0 for section in sections)
+        not body.carrier and not body.parts_of_type("side_plate") and all(section.aside == 0.0 for section in sections)
     )
     materials = {_number(material_of(model, shaft)) for shaft in shafts}
     return plain_shaft and not rigid and len(materials) == 1 and is_continuous(sections)
@@ -214,7 +216,7 @@ def _shape(model: Model, body: Body, sections: Sequence[Cylinder], notes: Notes)
         "start_z_mm": read(sections[0].start, "support_vector of the shaft"),
         "sections": read(pieces, "shaft_section"),
     }
-    material = material_table(material_of(model, body.of_type("shaft")[0]))
+    material = material_table(material_of(model, body.parts_of_type("shaft")[0]))
     if material is not None:
         entries["material"] = material
     return Block("", entries)
@@ -403,7 +405,7 @@ def _without_splines_as_stages(model: Model) -> Model:
 
     The spline connection itself specifies the connected parts.
     """
-    splines = {part.number for part in model.of_type(*JOINING)}
+    splines = {part.number for part in model.components_of_type(*JOINING)}
     relations = tuple(one for one in model.relations if one.type != "stage" or one.roles.get("stage") not in splines)
     return dataclasses.replace(model, relations=relations)
 
@@ -417,7 +419,7 @@ def _refuse_types(model: Model, notes: Notes) -> None:
             names = ", ".join(str(part) for part in parts)
             notes.faults.add(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
     notes.faults.tell()
-    if not any(True for _ in model.relations_of("stage")) or not model.of_type(*GEARS):
+    if not any(True for _ in model.relations_of("stage")) or not model.components_of_type(*GEARS):
         notes.faults.add("the file has no stage of two cylindrical gears; nothing to import")
 
 
@@ -483,11 +485,11 @@ class _Draft:
         """Return an error of the gearbox file with the REXS components of the named parts."""
         words = set(re.split(r"[^\w.]", fault)) | set(re.split(r"\W", fault))
         blocks = {name: block.comment for _, group in self.groups for name, block in group.items() if block.comment}
-        told = [
+        entries = [
             f"{name} is {comment}" for name, comment in blocks.items() if name in words or name.split(".")[1] in words
         ]
-        if told:
-            return f"{fault} ({'; '.join(told)})"
+        if entries:
+            return f"{fault} ({'; '.join(entries)})"
         return fault
 
     def leave_stiff(self, source: str, path: str | Path) -> None:
@@ -519,7 +521,7 @@ class _Draft:
         if not cases:
             torque = {self.ends.input: self.static.value[self.ends.input]}
             cases = {"draft": Block("", {"torques_N_m": Entry(torque)})}
-        units = self.model.of_type("gear_unit")
+        units = self.model.components_of_type("gear_unit")
         name = plain(units[0].name) if units and units[0].name else ""
         title = f"{Path(source).stem}" + (f": {name}" if name else "")
         top = {"name": Entry(plain(title, 200)), "default_inertias": Entry(INERTIAS)}
@@ -562,7 +564,7 @@ def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str
             },
         ),
     }
-    for unit in model.of_type("gear_unit")[:1]:
+    for unit in model.components_of_type("gear_unit")[:1]:
         keys = [f"direction_vector_gravity_{axis}" for axis in "uvw"]
         direction = np.array([unit.quantity(key) or 0.0 for key in keys])
         if unit.flag("account_for_gravity") and np.linalg.norm(direction) > 0.0:
@@ -597,9 +599,9 @@ def _note_ignored(model: Model, notes: Notes) -> None:
     for kind in kinds:
         if kind not in READ_TYPES:
             lines = (notes.lost, notes.ignored)[kind in TYPES_WITHOUT_EFFECT]
-            lines.append(f"{plain(kind)}, {len(model.of_type(kind))} of them")
+            lines.append(f"{plain(kind)}, {len(model.components_of_type(kind))} of them")
     for kind in kinds:
-        parts = model.of_type(kind)
+        parts = model.components_of_type(kind)
         keys = {key for part in parts for key in part.attributes if not key.startswith(OWN)}
         unread = keys - {key for part in parts for key in part.asked}
         if kind in READ_TYPES and unread:

@@ -12,7 +12,7 @@ from exugear.exchange.rexs.to_case.meshing import (
     Stage,
     centre_distance,
     modification_of,
-    told_if_impossible,
+    reports_impossible,
     unchecked,
     with_clear_tips,
     with_equal_racks,
@@ -91,7 +91,7 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     gears = with_equal_racks(gears, stages, notes)
     gears = with_shifts(gears, stages, notes)
     for number, gear in gears.items():
-        with told_if_impossible(gear):
+        with reports_impossible(gear):
             gears[number] = with_form_circles(with_fitting_tool(with_possible_cutter(gear, notes), notes), notes)
     gears = with_clear_tips(gears, stages, notes)
     owners = {number: body for number in gears if (body := bodies.of(model.components[number])) is not None}

@@ -120,14 +120,14 @@ def loads_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> list
 def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, notes: Notes) -> Loads:
     changes = case.changes if case else {}
     speeds: dict[str, float] = {}
-    for shaft in _changed(model.of_type("shaft"), changes):
-        body = bodies.of_any(shaft)
+    for shaft in _changed(model.components_of_type("shaft"), changes):
+        body = bodies.body_of(shaft)
         speed = shaft.quantity("rotational_speed", "1 / min")
         if body is not None and speed is not None and not body.fixed:
             speeds.setdefault(body.name, tidy(places.sense(shaft) * speed))
     torques: dict[str, float] = {}
     forces: dict[int, PointForce] = {}
-    for load in _changed(model.of_type("external_load"), changes):
+    for load in _changed(model.components_of_type("external_load"), changes):
         force = _point_force(model, places, bodies, load, notes)
         if force is not None:
             forces[load.number] = force
@@ -136,7 +136,7 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, 
         if body is not None and torque and load.flag("transmits_torque") is not False:
             torques[body.name] = torques.get(body.name, 0.0) + torque
     share = None
-    for unit in _changed(model.of_type("gear_unit"), changes):
+    for unit in _changed(model.components_of_type("gear_unit"), changes):
         share = unit.quantity("operating_time_fraction", "%")
     name = f"load_case_{case.number}" if case else "nominal"
     return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, forces, share)
@@ -181,7 +181,7 @@ def _shaft(model: Model, load: Component) -> Component | None:
 
 def _owner(model: Model, bodies: Bodies, load: Component) -> Body | None:
     shaft = _shaft(model, load)
-    body = bodies.of_any(shaft) if shaft else None
+    body = bodies.body_of(shaft) if shaft else None
     if body is None or body.fixed or body.carrier:
         return None
     return body
@@ -225,7 +225,7 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
     defined = {b.name for b in turning for part in b.parts if part.flag("defines_speed") is True}
     loaded = [
         body.name
-        for part in model.of_type("external_load")
+        for part in model.components_of_type("external_load")
         if part.flag("transmits_torque") is not False and (body := _owner(model, bodies, part)) is not None
     ]
     given = [name for load in loads for name in load.torques]
@@ -386,7 +386,9 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
     speeds = [_input_speed(load, ends, ratio) * (ratio if body == ends.output else 1.0) for load in loads]
     if body is None or not sum(shares) or not all(speeds):
         return None
-    hours = next((h for unit in model.of_type("gear_unit") if (h := unit.quantity("operating_time", "h"))), None)
+    hours = next(
+        (h for unit in model.components_of_type("gear_unit") if (h := unit.quantity("operating_time", "h"))), None
+    )
     life = assumed(USUAL_YEARS, "no operating_time in the file")
     if hours:
         life = derived(_rounded(hours / HOURS_PER_YEAR), f"operating_time of {hours:g} h")
@@ -401,7 +403,7 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
 def _lubricant(model: Model) -> Block | None:
     """Section on the oil if the file specifies its viscosity at both temperatures; for several oils, the thinnest."""
     oils = {}
-    for oil in model.of_type("lubricant"):
+    for oil in model.components_of_type("lubricant"):
         cold, hot = (oil.quantity(f"viscosity_at_{t}_degree_celsius", "mm^2 / s") for t in (40, 100))
         if cold and hot and hot < cold:
             oils[cold] = hot, oil.quantity("density_at_15_degree_celsius", "kg / m^3")
@@ -415,7 +417,7 @@ def _lubricant(model: Model) -> Block | None:
     }
     if density and DENSITIES[0] <= density <= DENSITIES[1]:
         entries["density_15_kg_per_m3"] = read(tidy(density), "density_at_15_degree_celsius")
-    casings = model.of_type("gear_casing")
+    casings = model.components_of_type("gear_casing")
     stated = [_changed(casings, changes) for changes in ({}, *(case.changes for case in model.load_cases))]
     temperatures = [casing.quantity("temperature_lubricant", "C") for parts in stated for casing in parts]
     hottest = max((t for t in temperatures if t is not None), default=math.nan)
@@ -427,7 +429,9 @@ def _lubricant(model: Model) -> Block | None:
 def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
     """Section on the rating: strength of gears by their materials, unless a limit is missing, and viscosity."""
     viscosities = [
-        one for oil in model.of_type("lubricant") if (one := oil.quantity("viscosity_at_40_degree_celsius", "mm^2 / s"))
+        one
+        for oil in model.components_of_type("lubricant")
+        if (one := oil.quantity("viscosity_at_40_degree_celsius", "mm^2 / s"))
     ]
     viscosity = (
         read(tidy(min(viscosities)), "viscosity_at_40_degree_celsius of the lubricant")
@@ -435,7 +439,9 @@ def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
         else assumed(USUAL_VISCOSITY, "no lubricant in the file")
     )
     keys = ("dynamic_factor_iso_6336_2006", "dynamic_factor_din_3990_1987")
-    factors = [one for stage in model.of_type("cylindrical_stage") for key in keys if (one := stage.quantity(key))]
+    factors = [
+        one for stage in model.components_of_type("cylindrical_stage") for key in keys if (one := stage.quantity(key))
+    ]
     dynamic = (
         read(tidy(max(1.0, *factors)), "the largest dynamic_factor of the stages")
         if factors

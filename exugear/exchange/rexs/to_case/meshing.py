@@ -385,7 +385,7 @@ def _cutter(gear: Toothing) -> PinionCutter | None:
 
 
 @contextmanager
-def told_if_impossible(*gears: Toothing) -> Iterator[None]:
+def reports_impossible(*gears: Toothing) -> Iterator[None]:
     """Convert errors of geometric relations without a solution to errors that name the gears."""
     try:
         yield
@@ -518,7 +518,7 @@ def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: 
     cleared = dict(gears)
     for stage in stages:
         for tip, mate in ((stage.gear, stage.pinion), (stage.pinion, stage.gear)):
-            with told_if_impossible(cleared[tip], cleared[mate]):
+            with reports_impossible(cleared[tip], cleared[mate]):
                 bound = _tip_bound(cleared, stage, tip)
             if bound is None:
                 continue

@@ -220,7 +220,7 @@ class Places(ReprMixin):
         _refuse_lost_vectors(model)
         faults = Faults()
         directions: dict[Component, Floats] = {}
-        for part in model.of_type(*TURNING):
+        for part in model.components_of_type(*TURNING):
             with faults.gathered():
                 directions[part] = self._frame(part, 0)[1][:, 0]
         faults.tell()
@@ -270,7 +270,7 @@ class Places(ReprMixin):
 
     def _outermost(self, parts: list[Component]) -> Floats:
         """Axes u, v, w of the gear unit as columns; those of the first part in a file without a gear unit."""
-        first = [*self._model.of_type("gear_unit"), *parts][:1]
+        first = [*self._model.components_of_type("gear_unit"), *parts][:1]
         if first:
             return self._frame(first[0], 0)[1]
         return np.eye(3)

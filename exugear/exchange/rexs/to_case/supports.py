@@ -56,7 +56,7 @@ RIGID = {"radial_stiffness": 1e10, "axial_stiffness": 1e10, "bending_stiffness":
 def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -> dict[str, Block]:
     """Tables of all bearings by name, and of connections that support a body without joining it rigidly."""
     blocks: dict[str, Block] = {}
-    for part in model.of_type(*BEARINGS, *PLAIN_BEARINGS):
+    for part in model.components_of_type(*BEARINGS, *PLAIN_BEARINGS):
         with notes.faults.gathered():
             block = _bearing(model, places, bodies, part, notes)
             if block is not None:
@@ -122,7 +122,7 @@ def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[s
 
 def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Component, Body, Body]]:
     """Yield couplings and fits between two separate bodies, once for equal planets."""
-    for part in model.of_type(*JOINING):
+    for part in model.components_of_type(*JOINING):
         both = ends(model, part)
         if both is None or is_one_piece(part) or not is_engaged(model, part):
             continue
@@ -136,7 +136,7 @@ def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, note
     both = ends(model, part)
     if both is None:
         raise RexsError(f"{part}: no relation 'side' defines the supported and the supporting body")
-    inner, outer = (None if end.type == "gear_casing" else bodies.of_any(end) for end in both)
+    inner, outer = (None if end.type == "gear_casing" else bodies.body_of(end) for end in both)
     if any(body is not None and bodies.of(end) is None for end, body in zip(both, (inner, outer), strict=True)):
         return None  # on a planet equal to the first
     inner, outer = (None if body is not None and body.fixed else body for body in (inner, outer))
@@ -317,11 +317,11 @@ def _catalogue(
         )
         del entries["fatigue_load_limit_kN"]
     if not arrangement:
-        _tell_axial(part, kind, sense, entries, notes)
+        _note_axial(part, kind, sense, entries, notes)
     return entries
 
 
-def _tell_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry], notes: Notes) -> None:
+def _note_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry], notes: Notes) -> None:
     """Add the axial locating direction of a bearing, or a note if the model of its type locates in both directions."""
     absorbed = part.text("axial_force_absorption")
     if kind in TYPES_OF_KEYS["locates_towards"][0] and absorbed in ("positive", "negative"):

@@ -37,7 +37,7 @@ from exugear.system.bearings.rolling.rows import (
     RollerRow,
     RollingBearing,
     RollingRow,
-    on_raceways,
+    raceway_rows,
 )
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin
@@ -173,7 +173,7 @@ def _placed(rows: tuple[RollingRow, ...], first_roller_angle: float) -> RowConta
 
 def is_preloaded(rows: Sequence[RollingRow]) -> bool:
     """Return whether rolling elements carry load before the bearing is loaded; ribs in contact do not count."""
-    return elastic_energy(row_contacts(on_raceways(rows)), np.zeros(6)) > 0.0
+    return elastic_energy(row_contacts(raceway_rows(rows)), np.zeros(6)) > 0.0
 
 
 def elastic_energy(contacts: RowContacts, displacement: Floats) -> float:

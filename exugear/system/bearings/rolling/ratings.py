@@ -27,7 +27,7 @@ from exugear.system.bearings.rolling.rows import (
     BearingError,
     RollerRow,
     RollingRow,
-    on_raceways,
+    raceway_rows,
 )
 
 MATERIAL_FACTOR: dict[BearingType, float] = {
@@ -226,7 +226,7 @@ def row_count(rows: Sequence[RollingRow], bearing_type: BearingType) -> int:
     The balls of a four-point bearing touch both halves of the rings. Where each pair of opposite contacts is
     given as a row of its own, rows at one place are one row of balls.
     """
-    rows = on_raceways(rows)
+    rows = raceway_rows(rows)
     if bearing_type == "four_point_ball":
         return len({row.axial_position for row in rows})
     return len(rows)
@@ -353,7 +353,7 @@ def _ball_reduction(bearing_type: BearingType, count: int) -> float:
 
 def _common_row(rows: Sequence[RollingRow], bearing_type: BearingType) -> RollerRow | BallRow:
     """Return the row that stands for all but ribs, or refuse rows that the standards cannot rate together."""
-    rows = on_raceways(rows)
+    rows = raceway_rows(rows)
     if not rows:
         raise BearingError("load rating: a bearing without rows has none")
     first = rows[0]

@@ -219,7 +219,7 @@ def is_rib(row: RollingRow) -> bool:
     return isinstance(row, RollerRow) and row.rib
 
 
-def on_raceways(rows: Sequence[RollingRow]) -> tuple[RollingRow, ...]:
+def raceway_rows(rows: Sequence[RollingRow]) -> tuple[RollingRow, ...]:
     """Rows without those that represent ribs: the rows with a rating and with rolling contact fatigue."""
     return tuple(row for row in rows if not is_rib(row))
 

@@ -37,7 +37,7 @@ class LawProperties:
     """Whether the load shuttles over the mesh cycle as in the table."""
 
     @property
-    def of_one_load(self) -> bool:
+    def uses_single_load(self) -> bool:
         """Whether it reads tables over the mesh cycle at the static load alone."""
         return self.needs_tables and not self.needs_axes
 

@@ -174,7 +174,7 @@ def test_numbers_that_nothing_has_are_refused_before_they_are_multiplied():
 
 def test_numbers_that_make_no_pair_of_gears_are_told_before_they_are_divided_by():
     file, _ = spur_pair()
-    second = file.model().of_type("cylindrical_gear")[1].number
+    second = file.model().components_of_type("cylindrical_gear")[1].number
     file.give(second, tip_diameter=100.0)
     on_one_axis = spur_pair()[0].text().replace("<c>90.0</c><c>0.0</c></array>", "<c>0.0</c><c>0.0</c></array>")
     for text, words in (

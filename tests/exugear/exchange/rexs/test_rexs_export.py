@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from exugear.cli.app import app
 from exugear.exchange.rexs.containers import parsed, read_rexs
-from exugear.exchange.rexs.export.export import in_axes, with_results
+from exugear.exchange.rexs.export.export import rotated_stiffness, with_results
 from exugear.exchange.rexs.export.names import NAMES, name_in, origins_of, stiffness_names
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.tree import Model, RexsError
@@ -84,7 +84,9 @@ def _present(names):
 def test_numbers_of_a_pair_are_those_of_its_closed_forms(exported):
     """By hand for the first stage of the 1.6 file: a = 190 mm, z 27/51, m_n 4.5, and the angles of ISO 21771."""
     _, model = exported(SPECTRUM)
-    stage = next(s for s in model.of_type("cylindrical_stage") if s.quantity("gear_ratio") == pytest.approx(51 / 27))
+    stage = next(
+        s for s in model.components_of_type("cylindrical_stage") if s.quantity("gear_ratio") == pytest.approx(51 / 27)
+    )
     assert stage.quantity("center_distance", "mm") == 190.0
     data = {
         model.components[one.roles["gear"]].whole("number_of_teeth"): model.components[one.roles["stage_gear_data"]]
@@ -93,7 +95,7 @@ def test_numbers_of_a_pair_are_those_of_its_closed_forms(exported):
     }
     assert data[27].quantity("pitch_diameter", "mm") == pytest.approx(2.0 * 190.0 * 27 / 78, rel=1e-9)
     assert data[51].quantity("pitch_diameter", "mm") == pytest.approx(2.0 * 190.0 * 51 / 78, rel=1e-9)
-    gears = {g.whole("number_of_teeth"): g for g in model.of_type("cylindrical_gear")}
+    gears = {g.whole("number_of_teeth"): g for g in model.components_of_type("cylindrical_gear")}
     helix = math.radians(gears[27].quantity("helix_angle_reference_diameter", "deg"))
     transverse = math.atan(math.tan(math.radians(20.0)) / math.cos(helix))
     base = 27 * 4.5 / math.cos(helix) * math.cos(transverse)
@@ -122,7 +124,9 @@ def test_the_static_load_belongs_to_the_load_case_that_has_its_torque(exported):
     cases = {case.number: case.changes for case in model.load_cases}
     with_force = {number for number, changes in cases.items() for found in changes.values() if key in found}
     assert with_force == {4}
-    stage = next(s for s in model.of_type("cylindrical_stage") if s.quantity("gear_ratio") == pytest.approx(51 / 27))
+    stage = next(
+        s for s in model.components_of_type("cylindrical_stage") if s.quantity("gear_ratio") == pytest.approx(51 / 27)
+    )
     force = float(cases[4][stage.number][key].value)
     assert force == pytest.approx(789.0 / gearbox.gears["gear_1"].base_radius, rel=1e-9)
     assert not any(key in part.attributes for part in model.components.values())
@@ -130,11 +134,11 @@ def test_the_static_load_belongs_to_the_load_case_that_has_its_torque(exported):
 
 def test_each_planet_gets_its_results(exported):
     _, model = exported(PLANETARY)
-    planets = [g for g in model.of_type("cylindrical_gear") if g.whole("number_of_teeth") == 22]
+    planets = [g for g in model.components_of_type("cylindrical_gear") if g.whole("number_of_teeth") == 22]
     assert len(planets) == 3
     base = 88.0 * math.cos(math.radians(20.0))
     assert [gear.quantity("base_diameter", "mm") for gear in planets] == pytest.approx([base] * 3, rel=1e-9)
-    stages = model.of_type("cylindrical_stage")
+    stages = model.components_of_type("cylindrical_stage")
     assert len(stages) == 6
     forces = {s.quantity("nominal_tangential_force_at_base_circle", "N") for s in stages}
     torque = 100e3 / (1500.0 * math.pi / 30.0)  # 100 kW at 1500 rpm, on three planets
@@ -165,10 +169,12 @@ def test_modes_bearings_and_tables_of_the_folder_are_in_the_file(tmp_path):
     exported = with_results(project.gearbox, project.folder, DATA / SEW)
     assert exported.left_out == ()
     model = parsed(exported.content, SEW)
-    unit = model.of_type("gear_unit")[0]
+    unit = model.components_of_type("gear_unit")[0]
     found = [float(one) for one in unit.attributes["custom_exugear_eigenfrequencies_bushing_iso6336_geometry"].value]
     assert found == pytest.approx(modes.frequency[modes.frequency > 0.0], rel=1e-9)
-    stage = next(s for s in model.of_type("cylindrical_stage") if s.quantity("center_distance", "mm") == 77.0)
+    stage = next(
+        s for s in model.components_of_type("cylindrical_stage") if s.quantity("center_distance", "mm") == 77.0
+    )
     error = [float(one) for one in stage.attributes["custom_exugear_transmission_error"].value]
     assert error == pytest.approx(1e6 * table.static_state["ste"].to_numpy(), rel=1e-9)
     assert stage.quantity("custom_exugear_face_load_factor") >= 1.0
@@ -186,7 +192,7 @@ def test_modes_bearings_and_tables_of_the_folder_are_in_the_file(tmp_path):
 
 def test_a_form_diameter_of_the_file_stays_and_ours_stands_beside_it(tmp_path):
     file, _ = spur_pair(root_form_diameter=None)
-    gears = [part.number for part in file.model().of_type("cylindrical_gear")]
+    gears = [part.number for part in file.model().components_of_type("cylindrical_gear")]
     file.give(gears[1], root_form_diameter=114.0)  # below what the tool's rounding leaves: the import takes the tool's
     path = tmp_path / "gearbox.rexs"
     path.write_text(file.text())
@@ -205,10 +211,10 @@ def test_a_form_diameter_of_the_file_stays_and_ours_stands_beside_it(tmp_path):
 def test_spur_gears_have_no_overlap_ratio_and_no_axial_pitch(exported):
     """REXS asks for more than 0 of both; helical gears have them: p_x = pi m_n / sin(beta) (ISO 21771)."""
     _, model = exported(PLANETARY)
-    assert not any(stage.given("overlap_contact_ratio") for stage in model.of_type("cylindrical_stage"))
-    assert not any(gear.given("axial_pitch") for gear in model.of_type("cylindrical_gear", "ring_gear"))
+    assert not any(stage.given("overlap_contact_ratio") for stage in model.components_of_type("cylindrical_stage"))
+    assert not any(gear.given("axial_pitch") for gear in model.components_of_type("cylindrical_gear", "ring_gear"))
     _, model = exported(SPECTRUM)
-    for gear in model.of_type("cylindrical_gear"):
+    for gear in model.components_of_type("cylindrical_gear"):
         helix = math.radians(abs(gear.quantity("helix_angle_reference_diameter", "deg")))
         pitch = math.pi * gear.quantity("normal_module", "mm") / math.sin(helix)
         assert gear.quantity("axial_pitch", "mm") == pytest.approx(pitch, rel=1e-9)
@@ -225,14 +231,14 @@ def test_tooth_thicknesses_are_those_of_the_reference_circle(tmp_path):
         path.write_text(file.text())
         gearbox = to_case(read_rexs(path), path.name).gearbox
         model = parsed(with_results(gearbox, tmp_path, path).content, path)
-        for gear in model.of_type("cylindrical_gear"):
+        for gear in model.components_of_type("cylindrical_gear"):
             for key in ends:
                 assert gear.quantity(key, "mm") == pytest.approx(3.0 * math.pi / 2.0 - 0.06, rel=1e-9)
 
 
 def test_speeds_that_the_file_leaves_out_are_put_into_each_load_case(tmp_path):
     file, shafts = spur_pair()
-    gears = [part.number for part in file.model().of_type("cylindrical_gear")]
+    gears = [part.number for part in file.model().components_of_type("cylindrical_gear")]
     file.load_case({shafts[0]: {"rotational_speed": 900.0}, shafts[1]: {"rotational_speed": -450.0}})
     file.load_case({shafts[0]: {"rotational_speed": -600.0}, shafts[1]: {"rotational_speed": 300.0}})
     path = tmp_path / "gearbox.rexs"
@@ -294,7 +300,7 @@ def test_the_trace_of_a_turned_stiffness_stays():
     raw = np.arange(36.0).reshape(6, 6)
     stiffness = raw + raw.T
     axes = np.array([[0.0, 0.0, -1.0], [0.6, 0.8, 0.0], [0.8, -0.6, 0.0]])
-    new = in_axes(stiffness, axes)
+    new = rotated_stiffness(stiffness, axes)
     assert np.trace(new[:3, :3]) == pytest.approx(np.trace(stiffness[:3, :3]))
     assert new[0, 0] == pytest.approx(stiffness[2, 2])
     assert new[0, 3] == pytest.approx(stiffness[2, 5])
@@ -318,7 +324,7 @@ def test_the_file_of_another_gearbox_is_refused(tmp_path):
 
 def test_a_result_of_another_program_is_replaced_and_told(tmp_path):
     text = (DATA / SPECTRUM).read_text(encoding="utf-8-sig")
-    number = read_rexs(DATA / SPECTRUM).of_type("cylindrical_gear")[0].number
+    number = read_rexs(DATA / SPECTRUM).components_of_type("cylindrical_gear")[0].number
     head = next(line for line in text.splitlines() if f'<component id="{number}"' in line)
     path = tmp_path / "gearbox.rexs"
     path.write_text(text.replace(head, head + '<attribute id="base_circle_diameter" unit="mm">1.0</attribute>', 1))

@@ -89,7 +89,9 @@ def test_what_is_no_gearbox_of_cylindrical_gears_is_refused_by_name(name):
 def test_centre_distances_are_those_of_the_file_and_of_its_positions(name, imported):
     """Three ways: the attribute, the positions of the gears, and the bodies of the finished gearbox."""
     model, gearbox = read_rexs(DATA / name), imported(name).gearbox
-    stated = {round(stage.quantity("center_distance", "mm"), 9) for stage in model.of_type("cylindrical_stage")}
+    stated = {
+        round(stage.quantity("center_distance", "mm"), 9) for stage in model.components_of_type("cylindrical_stage")
+    }
     assert {round(1e3 * pair.pair.centre_distance, 9) for pair in gearbox.pairs.values()} == stated
     for mesh in gearbox.meshes:  # positions of the files have 11 digits and more
         assert mesh.centre_distance == pytest.approx(mesh.pair.centre_distance, abs=1e-9)
@@ -114,7 +116,7 @@ def test_numbers_of_gears_are_those_of_the_file(imported):
 def test_diameters_are_those_that_the_file_gives_elsewhere(imported):
     """The newer planetary file gives no tip diameter, but crowns the sun's flank from 64.064 to 76 mm."""
     name = "FVA_Planetary_stage_-_Minus_gearing_1.1_vers2.rexsj"
-    crowning = read_rexs(DATA / name).of_type("profile_crowning")[0]
+    crowning = read_rexs(DATA / name).components_of_type("profile_crowning")[0]
     tip = crowning.quantity("diameter_where_profile_crowning_tip_is_specified", "mm")
     root = crowning.quantity("diameter_where_profile_crowning_root_is_specified", "mm")
     gearbox = imported(name).gearbox
@@ -144,7 +146,7 @@ def test_three_planets_make_one_body_and_stand_where_the_file_has_them(imported)
     gearbox, model = imported(PLANETARY).gearbox, read_rexs(DATA / PLANETARY)
     places = {
         tuple(np.round(part.vector("support_vector")[1:], 6))
-        for part in model.of_type("cylindrical_gear")
+        for part in model.components_of_type("cylindrical_gear")
         if part.whole("number_of_teeth") == 22
     }
     planets = [body for body in gearbox.bodies() if body.carrier == "carrier"]
@@ -204,7 +206,7 @@ def test_a_bearing_of_an_unknown_designation_is_a_blank_that_check_asks_for():
 def test_dimensions_of_designations_are_those_of_another_program(imported):
     """The SEW file gives dimensions, and designations in the names of its bearings."""
     found = 0
-    for part in read_rexs(DATA / SEW).of_type("rolling_bearing_with_catalog_geometry"):
+    for part in read_rexs(DATA / SEW).components_of_type("rolling_bearing_with_catalog_geometry"):
         boundary = boundary_of(part.name.split()[1])
         assert boundary is not None, part
         stated = [part.quantity(key, "mm") for key in ("inner_diameter", "outer_diameter", "width")]
@@ -275,7 +277,7 @@ def test_a_common_face_that_is_narrower_than_both_faces_is_kept():
 def test_a_gear_that_stands_aside_touches_over_what_the_faces_share():
     """The wheel moved by 5 mm along its shaft: 16 and 11 mm wide faces then share 8.5 mm."""
     model = read_rexs(DATA / SEW)
-    places = {part.number: part.vector("support_vector") for part in model.of_type("cylindrical_gear")}
+    places = {part.number: part.vector("support_vector") for part in model.components_of_type("cylindrical_gear")}
     pinion, wheel = (to_case(model, SEW).found.teeth.stages["stage_1"].__dict__[key] for key in ("pinion", "gear"))
     apart = places[wheel][0] - places[pinion][0]
     moved = Attribute(tuple(map(str, (places[pinion][0] + 5.0, *places[wheel][1:]))), "mm")

@@ -376,7 +376,7 @@ def test_what_a_coupling_says_nothing_of_is_as_rigid_as_its_torsion():
 
 def test_a_ring_that_the_casing_holds_against_turning_alone_is_told_as_fixed():
     file = planetary(RIGID)
-    couplings = [part.number for part in file.model().of_type("coupling")]
+    couplings = [part.number for part in file.model().components_of_type("coupling")]
     file.give(couplings[1], radial_stiffness=1e6)
     result = imported(file)
     assert any("and is elastic otherwise; modelled as rigid, since a body" in line for line in result.changed)
@@ -433,15 +433,15 @@ def test_planets_on_two_orbits_are_two_sets(tmp_path):
 def shifted_pair(shifts, distance=91.5):
     """Teeth 20 and 40, m_n 3, 91.5 mm apart in place of 90."""
     file, shafts = spur_pair()
-    gears = [part.number for part in file.model().of_type("cylindrical_gear")]
-    flanks = [part.number for part in file.model().of_type("cylindrical_gear_flank")]
+    gears = [part.number for part in file.model().components_of_type("cylindrical_gear")]
+    flanks = [part.number for part in file.model().components_of_type("cylindrical_gear_flank")]
     for number, shift in zip(flanks, np.repeat(np.array(shifts), 2).tolist(), strict=True):
         file.give(number, addendum_modification_coefficient=shift)
     for part in file.model().components.values():
         vector = part.vector("support_vector") if part.given("support_vector") else None
         if vector is not None and vector[1] == 90.0:
             file.give(part.number, support_vector=(vector[0], distance, vector[2]))
-    file.give(file.model().of_type("cylindrical_stage")[0].number, center_distance=distance)
+    file.give(file.model().components_of_type("cylindrical_stage")[0].number, center_distance=distance)
     del shafts, gears
     return file
 
@@ -474,7 +474,7 @@ def test_two_shifts_that_cannot_be_are_refused_with_what_the_centre_distance_off
 def test_of_centre_distance_and_positions_those_count_that_agree_with_the_shifts():
     total = asked_for(91.5)
     file = shifted_pair((total, 0.0))
-    stage = file.model().of_type("cylindrical_stage")[0].number
+    stage = file.model().components_of_type("cylindrical_stage")[0].number
     file.give(stage, center_distance=90.7)
     result = imported(file)
     assert result.gearbox.pairs["stage_1"].pair.centre_distance == pytest.approx(91.5e-3)
@@ -491,7 +491,7 @@ def test_of_centre_distance_and_positions_those_count_that_agree_with_the_shifts
 
 def test_where_the_shifts_agree_with_neither_distance_an_option_decides():
     file = shifted_pair((0.4, 0.0))
-    file.give(file.model().of_type("cylindrical_stage")[0].number, center_distance=90.7)
+    file.give(file.model().components_of_type("cylindrical_stage")[0].number, center_distance=90.7)
     with pytest.raises(RexsError, match="--distances positions or --distances file"):
         imported(file)
     for rule, distance in (("positions", 91.5e-3), ("file", 90.7e-3)):

@@ -20,7 +20,7 @@ def file_with_spectrum(version="1.6", **material):
     file.give(file.steel, **(LIMITS | material))
     file.give(file.unit, operating_time=20000.0)
     file.add("lubricant", viscosity_at_40_degree_celsius=150.0)
-    load = file.model().of_type("external_load")[0].number
+    load = file.model().components_of_type("external_load")[0].number
     for torque, speed, share in ((200.0, 1500.0, 70.0), (100.0, 900.0, 30.0)):
         changes = {file.unit: {"operating_time_fraction": share}, load: {"torque_around_u_axis": torque}}
         speeds = {shafts[0]: {"rotational_speed": speed}, shafts[1]: {"rotational_speed": -0.5 * speed}}

@@ -292,7 +292,7 @@ def test_a_fault_of_the_gearbox_file_names_the_components_it_is_about():
 
 def test_a_carrier_that_is_joined_with_the_casing_makes_a_star():
     """Both couplings that hold the ring hold the carrier instead: the ring turns at -17/61 of the sun's speed."""
-    held = {one.number for one in PLANETARY.of_type("switchable_coupling")}
+    held = {one.number for one in PLANETARY.components_of_type("switchable_coupling")}
     relations = tuple(
         dataclasses.replace(one, roles={**one.roles, "inner_part": 4})
         if one.type == "side" and one.roles.get("assembly") in held
@@ -309,11 +309,11 @@ def test_a_carrier_that_is_joined_with_the_casing_makes_a_star():
 def stepped() -> Model:
     """The planetary file with a second gear of 20 teeth on each planet, which meshes with a ring of 59."""
     components, relations = dict(PLANETARY.components), list(PLANETARY.relations)
-    ring = PLANETARY.of_type("ring_gear")[0].number
+    ring = PLANETARY.components_of_type("ring_gear")[0].number
     x, y, z = PLANETARY.components[ring].vector("support_vector")
     aside = {"support_vector": Attribute((x + 60.0, y, z), "mm"), "number_of_teeth": Attribute("59")}
     components[ring] = PLANETARY.components[ring].with_attributes(aside)
-    for first in [g for g in PLANETARY.of_type("cylindrical_gear") if g.whole("number_of_teeth") == 22]:
+    for first in [g for g in PLANETARY.components_of_type("cylindrical_gear") if g.whole("number_of_teeth") == 22]:
         number = first.number + 10_000
         x, y, z = first.vector("support_vector")
         place = {"support_vector": Attribute((x + 60.0, y, z), "mm"), "number_of_teeth": Attribute("20")}
@@ -352,7 +352,7 @@ def test_stepped_planets_are_imported_with_both_their_gears():
 def test_tooth_thickness_allowances_become_those_of_the_normal_section(given, factor):
     """DIN 3967: A_st = A_sn / cos(beta), A_W = A_sn cos(alpha_n); teeth have the mean."""
     ((key, unit),) = given.items()
-    number = next(part.number for part in SEW.of_type("cylindrical_gear"))
+    number = next(part.number for part in SEW.components_of_type("cylindrical_gear"))
     scale = 1.0 if unit == "mm" else 1e3
     values = {
         key.format(end): Attribute(amount * scale, unit) for end, amount in (("upper", -0.054), ("lower", -0.084))
@@ -373,7 +373,7 @@ def test_tooth_thickness_allowances_become_those_of_the_normal_section(given, fa
 
 
 def test_allowances_that_would_thicken_teeth_are_not_taken():
-    number = next(part.number for part in SEW.of_type("cylindrical_gear"))
+    number = next(part.number for part in SEW.components_of_type("cylindrical_gear"))
     values = {f"chordal_tooth_thickness_{end}_deviation": 0.02 for end in ("upper", "lower")}
     sections = gearbox_of(with_values(SEW, {number: values})).case.gears.values()
     assert all(one.tooth_thickness is None and one.tooth_thinning_mm > 0.0 for one in sections)

@@ -99,7 +99,7 @@ def test_a_planet_of_shift_zero_follows_from_its_sun_and_the_ring_from_the_plane
     """The sun has 0.2, so that sun and planet contradict 72 mm; planet and ring of shift zero agree."""
     file = planetary(0.0)
     model = file.model()
-    sun = next(one for one in model.of_type("cylindrical_gear"))
+    sun = next(one for one in model.components_of_type("cylindrical_gear"))
     for side in ("left", "right"):
         flank = model.related("flank", "gear", sun.number, side)[0]
         file.give(flank.number, addendum_modification_coefficient=0.2)
@@ -117,7 +117,7 @@ def test_data_of_a_rating_that_have_keys_are_used() -> None:
     file, _ = spur_pair()
     model = file.model()
     file.give(file.steel, endurance_limit_flank=1500.0, endurance_limit_root=461.0)
-    for gear in model.of_type("cylindrical_gear"):
+    for gear in model.components_of_type("cylindrical_gear"):
         given = {"averaged_peak_to_valley_height_root": 0.02, "tolerance_class_according_to_iso_1328_2013": 7}
         file.give(gear.number, **given)
     oil = {"viscosity_at_40_degree_celsius": 100.0, "viscosity_at_100_degree_celsius": 11.0}

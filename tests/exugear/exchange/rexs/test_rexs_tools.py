@@ -42,7 +42,7 @@ def imported(*tools: tuple[dict[str, float], dict[str, float]]) -> Toothing:
 def test_the_deepest_tool_makes_the_root_and_the_last_one_finishes_the_flank(of_flank: bool) -> None:
     """By hand: d_f = 60 - 2 * 1.4 * 3 mm; the grinding tool is straight to 1.25 - 0.2 (1 - sin 20 deg)."""
     file, _ = spur_pair()
-    for number in (part.number for part in file.model().of_type("cylindrical_gear")):
+    for number in (part.number for part in file.model().components_of_type("cylindrical_gear")):
         flank = file.model().related("flank", "gear", number, "left")[0].number
         machined(file, flank if of_flank else number, (HOB, ALLOWANCE), (GRINDING, {}))
     imported_gears = to_case(file.model(), "own").gearbox

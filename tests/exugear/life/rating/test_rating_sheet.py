@@ -16,7 +16,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.loads import StrengthSection
-from exugear.life.life import LEFT_OUT
+from exugear.life.life import NOT_RATED
 from exugear.life.rating.standard import FlankRules, MeshLoads, rate
 from exugear.project import Project
 from fe_ste.geometry.gears import Material
@@ -304,7 +304,7 @@ def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_li
     )
     assert any("exugear life" in line for line in project.rating().assumptions)
     data = project.life()
-    assert set(LEFT_OUT) <= set(json.loads(data.attrs["unrated"]))
+    assert set(NOT_RATED) <= set(json.loads(data.attrs["unrated"]))
     sheet = project.rating()
     for place, one in enumerate(sheet.flanks):
         assert one.finite_elements["S_F"] == pytest.approx(float(data["flank_root_safety"][place]))
@@ -348,7 +348,7 @@ def test_a_ring_is_rated_by_its_root_and_says_what_is_left_out():
     assert any("cutter" in remark for remark in ring.remarks)
     sun = next(one for one in sheet.flanks if one.gear == "sun")
     assert 1.0 < sun.standard["K_v"] < 1.05 and sun.standard["K_gamma"] > 1.0
-    assert sheet.left_out == LEFT_OUT and {"scuffing", "micropitting"} <= {line.split()[0] for line in LEFT_OUT}
+    assert sheet.left_out == NOT_RATED and {"scuffing", "micropitting"} <= {line.split()[0] for line in NOT_RATED}
 
 
 def written(content: dict[str, Any], folder: Path) -> Path:
@@ -382,7 +382,7 @@ def test_the_verb_prints_all_factors_and_ends_with_1_where_a_safety_is_short(tmp
         "S_F",
     ):
         assert name in good.output
-    for line in LEFT_OUT:
+    for line in NOT_RATED:
         assert line.split(":")[0] in " ".join(good.output.split())
     short = run(written(spur(tmp_path, minimum_S_H=9.0), tmp_path), "--json")
     assert short.exit_code == 1

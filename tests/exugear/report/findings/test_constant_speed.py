@@ -13,7 +13,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings.facts import facts_of_response
 from exugear.report.findings.groups import RankedResonance
-from exugear.report.findings.loudness import constant_speed_of, truest_of
+from exugear.report.findings.loudness import constant_speed_of, most_complete_levels
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -82,11 +82,11 @@ def test_the_loudest_of_all_orders_is_found_with_its_order():
 def test_the_level_that_leaves_least_out_is_told_and_branches_are_not():
     branch, best = response("nonlinear", branches=True), response("parametric")
     best["amplitude"] = 2.0 * best["amplitude"]
-    truest = truest_of([branch, response("linear"), best, response("linear")], CHOICE)
+    truest = most_complete_levels([branch, response("linear"), best, response("linear")], CHOICE)
     assert truest is not None
     assert truest.level.max() == pytest.approx(20.0 * np.log10(402.0), abs=0.01)
-    assert truest_of([branch], CHOICE) is None
-    assert truest_of([best], Choice("rigid", CHOICE.mesh_model, CHOICE.inertias)) is None
+    assert most_complete_levels([branch], CHOICE) is None
+    assert most_complete_levels([best], Choice("rigid", CHOICE.mesh_model, CHOICE.inertias)) is None
 
 
 def test_resonances_rank_by_their_level_at_constant_speed(runs):
@@ -96,10 +96,10 @@ def test_resonances_rank_by_their_level_at_constant_speed(runs):
         peak = finding.strongest
         at = levels.near(peak.line, peak.frequency, 15.0)
         judged.append(RankedResonance(bushing.located(finding, at.frequency), True, (), {}, at))
-    loudest = max(judged, key=lambda own: own.loudness)
+    loudest = max(judged, key=lambda own: own.ranking_level)
     assert loudest.frequency == pytest.approx(790.0)
-    assert loudest.loudness == pytest.approx(20.0 * np.log10(201.0), abs=0.01)
-    assert loudest.missed == pytest.approx(loudest.loudness - loudest.peak.level)
+    assert loudest.ranking_level == pytest.approx(20.0 * np.log10(201.0), abs=0.01)
+    assert loudest.missed == pytest.approx(loudest.ranking_level - loudest.peak.level)
 
 
 def test_a_mode_is_that_of_the_exact_frequency_not_of_the_run_up_s(runs):

@@ -10,9 +10,9 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings import facts
-from exugear.report.findings.facts import levers_of
-from exugear.report.findings.loudness import Loudness, Ranking, Resonance
-from exugear.report.findings.verdicts import best_change, guarded
+from exugear.report.findings.facts import sensitivities_of
+from exugear.report.findings.loudness import PeakAmplitude, Ranking, Resonance
+from exugear.report.findings.verdicts import best_change, track_mode
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.run_spectra import is_among, other_windows, survives
 from exugear.system.modes import modes_of
@@ -43,7 +43,7 @@ def test_first_order_shifts_are_those_of_a_full_solution(gearbox, pair, words):
     modes = modes_of(assembled(gearbox, Choice("rigid"), STIFFNESS))
     dataset = modes.to_dataset()
     for mode in np.flatnonzero(modes.frequency > 100.0):
-        lever = next((own for own in levers_of(Labels(gearbox), dataset, int(mode)) if own.what == words), None)
+        lever = next((own for own in sensitivities_of(Labels(gearbox), dataset, int(mode)) if own.what == words), None)
         before = float(modes.frequency[mode])
         after = frequency_of(gearbox, int(mode), STIFFNESS | {pair: (1.0 + little) * STIFFNESS[pair]})
         # The curvature of the square root over 10 % is 2.4 % of the shift; smaller ones are left out.
@@ -61,7 +61,7 @@ def swapping() -> ParameterVariation:
 
 
 def test_a_followed_mode_that_fades_is_no_gain_where_another_takes_over():
-    seen = guarded(swapping(), 500.0)
+    seen = track_mode(swapping(), 500.0)
     assert seen.amplification[-1] / seen.amplification[0] == pytest.approx(2.0 / 80.0)
     assert seen.loudest.tolist() == [80.0, 70.0, 42.0, 74.0, 82.0]
     best = best_change(swapping(), 500.0)
@@ -94,9 +94,9 @@ def test_a_card_has_25_words_at_most_whatever_the_names(gearbox):
     names = ("generator side planet carrier", "rotor side cylindrical roller bearing")
     words = Labels(gearbox)
     loudness = {
-        "error": Loudness(55.6e-6, "", 1234),
-        "force": Loudness(12e3, names[1], 2345),
-        "acceleration": Loudness(129.0, names[1], None),
+        "error": PeakAmplitude(55.6e-6, "", 1234),
+        "force": PeakAmplitude(12e3, names[1], 2345),
+        "acceleration": PeakAmplitude(129.0, names[1], None),
     }
     resonance = Resonance(f"2 x {names[0]} + {names[1]}", 66.0, 2.5, 185.0, loudness)
     ranking = Ranking((resonance,), (1.0, 3.0), False, "shafts")

@@ -59,23 +59,23 @@ def test_three_quantities_stand_side_by_side_and_the_best_place_in_any_comes_fir
     assert ranking.whole and ranking.accelerates == SHAFTS
     first, second, third = ranking.resonances
     assert (first.line, first.best, second.line, second.best) == ("mesh", 1, "2 x mesh", 1)
-    assert (first.loudness["error"].place, first.loudness["force"].place) == (1, 2)
-    assert first.loudness["acceleration"].place is None
+    assert (first.amplitudes["error"].place, first.amplitudes["force"].place) == (1, 2)
+    assert first.amplitudes["acceleration"].place is None
     assert second.frequency == pytest.approx(20.0 * 3.99 / (2.0 * np.pi))
-    assert second.loudness["force"].amplitude == pytest.approx(50.0, rel=1e-6)  # 30, 40 and 50: Pythagoras
-    assert {name: own.place for name, own in second.loudness.items()} == {"error": 3, "force": 1, "acceleration": 1}
+    assert second.amplitudes["force"].amplitude == pytest.approx(50.0, rel=1e-6)  # 30, 40 and 50: Pythagoras
+    assert {name: own.place for name, own in second.amplitudes.items()} == {"error": 3, "force": 1, "acceleration": 1}
     assert (third.line, third.best, third.speed) == ("2 x mesh", 2, pytest.approx(-1.5))
-    low, high = first.loudness["force"].limits
+    low, high = first.amplitudes["force"].limits
     assert (low.amplitude, low.place, high.amplitude, high.place) == (80.0, 1, 6.0, 2)
-    assert first.loudness["force"].places == second.loudness["force"].places == (1, 2)
-    assert third.loudness["error"].limits is None and third.loudness["error"].places is None
+    assert first.amplitudes["force"].places == second.amplitudes["force"].places == (1, 2)
+    assert third.amplitudes["error"].limits is None and third.amplitudes["error"].places is None
 
 
 def test_only_speeds_of_operation_are_ranked_and_all_where_none_of_them_was_computed():
     inside = ranking_of(response([1.8, 3.0], carried=True))
     assert [own.line for own in inside.resonances] == ["mesh"]
     assert (inside.speeds, inside.whole, inside.accelerates) == ((1.8, 3.0), False, HOUSING)
-    assert inside.resonances[0].loudness["force"].place == 1
+    assert inside.resonances[0].amplitudes["force"].place == 1
     beyond = ranking_of(response([50.0, 60.0]))
     assert beyond.whole and len(beyond.resonances) == 3
 
@@ -111,6 +111,6 @@ def test_the_ranking_of_the_grc_is_of_its_speeds_of_operation_and_of_shafts(grc,
     assert all(low <= -own.speed <= high for own in ranking.resonances)
     assert [own.best for own in ranking.resonances] == sorted(own.best for own in ranking.resonances)
     for quantity in ("error", "force", "acceleration"):
-        found = {own.loudness[quantity].place: own.loudness[quantity].amplitude for own in ranking.resonances}
+        found = {own.amplitudes[quantity].place: own.amplitudes[quantity].amplitude for own in ranking.resonances}
         placed = [found[place] for place in sorted(place for place in found if place is not None)]
         assert placed == sorted(placed, reverse=True)

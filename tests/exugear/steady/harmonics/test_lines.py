@@ -81,7 +81,7 @@ def test_a_function_of_one_base_on_the_lattice_is_its_series_at_the_angles(base)
     harmonics = np.array([[2.0, 0.3 + 0.1j, 0.2j], [0.0, 1.0j, -0.5]])
     turns = np.exp(1j * found.angles[:, base])
     series = [own[0].real + 2.0 * np.real(own[1] * turns + own[2] * turns**2) for own in harmonics]
-    np.testing.assert_allclose(found.along_base(base, harmonics), series, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(found.sample_along_base(base, harmonics), series, rtol=0.0, atol=1e-12)
 
 
 def balance(damping, frequency, lines, functions, force):

@@ -10,7 +10,7 @@ import pytest
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.templates.kinds import template
-from exugear.system.tooth_mesh.tables import fitting_table, requested_tables, wandering_loads
+from exugear.system.tooth_mesh.tables import fitting_table, requested_tables, shuttling_pairs
 
 from ...cases.command import exugear
 from ...cases.spur import SPUR_CASE
@@ -27,7 +27,7 @@ def with_tables(content, folder):
 
 @pytest.mark.validation
 def test_the_load_of_spur_teeth_stays_in_the_middle(tmp_path):
-    (own,) = wandering_loads(with_tables(tomllib.loads(SPUR_CASE), tmp_path), tmp_path)
+    (own,) = shuttling_pairs(with_tables(tomllib.loads(SPUR_CASE), tmp_path), tmp_path)
     assert own.amplitude < 1e-6
     assert own.over_error < 0.01
 
@@ -36,7 +36,7 @@ def test_the_load_of_spur_teeth_stays_in_the_middle(tmp_path):
 def test_the_load_of_helical_teeth_moves_along_them_as_their_contact_has_it(tmp_path):
     """Moment over push by the line loads of the contact itself, summed along the face."""
     gearbox = with_tables(tomllib.loads(template("pair")), tmp_path)
-    (own,) = wandering_loads(gearbox, tmp_path)
+    (own,) = shuttling_pairs(gearbox, tmp_path)
     point = fitting_table(gearbox, "helical", tmp_path).static_state
     line_load = point["line_load"].sum("tooth").to_numpy()
     across = point["axial_position"].to_numpy()

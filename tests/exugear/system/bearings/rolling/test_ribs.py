@@ -20,7 +20,7 @@ from exugear.system.bearings.rolling.rows import (
     RIB_APPROACH,
     BearingError,
     BearingOfRows,
-    on_raceways,
+    raceway_rows,
 )
 
 from ....cases.rolling import assert_compiled_forces_are_those_of
@@ -92,7 +92,7 @@ def test_the_contact_of_ribs_is_told_as_an_estimate():
     (found,) = [one for one in estimates(section("+z")) if one.key == "rib_contact_mm"]
     assert (found.low, found.value, found.high) == pytest.approx((1.89, 3.78, 5.67))
     assert not any(one.key == "rib_contact_mm" for one in estimates(section("none")))
-    assert len(on_raceways(rows("both"))) == 1
+    assert len(raceway_rows(rows("both"))) == 1
 
 
 @pytest.mark.parametrize(
