@@ -10,23 +10,36 @@ from exugear.cli.tables import print_table, print_text, wrapped
 from exugear.life.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet
 
 _BLOCKS: Mapping[str, tuple[str, ...]] = {
-    "load": ("torque", "F_t", "v", "N_L", "K_A", "K_gamma", "K_v", "F_betax", "K_Hbeta", "K_Halpha"),
-    "stiffness": ("K_Fbeta", "K_Falpha", "c'", "c_gammaalpha"),
-    "flank": ("Z_H", "Z_E", "Z_eps", "Z_beta", "Z_BD", "sigma_H0", "sigma_H"),
+    "load": ("torque", "load_torque", "F_t", "v", "N_L", "K_A", "K_gamma", "K_v", "F_betax", "K_Hbeta", "K_Halpha"),
+    "stiffness": ("K_Fbeta", "K_Falpha", "c'", "c_gammaalpha", "m_red", "n_E1", "N"),
+    "flank": ("Z_H", "Z_E", "Z_eps", "Z_beta", "f_ZCa", "Z_BD", "sigma_H0", "sigma_H"),
     "endured": ("sigma_Hlim", "Z_NT", "Z_L", "Z_v", "Z_R", "Z_W", "Z_X", "sigma_HG", "S_H"),
-    "root": ("Y_F", "Y_S", "Y_beta", "Y_B", "Y_DT", "sigma_F0", "sigma_F"),
+    "root": ("f_eps", "Y_F", "Y_S", "Y_beta", "Y_B", "Y_DT", "sigma_F0", "sigma_F"),
     "broken": ("sigma_Flim", "Y_NT", "Y_deltarelT", "Y_RrelT", "Y_X", "Y_rel", "Y_M", "sigma_FG", "S_F"),
 }
+_WORDS = {"torque": "torque of the gear", "load_torque": "torque of the loaded body"}
+_OF_2019 = ("f_ZCa", "f_eps")
+"""Factors of helical gears in the edition of 2019; their rows are omitted for other gears."""
 GEAR_COLUMN = 14
 """Width in characters at which the heading of a gear is wrapped."""
-_DIGITS = {"MPa": ".1f", "kN": ".4g", "kN m": ".5g", "m/s": ".3f", "um": ".1f", "N/(mm um)": ".3f", "N^0.5/mm": ".3f"}
+_DIGITS = {
+    "MPa": ".1f",
+    "kN": ".4g",
+    "kN m": ".5g",
+    "m/s": ".3f",
+    "um": ".1f",
+    "kg/mm": ".4f",
+    "rpm": ".0f",
+    "N/(mm um)": ".3f",
+    "N^0.5/mm": ".3f",
+}
 
 
 def print_rating(sheet: RatingSheet) -> None:
     """Print a rating sheet with its assumptions and neglected effects."""
     print_text(f"Rating to {sheet.edition}, method B; {sheet.load}")
     for title, flanks in _meshes(sheet):
-        print_table(f"Mesh {title}", [*_rows(flanks)])
+        print_table(f"Mesh {title}", [*_rows(flanks, sheet.other_edition)])
         for line in dict.fromkeys(line for flank in flanks for line in _remarks(flank)):
             note(line, style="yellow")
     for line in sheet.assumptions:
@@ -39,15 +52,19 @@ def _meshes(sheet: RatingSheet) -> Iterator[tuple[str, list[FlankSheet]]]:
     """Yield the gears of each mesh for one direction of load, with a title."""
     found: dict[tuple[str, int], list[FlankSheet]] = {}
     for flank in sheet.flanks:
-        sense = 1 if flank.standard["torque"] > 0.0 else -1
-        found.setdefault((flank.family, sense), []).append(flank)
+        found.setdefault((flank.family, flank.sense), []).append(flank)
     for (family, sense), flanks in found.items():
         yield family if sense > 0 else f"{family}, reversed load", flanks
 
 
-def _rows(flanks: list[FlankSheet]) -> Iterator[dict[str, str]]:
-    for name in (name for block in _BLOCKS.values() for name in block):
-        yield _row(name, name, flanks, lambda one: one.standard)
+def _rows(flanks: list[FlankSheet], other_edition: str) -> Iterator[dict[str, str]]:
+    names = [name for block in _BLOCKS.values() for name in block]
+    for name in names:
+        if name not in _OF_2019 or any(name in flank.standard for flank in flanks):
+            yield _row(name, _WORDS.get(name, name), flanks, lambda one: one.standard)
+    for name in names:
+        if any(name in flank.other_edition for flank in flanks):
+            yield _row(name, f"{name}, {other_edition}", flanks, lambda one: one.other_edition)
     if any(flank.finite_elements for flank in flanks):
         for name in FINITE_ELEMENTS:
             yield _row(name, f"{name}, finite elements", flanks, lambda one: one.finite_elements)

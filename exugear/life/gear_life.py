@@ -1,4 +1,4 @@
-"""Life of gears to ISO 6336:2006 with stresses from finite element contact: Miner's sums and safety factors by flank.
+"""Life of gears to ISO 6336 with stresses from finite element contact: Miner's sums and safety factors by flank.
 
 Load sharing, misalignment and the load distribution along face and profile are included in the stresses. K_gamma is
 included in the forces of the static balance, for each planet and angle; only K_v is a separate factor, so no influence
@@ -33,6 +33,7 @@ from fe_ste.standards.pitting import (
     CASE_HARDENED_CONTACT,
     THROUGH_HARDENED_BENDING,
     THROUGH_HARDENED_CONTACT,
+    UNMODIFIED,
     LifeCurve,
     damages,
     lubricant_factor,
@@ -40,10 +41,12 @@ from fe_ste.standards.pitting import (
     reduced_radius,
     roughness_factor,
     safety_factor,
+    single_contact_factors,
     tangential_force,
     velocity_factor,
 )
 from fe_ste.standards.tooth_root import (
+    RootStressFactors,
     notch_factor,
     root_face_load_factor,
     root_stress_factors,
@@ -102,8 +105,8 @@ class FlankLife:
     """sigma_H0 of ISO 6336-2 and sigma_F0 of ISO 6336-3 at the largest load, for comparison."""
     standard_contact_safety: float
     standard_root_safety: float
-    """S_H and S_F over the life with nominal stresses of ISO 6336-2 and -3, K_gamma and K_v of each load, K_Hbeta of
-    finite elements, K_Fbeta from K_Hbeta, and K_Halpha = K_Falpha = 1; NaN without strength."""
+    """S_H and S_F over the life with stresses of ISO 6336-2 and -3, K_gamma and K_v of each load, K_Hbeta of finite
+    elements, K_Fbeta from K_Hbeta, and K_Halpha = K_Falpha = 1; NaN without strength."""
     outside: float
     """Largest fraction of the load outside the path of contact, which tip relief would remove."""
     face_load: float
@@ -128,8 +131,31 @@ def check_strengths(
                 f"rating.gears.{name}.mean_stress_factor: this key is missing; teeth of {name} are loaded on both "
                 "flanks (alternating bending)"
             ).faults
+    if rating.f_ZCa is not None and not any(
+        mesh.pair.overlap_ratio > 0.0 and is_modified(gearbox, mesh.pair) for mesh in gearbox.meshes
+    ):
+        faults += gearbox.fault(
+            f"rating.f_ZCa = {rating.f_ZCa:g}: no helical gear has a modification; add [gears.NAME.modification], or "
+            f"remove the key (f_ZCa = {UNMODIFIED:g})"
+        ).faults
     if faults:
         raise GearboxFileError(*faults)
+
+
+def is_modified(gearbox: Gearbox, pair: GearPair) -> bool:
+    """Return whether the file removes material from the flanks of a gear of the pair."""
+    for gear in (pair.pinion, pair.gear):
+        section = gearbox.case.gears[gear.name].modification
+        if section is not None and section.removes_material:
+            return True
+    return False
+
+
+def auxiliary_factor(gearbox: Gearbox, rating: RatingSection, pair: GearPair) -> float:
+    """Return f_ZCa of ISO 6336-2:2019: the value of the file for modified flanks, otherwise 1.2."""
+    if rating.f_ZCa is not None and is_modified(gearbox, pair):
+        return rating.f_ZCa
+    return UNMODIFIED
 
 
 def warn_beyond_tables(
@@ -285,9 +311,12 @@ class _Case:
             stress.at(stress.compression, 1.0, torque, tilt)[..., member],
         )
 
+    def _root_factors(self) -> RootStressFactors:
+        return root_stress_factors(self.pair, self.tooth.member, edition=self.rating.edition)
+
     def _nominal_root(self, force: float) -> float:
         area = self.pair.face_width * self.pair.pinion.normal_module
-        return force / area * root_stress_factors(self.pair, self.tooth.member).product
+        return force / area * self._root_factors().product
 
     def _rated(
         self, hertz: Floats, root: Floats, cycles: Floats, speed: Floats, worst_hertz: float, worst_root: float
@@ -328,7 +357,11 @@ class _Case:
         force = tangential_force(self.pair.pinion, 1.0) * torque / self.pair.pinion.base_radius
         contact, bending = life_curves(strength)
         allowed = self._contact_strength(strength, speed)[:, None, None]
-        hertz = nominal_contact_stress(self.pair, 1.0) * np.sqrt(force * face)
+        auxiliary = 1.0
+        if self.rating.edition == "ISO 6336:2019":
+            auxiliary = auxiliary_factor(self.gearbox, self.rating, self.pair)
+        single = single_contact_factors(self.pair, auxiliary)[self.tooth.member]
+        hertz = single * nominal_contact_stress(self.pair, 1.0) * np.sqrt(force * face)
         flank = safety_factor(contact, hertz / allowed, 1.0, cycles)
         root = self._nominal_root(1.0) * force * root_face_load_factor(face, self.pair)
         return flank, safety_factor(bending, root, root_strength(strength, self.pair, self.tooth.member), cycles)

@@ -83,7 +83,7 @@ def mesh_stiffness(
 
     Parameters
     ----------
-    pair : the pair. An internal gear counts as a rack: infinitely many teeth, no profile shift.
+    pair : gear pair. For an internal gear the tooth number is infinite; its profile shift is included.
     tangential_force
         F_t at the reference circle, N. Below 100 N/mm of face width the stiffness falls with the fourth root of the
         load; without a force that correction is omitted.
@@ -138,13 +138,17 @@ def mesh_stiffness(
 
 
 def _flexibility(pair: GearPair) -> float:
-    """q', flexibility of one pair of teeth per unit of face width, mm um/N."""
+    """q', flexibility of one pair of teeth per unit of face width, mm um/N.
+
+    For an internal gear only the tooth number is infinite. Its profile shift has the sign of ISO 21771, opposite to
+    that of `Gear`.
+    """
     x_1 = pair.pinion.profile_shift
-    x_2 = pair.gear.profile_shift
+    x_2 = pair.gear.profile_shift * pair.gear.outward
     per_tooth_1 = 1.0 / _virtual_teeth(pair.pinion)
     per_tooth_2 = 1.0 / _virtual_teeth(pair.gear)
     if pair.gear.internal:
-        x_2 = per_tooth_2 = 0.0
+        per_tooth_2 = 0.0
     return (
         0.04723
         + 0.15551 * per_tooth_1
@@ -196,6 +200,9 @@ def _outside_validity(pair: GearPair, line_load: float | None) -> tuple[str, ...
 
 Hardening = Literal["case_hardened", "through_hardened"]
 """Steels that the standard has constants of."""
+Edition = Literal["ISO 6336:2019", "ISO 6336:2006"]
+"""Editions of the standard. They differ in Z_B and Z_D (`fe_ste.standards.pitting`) and in Y_F and Y_beta
+(`fe_ste.standards.tooth_root`) of helical gears. Both use the load factors of 2006."""
 
 _RESONANCE, _ABOVE = 1.15, 1.5
 """Speed ratios where the main resonance ends, and where the supercritical range begins."""
@@ -252,34 +259,54 @@ def helix_running_in(misalignment: float, hardening: Hardening, limit: float, ve
     return min(320e6 / limit * misalignment, 1e-6 * most * 1e6 / limit, misalignment)
 
 
-def reduced_mass(pair: GearPair, meshes: tuple[int, int] = (1, 1)) -> float:
-    """m_red: mass of both gears that vibrates along the line of action, over the face width, kg/m.
+def reduced_mass(pair: GearPair, meshes: tuple[int, int] = (1, 1), ring_held: bool = True) -> float:
+    """m_red: reduced mass of both gears on the line of action per unit of face width, kg/m.
 
     Parameters
     ----------
-    pair : external gears; solid between the held diameter and the middle of the teeth
-    meshes : teeth in mesh at once around gear 1 and gear 2: a sun has as many as planets
+    pair : gears that are solid between the held diameter and the middle of the teeth; for an internal gear, its rim
+    meshes : simultaneous meshes of gear 1 and gear 2; for a sun, the number of planets
+    ring_held : whether the housing holds an internal gear, which then has infinite mass
+
+    Notes
+    -----
+    Sun and p planets: ``J_p J_s / (p r_bs^2 J_p + r_bp^2 J_s)``. Planet and held ring: ``J_p / r_bp^2``.
     """
-    masses = (_mass_on_base_circle(gear) for gear in (pair.pinion, pair.gear))
+    masses = [_mass_on_base_circle(gear) for gear in (pair.pinion, pair.gear)]
+    if pair.gear.internal and ring_held:
+        masses[1] = math.inf
     return 1.0 / sum(count / mass for count, mass in zip(meshes, masses, strict=True))
 
 
 def _mass_on_base_circle(gear: Gear) -> float:
     """Polar moment of inertia over width and squared base radius, kg/m."""
     middle = 0.5 * (gear.tip_radius + gear.root_radius)
-    inertia = 0.5 * math.pi * gear.material.density * (middle**4 - (0.5 * gear.held_diameter) ** 4)
+    inertia = 0.5 * math.pi * gear.material.density * abs(middle**4 - (0.5 * gear.held_diameter) ** 4)
     return inertia / gear.base_radius**2
 
 
-def resonance_ratio(pair: GearPair, mesh_stiffness: float, speed: float, meshes: tuple[int, int] = (1, 1)) -> float:
+def resonance_speed(pair: GearPair, mesh_stiffness: float, mass: float) -> float:
+    """n_E1: speed of gear 1 relative to its frame at the main resonance, rad/s.
+
+    Parameters
+    ----------
+    mesh_stiffness : c_gamma_alpha, N/m per m
+    mass : m_red, kg/m, from `reduced_mass`
+    """
+    return math.sqrt(mesh_stiffness / mass) / pair.pinion.teeth
+
+
+def resonance_ratio(
+    pair: GearPair, mesh_stiffness: float, speed: float, meshes: tuple[int, int] = (1, 1), ring_held: bool = True
+) -> float:
     """N: speed of gear 1 against its frame (rad/s) over that of the main resonance.
 
     Parameters
     ----------
     mesh_stiffness : c_gamma_alpha, N/m per m
-    meshes : as in `reduced_mass`
+    meshes, ring_held : as in `reduced_mass`
     """
-    return abs(speed) * pair.pinion.teeth / math.sqrt(mesh_stiffness / reduced_mass(pair, meshes))
+    return abs(speed) / resonance_speed(pair, mesh_stiffness, reduced_mass(pair, meshes, ring_held))
 
 
 def dynamic_factor(

@@ -1,6 +1,10 @@
-"""Contact stress and permissible contact stress according to ISO 6336-2:2006, method B.
+"""Contact stress and permissible contact stress according to ISO 6336-2, method B, editions of 2019 and 2006.
 
 Checked against the first worked example of ISO/TR 6336-30:2017. Case-hardened and through-hardened steels.
+
+The edition of 2019 has the auxiliary factor f_ZCa in Z_B and Z_D of helical gears. Source: F. Mehlan, MADE4WIND
+drivetrain optimizer, https://github.com/FelixMehlan/MADE4WIND-drivetrain-optimizer, package `gearopt.safety` (1.2
+without flank modification, 1 for rings). The results of a rating program that its tests quote confirm both values.
 """
 
 from __future__ import annotations
@@ -15,6 +19,8 @@ from fe_ste.tools.arrays import Floats
 
 _SOFT, _HARD = 850e6, 1200e6
 """Allowable stress numbers, Pa, between which the constants of oil, speed and roughness change."""
+UNMODIFIED = 1.2
+"""f_ZCa of helical gears without profile and lead modification, ISO 6336-2:2019."""
 _REFERENCE_RADIUS = 10e-3
 """Reduced radius of curvature to which roughness is referred, m."""
 
@@ -53,12 +59,26 @@ def helix_factor(gear: Gear) -> float:
     return 1.0 / math.sqrt(math.cos(gear.helix_angle))
 
 
-def single_contact_factors(pair: GearPair) -> tuple[float, float]:
-    """Z_B and Z_D: from the pitch point to the inner points of single contact of gear 1 and gear 2."""
+def single_contact_factors(pair: GearPair, auxiliary_factor: float = 1.0) -> tuple[float, float]:
+    """Z_B and Z_D: from the pitch point to the inner points of single contact of gear 1 and gear 2.
+
+    Parameters
+    ----------
+    auxiliary_factor : f_ZCa of helical gears in the edition of 2019; 1 in the edition of 2006
+
+    Notes
+    -----
+    For overlap ratios of at least 1, Z_B and Z_D of external gears are the square root of f_ZCa; Z_D of an internal
+    gear is 1. For smaller overlap ratios they are interpolated linearly to the value of a spur gear, as in the edition
+    of 2006; the source does not cover this range.
+    """
     overlap = pair.overlap_ratio
     slope = math.tan(pair.working_pressure_angle)
+    helical = math.sqrt(auxiliary_factor)
     if overlap >= 1.0:
-        return 1.0, 1.0
+        if pair.gear.internal:
+            return helical, 1.0
+        return helical, helical
     one, two = (
         math.sqrt((gear.tip_radius / gear.base_radius) ** 2 - 1.0) * gear.outward for gear in (pair.pinion, pair.gear)
     )
@@ -69,7 +89,7 @@ def single_contact_factors(pair: GearPair) -> tuple[float, float]:
     factors = []
     for curvature in (at_one, at_two):
         factor = slope / math.sqrt(abs(curvature))
-        factors.append(max(factor - overlap * (factor - 1.0), 1.0))
+        factors.append(max(factor - overlap * (factor - helical), 1.0))
     return factors[0], 1.0 if pair.gear.internal else factors[1]
 
 

@@ -1,4 +1,8 @@
-"""Nominal tooth root stress to ISO 6336-3:2006 method B, for comparison with the finite elements.
+"""Nominal tooth root stress to ISO 6336-3 method B, editions of 2019 and 2006.
+
+The edition of 2019 has the load distribution influence factor f_epsilon in Y_F, and divides Y_beta by cos^3(beta).
+Source: F. Mehlan, MADE4WIND drivetrain optimizer, https://github.com/FelixMehlan/MADE4WIND-drivetrain-optimizer,
+package `gearopt.safety`. The results of a rating program that its tests quote confirm both factors.
 
 Gears without protuberance and undercut, tooth thinning neglected; internal gears to Corrigendum 1 of 2007, with their
 pinion-type cutter. Lengths in the formulas are in normal modules of the virtual spur gear in the normal section; an
@@ -14,7 +18,7 @@ import numpy as np
 
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.geometry.involute import involute
-from fe_ste.standards.iso6336 import Hardening
+from fe_ste.standards.iso6336 import Edition, Hardening
 from fe_ste.tools.arrays import Floats
 
 _ROOT_ANGLE, _RING_ROOT_ANGLE = math.pi / 3.0, math.pi / 6.0
@@ -36,7 +40,9 @@ class RootStressFactors:
     form: float
     stress_correction: float
     helix: float
-    """Y_F and Y_S with the load at the outer point of single contact, Y_beta."""
+    """Y_F (with f_epsilon) and Y_S with the load at the outer point of single contact, Y_beta."""
+    load_distribution: float
+    """f_epsilon of the edition of 2019; 1 in the edition of 2006."""
     rim: float
     deep_tooth: float
     """Y_B of thin rims, Y_DT of deep teeth of high accuracy."""
@@ -52,9 +58,13 @@ class RootStressFactors:
 
 
 def root_stress_factors(
-    pair: GearPair, member: int, tolerance_class: int | None = None, free_bore: bool = False
+    pair: GearPair,
+    member: int,
+    tolerance_class: int | None = None,
+    free_bore: bool = False,
+    edition: Edition = "ISO 6336:2019",
 ) -> RootStressFactors:
-    """Factors of the root stress of a gear in its pair, ISO 6336-3:2006, method B.
+    """Factors of the root stress of a gear in its pair, ISO 6336-3, method B.
 
     Parameters
     ----------
@@ -64,6 +74,7 @@ def root_stress_factors(
     free_bore
         Whether the diameter at which an external gear is held is a bore that nothing fills, as in planets on rollers,
         and not a seat on a shaft: its rim then counts, as that of a ring does.
+    edition : of the standard
     """
     gear = (pair.pinion, pair.gear)[member]
     virtual = gear.teeth / (math.cos(gear.base_helix_angle) ** 2 * math.cos(gear.helix_angle))
@@ -74,22 +85,69 @@ def root_stress_factors(
     shared = math.pi * math.cos(gear.normal_pressure_angle) * (contact_ratio - 1.0) * gear.outward
     loaded = 2.0 * math.hypot(0.5 * math.sqrt(tip**2 - base**2) - shared, 0.5 * base)
     form, correction, notch = form_and_correction(gear, virtual, loaded)
-    overlap = pair.overlap_ratio
-    helix = 1.0 - min(overlap, 1.0) * min(abs(gear.helix_angle), _LARGEST_HELIX) / math.radians(120.0)
+    distribution = 1.0
+    if edition == "ISO 6336:2019":
+        distribution = load_distribution_factor(pair.overlap_ratio, contact_ratio)
     remarks = {
         f"notch parameter q_s = {notch:.2f} is outside 1 to 8": not 1.0 <= notch <= 8.0,
         f"virtual contact ratio {contact_ratio:.2f} is not below 2": contact_ratio >= 2.0,
         "no cutter is specified: the root fillet of its rack is used": gear.internal and gear.cutter is None,
     }
     return RootStressFactors(
-        form=form,
+        form=form * distribution,
         stress_correction=correction,
-        helix=helix,
+        helix=helix_factor(gear.helix_angle, pair.overlap_ratio, edition),
+        load_distribution=distribution,
         rim=rim_factor(gear) if gear.internal or free_bore else 1.0,
         deep_tooth=_deep_tooth_factor(contact_ratio, tolerance_class),
         notch=notch,
         outside_validity=tuple(text for text, applies in remarks.items() if applies),
     )
+
+
+def load_distribution_factor(overlap: float, contact_ratio: float) -> float:
+    """f_epsilon of ISO 6336-3:2019: load distribution influence factor in Y_F.
+
+    Parameters
+    ----------
+    overlap : eps_beta
+    contact_ratio : eps_alpha_n, of the virtual spur gear
+
+    Notes
+    -----
+    1 for spur gears (0.7 for contact ratios of at least 2), ``eps_alpha_n^-0.5`` for overlap ratios of at least 1. In
+    between, the square is interpolated linearly, which makes the factor continuous; the source interpolates the factor
+    itself to ``1 / eps_alpha_n`` and is discontinuous there.
+
+    Examples
+    --------
+    >>> [round(load_distribution_factor(eps_beta, 1.5), 3) for eps_beta in (0.0, 0.5, 1.0, 1.5)]
+    [1.0, 0.913, 0.816, 0.816]
+    """
+    if overlap >= 1.0:
+        return 1.0 / math.sqrt(contact_ratio)
+    spur, spur_squared = (1.0, 1.0)
+    if contact_ratio >= 2.0:
+        spur, spur_squared = (0.7, 0.5)
+    if overlap <= 0.0:
+        return spur
+    return math.sqrt(spur_squared * (1.0 - overlap) + overlap / contact_ratio)
+
+
+def helix_factor(helix_angle: float, overlap: float, edition: Edition = "ISO 6336:2019") -> float:
+    """Y_beta of the helix angle (rad, 30 deg at most) and the overlap ratio (1 at most).
+
+    Examples
+    --------
+    >>> angle = math.radians(15.0)
+    >>> [round(helix_factor(angle, 1.5, edition), 3) for edition in ("ISO 6336:2006", "ISO 6336:2019")]
+    [0.875, 0.971]
+    """
+    angle = min(abs(helix_angle), _LARGEST_HELIX)
+    factor = 1.0 - min(overlap, 1.0) * angle / math.radians(120.0)
+    if edition == "ISO 6336:2006":
+        return factor
+    return float(factor / math.cos(angle) ** 3)
 
 
 def rim_factor(gear: Gear) -> float:

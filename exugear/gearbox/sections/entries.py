@@ -164,6 +164,7 @@ MeanRoughnessUm = Annotated[float, Range(0.02, 20.0, (0.1, 3.0), "Ra, a sixth of
 OilTemperature = Annotated[float, Range(-50.0, 250.0, (0.0, 120.0))]
 StrengthFactor = Annotated[float, Range(0.1, 2.0, (0.5, 1.3))]
 LoadFactorK = Annotated[float, Range(1.0, 10.0, (1.0, 2.0))]
+AuxiliaryFactor = Annotated[float, Range(1.0, 1.2, None, "f_ZCa is 1.2 without flank modification")]
 Viscosity = Annotated[float, Range(1.0, 5000.0, (15.0, 1000.0), "mm2/s at 40 degrees Celsius")]
 HotViscosity = Annotated[float, Range(0.5, 1000.0, (2.0, 100.0), "mm2/s at 100 degrees Celsius")]
 HeatConductance = Annotated[float, Range(0.01, 1e6, (1.0, 1e4), "W/K from the oil to the surroundings")]

@@ -89,6 +89,12 @@ class ModificationSection(Section):
     topography: FileName | None = None
     """CSV file of material removed over radius and face width, in the folder of the gearbox file."""
 
+    @property
+    def removes_material(self) -> bool:
+        """Whether any of the amounts differs from zero."""
+        amounts = (value for key, value in self if key.endswith("_um"))
+        return self.topography is not None or any(amounts)
+
     @model_validator(mode="after")
     def _starts(self) -> ModificationSection:
         for kind in ("tip", "root"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from exugear.gearbox.sections import entries as q
 from exugear.gearbox.sections.entries import Entries, FileName, Name, Section, Text
@@ -125,7 +125,7 @@ class LoadsSection(Section):
 
 
 class StrengthSection(Section):
-    """Strength of a gear according to ISO 6336:2006; material data from ISO 6336-5 or from tests."""
+    """Strength of a gear according to ISO 6336; material data from ISO 6336-5 or from tests."""
 
     sigma_H_lim_MPa: q.StressMPa
     """Allowable stress number for contact."""
@@ -189,8 +189,12 @@ class StrengthSection(Section):
 class RatingSection(Section):
     """Rating settings and the strength of the gears."""
 
-    edition: Literal["ISO 6336:2006"] = "ISO 6336:2006"
-    """Edition of the standard, named in every output."""
+    edition: Literal["ISO 6336:2019", "ISO 6336:2006"] = "ISO 6336:2019"
+    """Edition of the standard, listed in every output; the year (2019, 2006) is also accepted. The rating sheet also
+    lists values that differ by more than 1 % in the other edition."""
+    f_ZCa: q.AuxiliaryFactor | None = None
+    """Auxiliary factor of the contact stress of helical gears (ISO 6336-2:2019) for pairs with a `modification`; less
+    than 1.2 requires a modification that suits load and deflection. Other helical gears have 1.2."""
     dynamic_factor: q.LoadFactorK | None = None
     """Specified K_v of all meshes; or one of the next two keys together with `minimum_dynamic_factor`."""
     dynamic_factor_run: Name | None = None
@@ -219,6 +223,21 @@ class RatingSection(Section):
     """Required safety factor for tooth root breakage, over the life and under the maximum load."""
     minimum_S_0: q.SafetyFactor = 1.0
     """Required static safety factor of bearings."""
+
+    @field_validator("edition", mode="before")
+    @classmethod
+    def _edition_of_year(cls, value: Any) -> Any:
+        if str(value) in ("2006", "2019"):
+            return f"ISO 6336:{value}"
+        return value
+
+    @model_validator(mode="after")
+    def _edition(self) -> RatingSection:
+        if self.f_ZCa is not None and self.edition == "ISO 6336:2006":
+            raise ValueError(
+                f"f_ZCa = {self.f_ZCa:g}: {self.edition} does not have this factor; remove the key or set edition"
+            )
+        return self
 
     @model_validator(mode="after")
     def _dynamic_factor(self) -> RatingSection:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from exugear.gearbox.sections.loads import RatingSection
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.life.dynamic_factors import stated_factors
-from exugear.life.gear_life import check_strengths, flank_lives
+from exugear.life.gear_life import auxiliary_factor, check_strengths, flank_lives, is_modified
 from exugear.life.life import NOT_RATED, checked_loads, rating_of
 from exugear.life.load_spectrum.counted import (
     FLANKS,
@@ -33,13 +33,18 @@ from exugear.life.rating.standard import FlankRules, MeshLoads, rate
 from exugear.life.static_balance import ActingLoads, StaticBalance, acting_loads, static_balance
 from exugear.system.system import Assembly
 from fe_ste.root_stress import MeshCycleStress
-from fe_ste.standards.pitting import tangential_force
+from fe_ste.standards.iso6336 import Edition
+from fe_ste.standards.pitting import UNMODIFIED, tangential_force
 from fe_ste.standards.tooth_root import root_stress_factors
 from fe_ste.tools.display import ReprMixin
 
 if TYPE_CHECKING:
     import xarray as xr
 
+OTHER_EDITION: Mapping[Edition, Edition] = {"ISO 6336:2019": "ISO 6336:2006", "ISO 6336:2006": "ISO 6336:2019"}
+"""Edition that is compared with the edition of the file."""
+LISTED_DIFFERENCE = 0.01
+"""Relative difference above which the value of the other edition is listed."""
 LEAST_FORCE = 1.0
 """Tangential force, N, below which a mesh counts as unloaded and is not rated."""
 FINITE_ELEMENTS = ("sigma_H", "sigma_F", "K_Hbeta", "S_H", "S_F")
@@ -50,12 +55,21 @@ UNITS: Mapping[str, tuple[float, str]] = {
     **dict.fromkeys(("c'", "c_gammaalpha"), (1e-9, "N/(mm um)")),
     "F_t": (1e-3, "kN"),
     "torque": (1e-3, "kN m"),
+    "load_torque": (1e-3, "kN m"),
+    "m_red": (1e-3, "kg/mm"),
+    "n_E1": (1.0 / RPM, "rpm"),
     "v": (1.0, "m/s"),
     "F_betax": (1e6, "um"),
     "Z_E": (1e-3, "N^0.5/mm"),
 }
 """Factor from SI to the unit on the sheet, and that unit; other values are dimensionless."""
-_KEY_UNITS = {"N/(mm um)": "N_per_mm_um", "kN m": "kN_m", "m/s": "m_per_s", "N^0.5/mm": "root_MPa"}
+_KEY_UNITS = {
+    "N/(mm um)": "N_per_mm_um",
+    "kN m": "kN_m",
+    "m/s": "m_per_s",
+    "kg/mm": "kg_per_mm",
+    "N^0.5/mm": "root_MPa",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +89,10 @@ class FlankSheet:
     """Reasons why factors are not rated."""
     remarks: tuple[str, ...]
     """Conditions outside the range of the standard."""
+    sense: int = 1
+    """Sign of the loaded body's torque: 1, or -1 for reversed load."""
+    other_edition: Mapping[str, float] = field(default_factory=dict)
+    """Values of the other edition that differ by more than 1 %, SI."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,11 +105,14 @@ class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
     shortfalls: tuple[str, ...]
     assumptions: tuple[str, ...]
     left_out: tuple[str, ...] = NOT_RATED
+    other_edition: str = ""
+    """Edition of the values in `FlankSheet.other_edition`."""
 
     def summary(self) -> dict[str, Any]:
         """Return the values for JSON, with units in the keys; NaN is omitted, infinite values are text."""
         return {
             "edition": self.edition,
+            "other_edition": self.other_edition,
             "load": self.load,
             "flanks": [
                 {
@@ -99,6 +120,7 @@ class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
                     "mesh": flank.family,
                     "flank": flank.flank,
                     "standard": _plain_values(flank.standard),
+                    "other_edition": _plain_values(flank.other_edition),
                     "finite_elements": _plain_values(flank.finite_elements),
                     "not_rated": dict(flank.lacking),
                     "remarks": list(flank.remarks),
@@ -152,6 +174,7 @@ def rating_sheet(
         flanks=tuple(flanks),
         shortfalls=tuple(_shortfalls(rating, flanks)),
         assumptions=(*assumptions, *_assumptions(gearbox, rating)),
+        other_edition=OTHER_EDITION[rating.edition],
     )
 
 
@@ -171,6 +194,7 @@ def _flank(
     if not len(loads.force):
         return None
     found = rate(rules, loads)
+    other = rate(replace(rules, edition=OTHER_EDITION[rules.edition]), loads)
     lacking = dict(rules.lacking())
     if rules.strength is None:
         lacking["S_H, S_F"] = f"not rated: no strength; add [rating.gears.{tooth.gear}]"
@@ -183,13 +207,23 @@ def _flank(
         finite_elements=beside,
         lacking=lacking,
         remarks=root_stress_factors(rules.pair, tooth.member).outside_validity,
+        sense=sense,
+        other_edition={name: value for name, value in other.items() if _differs(found.get(name, math.nan), value)},
     )
+
+
+def _differs(value: float, other: float) -> bool:
+    """Return whether both are numbers that differ by more than `LISTED_DIFFERENCE`."""
+    if not (math.isfinite(value) and math.isfinite(other)):
+        return False
+    return abs(other - value) > LISTED_DIFFERENCE * abs(value)
 
 
 def _rules(gearbox: Gearbox, rating: RatingSection, counted: CountedLoads, tooth: ToothExposure) -> FlankRules:
     family = _family(gearbox, tooth.family)
     pair = family[0].pair
     bodies = gearbox.named_bodies
+    rolling = gearbox.train.rolling_speeds(counted.body, 1.0)
     around = [
         max(
             sum(other.family == one.family and _holder(other, side) == _holder(one, side) for other in gearbox.meshes)
@@ -207,6 +241,9 @@ def _rules(gearbox: Gearbox, rating: RatingSection, counted: CountedLoads, tooth
         viscosity=gearbox.viscosity_40,
         meshes=(around[0], around[1]),
         free_bore=bodies[tooth.holder].planet_of is not None,
+        ring_held=rolling.get(family[0].gear, 0.0) == 0.0,
+        edition=rating.edition,
+        f_ZCa=auxiliary_factor(gearbox, rating, pair),
     )
 
 
@@ -269,6 +306,13 @@ def _assumptions(gearbox: Gearbox, rating: RatingSection) -> Iterator[str]:
     yield (
         "C_R = 1: gears are solid discs; helix and profile modifications are not included in K_v, K_Hbeta and K_Halpha"
     )
+    if rating.edition == "ISO 6336:2019":
+        text = f"f_ZCa = {UNMODIFIED:g} for helical gears without flank modification (Z_B, Z_D)"
+        if rating.f_ZCa is None and any(is_modified(gearbox, mesh.pair) for mesh in gearbox.meshes):
+            text += "; the file has flank modifications: if they suit the load, set f_ZCa of [rating]"
+        yield text
+        yield "K factors, life factors, Z_L, Z_v and Z_R are taken from ISO 6336:2006 in both editions"
+    yield "m_red includes the rim of ring gears, except of those held by the housing"
     yield "Y_B: rim thickness of rings and planets; other gears are solid on shafts. Z_W = Z_X = 1"
     if gearbox.case.loads is None:
         if rating.nominal_hours is None:

@@ -1,4 +1,4 @@
-"""Rating of one flank of a gear to ISO 6336:2006, method B: factors, stresses, permissible stresses and safeties.
+"""Rating of one flank of a gear to ISO 6336, method B: factors, stresses, permissible stresses and safeties.
 
 Load sharing and misalignment are those of the static balance of the shafts. Misalignment and deviations that remain
 after running-in affect the distribution over face and teeth. Under a spectrum, factors are computed for each load and
@@ -19,6 +19,7 @@ from exugear.life.gear_life import hardening_of, life_curves, root_factors, root
 from fe_ste.geometry.gears import GearPair
 from fe_ste.standards.iso1328 import tolerance
 from fe_ste.standards.iso6336 import (
+    Edition,
     FlankDeviations,
     Hardening,
     MethodBStiffness,
@@ -27,10 +28,12 @@ from fe_ste.standards.iso6336 import (
     helix_running_in,
     mesh_stiffness,
     pitch_running_in,
-    resonance_ratio,
+    reduced_mass,
+    resonance_speed,
     transverse_load_factors,
 )
 from fe_ste.standards.pitting import (
+    UNMODIFIED,
     contact_ratio_factor,
     damages,
     elasticity_factor,
@@ -87,6 +90,18 @@ class FlankRules:
     """Simultaneous meshes of gear 1 and of gear 2, for the relative mass."""
     free_bore: bool
     """Whether the gear's bore is free, as for a planet."""
+    ring_held: bool = True
+    """Whether the housing holds an internal gear 2."""
+    edition: Edition = "ISO 6336:2019"
+    f_ZCa: float = UNMODIFIED
+    """Auxiliary factor of helical gears, edition of 2019."""
+
+    @property
+    def auxiliary_factor(self) -> float:
+        """Auxiliary factor in Z_B and Z_D: f_ZCa, or 1 in the edition of 2006."""
+        if self.edition == "ISO 6336:2006":
+            return 1.0
+        return self.f_ZCa
 
     @property
     def strength(self) -> StrengthSection | None:
@@ -122,9 +137,7 @@ class FlankRules:
     def lacking(self) -> dict[str, str]:
         """Return the reasons why factors are not rated, by factor."""
         lines = {}
-        if self.pair.gear.internal:
-            lines["K_v"] = "not rated: c' and mass of ring gears are not modelled; K_v of [rating] is used"
-        elif self.classes is None:
+        if self.classes is None:
             lines["K_v"] = "not rated: set tolerance_class of both gears; K_v of [rating] is used"
         if self.classes is None:
             lines["K_Halpha"] = "not rated: set tolerance_class of both gears; 1 is used"
@@ -137,7 +150,8 @@ def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
 
     Returns
     -------
-    stresses in Pa, F_t in N, v in m/s; unrated values are NaN
+    stresses in Pa, F_t in N, v in m/s; unrated values are NaN. ``torque`` is the torque of the gear from all its
+    meshes of the family, without factors; ``load_torque`` is the torque of the loaded body.
     """
     factors = [_load_factors(rules, loads, place) for place in range(len(loads.force))]
     stresses = [_stresses(rules, factor) for factor in factors]
@@ -165,7 +179,12 @@ def rate(rules: FlankRules, loads: MeshLoads) -> dict[str, float]:
         found["Y_M"] = strength.mean_stress_factor or 1.0
         found |= {"sigma_Hlim": MPA * strength.sigma_H_lim_MPa, "sigma_Flim": MPA * strength.sigma_F_lim_MPa}
     found |= dict(zip(("Z_L", "Z_v", "Z_R"), allowed[decides].tolist(), strict=True))
-    place = {"torque": float(loads.torque[decides]), "N_L": float(loads.turns.sum())}
+    gear = (rules.pair.pinion, rules.pair.gear)[rules.member]
+    place = {
+        "torque": factors[decides]["F_t"] * gear.reference_radius * rules.meshes[rules.member],
+        "load_torque": float(loads.torque[decides]),
+        "N_L": float(loads.turns.sum()),
+    }
     return {**place, **factors[decides], **stresses[decides], **found}
 
 
@@ -185,8 +204,11 @@ def _load_factors(rules: FlankRules, loads: MeshLoads, place: int) -> dict[str, 
     line_load = force * rules.application_factor * sharing / width
     left = _run_in(rules, deviations, velocity)
     dynamic = rules.stated_dynamic_factor
-    if left is not None and not pair.gear.internal:
-        dynamic = _dynamic(rules, stiffness, line_load, float(loads.speed[place]), left)
+    mass = reduced_mass(pair, rules.meshes, rules.ring_held)
+    resonance = resonance_speed(pair, stiffness.mesh_stiffness, mass)
+    ratio = abs(float(loads.speed[place])) / resonance
+    if left is not None:
+        dynamic = _dynamic(rules, stiffness, line_load, ratio, left)
     opening = float(loads.opening[place]) + (deviations.helix if deviations else 0.0)
     taken = _mean(rules, lambda kind, limit: helix_running_in(opening, kind, limit, velocity))
     face = face_load_factor(
@@ -212,15 +234,17 @@ def _load_factors(rules: FlankRules, loads: MeshLoads, place: int) -> dict[str, 
         "K_Falpha": across[1],
         "c'": stiffness.single_stiffness,
         "c_gammaalpha": stiffness.mesh_stiffness,
+        "m_red": mass,
+        "n_E1": resonance,
+        "N": ratio,
     }
 
 
 def _dynamic(
-    rules: FlankRules, stiffness: MethodBStiffness, line_load: float, speed: float, left: FlankDeviations
+    rules: FlankRules, stiffness: MethodBStiffness, line_load: float, ratio: float, left: FlankDeviations
 ) -> float:
     pair = rules.pair
     relief = _running_in_relief(rules) if max(rules.classes or (FINE_CLASS + 1,)) <= FINE_CLASS else None
-    ratio = resonance_ratio(pair, stiffness.mesh_stiffness, speed, rules.meshes)
     return dynamic_factor(ratio, pair.total_contact_ratio, stiffness.single_stiffness, line_load, left, relief)
 
 
@@ -255,8 +279,14 @@ def _stresses(rules: FlankRules, of: dict[str, float]) -> dict[str, float]:
     pair = rules.pair
     member = rules.member
     strength = rules.strength
-    root = root_stress_factors(pair, member, strength.tolerance_class if strength else None, rules.free_bore)
-    single = single_contact_factors(pair)[member]
+    tolerance_class = strength.tolerance_class if strength else None
+    root = root_stress_factors(pair, member, tolerance_class, rules.free_bore, rules.edition)
+    single = single_contact_factors(pair, rules.auxiliary_factor)[member]
+    of_2019 = {}
+    if rules.edition == "ISO 6336:2019" and pair.overlap_ratio > 0.0:
+        of_2019 = {"f_ZCa": rules.f_ZCa, "f_eps": root.load_distribution}
+        if (pair.pinion, pair.gear)[member].internal:
+            of_2019["f_ZCa"] = 1.0
     common = of["K_A"] * of["K_gamma"] * of["K_v"]
     nominal = nominal_contact_stress(pair, of["F_t"])
     nominal_root = of["F_t"] / (pair.face_width * pair.pinion.normal_module) * root.product
@@ -267,6 +297,7 @@ def _stresses(rules: FlankRules, of: dict[str, float]) -> dict[str, float]:
         "Z_eps": contact_ratio_factor(pair),
         "Z_beta": helix_factor(pair.pinion),
         "Z_BD": single,
+        **of_2019,
         "Z_W": 1.0,
         "Z_X": 1.0,
         "Y_F": root.form,

@@ -101,7 +101,8 @@ def test_both_safeties_are_told_and_that_of_the_standard_has_its_factors():
     # Both stresses are proportional to torque at one K_Hbeta: safeties are as strengths over stresses are.
     assert ratio == pytest.approx(1.05 * 1.2**exponent / 1.0, rel=2e-3)
     contact = (one.contact_safety * one.contact_stress) / (one.standard_contact_safety * one.nominal_contact)
-    assert contact == pytest.approx(math.sqrt(1.05 * 1.2), rel=2e-3)
+    # f_ZCa of helical gears without flank modification, ISO 6336-2:2019
+    assert contact == pytest.approx(math.sqrt(1.2 * 1.05 * 1.2), rel=2e-3)
     ring = planets_with()["ring ring_planet"]  # its Y_F is that of Corrigendum 1, and its rim counts
     assert 1.0 < ring.standard_root_safety < math.inf and ring.nominal_root > 0.0
 

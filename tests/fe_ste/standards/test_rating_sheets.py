@@ -1,6 +1,6 @@
 """Load factors, Z and Y factors against sheets that a rating program printed by ISO 6336:2006, method B.
 
-Figures of the stages 2 and 3 of the NREL 5 MW gearbox: stage_02.rtf and stage_03.rtf in folder @NREL_5MW of
+Figures of the NREL 5 MW gearbox: stage_01.rtf to stage_03.rtf in folder @NREL_5MW of
 github.com/gfsReboucas/Drivetrain (at 4a88df3), with their inputs. Deviations there are of ISO 1328-1:1995 and rounded,
 so they are inputs, as C_R is. The density, which no sheet prints, is the 7830 kg/m3 that its reduced masses ask for.
 K_Halpha with f_f_alpha in the place of f_pb, B_k = 1 from class 6 on, and the sign in rho_F of rings were settled by
@@ -26,6 +26,7 @@ from fe_ste.standards.iso6336 import (
     pitch_running_in,
     reduced_mass,
     resonance_ratio,
+    resonance_speed,
     transverse_load_factors,
 )
 from fe_ste.standards.pitting import (
@@ -43,12 +44,13 @@ from fe_ste.standards.pitting import (
     zone_factor,
 )
 from fe_ste.standards.tooth_root import (
+    RootStressFactors,
     notch_factor,
     root_face_load_factor,
-    root_stress_factors,
     size_factor,
     surface_factor,
 )
+from fe_ste.standards.tooth_root import root_stress_factors as root_stress_factors_of
 
 from ..cases.gears import nrel_stage_3
 
@@ -56,6 +58,13 @@ STEEL = Material(density=7830.0)
 RPM = math.pi / 30.0
 LIMIT, VISCOSITY, K_A, K_GAMMA, K_HBETA = 1500e6, 220.0, 1.25, 1.10, 1.150
 LIVES = 12255.788e6, 3096.199e6
+
+
+def root_stress_factors(pair: GearPair, member: int, *options: int, free_bore: bool = False) -> RootStressFactors:
+    """By the edition of the sheets."""
+    return root_stress_factors_of(pair, member, *options, free_bore=free_bore, edition="ISO 6336:2006")
+
+
 STAGE_3 = nrel_stage_3(STEEL)
 
 
@@ -276,7 +285,78 @@ PRINTED_2 = {
 }
 
 
+def stage_1() -> tuple[Gear, Gear, Gear]:
+    common = {"normal_module": 45e-3, "face_width": 0.491, "material": STEEL}
+    sun = Gear(name="sun", teeth=19, profile_shift=0.6170, held_diameter=482.33e-3, tip_diameter=978.808e-3, **common)
+    planet = Gear(
+        name="planet", teeth=17, profile_shift=0.8021, held_diameter=408.99e-3, tip_diameter=905.470e-3, **common
+    )
+    ring = Gear(
+        name="ring",
+        teeth=56,
+        internal=True,
+        profile_shift=0.5013,
+        rack=BasicRack(tip_radius=0.30),
+        held_diameter=2994.24e-3,
+        tip_diameter=2475.118e-3,
+        **common,
+    )
+    return sun, planet, ring
+
+
+@cache
+def sun_planet_1() -> GearPair:
+    """The planet is the smaller gear."""
+    sun, planet, _ = stage_1()
+    return GearPair(name="sun", pinion=planet, gear=sun, centre_distance=0.863 + 1e-6)
+
+
+@cache
+def ring_planet_1() -> GearPair:
+    _, planet, ring = stage_1()
+    return GearPair(name="ring", pinion=planet, gear=ring, centre_distance=0.863 - 1e-6)
+
+
+BLANK_1 = 1.0 + math.log(0.25) / (5.0 * math.exp(3.5 / 5.0))
+"""C_R of the planetary stages: b_s / b = 0.25, s_R = 3.5 m_n."""
+
+
+def stiffness_of(pair: GearPair) -> MethodBStiffness:
+    return mesh_stiffness(pair, blank_factor=BLANK_1)
+
+
+def main_resonance(pair: GearPair, meshes: tuple[int, int]) -> float:
+    """n_E1 of the smaller gear, rpm."""
+    return resonance_speed(pair, stiffness_of(pair).mesh_stiffness, reduced_mass(pair, meshes)) / RPM
+
+
+def dynamic_of_ring_2() -> float:
+    """K_V of planet and ring, stage 2: f_pb 20.7 and f_f_alpha 27 um less the running-in that is printed."""
+    stiffness = stiffness_of(ring_planet())
+    left = FlankDeviations(20.7e-6 - 3.142e-6, 27e-6 - 4.098e-6)
+    contact_ratio = ring_planet().total_contact_ratio
+    return dynamic_factor(0.124, contact_ratio, stiffness.single_stiffness, LINE_LOAD_2, left)
+
+
+PRINTED_RINGS = {
+    "stage 1: c' of sun and planet": (lambda: 1e-9 * stiffness_of(sun_planet_1()).single_stiffness, 12.362),
+    "stage 1: c_gamma_alpha of sun and planet": (lambda: 1e-9 * stiffness_of(sun_planet_1()).mesh_stiffness, 13.426),
+    "stage 1: c' of planet and ring": (lambda: 1e-9 * stiffness_of(ring_planet_1()).single_stiffness, 13.289),
+    "stage 1: c_gamma_alpha of planet and ring": (lambda: 1e-9 * stiffness_of(ring_planet_1()).mesh_stiffness, 16.063),
+    "stage 1: m_red of sun and planets": (lambda: 1e-3 * reduced_mass(sun_planet_1(), (1, 3)), 0.6606),
+    "stage 1: m_red of planet and held ring": (lambda: 1e-3 * reduced_mass(ring_planet_1(), (1, 3)), 2.4597),
+    "stage 1: n_E1 of the sun": (lambda: main_resonance(sun_planet_1(), (1, 3)) * 17 / 19, 2266.0),
+    "stage 1: n_E1 of the planet": (lambda: main_resonance(ring_planet_1(), (1, 3)), 1435.0),
+    "stage 2: c' of planet and ring": (lambda: 1e-9 * stiffness_of(ring_planet()).single_stiffness, 14.053),
+    "stage 2: c_gamma_alpha of planet and ring": (lambda: 1e-9 * stiffness_of(ring_planet()).mesh_stiffness, 20.563),
+    "stage 2: m_red of planet and held ring": (lambda: 1e-3 * reduced_mass(ring_planet(), (1, 3)), 1.4684),
+    "stage 2: n_E1 of the planet": (lambda: main_resonance(ring_planet(), (1, 3)), 993.0),
+    "stage 2: K_V of planet and ring": (dynamic_of_ring_2, 1.06),
+}
+
+
 PRINTED = {
+    **PRINTED_RINGS,
     **{f"helical stage: {name}": own for name, own in PRINTED_3.items()},
     **{f"planetary stage: {name}": own for name, own in PRINTED_2.items()},
 }
@@ -325,3 +405,13 @@ def test_running_in_takes_no_more_than_there_is_and_no_more_than_its_bounds():
         left = [60e-6 - running_in(60e-6, "through_hardened", 700e6, speed) for speed in (4.0, 9.0, 20.0)]
         assert left == sorted(left) and min(left) >= 0.0
         assert running_in(1e-6, "through_hardened", 100e6, 4.0) == pytest.approx(1e-6)
+
+
+def test_a_ring_that_turns_vibrates_with_the_planet():
+    """By hand: planet and rim in series, three meshes around the rim."""
+    pair = ring_planet()
+    planet = reduced_mass(pair)
+    middle = 0.5 * (pair.gear.tip_radius + pair.gear.root_radius)
+    inertia = 0.5 * math.pi * 7830.0 * ((0.5 * pair.gear.held_diameter) ** 4 - middle**4)
+    rim = inertia / pair.gear.base_radius**2
+    assert reduced_mass(pair, (1, 3), ring_held=False) == pytest.approx(1.0 / (1.0 / planet + 3.0 / rim))

@@ -20,7 +20,7 @@ from exugear.life.life import NOT_RATED
 from exugear.life.rating.standard import FlankRules, MeshLoads, rate
 from exugear.project import Project
 from fe_ste.geometry.gears import Material
-from fe_ste.standards.iso6336 import mesh_stiffness
+from fe_ste.standards.iso6336 import Edition, mesh_stiffness, reduced_mass
 from fe_ste.standards.pitting import CASE_HARDENED_BENDING, CASE_HARDENED_CONTACT
 
 from ....fe_ste.cases.gears import nrel_stage_3
@@ -40,7 +40,7 @@ STRENGTH: dict[str, Any] = {
 REDUCED = {key: value for key, value in STRENGTH.items() if key != "tolerance_class"}
 
 
-def rules(member: int = 1, **strength: Any) -> FlankRules:
+def rules(member: int = 1, edition: Edition = "ISO 6336:2019", **strength: Any) -> FlankRules:
     of = StrengthSection(**(STRENGTH | strength))
     return FlankRules(
         pair=nrel_stage_3(Material()),
@@ -51,6 +51,7 @@ def rules(member: int = 1, **strength: Any) -> FlankRules:
         viscosity=220.0,
         meshes=(1, 1),
         free_bore=False,
+        edition=edition,
     )
 
 
@@ -66,7 +67,7 @@ def test_a_sheet_has_the_figures_of_a_rating_program():
     Within 0.1 % and half a digit. K_v 1.092 there has f_f_alpha of 22 um, class 6 of today has 18: 0.3 % less; the
     disc is solid here (C_R 0.898 there).
     """
-    found = rate(rules(), loads())
+    found = rate(rules(edition="ISO 6336:2006"), loads())
     printed = {
         "F_t": 240064.4,
         "v": 20.83,
@@ -157,6 +158,83 @@ def test_what_is_not_rated_is_named_and_never_a_number():
     assert math.isnan(nobody["S_H"]) and math.isnan(nobody["S_F"]) and nobody["sigma_H"] > 0.0
 
 
+def test_the_editions_differ_by_f_zca_f_epsilon_and_the_cube_of_the_cosine():
+    """Helix 10 deg, overlap ratio 1.42: S_H by the root of 1.2, sigma_F0 by eps_alpha_n^-0.5 / cos^3, nothing else."""
+    now, before = (rate(rules(edition=edition), loads()) for edition in ("ISO 6336:2019", "ISO 6336:2006"))
+    pair = nrel_stage_3(Material())
+    virtual = pair.transverse_contact_ratio / math.cos(pair.gear.base_helix_angle) ** 2
+    root = virtual**-0.5 / math.cos(math.radians(10.0)) ** 3
+    expected = {
+        "Z_BD": math.sqrt(1.2),
+        "sigma_H": math.sqrt(1.2),
+        "S_H": 1.0 / math.sqrt(1.2),
+        "Y_F": virtual**-0.5,
+        "Y_beta": 1.0 / math.cos(math.radians(10.0)) ** 3,
+        "sigma_F0": root,
+        "sigma_F": root,
+        "S_F": 1.0 / root,
+    }
+    for name, value in before.items():
+        ratio = now[name] / value if value else 1.0
+        assert ratio == pytest.approx(expected.get(name, 1.0), rel=1e-6), name
+    assert now["f_ZCa"] == 1.2 and now["f_eps"] == pytest.approx(virtual**-0.5)
+    assert set(now) - set(before) == {"f_ZCa", "f_eps"}
+
+
+def test_the_torque_is_that_of_the_gear_and_m_red_and_n_e1_are_those_of_k_v():
+    for member in (0, 1):
+        found, pair = rate(rules(member), loads()), nrel_stage_3(Material())
+        gear = (pair.pinion, pair.gear)[member]
+        assert found["torque"] == pytest.approx(240064.4 * gear.reference_radius)
+        assert found["load_torque"] == 1.0
+        assert found["m_red"] == pytest.approx(reduced_mass(pair))
+        assert found["n_E1"] == pytest.approx(math.sqrt(found["c_gammaalpha"] / found["m_red"]) / 24)
+        assert found["N"] == pytest.approx(1165.9 * math.pi / 30.0 / found["n_E1"])
+
+
+def helical(folder: Path, **rating: Any) -> dict[str, Any]:
+    """The pair with a helix of 15 deg and faces wide enough for an overlap ratio above 1."""
+    content = spur(folder, **rating)
+    for name, hand in (("pinion", 1.0), ("wheel", -1.0)):
+        content["gears"][name] |= {"helix_angle_deg": 15.0 * hand, "face_width_mm": 40.0}
+    distance = 75.0 / math.cos(math.radians(15.0)) + 0.01
+    content["pairs"]["spur"]["centre_distance_mm"] = distance
+    content["bodies"]["shaft_2"]["axis_position_mm"] = [distance, 0.0]
+    return content
+
+
+def test_a_sheet_shows_both_editions_where_they_differ(tmp_path):
+    sheets = {year: project_of(helical(tmp_path, edition=year), tmp_path).rating() for year in (2019, "ISO 6336:2006")}
+    now, before = sheets[2019], sheets["ISO 6336:2006"]
+    assert (now.edition, now.other_edition) == ("ISO 6336:2019", "ISO 6336:2006")
+    assert (before.edition, before.other_edition) == (now.other_edition, now.edition)
+    for one, other in zip(now.flanks, before.flanks, strict=True):
+        assert {"Z_BD", "sigma_H", "S_H", "Y_F", "Y_beta", "sigma_F0", "sigma_F", "S_F"} <= set(one.other_edition)
+        for name, value in one.other_edition.items():
+            assert value == pytest.approx(other.standard[name])
+            assert abs(value - one.standard[name]) > 0.01 * abs(one.standard[name])
+    assert now.summary()["flanks"][0]["other_edition"]["sigma_F0_MPa"] > 0.0
+    printed = run(written(helical(tmp_path), tmp_path))
+    assert "S_H, ISO 6336:2006" in printed.output and "Rating to ISO 6336:2019" in printed.output
+    straight = project_of(spur(tmp_path), tmp_path).rating()
+    assert not any(flank.other_edition for flank in straight.flanks), "spur gears are rated alike"
+
+
+def test_f_zca_counts_for_modified_flanks_alone(tmp_path):
+    content = helical(tmp_path, f_ZCa=1.05)
+    content["gears"]["pinion"]["modification"] = {"tip_relief_um": 10.0, "tip_relief_length_mm": 1.0}
+    stated = project_of(content, tmp_path).rating().flanks[0].standard
+    assert stated["f_ZCa"] == 1.05 and stated["Z_BD"] == pytest.approx(math.sqrt(1.05))
+    del content["rating"]["f_ZCa"]
+    sheet = project_of(content, tmp_path).rating()
+    assert sheet.flanks[0].standard["f_ZCa"] == 1.2
+    assert any("set f_ZCa" in line for line in sheet.assumptions)
+    content["gears"]["pinion"]["modification"] = {"lead_crowning_um": 0.0}
+    content["rating"]["f_ZCa"] = 1.05
+    with pytest.raises(GearboxFileError, match="no helical gear has a modification"):
+        project_of(content, tmp_path).rating()
+
+
 def spur(folder: Path, **rating: Any) -> dict[str, Any]:
     """Spur pair with a rating for its static load at rated speed."""
     content = tomllib.loads(SPUR_CASE)
@@ -233,6 +311,10 @@ def test_finite_elements_of_a_life_stand_beside_its_spectrum_and_only_of_that_li
         assert one.finite_elements["sigma_H"] == pytest.approx(float(data["flank_contact_stress"][place]))
     page = project.report().path.read_text("utf-8")
     assert '"rating"' in page and '"sigma_FG_MPa"' in page
+    content["rating"]["edition"] = "ISO 6336:2006"
+    before = Project(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")), project.folder, project.choice)
+    assert not before.rating().flanks[0].finite_elements, "a life of another edition is not used"
+    del content["rating"]["edition"]
     content["rating"]["dynamic_factor"] = 1.2
     other = Project(Gearbox.from_dict(content, str(tmp_path / "gearbox.toml")), project.folder, project.choice).rating()
     assert not other.flanks[0].finite_elements
@@ -260,7 +342,8 @@ def test_a_ring_is_rated_by_its_root_and_says_what_is_left_out():
         strength["tolerance_class"] = 5
     sheet = Project(Gearbox.from_dict(content, str(GRC)), Path("nowhere"), Choice("bushing")).rating()
     ring = next(one for one in sheet.flanks if one.gear == "ring")
-    assert ring.standard["K_v"] == 1.05 and "ring gears" in ring.lacking["K_v"]
+    assert 1.0 < ring.standard["K_v"] < 1.05 and "K_v" not in ring.lacking
+    assert ring.standard["m_red"] > 0.0 and ring.standard["N"] < 0.85
     assert ring.standard["S_F"] > 1.0 and ring.standard["sigma_F0"] > 0.0
     assert any("cutter" in remark for remark in ring.remarks)
     sun = next(one for one in sheet.flanks if one.gear == "sun")
@@ -283,7 +366,21 @@ def test_the_verb_prints_all_factors_and_ends_with_1_where_a_safety_is_short(tmp
     before = sorted(tmp_path.rglob("*"))
     good = run(path)
     assert good.exit_code == 0, good.output
-    for name in ("K_A", "K_gamma", "K_v", "K_Hbeta", "K_Halpha", "K_Fbeta", "K_Falpha", "Z_BD", "Y_deltarelT", "S_F"):
+    for name in (
+        "torque of the gear",
+        "m_red",
+        "n_E1",
+        "K_A",
+        "K_gamma",
+        "K_v",
+        "K_Hbeta",
+        "K_Halpha",
+        "K_Fbeta",
+        "K_Falpha",
+        "Z_BD",
+        "Y_deltarelT",
+        "S_F",
+    ):
         assert name in good.output
     for line in NOT_RATED:
         assert line.split(":")[0] in " ".join(good.output.split())
@@ -304,6 +401,12 @@ def test_the_verb_prints_all_factors_and_ends_with_1_where_a_safety_is_short(tmp
         (lambda content: content["rating"]["gears"]["wheel"].update(tolerance_class=12), "tolerance_class"),
         (lambda content: content["rating"]["gears"]["wheel"].update(root_factor=1.0), "root_roughness_Rz_um"),
         (lambda content: content["rating"].update(application_factor=0.5), "application_factor"),
+        (lambda content: content["rating"].update(edition="ISO 6336:1996"), "rating.edition"),
+        (lambda content: content["rating"].update(edition=1996), "rating.edition"),
+        (lambda content: content["rating"].update(f_ZCa=0.9), "rating.f_ZCa"),
+        (lambda content: content["rating"].update(f_ZCa=1.3), "rating.f_ZCa"),
+        (lambda content: content["rating"].update(f_ZCa=1.0), "no helical gear has a modification"),
+        (lambda content: content["rating"].update(f_ZCa=1.0, edition=2006), "does not have this factor"),
         (lambda content: content["rating"].pop("viscosity_40_mm2_per_s"), "viscosity_40"),
     ],
 )
