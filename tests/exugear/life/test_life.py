@@ -344,10 +344,10 @@ def test_check_says_for_each_verb_of_a_life_whether_it_is_possible_and_all_that_
     case = tmp_path / "gearbox.toml"
     case.write_text(SPUR_CASE)
     said = " ".join(exugear("check", case).stdout.split())
-    assert "loads: not available, loads: this section is missing" in said
-    assert "life: not available, rating: this section is missing" in said
-    assert "life: not available, lubricant.viscosity_40_mm2_per_s: this key is missing" in said
-    assert "check --rating: not available, rating: this section is missing" in said
+    assert "Command loads: not available - loads: this section is missing" in said
+    assert "Command life: not available - rating: this section is missing" in said
+    assert "- lubricant.viscosity_40_mm2_per_s: this key is missing" in said
+    assert "Command check --rating: not available - rating: this section is missing" in said
     assert json.loads(exugear("check", case, "--json").stdout)["life"]["loads"]
 
 

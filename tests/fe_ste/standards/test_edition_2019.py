@@ -1,7 +1,7 @@
 """ISO 6336:2019 against a planetary stage that a rating program rated by it, and against the edition of 2006.
 
 Figures of the rating program: those that tests/ of github.com/FelixMehlan/MADE4WIND-drivetrain-optimizer (F. Mehlan,
-MADE4WIND drivetrain optimizer, 2025) quotes of two stages with helix angles of 15 deg and module 40 mm: z 41/34/112,
+MADE4WIND drivetrain optimizer) quotes of two stages with helix angles of 15 deg and module 40 mm: z 41/34/112,
 x 0.3698/0.9220, b 750 mm, and z 33/27/90, x 0.2004/0.2624, b 800 mm. Rack 1.25/0.38/1.0. Teeth are thinned by DIN 3967,
 series cd25, at which roots are computed there; tips are shortened to the rack's clearance.
 The cutter of the rings is not stated, so their roots are left out.
