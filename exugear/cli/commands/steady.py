@@ -208,7 +208,10 @@ def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, 
     if as_json:
         summary = _whole_summary(project, settings, data, ranking, pulling, excited)
         remarks = {
-            "neglected_shuttling": [_wandering_summary(own) for own in wandering],
+            "neglected_shuttling": [
+                {"pair": load.pair, "load_centroid_m": load.amplitude, "over_transmission_error": load.over_error}
+                for load in wandering
+            ],
             "bearings_outside_linear_range": [_swing_summary(own) for own in swinging],
         }
         print_json({**summary, **remarks})
@@ -294,7 +297,10 @@ def _whole_summary(
         "harmonics": int(data.attrs["harmonics"]),
         "truncation_of_compliance": _left_out(data),
         "change_with_more_harmonics": _known(float(data.attrs["change_with_more"])),
-        "meshes_that_pull": [_pull_summary(pull) for pull in pulling],
+        "meshes_that_pull": [
+            {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
+            for pull in pulling
+        ],
         "not_converged": [
             {"speed_rpm": load["speed"] / RPM, "reason": load["reason"]}
             for load in json.loads(data.attrs["not_converged"])
@@ -364,12 +370,6 @@ def _warn_of_tensile_forces(data: xr.Dataset) -> tuple[TensileMesh, ...]:
     return found
 
 
-def _pull_summary(pull: TensileMesh) -> dict[str, Any]:
-    from exugear.gearbox.units import RPM
-
-    return {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
-
-
 def _warn_of_instability(data: xr.Dataset, growth: float) -> None:
     """Print the speeds without a converged or stable steady state."""
     from exugear.gearbox.units import RPM
@@ -402,10 +402,6 @@ def _warn_of_shuttling(project: Project) -> tuple[Shuttling, ...]:
             style="yellow",
         )
     return found
-
-
-def _wandering_summary(load: Shuttling) -> dict[str, Any]:
-    return {"pair": load.pair, "load_centroid_m": load.amplitude, "over_transmission_error": load.over_error}
 
 
 def _left_out(data: xr.Dataset) -> dict[str, float]:
