@@ -37,11 +37,11 @@ def page_body(material: ReportData, parts: Sequence[Part]) -> str:
     """Combine the sections: invalid runs first, then the findings, then skipped results."""
     notes = material.context.notes
     warning = "Invalid runs; they are included in the results below"
-    head = html.element(
-        "header",
-        _headline(material) + _tools() + _contents(parts),
-        class_="top",
+    links = "".join(
+        html.element("a", html.text(part.title), href=f"#{part.name}") for part in parts if part.title and part.html
     )
+    contents = html.element("nav", links, aria_label="Sections")
+    head = html.element("header", _headline(material) + _tools() + contents, class_="top")
     above = html.alert(warning, notes.invalid_runs) if notes.invalid_runs else ""
     left_out = html.section("Skipped", html.bullets(notes.left_out), name="left-out") if notes.left_out else ""
     main = html.element("main", above + _sets(material) + "".join(part.html for part in parts) + left_out, id="content")
@@ -74,13 +74,6 @@ def _tools() -> str:
         button("theme", "◐", "Dark or light colours"),
     ]
     return html.element("div", "".join(buttons), class_="page-tools scripts-only")
-
-
-def _contents(parts: Sequence[Part]) -> str:
-    links = "".join(
-        html.element("a", html.text(part.title), href=f"#{part.name}") for part in parts if part.title and part.html
-    )
-    return html.element("nav", links, aria_label="Sections")
 
 
 def _sets(material: ReportData) -> str:
