@@ -600,13 +600,10 @@ def compute_points(task: Task, points: Iterable[Work], opens: Opens, tell: Tell)
         with suppress(BrokenExecutor), opens() as pool:
             running.work(pool)
     seen = read_journals(task.folder, running.found)
-    _note_here(task, [record for point, record in running.found.items() if point not in seen])
-    return running.found
-
-
-def _note_here(task: Task, records: list[Record]) -> None:
-    """Record points that workers wrote into a folder that is not visible to this process."""
+    # The remaining points were written by workers into a folder that is not visible to this process.
     journal = Journal(task.folder)
-    for record in records:
-        journal.add(record)
+    for point, record in running.found.items():
+        if point not in seen:
+            journal.add(record)
     journal.settle()
+    return running.found
