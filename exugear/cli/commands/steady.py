@@ -142,7 +142,10 @@ def steady(
         if load_case is not None:
             project = project.at_load_case(load_case)
         settings = _settings(project, method, speeds, harmonics, branches)
-        _refuse_what_has_none(project)
+        # A variant without steady-state response is refused before tables and finite elements are computed.
+        with suppress(FailedError):  # such a failure does not apply to the selected mesh model
+            if reason := steady_lack(assembled_by_iso(project.gearbox, project.choice.variant), project.choice.variant):
+                raise BadInputError(reason)
         project.begin()
         project.prepare()
         _print_result(project, settings, project.steady(settings), as_json)
@@ -160,14 +163,6 @@ def _warn_of_other_loads(gearbox: Gearbox) -> None:
                 f"({load_in_words(load_case)}): add --load-case {name} to compute it there",
                 style="yellow",
             )
-
-
-def _refuse_what_has_none(project: Project) -> None:
-    """Raise an error for a variant without steady-state response before tables and finite elements are computed."""
-    with suppress(FailedError):  # such a failure does not apply to the selected mesh model
-        variant = project.choice.variant
-        if reason := steady_lack(assembled_by_iso(project.gearbox, variant), variant):
-            raise BadInputError(reason)
 
 
 def _settings(
@@ -212,7 +207,15 @@ def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, 
                 {"pair": load.pair, "load_centroid_m": load.amplitude, "over_transmission_error": load.over_error}
                 for load in wandering
             ],
-            "bearings_outside_linear_range": [_swing_summary(own) for own in swinging],
+            "bearings_outside_linear_range": [
+                {
+                    "bearing": swing.bearing,
+                    "speeds": swing.count,
+                    "worst_speed_rpm": swing.speed / RPM,
+                    "share_of_static_load": swing.share,
+                }
+                for swing in swinging
+            ],
         }
         print_json({**summary, **remarks})
         _fail_if_doubtful(data, growth)
@@ -464,17 +467,6 @@ def _warn_of_bearing_loads(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]
             style="yellow",
         )
     return swinging
-
-
-def _swing_summary(swing: BearingLoadExcursion) -> dict[str, Any]:
-    from exugear.gearbox.units import RPM
-
-    return {
-        "bearing": swing.bearing,
-        "speeds": swing.count,
-        "worst_speed_rpm": swing.speed / RPM,
-        "share_of_static_load": swing.share,
-    }
 
 
 def _summary(peak: Peak) -> dict[str, Any]:
