@@ -157,7 +157,9 @@ def write_report(
     parts = [section(material) for section in SECTIONS]
     # The body is made last, because sections add notes that its head shows.
     body = page_body(material, parts)
-    data = {**_head_data(material), **_merged(parts)}
+    rated = gearbox.case.operation.rated_speed_rpm
+    head: dict[str, Any] = {"name": gearbox.name, "input": material.input_words, "rated": rated}
+    data = {**head, "lines": [], "groups": [], "models": {}, **_merged(parts)}
     title = f"{gearbox.name}: resonance report"
     path = folder / REPORT_FILE
     page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
@@ -180,18 +182,6 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
     # Variations come last; another process may compute them in the meantime.
     drawn = run_data(material)
     return replace(material, run_data=drawn, variations=model_variations(context, results.modes, begun))
-
-
-def _head_data(material: ReportData) -> dict[str, Any]:
-    gearbox = material.context.gearbox
-    return {
-        "name": gearbox.name,
-        "input": material.input_words,
-        "rated": gearbox.case.operation.rated_speed_rpm,
-        "lines": [],
-        "groups": [],
-        "models": {},
-    }
 
 
 def _merged(parts: list[Part]) -> Mapping[str, Any]:
