@@ -21,7 +21,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -330,11 +330,6 @@ Opens = Callable[[], AbstractContextManager[Pool]]
 """Function that starts workers; called again after workers were lost."""
 
 
-@contextmanager
-def _here() -> Iterator[Pool]:
-    yield Pool(AtOnce(), 1)
-
-
 def processes(workers: int | None = None) -> Opens:
     """Return worker processes, by default on all cores; with one worker, this process itself.
 
@@ -352,7 +347,7 @@ def processes(workers: int | None = None) -> Opens:
             yield Pool(executor, count)
 
     if count == 1:
-        return _here
+        return lambda: nullcontext(Pool(AtOnce(), 1))
     return opened
 
 
