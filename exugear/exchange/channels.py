@@ -181,7 +181,8 @@ class Channels(ReprMixin):
             found = values * factors
             self._check_numbers(found, places, second * time, steps.count - len(time))
             yield second * time, found
-        steps.check_length()
+        if steps.count < LEAST_LINES:
+            raise LoadFileError(f"{self.path}: {steps.count} time steps; at least {LEAST_LINES} are required")
 
     def _check_numbers(self, values: Floats, places: Sequence[int], time: Floats, before: int) -> None:
         bad = np.argwhere(~np.isfinite(values))
@@ -251,7 +252,3 @@ class _Steps:
                 )
         self.count += len(time)
         self.last = float(time[-1]) if len(time) else self.last
-
-    def check_length(self) -> None:
-        if self.count < LEAST_LINES:
-            raise LoadFileError(f"{self.path}: {self.count} time steps; at least {LEAST_LINES} are required")

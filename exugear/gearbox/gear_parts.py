@@ -365,7 +365,8 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
                 )
         first = gears[section.pinion]
         second = gears[section.gear]
-        if _is_turned_over(first, second):
+        # A file may call the larger gear or the ring gear the pinion; gear 1 is then the other gear.
+        if (first.internal, first.teeth) > (second.internal, second.teeth):
             first, second = second, first
         return origin.guarded(
             f"pairs.{name}",
@@ -378,11 +379,6 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
         )
 
     return part_of_each(convert_section, origin.case.pairs)
-
-
-def _is_turned_over(pinion: Gear, gear: Gear) -> bool:
-    """Return whether a file calls the larger gear or the ring gear the pinion; gear 1 is then the other gear."""
-    return pinion.internal > gear.internal or (pinion.internal == gear.internal and pinion.teeth > gear.teeth)
 
 
 def pair_specs(

@@ -99,9 +99,11 @@ class Gearbox(ReprMixin):
             case = parse_case(dict(content), source)
         except GearboxFileError as error:
             rest = cls(readable(content), source, content, permissions)
-            raise GearboxFileError(*error.faults, *checks.faults_of(_checks_of_entries(rest))) from None
+            alone = [check for check in _checks_of_parts(rest) if check.name in ALONE]
+            raise GearboxFileError(*error.faults, *checks.faults_of(alone)) from None
         gearbox = cls(case, source, content, permissions)
-        checks.check(_checks_of(gearbox))
+        # Each check follows its prerequisites; building a part checks its section.
+        checks.check([*_checks_of_parts(gearbox), *_checks_of_the_whole(gearbox)])
         return gearbox
 
     def varied(self, changes: Mapping[str, Any]) -> Gearbox:
@@ -461,16 +463,6 @@ class Gearbox(ReprMixin):
 
 ALONE = ("bodies", "masses", "gears", "stiffness", "supports", "modifications", "pairs")
 """Checks that remain meaningful if other entries of the file cannot be read."""
-
-
-def _checks_of_entries(gearbox: Gearbox) -> tuple[checks.Check, ...]:
-    """List the checks for the readable entries of a file with syntax or validation errors."""
-    return tuple(check for check in _checks_of_parts(gearbox) if check.name in ALONE)
-
-
-def _checks_of(gearbox: Gearbox) -> tuple[checks.Check, ...]:
-    """List all checks, each after its prerequisites; building a part checks its section."""
-    return (*_checks_of_parts(gearbox), *_checks_of_the_whole(gearbox))
 
 
 def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:

@@ -149,19 +149,22 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
         return ""
     amplitude = data["amplitude"].to_numpy()[:, 1:, places].astype(np.float64)
     order = np.argsort(-amplitude.max(axis=(0, 1)))[:SEATS]
+    bases = tuple(str(name) for name in data["base"].to_numpy())
     rows = []
     for seat in order:
         if not amplitude[..., seat].max() > MIN_RELATIVE_ACCELERATION * amplitude.max():
             break
         point, line = np.unravel_index(int(np.argmax(amplitude[..., seat])), amplitude.shape[:2])
         speed = abs(float(data["speed"][point]))
+        _, name, *axes = signals[places[seat]].split(" ")  # such as `seat_acceleration hss_a x`
+        index = tuple(int(n) for n in data["index"][int(line) + 1].to_numpy())
         rows.append(
             {
-                "seat": _seat_words(material, signals[places[seat]]),
+                "seat": " ".join([material.words.of(name), *axes]),
                 "acceleration / (m/s²)": Cell(
                     figure_text(float(amplitude[point, line, seat])), float(amplitude[point, line, seat])
                 ),
-                "order": _line_words(material, data, int(line) + 1),
+                "order": material.words.labelled(line_name(index, bases)),
                 "speed / rpm": Cell(figure_text(speed / RPM, 4), speed),
                 "frequency / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
             }
@@ -176,17 +179,6 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
     )
     table = pieces.table(rows, ("order",), caption=title, name=f"seats-{'-'.join(title.split()[7:])}", sortable=True)
     return pieces.element("h3", pieces.text(title)) + pieces.paragraph(words, "note") + table
-
-
-def _line_words(material: ReportData, data: xr.Dataset, line: int) -> str:
-    bases = tuple(str(name) for name in data["base"].to_numpy())
-    return material.words.labelled(line_name(tuple(int(n) for n in data["index"][line].to_numpy()), bases))
-
-
-def _seat_words(material: ReportData, signal: str) -> str:
-    """Return the label of a signal such as ``seat_acceleration hss_a x``."""
-    _, name, *rest = signal.split(" ")
-    return " ".join([material.words.of(name), *rest])
 
 
 def _duties(material: ReportData, assembly: Assembly) -> str:

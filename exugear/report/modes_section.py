@@ -55,15 +55,11 @@ def modes_section(material: ReportData) -> Part:
         class_="controls scripts-only",
     )
     # Without run-ups, no other section has the animated mode shapes.
-    stage = "" if material.groups else _stage_alone()
+    stage = "" if material.groups else pieces.element("div", stage_figure(), class_="scripts-only")
     lists = [_all_modes(material, model, data) for model, data in modes.items()]
     framed = pieces.element("div", campbell, class_="scripts-only")
     html = pieces.section("Modes and orders", chooser, framed, stage, *lists, name="modes")
     return Part(html, {"models": models}, "Modes and orders", "modes")
-
-
-def _stage_alone() -> str:
-    return pieces.element("div", stage_figure(), class_="scripts-only")
 
 
 def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, Any]:

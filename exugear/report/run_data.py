@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -68,12 +67,6 @@ def level_bytes(level: Floats, floor: float, step: float) -> NDArray[np.uint8]:
     """
     steps: NDArray[np.uint8] = np.clip(np.round((level - floor) / step), 0, 255).astype("u1")
     return steps
-
-
-def cut_levels(spectra: Waterfall, lines: Sequence[OrderLine]) -> NDArray[Any]:
-    """Return the level along each order (frames, lines), tenths of a dB; `NO_LEVEL` where there is none."""
-    levels = np.array([spectra.along(line) for line in lines]).reshape(len(lines), spectra.time.size).T
-    return tenths(levels)
 
 
 def tenths(levels: Floats) -> NDArray[Any]:
@@ -208,8 +201,10 @@ def _cells(
 
 def _cuts(material: ReportData, spectra: Waterfall, every: int) -> dict[str, Any]:
     speeds = (spectra.speed[::every] / RPM).astype("f4")
+    levels = np.array([spectra.along(line) for line in material.lines])
+    cuts = tenths(levels.reshape(len(material.lines), spectra.time.size).T)
     return {
-        "cuts": material.arrays.add(cut_levels(spectra, material.lines)[::every].copy(), differences=True),
+        "cuts": material.arrays.add(cuts[::every].copy(), differences=True),
         "speeds": material.arrays.add(speeds),
     }
 

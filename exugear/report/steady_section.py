@@ -72,7 +72,12 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
         context.notes.statements.append(f"Steady-state response, {label}: {message}")
         note = pieces.paragraph(f"Warning: {message}", "warning")
     growth = float(data.attrs["growth_rate"])
-    others = [_other_load(run) for run in runs if run.attributes.get("table_doubt")]
+    others = [
+        f"the run-up of the load case {run.attributes['load_case']} has another load ({run.attributes['load']}), which "
+        "also changes its levels."
+        for run in runs
+        if run.attributes.get("table_doubt")
+    ]
     context.notes.statements.extend(f"Steady-state response, {label}: {other}" for other in others)
     content = [
         pieces.paragraph(f"At the static load: {static_load_in_words(context.gearbox)}.", "note"),
@@ -101,14 +106,6 @@ def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) ->
         ),
     ]
     return pieces.section(label[0].upper() + label[1:], *content, level=3)
-
-
-def _other_load(run: VariantRun) -> str:
-    """State that the run-up shown with a response has another load."""
-    return (
-        f"the run-up of the load case {run.attributes['load_case']} has another load ({run.attributes['load']}), which "
-        "also changes its levels."
-    )
 
 
 def _shared_lines(material: ReportData, data: xr.Dataset) -> str:

@@ -128,12 +128,9 @@ def _html(material: ReportData) -> str:
     right = pieces.element("div", detail + stage)
     controls = pieces.element("div", channel + views, class_="controls scripts-only")
     split = pieces.element("div", left + right, class_="split scripts-only")
-    return pieces.section("Waterfall and order cuts", controls, split, _without_scripts(words), name="rings")
-
-
-def _without_scripts(words: str) -> str:
-    said = f"Diagrams require JavaScript, which is disabled; nothing is loaded from a network. {words}"
-    return f"<noscript>{pieces.paragraph(said, 'warning')}</noscript>"
+    text = f"Diagrams require JavaScript, which is disabled; nothing is loaded from a network. {words}"
+    warning = f"<noscript>{pieces.paragraph(text, 'warning')}</noscript>"
+    return pieces.section("Waterfall and order cuts", controls, split, warning, name="rings")
 
 
 def _groups_text(groups: Sequence[RunGroup]) -> str:
@@ -175,7 +172,8 @@ def ranking_section(material: ReportData) -> Part:
         _note_comparisons(material, group)
     if not tables:
         return Part("")
-    controls = pieces.element("div", _variant_choice() + _filters(), class_="controls scripts-only")
+    choice = pieces.element("div", "", class_="choices", id="variant", role="group", aria_label="Resonances of")
+    controls = pieces.element("div", choice + _filters(), class_="controls scripts-only")
     html = pieces.section(
         "Resonance ranking",
         *in_operation,
@@ -221,10 +219,6 @@ def _operating_row(material: ReportData, resonance: Resonance) -> dict[str, obje
         if name == "force":
             row["Bearing"] = material.words.of(peak.at)
     return row
-
-
-def _variant_choice() -> str:
-    return pieces.element("div", "", class_="choices", id="variant", role="group", aria_label="Resonances of")
 
 
 def _filters() -> str:

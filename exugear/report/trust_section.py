@@ -69,14 +69,20 @@ def trust_section(material: ReportData) -> Part:
     """List assumptions, checks, inputs and provenance of the results."""
     charts: dict[str, Any] = {}
     compared = "".join(_exudyn_comparison(material, run, charts) for run in material.results.runs)
+    rows = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
+    inputs = pieces.table(rows, ("value",), caption="All inputs of the gearbox file", name="inputs")
+    terms = "".join(f"<dt>{pieces.text(term)}</dt><dd>{pieces.text(words)}</dd>" for term, words in GLOSSARY.items())
     parts = [
         pieces.folded("Assumptions", _assumptions(material), opened=True),
         pieces.folded("Runs and energy balance", _runs(material)),
-        pieces.folded("All inputs of the gearbox file", _inputs(material)),
+        pieces.folded("All inputs of the gearbox file", inputs),
         pieces.folded("Provenance: hashes and versions", _provenance(material)),
         pieces.folded("Run time", _times(material)),
-        pieces.folded("Glossary", _glossary()),
-        pieces.folded("Libraries in this page and their licences", _licences()),
+        pieces.folded("Glossary", pieces.element("dl", terms)),
+        pieces.folded(
+            "Libraries in this page and their licences",
+            pieces.element("pre", pieces.text(licences()), class_="licences"),
+        ),
     ]
     if compared:
         parts.insert(2, pieces.folded("Comparison with Exudyn", compared))
@@ -192,11 +198,6 @@ def _run_row(material: ReportData, run: VariantRun) -> dict[str, object]:
     }
 
 
-def _inputs(material: ReportData) -> str:
-    rows = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
-    return pieces.table(rows, ("value",), caption="All inputs of the gearbox file", name="inputs")
-
-
 def flat_keys(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, str]]:
     """Yield all keys of a gearbox file with their tables, and their values as text.
 
@@ -244,12 +245,3 @@ def _times(material: ReportData) -> str:
     ]
     note = pieces.paragraph("Each step was a separate process; some ran in parallel.", "note") if rows else ""
     return pieces.table(rows, caption="Run time") + note
-
-
-def _glossary() -> str:
-    terms = "".join(f"<dt>{pieces.text(term)}</dt><dd>{pieces.text(words)}</dd>" for term, words in GLOSSARY.items())
-    return pieces.element("dl", terms)
-
-
-def _licences() -> str:
-    return pieces.element("pre", pieces.text(licences()), class_="licences")

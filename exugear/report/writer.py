@@ -37,11 +37,11 @@ def page_body(material: ReportData, parts: Sequence[Part]) -> str:
     """Combine the sections: invalid runs first, then the findings, then skipped results."""
     notes = material.context.notes
     warning = "Invalid runs; they are included in the results below"
-    head = html.element(
-        "header",
-        _headline(material) + _tools() + _contents(parts),
-        class_="top",
+    links = "".join(
+        html.element("a", html.text(part.title), href=f"#{part.name}") for part in parts if part.title and part.html
     )
+    contents = html.element("nav", links, aria_label="Sections")
+    head = html.element("header", _headline(material) + _tools() + contents, class_="top")
     above = html.alert(warning, notes.invalid_runs) if notes.invalid_runs else ""
     left_out = html.section("Skipped", html.bullets(notes.left_out), name="left-out") if notes.left_out else ""
     main = html.element("main", above + _sets(material) + "".join(part.html for part in parts) + left_out, id="content")
@@ -74,13 +74,6 @@ def _tools() -> str:
         button("theme", "◐", "Dark or light colours"),
     ]
     return html.element("div", "".join(buttons), class_="page-tools scripts-only")
-
-
-def _contents(parts: Sequence[Part]) -> str:
-    links = "".join(
-        html.element("a", html.text(part.title), href=f"#{part.name}") for part in parts if part.title and part.html
-    )
-    return html.element("nav", links, aria_label="Sections")
 
 
 def _sets(material: ReportData) -> str:
@@ -164,7 +157,9 @@ def write_report(
     parts = [section(material) for section in SECTIONS]
     # The body is made last, because sections add notes that its head shows.
     body = page_body(material, parts)
-    data = {**_head_data(material), **_merged(parts)}
+    rated = gearbox.case.operation.rated_speed_rpm
+    head: dict[str, Any] = {"name": gearbox.name, "input": material.input_words, "rated": rated}
+    data = {**head, "lines": [], "groups": [], "models": {}, **_merged(parts)}
     title = f"{gearbox.name}: resonance report"
     path = folder / REPORT_FILE
     page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
@@ -187,18 +182,6 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
     # Variations come last; another process may compute them in the meantime.
     drawn = run_data(material)
     return replace(material, run_data=drawn, variations=model_variations(context, results.modes, begun))
-
-
-def _head_data(material: ReportData) -> dict[str, Any]:
-    gearbox = material.context.gearbox
-    return {
-        "name": gearbox.name,
-        "input": material.input_words,
-        "rated": gearbox.case.operation.rated_speed_rpm,
-        "lines": [],
-        "groups": [],
-        "models": {},
-    }
 
 
 def _merged(parts: list[Part]) -> Mapping[str, Any]:

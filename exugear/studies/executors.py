@@ -21,7 +21,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
-from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -330,11 +330,6 @@ Opens = Callable[[], AbstractContextManager[Pool]]
 """Function that starts workers; called again after workers were lost."""
 
 
-@contextmanager
-def _here() -> Iterator[Pool]:
-    yield Pool(AtOnce(), 1)
-
-
 def processes(workers: int | None = None) -> Opens:
     """Return worker processes, by default on all cores; with one worker, this process itself.
 
@@ -352,7 +347,7 @@ def processes(workers: int | None = None) -> Opens:
             yield Pool(executor, count)
 
     if count == 1:
-        return _here
+        return lambda: nullcontext(Pool(AtOnce(), 1))
     return opened
 
 
@@ -600,13 +595,10 @@ def compute_points(task: Task, points: Iterable[Work], opens: Opens, tell: Tell)
         with suppress(BrokenExecutor), opens() as pool:
             running.work(pool)
     seen = read_journals(task.folder, running.found)
-    _note_here(task, [record for point, record in running.found.items() if point not in seen])
-    return running.found
-
-
-def _note_here(task: Task, records: list[Record]) -> None:
-    """Record points that workers wrote into a folder that is not visible to this process."""
+    # The remaining points were written by workers into a folder that is not visible to this process.
     journal = Journal(task.folder)
-    for record in records:
-        journal.add(record)
+    for point, record in running.found.items():
+        if point not in seen:
+            journal.add(record)
     journal.settle()
+    return running.found

@@ -81,7 +81,7 @@ def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
     """Draw an output over one parameter, with a curve for each value of another and a panel for each of the others."""
     dimensions = [str(dim) for dim in values.dims if values.sizes[dim] > 1] or [str(values.dims[-1])]
     values = values.squeeze([dim for dim in values.dims if dim not in dimensions])
-    numeric = [dimension for dimension in dimensions if _is_number(values, dimension)]
+    numeric = [dim for dim in dimensions if dim in values.coords and values[dim].dtype.kind in "fi"]
     along = SAMPLE if SAMPLE in dimensions else (numeric or dimensions[-1:])[0]
     others = [dimension for dimension in dimensions if dimension != along]
     panels = others[:-1]
@@ -100,20 +100,16 @@ def _draw_over_parameters(figure: Figure, values: xr.DataArray) -> None:
         draw = _draw_bars
     for axes, rows, label in zip(grid.flat, stacked, labels, strict=False):
         draw(axes, values, along, rows, _combinations(values, by))
-        _mark_infinite(axes, rows)
+        infinite = int(np.isinf(rows).sum())
+        if infinite:  # the scale cannot show them
+            text = f"{infinite} of {rows.size} infinite"
+            axes.text(0.02, 0.98, text, va="top", transform=axes.transAxes, fontsize=7.5)
         axes.set_title(f"{', '.join(panels)} {label}" if panels else "")
     for axes in grid.flat[len(labels) :]:
         axes.set_visible(False)
     if by:
         handles, names = grid.flat[0].get_legend_handles_labels()
         figure.legend(handles, names, title=by[0], loc="outside right upper")
-
-
-def _mark_infinite(axes: Axes, rows: Floats) -> None:
-    """State the number of infinite values, which the scale cannot show."""
-    count = int(np.isinf(rows).sum())
-    if count:
-        axes.text(0.02, 0.98, f"{count} of {rows.size} infinite", va="top", transform=axes.transAxes, fontsize=7.5)
 
 
 def _finite(values: Floats) -> Floats:
@@ -126,12 +122,6 @@ def _label(values: xr.DataArray) -> str:
     if units not in ("", "1"):
         return f"{values.name} / {units}"
     return str(values.name)
-
-
-def _is_number(values: xr.DataArray, dimension: str) -> bool:
-    if dimension in values.coords:
-        return bool(values[dimension].dtype.kind in "fi")
-    return False
 
 
 def _draw_curves(axes: Axes, values: xr.DataArray, along: str, rows: Floats, labels: list[str]) -> None:

@@ -362,7 +362,7 @@ class Study(ReprMixin):
     ) -> Study:
         case = Gearbox.from_toml(folder / file.case, permissions)
         try:
-            gearbox = _varied(case, file.changes)
+            gearbox = Gearbox.from_dict(changed(case.content, file.changes), case.source, case.permissions)
             for table in ("parameters", "tolerances"):
                 for name, parameter in getattr(file, table).items():
                     for path in parameter.targets:
@@ -426,10 +426,6 @@ class Study(ReprMixin):
             with suppress(ValueError, NotImplementedError, OSError):  # an invalid pattern is refused where it is read
                 files += sorted(folder.glob(pattern))
         return [file_digest(file) for file in files if file.suffix and file.is_file()]
-
-
-def _varied(gearbox: Gearbox, changes: Mapping[str, Any]) -> Gearbox:
-    return Gearbox.from_dict(changed(gearbox.content, changes), gearbox.source, gearbox.permissions)
 
 
 def _guarded(key: str, check: Any, *arguments: Any) -> None:

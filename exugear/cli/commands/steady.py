@@ -142,7 +142,10 @@ def steady(
         if load_case is not None:
             project = project.at_load_case(load_case)
         settings = _settings(project, method, speeds, harmonics, branches)
-        _refuse_what_has_none(project)
+        # A variant without steady-state response is refused before tables and finite elements are computed.
+        with suppress(FailedError):  # such a failure does not apply to the selected mesh model
+            if reason := steady_lack(assembled_by_iso(project.gearbox, project.choice.variant), project.choice.variant):
+                raise BadInputError(reason)
         project.begin()
         project.prepare()
         _print_result(project, settings, project.steady(settings), as_json)
@@ -160,14 +163,6 @@ def _warn_of_other_loads(gearbox: Gearbox) -> None:
                 f"({load_in_words(load_case)}): add --load-case {name} to compute it there",
                 style="yellow",
             )
-
-
-def _refuse_what_has_none(project: Project) -> None:
-    """Raise an error for a variant without steady-state response before tables and finite elements are computed."""
-    with suppress(FailedError):  # such a failure does not apply to the selected mesh model
-        variant = project.choice.variant
-        if reason := steady_lack(assembled_by_iso(project.gearbox, variant), variant):
-            raise BadInputError(reason)
 
 
 def _settings(
@@ -208,8 +203,19 @@ def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, 
     if as_json:
         summary = _whole_summary(project, settings, data, ranking, pulling, excited)
         remarks = {
-            "neglected_shuttling": [_wandering_summary(own) for own in wandering],
-            "bearings_outside_linear_range": [_swing_summary(own) for own in swinging],
+            "neglected_shuttling": [
+                {"pair": load.pair, "load_centroid_m": load.amplitude, "over_transmission_error": load.over_error}
+                for load in wandering
+            ],
+            "bearings_outside_linear_range": [
+                {
+                    "bearing": swing.bearing,
+                    "speeds": swing.count,
+                    "worst_speed_rpm": swing.speed / RPM,
+                    "share_of_static_load": swing.share,
+                }
+                for swing in swinging
+            ],
         }
         print_json({**summary, **remarks})
         _fail_if_doubtful(data, growth)
@@ -294,7 +300,10 @@ def _whole_summary(
         "harmonics": int(data.attrs["harmonics"]),
         "truncation_of_compliance": _left_out(data),
         "change_with_more_harmonics": _known(float(data.attrs["change_with_more"])),
-        "meshes_that_pull": [_pull_summary(pull) for pull in pulling],
+        "meshes_that_pull": [
+            {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
+            for pull in pulling
+        ],
         "not_converged": [
             {"speed_rpm": load["speed"] / RPM, "reason": load["reason"]}
             for load in json.loads(data.attrs["not_converged"])
@@ -364,12 +373,6 @@ def _warn_of_tensile_forces(data: xr.Dataset) -> tuple[TensileMesh, ...]:
     return found
 
 
-def _pull_summary(pull: TensileMesh) -> dict[str, Any]:
-    from exugear.gearbox.units import RPM
-
-    return {"mesh": pull.mesh, "speeds": pull.count, "worst_speed_rpm": pull.speed / RPM, "share_of_time": pull.share}
-
-
 def _warn_of_instability(data: xr.Dataset, growth: float) -> None:
     """Print the speeds without a converged or stable steady state."""
     from exugear.gearbox.units import RPM
@@ -402,10 +405,6 @@ def _warn_of_shuttling(project: Project) -> tuple[Shuttling, ...]:
             style="yellow",
         )
     return found
-
-
-def _wandering_summary(load: Shuttling) -> dict[str, Any]:
-    return {"pair": load.pair, "load_centroid_m": load.amplitude, "over_transmission_error": load.over_error}
 
 
 def _left_out(data: xr.Dataset) -> dict[str, float]:
@@ -468,17 +467,6 @@ def _warn_of_bearing_loads(data: xr.Dataset) -> tuple[BearingLoadExcursion, ...]
             style="yellow",
         )
     return swinging
-
-
-def _swing_summary(swing: BearingLoadExcursion) -> dict[str, Any]:
-    from exugear.gearbox.units import RPM
-
-    return {
-        "bearing": swing.bearing,
-        "speeds": swing.count,
-        "worst_speed_rpm": swing.speed / RPM,
-        "share_of_static_load": swing.share,
-    }
 
 
 def _summary(peak: Peak) -> dict[str, Any]:

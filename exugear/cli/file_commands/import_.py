@@ -34,7 +34,9 @@ def import_(
         from exugear.exchange.rexs.to_case.notes import Rules
         from fe_ste.tools.files import write_file
 
-        target = (out or Path(_stem(file))) / NAME
+        # A REXS file may have two extensions.
+        stem = file.name.removesuffix(".zip").removesuffix(".xml").removesuffix(".json").rsplit(".rexs", 1)[0]
+        target = (out or Path(stem or "imported")) / NAME
         _refuse_existing(target)
         imported = _imported(file, target, Rules(shifts.value, distances.value))
         if imported.spectrum:
@@ -74,11 +76,6 @@ def import_(
 def _refuse_existing(path: Path) -> None:
     if path.exists():
         raise BadInputError(f"{path}: exists already and may have been edited; specify another folder with --out")
-
-
-def _stem(file: Path) -> str:
-    """Name of a file without its extensions; a REXS file may have two."""
-    return file.name.removesuffix(".zip").removesuffix(".xml").removesuffix(".json").rsplit(".rexs", 1)[0] or "imported"
 
 
 def _imported(file: Path, target: Path, rules: Rules) -> Imported:

@@ -124,15 +124,11 @@ def _put_inside(text: str, place: _Node, key: str, new: Sequence[str]) -> Iterat
     items = place.all(key)
     node = place[key]
     if items:
-        space = _space_before(text, items[-1].start)
+        before = text[max(0, items[-1].start - LONGEST_INDENT) : items[-1].start]
+        space = before[len(before.rstrip()) :]
         yield items[-1].end, items[-1].end, "".join(f",{space}{one}" for one in new)
     elif node is not None:
         yield node.start, node.end, f"[{', '.join(new)}]"
     else:
         last = max(member.end for member in place.members.values())
         yield last, last, f', "{key}": [{", ".join(new)}]'
-
-
-def _space_before(text: str, place: int) -> str:
-    before = text[max(0, place - LONGEST_INDENT) : place]
-    return before[len(before.rstrip()) :]

@@ -7,7 +7,7 @@ import binascii
 import codecs
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -373,7 +373,7 @@ def _elements(content: bytes) -> _Element:
     parser = expat.ParserCreate("utf-8")
     parser.buffer_text = True
     parser.StartElementHandler = start
-    parser.EndElementHandler = _closing(open_elements)
+    parser.EndElementHandler = lambda _: open_elements.pop()
     parser.CharacterDataHandler = lambda text: open_elements[-1].texts.append(text)
     parser.StartDoctypeDeclHandler = refuse
     parser.EntityDeclHandler = refuse
@@ -383,10 +383,3 @@ def _elements(content: bytes) -> _Element:
         reason = expat.errors.messages.get(error.code, "cannot be parsed")
         raise RexsError(f"not an XML file: {reason} in line {error.lineno}") from None
     return top.children[0]
-
-
-def _closing(open_elements: list[_Element]) -> Callable[[str], None]:
-    def end(_: str) -> None:
-        open_elements.pop()
-
-    return end

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -147,12 +147,6 @@ class Faults(ReprMixin, line=": {_found!n}"):
             yield
         except RexsError as error:
             self._found += error.faults
-
-    def gather_each(self, attempts: Iterator[Callable[[], object]]) -> None:
-        """Run all attempts and collect the errors of each."""
-        for attempt in attempts:
-            with self.gathered():
-                attempt()
 
     def tell(self) -> None:
         """Raise the collected errors, if any.

@@ -206,7 +206,10 @@ def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] |
         attributes = load_run(path, ()).attrs
         if not _fits(context, path, attributes):
             return None
-        _note_invalid_run(context, path, attributes)
+        if verdict := verdict_of(attributes):
+            name = context.name_of(path)
+            context.notes.invalid_runs.append(f"{name}: {verdict}")
+            context.notes.statements.append(f"Invalid: {name}: {verdict}")
         signals = run_signals(path)
         return signals, signals.suitable_window
     except FileError as error:
@@ -241,15 +244,6 @@ def _fits(context: Context, path: Path, attributes: Mapping[str, Any]) -> bool:
         reason = str(error)
     context.notes.left_out.append(f"{context.name_of(path)}: {reason}")
     return False
-
-
-def _note_invalid_run(context: Context, path: Path, attributes: Mapping[str, Any]) -> None:
-    """Note an invalid run with the reason stored in its file."""
-    verdict = verdict_of(attributes)
-    if verdict:
-        name = context.name_of(path)
-        context.notes.invalid_runs.append(f"{name}: {verdict}")
-        context.notes.statements.append(f"Invalid: {name}: {verdict}")
 
 
 def run_key(attributes: Mapping[str, Any]) -> tuple[str, str, str]:

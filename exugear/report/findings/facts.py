@@ -267,15 +267,12 @@ def _speed_relative_to_rated(context: Context, group: RunGroup) -> tuple[str, ..
     compared = f"Speed: {figure_text(times, 2)} × rated."
     if times <= AROUND_RATED:
         return (compared,)
-    near = next((own for own in group.ranked[group.main] if own.steady and _is_near_rated(own, rated)), None)
+    limit = AROUND_RATED * rated
+    near = next((own for own in group.ranked[group.main] if own.steady and own.speed / RPM <= limit), None)
     said = "none"
     if near is not None:
         said = f"{frequency_text(near.frequency)}, {amplitude_text(near.ranking_level)}"
     return compared, f"Up to {AROUND_RATED:g} × rated: {said}."
-
-
-def _is_near_rated(resonance: RankedResonance, rated: float) -> bool:
-    return resonance.speed / RPM <= AROUND_RATED * rated
 
 
 def _compliance(group: RunGroup) -> SummaryCard | None:
@@ -295,18 +292,12 @@ def _compliance(group: RunGroup) -> SummaryCard | None:
     said = _short(
         f"Torsional model: highest resonance {frequency_text(stiff.finding.resonance.frequency)} at "
         f"{speed_text(stiff.peak.speed)}, {amplitude_text(stiff.peak.level)}.",
-        f"{'Flexible bodies add' if elastic else 'Bearing stiffness adds'} {_resonances(fresh)} and "
-        f"{'remove' if elastic else 'removes'} {gone}{counted}.",
+        f"{'Flexible bodies add' if elastic else 'Bearing stiffness adds'} {fresh} "
+        f"resonance{'s' * (fresh != 1)} and {'remove' if elastic else 'removes'} {gone}{counted}.",
     )
     sign = "−" if change < 0.0 else "+"
     kind = "Effect of flexible bodies" if elastic else "Effect of bearing stiffness"
     return SummaryCard(kind, f"{sign}{figure_text(abs(change), 2)} dB", "at the highest peak", said, "ranking")
-
-
-def _resonances(count: int) -> str:
-    if count == 1:
-        return f"{count} resonance"
-    return f"{count} resonances"
 
 
 def _sensitivity(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]) -> SummaryCard | None:

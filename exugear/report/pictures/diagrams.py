@@ -64,7 +64,8 @@ def plot_campbell(
         panel.grid(False)
         for mode in modes[modes <= top]:
             panel.axhline(1e-3 * mode, color="#BBBBBB", linewidth=0.8, zorder=1)
-        for line, colour in zip(order_lines, _repeated(len(order_lines)), strict=True):
+        for number, line in enumerate(order_lines):
+            colour = COLOURS[number % len(COLOURS)]
             end = float(line.frequency(fastest))
             reach = min(1.0, top / end)
             panel.plot([0.0, reach * end_speed], [0.0, 1e-3 * reach * end], color=colour, label=line.name, zorder=2)
@@ -82,10 +83,6 @@ def plot_campbell(
         if order_lines:
             figure.legend(loc="outside upper center", ncols=4)
         return finish_figure(figure, path)
-
-
-def _repeated(count: int) -> list[str]:
-    return [COLOURS[index % len(COLOURS)] for index in range(count)]
 
 
 # Diagrams of runs: waterfalls with order lines

@@ -88,7 +88,11 @@ def write_animation(way_out: Sequence[Figure], target: Path, duration: float) ->
     finished = [_set_picture(figure) for figure in way_out]
     pictures = finished + finished[-2:0:-1]
     # One palette for all frames, otherwise colours flicker.
-    palette = _with_white(pictures[0].quantize(colors=255, method=Image.Quantize.MEDIANCUT))
+    palette = pictures[0].quantize(colors=255, method=Image.Quantize.MEDIANCUT)
+    # Averaging turns white into light grey, which is set to white again.
+    colours = np.array(palette.getpalette()).reshape(-1, 3)
+    colours[colours.min(axis=1) >= 250] = 255
+    palette.putpalette(colours.ravel().tolist())
     indexed = [picture.quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
     pause = round(1e3 * duration / len(indexed))
     content = io.BytesIO()
@@ -105,14 +109,6 @@ def _set_picture(figure: Figure) -> PIL.Image.Image:
     finished = io.BytesIO()
     figure.savefig(finished, format="png", dpi=100)
     return Image.open(finished).convert("RGB")
-
-
-def _with_white(indexed: PIL.Image.Image) -> PIL.Image.Image:
-    """Set the lightest colours of a palette, light greys from averaging, to white."""
-    colours = np.array(indexed.getpalette()).reshape(-1, 3)
-    colours[colours.min(axis=1) >= 250] = 255
-    indexed.putpalette(colours.ravel().tolist())
-    return indexed
 
 
 # Pictures and animations of a gearbox and its modes, rendered off-screen with pyvista

@@ -238,7 +238,9 @@ def whole_page(
         HTML. Its content security policy permits only scripts and styles with these hashes, whatever names or untrusted
         files contain, and blocks all requests.
     """
-    style = "\n".join([vendored("uPlot.min.css"), *map(_style, STYLES)])
+    folder = files("exugear.report.web").joinpath("styles")
+    styles = [folder.joinpath(f"{name}.css").read_text(encoding="utf-8") for name in STYLES]
+    style = "\n".join([vendored("uPlot.min.css"), *styles])
     scripts = [*map(vendored, libraries), bundle(script)]
     policy = (
         f"default-src 'none'; script-src {' '.join(map(_digest, [THEME, *scripts]))}; style-src {_digest(style)}; "
@@ -254,10 +256,6 @@ def whole_page(
         + "\n".join(f"<script>{script}</script>" for script in scripts)
         + "\n</body></html>\n"
     )
-
-
-def _style(name: str) -> str:
-    return files("exugear.report.web").joinpath("styles", f"{name}.css").read_text(encoding="utf-8")
 
 
 def _digest(content: str) -> str:

@@ -74,13 +74,10 @@ def pick_resonances(
     [120]
     """
     searched = tuple(lines)
-    highest = max((_highest(spectra.along(line)) for line in searched), default=0.0)
+    levels = (spectra.along(line) for line in searched)
+    highest = max((float(np.max(level, initial=-np.inf, where=np.isfinite(level))) for level in levels), default=0.0)
     picks = (pick for line in searched for pick in (peaks or peaks_on_line)(spectra, line, prominence))
     return tuple(pick for pick in picks if pick.level > highest - depth)
-
-
-def _highest(level: Floats) -> float:
-    return float(np.max(level, initial=-np.inf, where=np.isfinite(level)))
 
 
 def peaks_on_line(spectra: Waterfall, line: OrderLine, prominence: float) -> list[Pick]:

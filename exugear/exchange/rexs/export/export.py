@@ -510,7 +510,8 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     check_same_gears(gearbox, imported.gearbox)
     target = Target(model, origins_of(imported.found), _static_load_case(gearbox, model))
     stored = StoredResults(gearbox, folder)
-    results = Results(_version(model))
+    major, minor = model.version.split(".")[:2]
+    results = Results((int(major), int(minor)))
     unit = next((part.number for part in model.components_of_type("gear_unit")), next(iter(model.components)))
     results.put_own(unit, "program", "none", f"exugear {exugear.__version__}")
     results.put_own(unit, "case", "none", gearbox.name)
@@ -529,11 +530,6 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     content = with_additions(path, results.additions)
     own = sum(addition.name.startswith(OWN) for addition in results.additions)
     return Exported(content, own, len(results.additions) - own, _replaced(model, results), tuple(stored.left_out))
-
-
-def _version(model: Model) -> tuple[int, int]:
-    major, minor = model.version.split(".")[:2]
-    return int(major), int(minor)
 
 
 def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:

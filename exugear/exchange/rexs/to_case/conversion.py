@@ -190,18 +190,12 @@ def _digits(value: float) -> float:
 def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
     """Return whether the sections of a body form one flexible shaft."""
     shafts = [part for part in body.parts_of_type("shaft") if part.given("support_vector")]
-    rigid = any(is_rigid(material_of(model, shaft)) for shaft in shafts)
+    materials = [material_of(model, shaft) for shaft in shafts]
+    rigid = any(map(is_rigid, materials))
     plain_shaft = (
         not body.carrier and not body.parts_of_type("side_plate") and all(section.aside == 0.0 for section in sections)
     )
-    materials = {_number(material_of(model, shaft)) for shaft in shafts}
-    return plain_shaft and not rigid and len(materials) == 1 and is_continuous(sections)
-
-
-def _number(material: Component | None) -> int:
-    if material is None:
-        return -1
-    return material.number
+    return plain_shaft and not rigid and len(set(materials)) == 1 and is_continuous(sections)
 
 
 def _shape(model: Model, body: Body, sections: Sequence[Cylinder], notes: Notes) -> Block:

@@ -154,7 +154,9 @@ def _ordered(
         with notes.faults.gathered():
             if gears[one.number].internal and gears[other.number].internal:
                 raise RexsError(f"{part}: two ring gears cannot mesh")
-            pinion, gear = sorted((one, other), key=lambda each: _size(gears[each.number]))
+            pinion, gear = sorted(
+                (one, other), key=lambda each: (gears[each.number].internal, gears[each.number].teeth)
+            )
             apart = math.dist(places.position(one)[:2], places.position(other)[:2])
             both = gears[pinion.number], gears[gear.number]
             if both[1].internal and both[1].teeth <= both[0].teeth:
@@ -181,10 +183,6 @@ def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Tooth
     if 0.0 < overlap < least - FACE_TOLERANCE:
         return derived(overlap, "overlap of the face widths at their positions")
     return None
-
-
-def _size(gear: Toothing) -> tuple[bool, int]:
-    return gear.internal, gear.teeth
 
 
 def _check_equal_planets(

@@ -292,7 +292,8 @@ def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: f
         speed = _input_speed(load, ends, ratio)
         fastest = max(fastest, speed, key=abs)
         entries = {"description": Entry(load.description)} if load.description else {}
-        entries["torques_N_m"] = _balanced(ends, torque, ratio)
+        torques = {ends.input: torque, ends.output: _rounded(-torque / ratio)}
+        entries["torques_N_m"] = derived(torques, "the output balances the torques")
         if speed:
             entries["start_speed_rpm"] = read(tidy(speed), f"rotational_speed, at {ends.input}")
         entries["duration_s"] = assumed(1.0, "")
@@ -300,10 +301,6 @@ def load_case_blocks(loads: Sequence[Loads], ends: Ends, static: float, ratio: f
     if fastest:
         blocks["run_up"] = _run_up(ends, static, ratio, fastest)
     return blocks
-
-
-def _balanced(ends: Ends, torque: float, ratio: float) -> Entry:
-    return derived({ends.input: torque, ends.output: _rounded(-torque / ratio)}, "the output balances the torques")
 
 
 def _run_up(ends: Ends, torque: float, ratio: float, speed: float) -> Block:

@@ -243,13 +243,10 @@ def _rib_stiffness(part: Component, catalogue: Mapping[str, Entry]) -> dict[str,
     value = part.quantity("axial_stiffness", "N / m")
     if not value or catalogue["type"].value not in CYLINDERS or "ribs" in catalogue:
         return {}
-    return {"stiffness": Block("", {"axial_N_per_m": _axial_stiffness(value)})}
-
-
-def _axial_stiffness(value: float) -> Entry:
+    stiffness = read(tidy(value), "axial_stiffness")
     if value >= RIGID_ABOVE["axial_stiffness"]:
-        return assumed(RIGID["axial_stiffness"], f"axial_stiffness of {value:g} means rigid")
-    return read(tidy(value), "axial_stiffness")
+        stiffness = assumed(RIGID["axial_stiffness"], f"axial_stiffness of {value:g} means rigid")
+    return {"stiffness": Block("", {"axial_N_per_m": stiffness})}
 
 
 def _sizes(part: Component, kind: str | None, notes: Notes) -> dict[str, Entry]:
