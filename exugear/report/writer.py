@@ -5,15 +5,25 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+from exugear.gearbox.choice import Choice
 from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.variant import Variant
 from exugear.report.bearings_section import bearings_section
-from exugear.report.findings.context import Context, bytes_of_runs, stored_models, with_responses
+from exugear.report.findings.context import (
+    Context,
+    StoredResults,
+    bytes_of_runs,
+    choice_of,
+    stored_models,
+    with_responses,
+)
 from exugear.report.findings.groups import groups_of
 from exugear.report.findings.verdicts import begin_variations, model_variations
 from exugear.report.findings.words import Labels
@@ -28,6 +38,7 @@ from exugear.report.trust_section import trust_section
 from exugear.report.web import html
 from exugear.report.web.document import ArrayStore, whole_page
 from exugear.results.folder import REPORT_FILE, read_stored_gearbox
+from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.files import write_file
 
 # Page elements outside the sections: head, table of contents, controls of the whole page, footer
@@ -44,6 +55,8 @@ def page_body(material: ReportData, parts: Sequence[Part]) -> str:
     head = html.element("header", _headline(material) + _tools() + contents, class_="top")
     above = html.alert(warning, notes.invalid_runs) if notes.invalid_runs else ""
     left_out = html.section("Skipped", html.bullets(notes.left_out), name="left-out") if notes.left_out else ""
+    if commands := commands_for_missing(material.context, material.results):
+        left_out += html.section("Not computed", html.bullets(commands), name="not-computed")
     main = html.element("main", above + _sets(material) + "".join(part.html for part in parts) + left_out, id="content")
     text = f"Created by exugear from {material.file_words}. This page makes no network requests."
     foot = html.element("footer", html.paragraph(text))
@@ -51,6 +64,45 @@ def page_body(material: ReportData, parts: Sequence[Part]) -> str:
     live = html.element("p", "", id="said", class_="toast", role="status", aria_live="polite")
     tip = html.element("p", "", id="tip", class_="tip", hidden=True)
     return skip + head + main + foot + live + tip
+
+
+def commands_for_missing(context: Context, results: StoredResults) -> list[str]:
+    """List results that the folder lacks, with the commands that compute them.
+
+    These are the modes of each model with other results, and a steady-state response and a run if there is none.
+    """
+    computed = [choice_of(run.attributes) for run in results.runs]
+    computed += [choice_of(data.attrs) for data in results.steady]
+    models = list(dict.fromkeys([*computed, *results.modes])) or [Choice("bushing")]
+    wanted = [("natural frequencies", "modes", model) for model in models if model not in results.modes]
+    # The variant with most degrees of freedom comes last in the list of variants.
+    richest = max(models, key=lambda model: list(Variant).index(model.variant))
+    if not results.steady and LAWS[richest.mesh_model].has_force:
+        wanted.append(("steady-state response", "steady", richest))
+    if not results.runs:
+        wanted.append(("run-up", "run", richest))
+    return [f"{what}, {model.variant}: {_command(context, verb, model)}" for what, verb, model in wanted]
+
+
+def _command(context: Context, verb: str, model: Choice) -> str:
+    """Return a command line for model settings, without options that have their default values."""
+    words = ["exugear", verb, _shown(context.gearbox.source), "--variant", str(model.variant)]
+    usual = Choice(model.variant)
+    if model.mesh_model != usual.mesh_model:
+        words += ["--mesh-model", model.mesh_model]
+    if model.inertias not in (None, context.gearbox.case.default_inertias):
+        words += ["--inertias", str(model.inertias)]
+    if verb == "steady" and LAWS[model.mesh_model].loses_contact:
+        words += ["--method", "nonlinear"]
+    return shlex.join([*words, "--out", _shown(context.folder)])
+
+
+def _shown(path: str | Path) -> str:
+    """Return a path from the current folder, or its name: the page does not show where it is on this machine."""
+    absolute = Path(path).absolute()
+    if absolute.is_relative_to(Path.cwd()):
+        return str(absolute.relative_to(Path.cwd()))
+    return absolute.name
 
 
 def _headline(material: ReportData) -> str:
@@ -119,6 +171,8 @@ class Report:
     """Path of the page."""
     statements: tuple[str, ...]
     """Statements of the summary."""
+    missing: tuple[str, ...]
+    """Results that are not in the folder, each with the command that computes it."""
     left_out: tuple[str, ...]
     """Skipped files that do not belong to the gearbox file, and results that could not be computed, with the reason."""
 
@@ -164,7 +218,8 @@ def write_report(
     path = folder / REPORT_FILE
     page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
     write_file(path, page.encode("utf-8", "replace"))
-    return Report(path, tuple(context.notes.statements), tuple(context.notes.left_out))
+    missing = tuple(commands_for_missing(context, material.results))
+    return Report(path, tuple(context.notes.statements), missing, tuple(context.notes.left_out))
 
 
 def _material(context: Context, executor: Executor | None) -> ReportData:

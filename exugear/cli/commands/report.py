@@ -6,7 +6,7 @@ import math
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,9 @@ from exugear.cli.console import (
     say,
 )
 from exugear.cli.tables import print_table
+
+if TYPE_CHECKING:
+    from exugear.report.writer import Report
 
 
 def report(
@@ -56,7 +59,7 @@ def report(
                 written = write_report(folder, near, tell, allow_dir, executor)
         except ReportError as error:
             raise BadInputError(error) from error
-        _print_report(folder, written.path, written.statements, written.left_out, as_json)
+        _print_report(folder, written, as_json)
 
 
 def _results_of(folder: Path) -> Path:
@@ -80,26 +83,27 @@ def _parallel_worker() -> AbstractContextManager[Executor | None]:
     return nullcontext()
 
 
-def _print_report(
-    folder: Path, path: Path, statements: tuple[str, ...], left_out: tuple[str, ...], as_json: bool
-) -> None:
+def _print_report(folder: Path, written: Report, as_json: bool) -> None:
     from exugear.results.folder import times_spent
 
     spent = times_spent(folder)
-    for line in left_out:
+    for line in written.left_out:
         note(f"Warning: skipped: {line}", style="yellow")
+    for line in written.missing:
+        note(f"Not computed: {line}")
     if as_json:
         times = {entry.step: entry.seconds for entry in spent}
-        print_json({"report": str(path), "statements": list(statements), "left_out": list(left_out), "seconds": times})
+        lists = {name: list(getattr(written, name)) for name in ("statements", "missing", "left_out")}
+        print_json({"report": str(written.path), **lists, "seconds": times})
         return
-    for line in statements:
+    for line in written.statements:
         say(f"- {line}")
     rows = [
         {"step": entry.step, "wall\ntime s": f"{entry.seconds:.1f}", "memory\npeak MB": _megabytes(entry.memory)}
         for entry in spent
     ]
     print_table("Run time, last execution of each step", rows, legend="Parallel steps overlap.")
-    say(f"Report: {path}")
+    say(f"Report: {written.path}")
 
 
 def _megabytes(memory: float) -> str:

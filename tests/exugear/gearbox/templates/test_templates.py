@@ -120,7 +120,10 @@ def test_a_report_of_the_folder_of_the_gearbox_file_is_that_of_its_results(
     assert exugear("modes", "my/gearbox.toml", "--variant", "bushing", "--mesh-model", "iso6336").exit_code == 0
     written = exugear("report", "my")
     assert written.exit_code == 0 and "its results are in results/my" in written.stderr
-    assert (tmp_path / "results" / "my" / "report.html").is_file()
+    page = (tmp_path / "results" / "my" / "report.html").read_text(encoding="utf-8")
+    for command in ("exugear steady", "exugear run"):
+        line = f"{command} my/gearbox.toml --variant bushing --mesh-model iso6336 --out results/my"
+        assert line in written.stderr.replace("\n", " ") and line in page
     assert exugear("report", tmp_path / "nothing").exit_code == 2
 
 
