@@ -21,7 +21,13 @@ from exugear.gearbox.units import RPM, UM
 from exugear.life.gear_life import RZ_OF_RA, roughness_of
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.life import viscosity_at
-from fe_ste.standards.mesh_loss import MeshOperation, friction_schlenk, helical_loss_factor, loss_factor
+from fe_ste.standards.mesh_loss import (
+    MeshOperation,
+    friction_niemann,
+    friction_schlenk,
+    helical_loss_factor,
+    loss_factor,
+)
 from fe_ste.transmission_error.sliding import table_friction, table_loss_factor
 from fe_ste.transmission_error.table import MeshTable
 
@@ -49,6 +55,8 @@ EXPANSION = 0.7
 """Decrease of the density, kg/(m3 K)."""
 RMS_OF_RA = 1.11
 """Root mean square roughness of ground flanks over Ra (Gaussian heights: sqrt(pi / 2) = 1.25; sine: 1.11)."""
+NIEMANN_WINTER, XU_KAHRAMAN = "niemann_winter", "xu_kahraman"
+"""Methods of friction besides that of Schlenk."""
 HELICAL_FROM = 0.9
 """Overlap ratio from which contact lines carry a constant load per length rather than tooth pairs an equal load."""
 HOTTEST = 250.0
@@ -68,8 +76,8 @@ class MeshLoss:
     """Whether the loss factor is that of the line loads of a transmission error table."""
     friction: float
     """Mean coefficient of friction by Schlenk."""
-    other_friction: float | None
-    """The same by Xu and Kahraman from the table; None without one."""
+    other_friction: Mapping[str, float]
+    """The same by other methods: `NIEMANN_WINTER`, and with a table `XU_KAHRAMAN`; empty without load or motion."""
 
     @property
     def loss(self) -> float:
@@ -79,9 +87,9 @@ class MeshLoss:
     @property
     def band(self) -> tuple[float, float]:
         """Smallest and largest loss by the methods of friction, W."""
-        other = self.other_friction or self.friction
+        all_methods = (self.friction, *self.other_friction.values())
         scale = self.power * self.loss_factor
-        return scale * min(self.friction, other), scale * max(self.friction, other)
+        return scale * min(all_methods), scale * max(all_methods)
 
 
 @dataclass(frozen=True)
@@ -246,7 +254,7 @@ def _mesh_losses(
         power = len(meshes) * mean * relative * pair.pinion.base_radius
         table = tables.get(pair.name)
         friction = 0.0
-        other = None
+        other: dict[str, float] = {}
         if table is not None:
             factor = table_loss_factor(pair, table.static_state)
         elif pair.overlap_ratio >= HELICAL_FROM:
@@ -254,11 +262,17 @@ def _mesh_losses(
         else:
             factor = loss_factor(pair)
         if relative > 0.0 and mean > 0.0:
-            stated = (_roughness(gearbox, gear.name) for gear in (pair.pinion, pair.gear))
-            roughness = 0.5 * sum(value or USUAL_ROUGHNESS for value in stated)
+            stated = [_roughness(gearbox, gear.name) or USUAL_ROUGHNESS for gear in (pair.pinion, pair.gear)]
+            roughness = 0.5 * sum(stated)
             friction = friction_schlenk(MeshOperation.of(pair, mean, relative, viscosity, roughness))
+            rougher = MeshOperation.of(pair, mean, relative, viscosity, max(stated))
+            # Its sum speed is that at the reference circle.
+            speeds_ratio = math.tan(pair.pinion.transverse_pressure_angle) / math.tan(pair.working_pressure_angle)
+            other[NIEMANN_WINTER] = friction_niemann(rougher, 2.0 * pair.pinion.reference_radius, speeds_ratio)
             if table is not None:
-                other = table_friction(pair, table.static_state, relative, viscosity, RMS_OF_RA * roughness)
+                other[XU_KAHRAMAN] = table_friction(
+                    pair, table.static_state, relative, viscosity, RMS_OF_RA * roughness
+                )
         found.append(MeshLoss(family, len(meshes), power, factor, table is not None, friction, other))
     return tuple(found)
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 MESH_LEGEND = (
     "H_V: gear loss factor, from the line loads of the table (*) or in closed form. mu_m: mean coefficient of friction "
-    "by Schlenk. Band: from Xu and Kahraman to Schlenk, where a table exists."
+    "by Schlenk. Band: also by Niemann and Winter and, with a table, by Xu and Kahraman."
 )
 BEARING_LEGEND = (
     "P: equivalent dynamic load; C: basic dynamic load rating; mu: constant coefficient of friction (SKF), valid for "
@@ -149,7 +149,7 @@ def _summary(found: Losses) -> dict[str, Any]:
                 "loss_factor": mesh.loss_factor,
                 "from_table": mesh.from_table,
                 "friction": mesh.friction,
-                "friction_xu_kahraman": mesh.other_friction,
+                **{f"friction_{method}": value for method, value in mesh.other_friction.items()},
                 "loss_W": mesh.loss,
                 "loss_band_W": list(mesh.band),
             }

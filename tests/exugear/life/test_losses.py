@@ -54,7 +54,10 @@ def test_input_is_output_and_losses_by_element(oiled: Gearbox, found: Losses) ->
     assert found.efficiency == pytest.approx(1.0 - sum(parts) / found.input_power, rel=1e-12)
     assert 0.95 < found.efficiency < 0.98
     low, high = found.band
-    assert low <= found.total <= high
+    assert low < found.total <= high
+    for mesh in found.meshes:
+        assert set(mesh.other_friction) == {"niemann_winter"}
+        assert 0.4 < mesh.other_friction["niemann_winter"] / mesh.friction < 1.5
 
 
 def test_each_mesh_transmits_what_its_stage_does(oiled: Gearbox, found: Losses) -> None:
