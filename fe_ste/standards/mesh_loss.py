@@ -61,8 +61,8 @@ def loss_factor(pair: GearPair) -> float:
 def helical_loss_factor(pair: GearPair) -> float:
     """Gear loss factor H_V with a constant load per length of all contact lines, as in wide helical gears.
 
-    As `loss_factor` with the bracket (eps_1 |eps_1| + eps_2 |eps_2|) / eps_alpha: the mean distance from the pitch
-    point over the path of contact.
+    As `loss_factor` with the bracket (eps_1 abs(eps_1) + eps_2 abs(eps_2)) / eps_alpha: the mean distance from the
+    pitch point over the path of contact.
     """
     first, second = partial_contact_ratios(pair)
     return _sliding(pair) * (first * abs(first) + second * abs(second)) / (first + second)
@@ -167,10 +167,10 @@ def friction_xu_kahraman(
 ) -> Floats:
     """Local coefficient of friction in an elastohydrodynamic contact by Xu and Kahraman.
 
-    mu = e^f p^b2 |SR|^b3 v^b6 eta^b7 R^b8, f = b1 + b4 |SR| p lg eta + b5 e^(-|SR| p lg eta) + b9 e^S, with GPa, m/s,
-    mPa s, m and um rms (H. Xu, Development of a generalized mechanical efficiency prediction methodology for gear
-    pairs, dissertation, Ohio State University, 2005). The term of roughness was fitted up to 0.5 um and rises steeply
-    beyond.
+    mu = e^f p^b2 SR^b3 v^b6 eta^b7 R^b8, f = b1 + b4 SR p lg eta + b5 e^(-SR p lg eta) + b9 e^S, SR the absolute
+    slide-to-roll ratio, with GPa, m/s, mPa s, m and um rms (H. Xu, Development of a generalized mechanical efficiency
+    prediction methodology for gear pairs, dissertation, Ohio State University, 2005). The term of roughness was fitted
+    up to 0.5 um and rises steeply beyond.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Sliding of the teeth over the mesh cycle, from the line loads of a transmission error table.
 
 Where a tooth pair touches at a distance x along the line of action from the pitch point, its flanks slide on each other
-with the speed |omega_1 (1 + 1/u)| |x|, omega_1 that of gear 1 relative to the frame of the mesh.
+with the speed abs(omega_1 (1 + 1/u) x), omega_1 that of gear 1 relative to the frame of the mesh.
 """
 
 from __future__ import annotations
