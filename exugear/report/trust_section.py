@@ -104,6 +104,8 @@ def _assumptions(material: ReportData) -> str:
         "Modes: linearised at the static load, mesh stiffness averaged over the mesh cycle.",
         *_elastic_words(material),
     ]
+    if friction := case.damping.tooth_friction:
+        listed.append(f"Friction of teeth in steady-state responses: coefficient {friction:g}; runs do not include it.")
     return pieces.bullets(listed) + pieces.paragraph(
         f"The sources of the inputs are in the comments of {material.file_words} and in files of its folder.", "note"
     )
