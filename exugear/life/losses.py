@@ -55,7 +55,8 @@ EXPANSION = 0.7
 """Decrease of the density, kg/(m3 K)."""
 RMS_OF_RA = 1.11
 """Root mean square roughness of ground flanks over Ra (Gaussian heights: sqrt(pi / 2) = 1.25; sine: 1.11)."""
-NIEMANN_WINTER, XU_KAHRAMAN = "niemann_winter", "xu_kahraman"
+NIEMANN_WINTER = "niemann_winter"
+XU_KAHRAMAN = "xu_kahraman"
 """Methods of friction in addition to that of Schlenk."""
 HELICAL_FROM = 0.9
 """Overlap ratio from which contact lines carry a constant load per length rather than tooth pairs an equal load."""

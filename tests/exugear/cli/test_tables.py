@@ -24,6 +24,7 @@ from exugear.gearbox.sections.case import DampingSection
 from exugear.gearbox.variant import Variant
 from exugear.life.rating.sheet import FINITE_ELEMENTS, FlankSheet, RatingSheet
 from exugear.report.findings.loudness import PeakAmplitude, Ranking, Resonance
+from exugear.report.writer import Report
 from exugear.system.bearings.duty import Ratings
 from tests.exugear.cases.command import exugear
 
@@ -309,7 +310,7 @@ def test_loads(printed: Printed) -> None:
 def test_report(printed: Printed, tmp_path: Any) -> None:
     step = f"comparison with Exudyn, flexible, {', '.join(NAMES)}"
     (tmp_path / "times.jsonl").write_text(json.dumps({"step": step, "seconds": 123456.7, "memory": 1.234e11}) + "\n")
-    report._print_report(tmp_path, tmp_path.relative_to(tmp_path), (), (), False)
+    report._print_report(tmp_path, Report(tmp_path.relative_to(tmp_path), (), (), ()), False)
     printed.check(1)
 
 
