@@ -73,7 +73,7 @@ def commands_for_missing(context: Context, results: StoredResults) -> list[str]:
     """
     computed = [choice_of(run.attributes) for run in results.runs]
     computed += [choice_of(data.attrs) for data in results.steady]
-    models = list(dict.fromkeys([*computed, *results.modes])) or [Choice("bushing")]
+    models = list(dict.fromkeys([*computed, *results.modes])) or [Choice()]
     wanted = [("natural frequencies", "modes", model) for model in models if model not in results.modes]
     # The variant with most degrees of freedom comes last in the list of variants.
     richest = max(models, key=lambda model: list(Variant).index(model.variant))

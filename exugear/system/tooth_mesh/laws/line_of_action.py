@@ -28,7 +28,6 @@ from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import fitting_table, table_path, wanted_table
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import kernel
-from fe_ste.transmission_error.sliding import friction_over_cycle
 from fe_ste.transmission_error.surface import GapError, SteSurface, complete_cycle
 from fe_ste.transmission_error.table import TableError
 
@@ -67,6 +66,8 @@ class LineOfAction(Law):
         computed_from = wanted_table(gearbox, pair, len(stiffness))
         force = float(point["line_of_action_force"].mean())
         centres = {name: np.asarray(point[name].to_numpy(), dtype=np.float64) for name in _CENTRES}
+        from fe_ste.transmission_error.sliding import friction_over_cycle  # loads xarray, which only tables need
+
         friction = friction_over_cycle(computed_from.pair, table.static_state)
         return MeshCurve(stiffness, tangent, force, computed_from, friction=friction, **centres)
 
