@@ -21,9 +21,10 @@ from exugear.steady.steady_response import harmonic_balance_model
 from exugear.system.build import assemble
 from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.placement import MeshGeometry
-from fe_ste.standards.mesh_loss import partial_contact_ratios
+from fe_ste.geometry.gears import GearPair
 from fe_ste.transmission_error.sliding import friction_over_cycle, table_loss_factor
 
+from ...fe_ste.cases.line_loads import state_of
 from ..cases.command import exugear
 from ..cases.spur import SPUR_CASE
 
@@ -31,19 +32,9 @@ COEFFICIENT = 0.05
 POSITIONS = 50
 
 
-def line_loads(pair, axial_lines: int = 1) -> xr.Dataset:
+def line_loads(pair: GearPair, lines: int = 1) -> xr.Dataset:
     """Equal load on all tooth pairs in contact."""
-    teeth = np.arange(-4, 5)
-    pmc = np.arange(POSITIONS) / POSITIONS
-    axial = pair.face_width * ((np.arange(axial_lines) + 0.5) / axial_lines - 0.5)
-    pitches = math.tan(pair.pinion.base_helix_angle) * axial / pair.transverse_base_pitch
-    along = pmc[:, None, None] + teeth[None, :, None] + pitches
-    first, second = partial_contact_ratios(pair)
-    load = ((along > -second) & (along <= first)).astype(float)
-    load /= load.sum(axis=(1, 2), keepdims=True)
-    return xr.Dataset(
-        {"line_load": (("pmc", "tooth", "axial_position"), load)}, {"pmc": pmc, "tooth": teeth, "axial_position": axial}
-    )
+    return state_of(pair, POSITIONS, lines)
 
 
 def curves_with_friction(gearbox: Gearbox, stiffness: dict, lines: int = 9) -> dict[str, MeshCurve]:
@@ -97,7 +88,7 @@ def test_forces_are_those_of_vectors_at_the_contact_points(load: float, speed: f
     axes = np.zeros(3), np.array([0.075, 0.0, 0.0])
     for tooth, place in enumerate(state["tooth"].to_numpy()):
         for n, pmc in enumerate(state["pmc"].to_numpy()):
-            share = float(state["line_load"][n, tooth, 0])
+            share = float(state["line_load"][n, tooth, 0]) / float(state["line_load"][n].sum())
             point = pitch_point + (place + pmc) * mesh.pair.transverse_base_pitch * normal
             velocity = np.cross([0.0, 0.0, turns], point - pitch_point)
             size = np.linalg.norm(velocity)

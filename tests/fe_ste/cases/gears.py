@@ -111,3 +111,30 @@ def nrel_stage_3(material: Material) -> GearPair:
         **common,
     )
     return GearPair(name="stage 3", pinion=pinion, gear=wheel, centre_distance=0.861 + 1e-6)
+
+
+def nrel_stage_1(material: Material) -> tuple[GearPair, GearPair]:
+    """Planet with sun, and planet with ring, of the first stage of the NREL 5 MW gearbox.
+
+    The rating sheet is published: KISSsoft report in gfsReboucas/Drivetrain, @NREL_5MW/stage_01.rtf; Nejad et al., Wind
+    Energy 2016, 10.1002/we.1884.
+    """
+    common: dict[str, Any] = {"normal_module": 45e-3, "face_width": 0.491, "material": material}
+    sun = Gear(name="sun", teeth=19, profile_shift=0.6170, held_diameter=482.33e-3, tip_diameter=978.808e-3, **common)
+    planet = Gear(
+        name="planet", teeth=17, profile_shift=0.8021, held_diameter=408.99e-3, tip_diameter=905.470e-3, **common
+    )
+    ring = Gear(
+        name="ring",
+        teeth=56,
+        internal=True,
+        profile_shift=0.5013,
+        rack=BasicRack(tip_radius=0.30),
+        held_diameter=2994.24e-3,
+        tip_diameter=2475.118e-3,
+        **common,
+    )
+    return (
+        GearPair(name="sun", pinion=planet, gear=sun, centre_distance=0.863 + 1e-6),
+        GearPair(name="ring", pinion=planet, gear=ring, centre_distance=0.863 - 1e-6),
+    )

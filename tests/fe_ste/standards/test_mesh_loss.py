@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import xarray as xr
 
-from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.geometry.gears import Gear, GearPair, Material
 from fe_ste.standards.mesh_loss import (
     MeshOperation,
     friction_niemann,
@@ -21,18 +20,10 @@ from fe_ste.standards.mesh_loss import (
 )
 from fe_ste.transmission_error.sliding import table_friction, table_loss_factor
 
-WHEEL = {"normal_module": 45e-3, "face_width": 0.491, "tooth_thinning": 1e-4}
-SUN = Gear(name="sun", teeth=19, profile_shift=0.6170, tip_diameter=0.978808, held_diameter=0.4, **WHEEL)
-PLANET = Gear(name="planet", teeth=17, profile_shift=0.8021, tip_diameter=0.905470, held_diameter=0.4, **WHEEL)
-RING = Gear(
-    name="ring", teeth=56, profile_shift=0.5013, tip_diameter=2.475118, held_diameter=3.0, internal=True, **WHEEL
-)
-PAIRS = {
-    "sun": GearPair(name="sun", pinion=PLANET, gear=SUN, centre_distance=0.863),
-    "ring": GearPair(name="ring", pinion=PLANET, gear=RING, centre_distance=0.863),
-}
-"""First stage of the NREL 5 MW gearbox: KISSsoft report in gfsReboucas/Drivetrain, @NREL_5MW/stage_01.rtf; Nejad et
-al., Wind Energy 2016, 10.1002/we.1884."""
+from ..cases.gears import nrel_stage_1
+from ..cases.line_loads import state_of
+
+PAIRS = dict(zip(("sun", "ring"), nrel_stage_1(Material()), strict=True))
 REPORTED = [("sun", 1.01, 0.041, 9.272), ("ring", 1.05, 0.045, 8.986)]
 """Dynamic factor, coefficient of friction and loss (kW) of a mesh in that report."""
 
@@ -60,26 +51,10 @@ def test_friction_and_loss_are_those_of_a_public_report(
     viscosity = {"sun": 32.0e-3, "ring": 32.3e-3}[name]
     mesh = MeshOperation.of(pair, 1.1 * dynamic * force, speed, viscosity, {"sun": 0.6e-6, "ring": 1.05e-6}[name])
     ratio = math.tan(math.radians(20.0)) / math.tan(pair.working_pressure_angle)
-    diameter = 2.0 * {"sun": SUN, "ring": PLANET}[name].reference_radius
+    diameter = 2.0 * {"sun": PAIRS["sun"].gear, "ring": PAIRS["ring"].pinion}[name].reference_radius
     friction = friction_niemann(mesh, diameter, ratio)
     assert friction == pytest.approx(reported, abs=6e-4)
     assert 1e-3 * power * friction * loss_factor(pair) == pytest.approx(loss, rel=5e-3)
-
-
-def state_of(pair: GearPair, positions: int = 400, lines: int = 41) -> xr.Dataset:
-    """Equal load on all tooth pairs in contact, evenly along the face."""
-    teeth = np.arange(-6, 7)
-    pmc = np.arange(positions) / positions
-    axial = pair.face_width * ((np.arange(lines) + 0.5) / lines - 0.5)
-    pitches = math.tan(pair.pinion.base_helix_angle) * axial / pair.transverse_base_pitch
-    along = pmc[:, None, None] + teeth[None, :, None] + pitches
-    first, second = partial_contact_ratios(pair)
-    # A pair is in contact from the tip of gear 2 to that of gear 1.
-    touching = ((along > -second) & (along <= first)).astype(float)
-    load = 1e5 * touching / touching.sum(axis=(1, 2), keepdims=True)
-    return xr.Dataset(
-        {"line_load": (("pmc", "tooth", "axial_position"), load)}, {"pmc": pmc, "tooth": teeth, "axial_position": axial}
-    )
 
 
 @pytest.mark.parametrize("name", PAIRS)

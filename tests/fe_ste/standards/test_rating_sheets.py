@@ -52,7 +52,7 @@ from fe_ste.standards.tooth_root import (
 )
 from fe_ste.standards.tooth_root import root_stress_factors as root_stress_factors_of
 
-from ..cases.gears import nrel_stage_3
+from ..cases.gears import nrel_stage_1, nrel_stage_3
 
 STEEL = Material(density=7830.0)
 RPM = math.pi / 30.0
@@ -285,36 +285,7 @@ PRINTED_2 = {
 }
 
 
-def stage_1() -> tuple[Gear, Gear, Gear]:
-    common = {"normal_module": 45e-3, "face_width": 0.491, "material": STEEL}
-    sun = Gear(name="sun", teeth=19, profile_shift=0.6170, held_diameter=482.33e-3, tip_diameter=978.808e-3, **common)
-    planet = Gear(
-        name="planet", teeth=17, profile_shift=0.8021, held_diameter=408.99e-3, tip_diameter=905.470e-3, **common
-    )
-    ring = Gear(
-        name="ring",
-        teeth=56,
-        internal=True,
-        profile_shift=0.5013,
-        rack=BasicRack(tip_radius=0.30),
-        held_diameter=2994.24e-3,
-        tip_diameter=2475.118e-3,
-        **common,
-    )
-    return sun, planet, ring
-
-
-@cache
-def sun_planet_1() -> GearPair:
-    """The planet is the smaller gear."""
-    sun, planet, _ = stage_1()
-    return GearPair(name="sun", pinion=planet, gear=sun, centre_distance=0.863 + 1e-6)
-
-
-@cache
-def ring_planet_1() -> GearPair:
-    _, planet, ring = stage_1()
-    return GearPair(name="ring", pinion=planet, gear=ring, centre_distance=0.863 - 1e-6)
+SUN_PLANET_1, RING_PLANET_1 = nrel_stage_1(STEEL)
 
 
 BLANK_1 = 1.0 + math.log(0.25) / (5.0 * math.exp(3.5 / 5.0))
@@ -339,14 +310,14 @@ def dynamic_of_ring_2() -> float:
 
 
 PRINTED_RINGS = {
-    "stage 1: c' of sun and planet": (lambda: 1e-9 * stiffness_of(sun_planet_1()).single_stiffness, 12.362),
-    "stage 1: c_gamma_alpha of sun and planet": (lambda: 1e-9 * stiffness_of(sun_planet_1()).mesh_stiffness, 13.426),
-    "stage 1: c' of planet and ring": (lambda: 1e-9 * stiffness_of(ring_planet_1()).single_stiffness, 13.289),
-    "stage 1: c_gamma_alpha of planet and ring": (lambda: 1e-9 * stiffness_of(ring_planet_1()).mesh_stiffness, 16.063),
-    "stage 1: m_red of sun and planets": (lambda: 1e-3 * reduced_mass(sun_planet_1(), (1, 3)), 0.6606),
-    "stage 1: m_red of planet and held ring": (lambda: 1e-3 * reduced_mass(ring_planet_1(), (1, 3)), 2.4597),
-    "stage 1: n_E1 of the sun": (lambda: main_resonance(sun_planet_1(), (1, 3)) * 17 / 19, 2266.0),
-    "stage 1: n_E1 of the planet": (lambda: main_resonance(ring_planet_1(), (1, 3)), 1435.0),
+    "stage 1: c' of sun and planet": (lambda: 1e-9 * stiffness_of(SUN_PLANET_1).single_stiffness, 12.362),
+    "stage 1: c_gamma_alpha of sun and planet": (lambda: 1e-9 * stiffness_of(SUN_PLANET_1).mesh_stiffness, 13.426),
+    "stage 1: c' of planet and ring": (lambda: 1e-9 * stiffness_of(RING_PLANET_1).single_stiffness, 13.289),
+    "stage 1: c_gamma_alpha of planet and ring": (lambda: 1e-9 * stiffness_of(RING_PLANET_1).mesh_stiffness, 16.063),
+    "stage 1: m_red of sun and planets": (lambda: 1e-3 * reduced_mass(SUN_PLANET_1, (1, 3)), 0.6606),
+    "stage 1: m_red of planet and held ring": (lambda: 1e-3 * reduced_mass(RING_PLANET_1, (1, 3)), 2.4597),
+    "stage 1: n_E1 of the sun": (lambda: main_resonance(SUN_PLANET_1, (1, 3)) * 17 / 19, 2266.0),
+    "stage 1: n_E1 of the planet": (lambda: main_resonance(RING_PLANET_1, (1, 3)), 1435.0),
     "stage 2: c' of planet and ring": (lambda: 1e-9 * stiffness_of(ring_planet()).single_stiffness, 14.053),
     "stage 2: c_gamma_alpha of planet and ring": (lambda: 1e-9 * stiffness_of(ring_planet()).mesh_stiffness, 20.563),
     "stage 2: m_red of planet and held ring": (lambda: 1e-3 * reduced_mass(ring_planet(), (1, 3)), 1.4684),
