@@ -168,8 +168,7 @@ def steady_section(part: Results) -> str:
             ),
             "Lines, variant bushing, method parametric, no speeds added:\n",
             table(["harmonics", "sum of multiples of combinations", "lines", "all"], growth),
-            "Damping and friction over damping times alone, variant bushing; runs do not include the friction of teeth:"
-            "\n",
+            "Damping and friction over damping times alone, variant bushing:\n",
             table(["dissipation", "response, parametric", "run-up"], dissipation),
             items(
                 [

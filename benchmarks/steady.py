@@ -6,6 +6,7 @@ Measured by ``python benchmarks/run_all.py --part steady``.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.bodies.of_gearbox import reduced_bodies
 from exugear.system.build import assemble
 from exugear.system.system import Assembly
-from exugear.system.tooth_mesh.element import MeshCurve
+from exugear.system.tooth_mesh.element import MeshCurve, MeshData
 from exugear.transient.runup import simulate
 
 SPEEDS = "0:215:400"
@@ -47,20 +48,29 @@ def cost_of(assembly: Assembly, settings: SteadySettings) -> dict[str, Any]:
     }
 
 
-def with_dissipation(gearbox: Gearbox, keys: dict[str, Any]) -> Assembly:
-    """Variant bushing with other keys of the section on damping, and friction of the teeth of realistic size."""
+def curves_of(gearbox: Gearbox) -> dict[str, MeshCurve]:
+    """Mesh stiffness of a gearbox with friction of the teeth of realistic size."""
     cycle = 2.0 * np.pi * np.arange(50) / 50
     friction = np.array([0.3 * np.cos(cycle), 0.01 + 0.002 * np.cos(cycle + 1.0), 1e-3 * np.sin(cycle)])
-    curves = {
+    return {
         name: MeshCurve(np.asarray(values), np.asarray(values), 1e5, friction=friction)
         for name, values in stiffness_of(gearbox).items()
     }
-    return assemble(gearbox.varied({"damping": keys}), Choice("bushing"), curves)
 
 
-def run_up_of(gearbox: Gearbox, variant: str, bodies: dict[str, ElasticBody], duration: float) -> float:
+def dissipation_of(gearbox: Gearbox, speeds: SpeedRange, duration: float) -> dict[str, Any]:
+    """Processor time of a response and of a run-up, variant bushing."""
+    choice = Choice("bushing")
+    curves = curves_of(gearbox)
+    response = cost_of(assemble(gearbox, choice, curves), SteadySettings(speeds, at_resonances=False))
+    return {**response, "run_up_s": run_up_of(gearbox, choice, curves, {}, duration)}
+
+
+def run_up_of(
+    gearbox: Gearbox, choice: Choice, stiffness: Mapping[str, MeshData], bodies: dict[str, ElasticBody], duration: float
+) -> float:
     """Processor time of a run-up with its results stored, s."""
-    given = gearbox, Choice(variant), stiffness_of(gearbox)
+    given = gearbox, choice, stiffness
     with tempfile.TemporaryDirectory() as folder:
         simulate(*given, folder, bodies=bodies, duration=0.01)  # loads the compiled code
         return timed(lambda: simulate(*given, folder, bodies=bodies, duration=duration)).processor
@@ -92,10 +102,12 @@ def measure(quick: bool) -> dict[str, Any]:
         for h, c in LINES
     ]
     duration = 1.0 if quick else 30.0
-    run_ups = {variant: run_up_of(case, variant, bodies, duration) for variant, (case, bodies) in cases.items()}
+    run_ups = {
+        variant: run_up_of(case, Choice(variant), stiffness_of(case), bodies, duration)
+        for variant, (case, bodies) in cases.items()
+    }
     dissipation = [
-        {"what": what, **cost_of(with_dissipation(gearbox, keys), SteadySettings(speeds, at_resonances=False))}
-        | {"run_up_s": run_up_of(gearbox.varied({"damping": keys}), "bushing", {}, duration)}
+        {"what": what, **dissipation_of(gearbox.varied({"damping": keys}), speeds, duration)}
         for what, keys in DISSIPATION.items()
     ]
     coordinates = {variant: assembly.size for variant, assembly in assemblies.items()}

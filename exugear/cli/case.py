@@ -126,6 +126,26 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
         )
 
 
+def check_friction(gearbox: Gearbox, mesh_model: str) -> None:
+    """Raise an error if the file requests friction of the teeth that the mesh model cannot have."""
+    friction = gearbox.case.damping.tooth_friction
+    law = LAWS[mesh_model]
+    if friction == 0.0 or not law.has_force:
+        return
+    if not law.has_line_loads:
+        known = ", ".join(other.name for other in LAWS.values() if other.has_line_loads)
+        raise BadInputError(
+            f"--mesh-model {mesh_model}: damping.tooth_friction = {friction:g} requires line loads over the mesh "
+            f"cycle, which this mesh model does not have; use --mesh-model {known}, or remove the key"
+        )
+    for mesh in gearbox.meshes:
+        if gearbox.case.pairs[mesh.pair.name].stiffness is not None:
+            raise gearbox.fault(
+                f"damping.tooth_friction = {friction:g}: requires line loads over the mesh cycle, which are unknown "
+                f"for a stated stiffness; remove pairs.{mesh.pair.name}.stiffness, or remove tooth_friction"
+            )
+
+
 # Arguments and options that several commands share
 
 CaseArgument = Annotated[Path, typer.Argument(metavar="GEARBOX.toml", help="Gearbox file.", show_default=False)]

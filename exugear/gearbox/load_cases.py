@@ -21,6 +21,7 @@ from exugear.gearbox.reading import GearboxFileError, fault_line, shortened
 from exugear.gearbox.train import UNLOADED
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
+from fe_ste.standards.mesh_loss import loss_factor
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin, TitledRows, value_range
 
@@ -256,6 +257,32 @@ def bearing_range_warning(gearbox: Gearbox, loads: LoadSummary, variant: str) ->
     return (
         f'bearings are linearised at the static load, but the load case {loads.name} {how}; set model = "iso16281" on '
         "the bearings for displacements and loads there"
+    )
+
+
+def friction_warning(gearbox: Gearbox, loads: LoadSummary) -> str:
+    """Return a warning if torques that are to accelerate the gear train do not overcome the friction of its teeth.
+
+    Examples
+    --------
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml").varied({"damping": {"tooth_friction": 0.05}})
+    >>> friction_warning(gearbox, summarise_loads(gearbox, gearbox.load_cases["reference"]))
+    'the net torque at the input, 4472 N m, is below the friction of the teeth, about 4742 N m: the gearbox ...
+    """
+    coefficient = gearbox.case.damping.tooth_friction
+    if coefficient == 0.0 or loads.driven:
+        return ""
+    turns = gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)
+    friction = 0.0
+    for mesh in gearbox.meshes:
+        pinion_speed = abs(turns[mesh.pinion] - turns.get(mesh.frame, 0.0))
+        power = abs(loads.mesh_forces[mesh.name]) * mesh.pair.pinion.base_radius * pinion_speed
+        friction += coefficient * loss_factor(mesh.pair) * power
+    if abs(loads.net_torque) >= friction:
+        return ""
+    return (
+        f"the net torque at the input, {abs(loads.net_torque):.4g} N m, is below the friction of the teeth, about "
+        f"{friction:.4g} N m: the gearbox slows down or stands still; increase a torque, or remove tooth_friction"
     )
 
 

@@ -105,7 +105,7 @@ def _assumptions(material: ReportData) -> str:
         *_elastic_words(material),
     ]
     if friction := case.damping.tooth_friction:
-        listed.append(f"Friction of teeth in steady-state responses: coefficient {friction:g}; runs do not include it.")
+        listed.append(f"Friction of teeth in runs and steady-state responses: coefficient {friction:g}.")
     return pieces.bullets(listed) + pieces.paragraph(
         f"The sources of the inputs are in the comments of {material.file_words} and in files of its folder.", "note"
     )

@@ -276,6 +276,15 @@ SIGNALS = (
         is_power=True,
     ),
     Signal(
+        "tooth_friction_work",
+        ("balance_time",),
+        "J",
+        "work of the friction of the teeth since the start",
+        sign_convention="positive: taken from the system",
+        filled_by=("observe_meshes",),
+        is_power=True,
+    ),
+    Signal(
         "bearing_rate_work",
         ("balance_time",),
         "J",
@@ -287,9 +296,9 @@ SIGNALS = (
 )
 """All signals, in the order of the file.
 
-The energy balance: the loads' work = change of kinetic and elastic energy + the other four. The last two of these are
-the work of the model `tangential`, whose force has components not conjugate to its deflection, and the work of bearings
-whose rate is not the derivative of their displacement (see `exugear.system.kernels.connectors`).
+The energy balance: the loads' work = change of kinetic and elastic energy + the other five. Of these, the work of the
+model `tangential` is that of a force with components not conjugate to its deflection, and the last one is the work of
+bearings whose rate is not the derivative of their displacement (see `exugear.system.kernels.connectors`).
 """
 MESH_TIMES = tuple(signal.name for signal in SIGNALS if signal.is_mesh_time)
 """Times (s) that a run adds up for each mesh."""

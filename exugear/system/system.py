@@ -479,7 +479,7 @@ class Assembly(ReprMixin):
         return connector_strains(q, self.connectors)
 
     def mesh_states(self, q: Floats, v: Floats, meshes: MeshArrays | None = None) -> Floats:
-        """State of each mesh, (meshes, 10): columns as named in `exugear.system.kernels.meshes`."""
+        """State of each mesh, (meshes, 11): columns as named in `exugear.system.kernels.meshes`."""
         out = np.zeros((len(self.elements), STATE_SIZE))
         mesh_state(*self.with_travelling(q, v), self.meshes if meshes is None else meshes, out)
         return out

@@ -26,7 +26,7 @@ from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.build import assemble
 from exugear.system.signals import signal_layout
 from exugear.system.system import Assembly
-from exugear.system.tooth_mesh.element import Angles, MeshData
+from exugear.system.tooth_mesh.element import Angles, MeshData, friction_lack
 from exugear.transient.compiled.integrator import INTEGRATORS, choose_integration, fastest_motion
 from exugear.transient.compiled.solver import CompiledSystem, compile_loop_ahead, unsupported_reason
 from exugear.transient.outcome import LimitError, Progress, ProgressMeter, Run, RunError
@@ -219,7 +219,7 @@ def simulate(
     ------
     GearboxFileError
         A load case or a duration that cannot be run: too short, too long for the disk, or with a motion so fast that it
-        requires an extremely small step.
+        requires an extremely small step. Friction of the teeth without line loads.
     RunError
         The compiled solver does not support the variant or the step, a state is not finite, Exudyn reduced a step, or
         there is nothing to resume.
@@ -244,6 +244,8 @@ def simulate(
             compile_loop_ahead(parts)
 
     assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles, before_balance=begin_to_compile)
+    if lack := friction_lack(assembly.elements):
+        raise gearbox.fault(lack)
     total = case.duration if duration is None else duration
     if integrator is not None and integrator not in INTEGRATORS:
         raise RunError(f"integrator {integrator!r} is unknown; integrators are {', '.join(INTEGRATORS)}")

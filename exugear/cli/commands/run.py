@@ -21,6 +21,7 @@ from exugear.cli.case import (
     OutOption,
     ScriptsOption,
     VariantOption,
+    check_friction,
     open_project,
 )
 from exugear.cli.console import BadInputError, FailedError, StoppedError, exit_codes, note, print_json, say
@@ -141,6 +142,7 @@ def run(
             _check_solver(project.gearbox, variant, Solver.compiled)
         if integrator and solver is Solver.exudyn:
             raise BadInputError(f"--integrator {integrator}: applies to the compiled solver only; remove --integrator")
+        check_friction(project.gearbox, choice.mesh_model)
         if not resume:
             project.begin()
         _check_run_directory(project.run_directory, resume)
@@ -265,6 +267,7 @@ def _warn_before_run(project: Project, duration: float | None, band: float) -> N
         band_warning,
         bearing_range_warning,
         doubts_about,
+        friction_warning,
         other_load_warning,
         summarise_loads,
     )
@@ -275,14 +278,9 @@ def _warn_before_run(project: Project, duration: float | None, band: float) -> N
     loads = summarise_loads(project.gearbox, load_case, project.choice.inertias, duration)
     of_bearings = bearing_range_warning(project.gearbox, loads, project.choice.variant)
     of_tables = other_load_warning(project.gearbox, loads, law.uses_single_load)
-    for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, band_warning(loads, band))):
+    of_friction = friction_warning(project.gearbox, loads)
+    for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, band_warning(loads, band), of_friction)):
         note(f"Warning: load_cases.{load_case.name}: {doubt}", style="yellow")
-    if friction := project.gearbox.case.damping.tooth_friction:
-        note(
-            f"Warning: damping.tooth_friction = {friction:g}: runs do not include the friction of teeth; "
-            "exugear steady does",
-            style="yellow",
-        )
 
 
 def _simulate(project: Project, resume: bool, command: str, **options: Any) -> Run:
@@ -335,6 +333,7 @@ def _print_run_result(
         **{key: float(attributes[key]) for key in EXPECTATIONS if key in attributes},
         "input_speed_rpm": float(data["input_speed"][-1]) / RPM,
         "energy_not_accounted_for": energy_residual(data),
+        "tooth_friction_work_J": float(data["tooth_friction_work"][-1]),
         "load": str(attributes.get("load", "")),
         **{doubt: str(attributes.get(doubt, "")) for doubt in ("table_doubt", "band_doubt", "bearing_doubt")},
         "longest_tensile_time_s": longest["tensile_time"],
@@ -373,6 +372,8 @@ def _print_run(summary: dict[str, Any], outside: float) -> None:
             f"{100.0 * abs(summary['expected_error_at_band']):.2g} % of amplitudes, "
             f"{100.0 * summary['expected_error_of_resonances']:.2g} % of resonance peaks"
         )
+    if summary["tooth_friction_work_J"]:
+        say(f"Friction of the teeth included: it dissipates {1e-3 * summary['tooth_friction_work_J']:.4g} kJ")
     if outside > 0.0:
         say(
             f"Warning: a mesh was outside the range of its table for {outside:.3g} s (extrapolated linearly; variable "

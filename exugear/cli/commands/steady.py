@@ -21,6 +21,7 @@ from exugear.cli.case import (
     ScriptsOption,
     VariantOption,
     assembled_by_iso,
+    check_friction,
     open_project,
     steady_lack,
 )
@@ -146,6 +147,7 @@ def steady(
         with suppress(FailedError):  # such a failure does not apply to the selected mesh model
             if reason := steady_lack(assembled_by_iso(project.gearbox, project.choice.variant), project.choice.variant):
                 raise BadInputError(reason)
+        check_friction(project.gearbox, choice.mesh_model)
         project.begin()
         project.prepare()
         _print_result(project, settings, project.steady(settings), as_json)

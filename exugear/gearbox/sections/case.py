@@ -143,7 +143,7 @@ class DampingSection(Section):
     body_time_s: q.DampingTimeS = 1e-6
     """Ratio of damping to stiffness of flexible bodies."""
     tooth_friction: q.Friction = 0.0
-    """Coefficient of friction of the teeth in steady-state responses (`exugear losses` lists it); none by default."""
+    """Coefficient of friction of the teeth in runs and steady-state responses; `exugear losses` lists estimates."""
 
     @model_validator(mode="after")
     def _check_modal(self) -> DampingSection:

@@ -17,10 +17,9 @@ from exugear.steady.harmonics.lines import Coupling, LineSet, fourier_coefficien
 from exugear.steady.mean_system.mesh_places import MeshInterface, coupled, families, group_of
 from exugear.steady.mean_system.mesh_waves import MeshWaves
 from exugear.steady.mean_system.rotating_frame import SteadyError
+from exugear.system.tooth_mesh.element import friction_lack
+from exugear.system.tooth_mesh.laws.friction import FRICTION_PARTS
 from fe_ste.tools.arrays import Complexes
-
-PARTS = 3
-"""Force across the line of action, moment about the gear axes, moment about the line of action."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +52,12 @@ def tooth_friction(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed
     static = assembly.gearbox.train.static_mesh_forces()
     turns = waves.system.frame.speeds
     elements = [assembly.elements[wave.first] for wave in waves.waves]
-    cycles = np.zeros((PARTS, len(elements), harmonics + 1), dtype=complex)
+    cycles = np.zeros((FRICTION_PARTS, len(elements), harmonics + 1), dtype=complex)
+    if lack := friction_lack(elements):
+        raise SteadyError(lack)
     for m, element in enumerate(elements):
-        if element.friction is None:
-            raise SteadyError(
-                f"damping.tooth_friction = {coefficient:g}: pair {element.mesh.pair.name} has no line loads over the "
-                "mesh cycle; use --mesh-model line_of_action with a table of exugear ste, or remove the key"
-            )
+        if element.friction is None:  # of a mesh without load
+            continue
         # Friction opposes the sliding of gear 1 on gear 2.
         sliding = turns.get(element.mesh.pinion, 0.0) - turns.get(element.mesh.gear, 0.0)
         size = -coefficient * math.copysign(1.0, speed * sliding) * abs(static[element.mesh.name])
@@ -67,13 +65,13 @@ def tooth_friction(waves: MeshWaves, lines: LineSet, ports: MeshInterface, speed
             found = fourier_coefficients(size * samples, harmonics)
             cycles[part, m, : len(found)] = found
     rows = np.array([element.friction_rows for element in assembly.elements])
-    gradients = np.stack([waves.gradients(rows[:, part], speed) for part in range(PARTS)], axis=1)
+    gradients = np.stack([waves.gradients(rows[:, part], speed) for part in range(FRICTION_PARTS)], axis=1)
     weighted = gradients * waves.weights[:, None, None]
     spectra = {(part, 0): own for part, own in enumerate(cycles)}
-    everywhere = np.zeros((len(lines.index), len(elements), PARTS), dtype=complex)
+    everywhere = np.zeros((len(lines.index), len(elements), FRICTION_PARTS), dtype=complex)
     everywhere[0, :, 0] = [wave.wave == 0 for wave in waves.waves]
     kinds = families(waves)
-    coupling = Coupling(lines, tuple(group_of(own, harmonics, PARTS, lines.index.shape[1]) for own in kinds))
-    functions = [coupled(waves, own, spectra, ports, speed, PARTS) for own in kinds]
+    coupling = Coupling(lines, tuple(group_of(own, harmonics, FRICTION_PARTS, lines.index.shape[1]) for own in kinds))
+    functions = [coupled(waves, own, spectra, ports, speed, FRICTION_PARTS) for own in kinds]
     forces = coupling.of(functions, everywhere.reshape(len(everywhere), -1))
     return np.asarray(forces @ weighted.reshape(-1, weighted.shape[2]))

@@ -43,14 +43,15 @@ ROW_SIZE = FRAME + 1
 SPIN_1 = SPIN
 SPIN_2 = BODY_SIZE + SPIN
 
-DEFLECTION, RATE, PMC, STIFFNESS, FORCE, ENERGY, DAMPED_POWER, CYCLE_POWER, OTHER_POWER, OUTSIDE = range(10)
+DEFLECTION, RATE, PMC, STIFFNESS, FORCE, ENERGY, DAMPED_POWER, CYCLE_POWER, OTHER_POWER = range(9)
+FRICTION_POWER, OUTSIDE = range(9, 11)
 """Columns of `mesh_state`.
 
 Deflection (m), its rate (m/s), pmc in [0, 1), tangent stiffness (N/m), F_bt (N, negative on the other flank), elastic
 energy (J); powers (W): damped, of the stiffness that changes with pmc, of a force that is not conjugate to its
-deflection; 1 where the mesh is outside its table.
+deflection, of friction of the teeth; 1 where the mesh is outside its table.
 """
-STATE_SIZE = 10
+STATE_SIZE = 11
 TILT_STIFFNESS, TILT_DAMPING, TILT_LEVER, TILT_MOMENT, TILT_REST = range(5)
 """Columns of `MeshArrays.tilt`."""
 TILT_COLUMNS = 5
@@ -97,6 +98,15 @@ class MeshArrays(NamedTuple):
     """(m, 2) number of equal cubic pieces of each gear's deviation over its revolution; 0 without deviation."""
     error: Floats
     """(m, 2, e, 4) coefficients of the deviation over each piece, m along the transverse line of action."""
+    friction_pieces: Integers
+    """(m,) number of equal cubic pieces of the friction of the teeth over the mesh cycle; 0 without friction."""
+    friction: Floats
+    """(m, p, 12) coefficients over each piece: of the force across the line of action, per unit mesh force, and of the
+    moments about the gear axes and about the line of action (m)."""
+    friction_rows: Floats
+    """(m, 3, 12) rows of this force and these moments."""
+    friction_speed: Floats
+    """(m,) speed of gear 1 relative to gear 2 (rad/s) above which friction has its full size."""
     table: TableArrays
     """Tables of the meshes with the model `table`."""
 
@@ -335,15 +345,16 @@ def gear_positions(q: Floats, meshes: MeshArrays, out: Floats) -> None:
 ALONG_DEFLECTION, ALONG_FORCE, TABLE_FORCE = range(3)
 """Rows of `MeshMemory.gradient`."""
 LAST_DEFLECTION, LAST_RATE, LAST_OUTSIDE, LAST_FORCE, LAST_ENERGY, LAST_DAMPED, LAST_CYCLE, LAST_OTHER = range(8)
-LAST_CENTRE, LAST_MISALIGNMENT, LAST_CENTRE_RATE = range(8, 11)
+LAST_CENTRE, LAST_MISALIGNMENT, LAST_CENTRE_RATE, LAST_FRICTION, LAST_FRICTION_POWER = range(8, 13)
 """Columns of `MeshMemory.states`: deflection (m), rate (m/s), 1 outside a table, scalar force (N; of a table F_bt), and
 the terms of the mesh in the energy balance: elastic energy (J); dissipated power, power of the stiffness that changes
 with pmc, and power of a force that is not conjugate to its deflection (W); for tables, change of centre distance (m),
-misalignment (rad) and rate of the centre distance (m/s).
+misalignment (rad) and rate of the centre distance (m/s); friction force across the line of action (N), and power that
+friction dissipates (W).
 """
-STATES_SIZE = 11
-DEFLECTION_ROW, FORCE_ROW = range(2)
-"""Rows of `Meshes.rows`."""
+STATES_SIZE = 13
+DEFLECTION_ROW, FORCE_ROW, FRICTION_ROW = range(3)
+"""Rows of `Meshes.rows`; those of friction are the last three."""
 FIXED, ALONG_COSINE, ALONG_SINE, SECOND = range(0, 4 * PADDED, PADDED)
 """First columns of the parts of each row, and first column of the second gear."""
 TILT_ROW_X, TILT_ROW_Y, TILT_SHIFT, TILT_RESISTANCE, TILT_DAMPER, TILT_ARM, TILT_PUSH = range(7)
@@ -353,11 +364,12 @@ misalignment at zero tilts relative to that of the contact state (rad); tilt sti
 """
 PADDED_FRAME = 2 * PADDED
 """Index of the frame's angle in a gradient of `MeshMemory.gradients`, after two padded gears."""
-KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_BEARING_RATES = range(7)
+KINETIC, ELASTIC, OF_LOADS, DISSIPATED, OF_VARYING_STIFFNESS, NON_CONSERVATIVE, OF_FRICTION, OF_BEARING_RATES = range(8)
 """Columns of the energy balance, as recorded by runs (`exugear.transient.compiled.sampling`).
 
 Kinetic and elastic energy (J); powers (W): of the loads, dissipated, of the stiffness that changes with pmc, of mesh
-forces that are not conjugate to their deflection, of bearings whose rate is not the derivative of their displacement.
+forces that are not conjugate to their deflection, of friction of the teeth, of bearings whose rate is not the
+derivative of their displacement.
 """
 
 
@@ -387,11 +399,11 @@ class Meshes(NamedTuple):
     ends: Integers
     """(m, 2) indices of the two gears among the padded positions."""
     rows: Floats
-    """(m, 2, 48) rows over the padded positions of both gears: parts W0, W1, W2 of the first, then of the second gear.
+    """(m, 5, 48) rows over the padded positions of both gears: parts W0, W1, W2 of the first, then of the second gear.
     The row is W0 + W1 cos psi + W2 sin psi at the angle psi of the frame.
     """
     offsets: Floats
-    """(m, 2, 3) contributions of cos psi, sin psi and psi itself to the value of each row."""
+    """(m, 5, 3) contributions of cos psi, sin psi and psi itself to the value of each row."""
     cycles: Floats
     phase: Floats
     pieces: Integers
@@ -402,6 +414,10 @@ class Meshes(NamedTuple):
     line_of_action: Floats
     error_pieces: Integers
     error: Floats
+    friction_pieces: Integers
+    friction: Floats
+    friction_rows: Floats
+    friction_speed: Floats
     nominal: Floats
     """(m,) deflection of gears in their nominal position, m."""
     table: TableArrays | None
@@ -416,7 +432,7 @@ class MeshMemory(NamedTuple):
     gradients: Floats
     """(4, 17) gradients over two padded positions and the frame's angle; the last one is a sum."""
     states: Floats
-    """(m, 11) state of each mesh, columns as named in this module."""
+    """(m, 13) state of each mesh, columns as named in this module."""
     pieces: Integers
     """(m, 2) load piece of each flank's table that was used last."""
     law: Scratch | None
@@ -512,6 +528,16 @@ def row_motion(
     put(gradient, PADDED, gradient_2)
     gradient[PADDED_FRAME] = turning
     return value, rate
+
+
+@kernel
+def push_apart(m: int, force: float, gradient: Floats, meshes: Meshes, work: MeshWork) -> None:
+    """Subtract a scalar force times its gradient from what acts on the gears of mesh m and on its frame."""
+    first = work.loads[meshes.ends[m, 0]]
+    second = work.loads[meshes.ends[m, 1]]
+    put(first, 0, eight(first, 0) - eight(gradient, 0) * force)
+    put(second, 0, eight(second, 0) - eight(gradient, PADDED) * force)
+    work.force[meshes.coordinates[m, FRAME]] -= force * gradient[PADDED_FRAME]
 
 
 @kernel

@@ -26,7 +26,7 @@ each mesh model defines its deflection, force and other inputs (`exugear.system.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar, Literal
@@ -166,6 +166,18 @@ class Law:
         return None
 
 
+def friction_lack(elements: Sequence[MeshElement]) -> str:
+    """Reason why the requested friction of the teeth cannot be computed; empty if it can, or without friction."""
+    for element in elements:
+        if element.friction_coefficient > 0.0 and element.friction is None and element.load > 0.0:
+            return (
+                f"damping.tooth_friction = {element.friction_coefficient:g}: pair {element.mesh.pair.name} has no line "
+                "loads over the mesh cycle; use --mesh-model line_of_action with a table of exugear ste, or remove the "
+                "key"
+            )
+    return ""
+
+
 # The mesh force element: frames, signs and phases of every mesh, and its parameters for the kernel
 
 STEEPEST = 2.0
@@ -220,8 +232,10 @@ class MeshElement:
     friction: Floats | None = None
     """(3, n) force and moments of friction over the mesh cycle per unit coefficient and mesh force, along
     `friction_rows`; None if unknown."""
-    friction_rows: Floats | None = None
+    friction_rows: Floats = field(default_factory=lambda: np.zeros((3, 2 * BODY_SIZE)))
     """(3, 12) rows of these forces and moments."""
+    friction_coefficient: float = 0.0
+    """Coefficient of friction of the teeth in runs and steady-state responses."""
 
     def with_contact(self, contact: ContactState) -> MeshElement:
         """Return the mesh, so far with even load, with the results of a solved contact, in the axes of its table.
@@ -376,6 +390,7 @@ def mesh_elements(
             load_ways=_load_ways(law, data, flank, usual[mesh.name]),
             friction=data.friction if isinstance(data, MeshCurve) and flank == usual[mesh.name] else None,
             friction_rows=friction_rows(mesh, flank, ends),
+            friction_coefficient=gearbox.case.damping.tooth_friction,
         )
         if known is not None and law.tilts:
             element = replace(element.with_contact(known), computed_from=None)

@@ -398,7 +398,8 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
     axis[given.coordinates[:, :FRAME].reshape(-1, 2, BODY_SIZE)[:, :, 0] < 0] = 0.0
     elements = numbers.assembly.elements
     table = given.table
-    rows, offsets = padded_rows(np.stack([given.deflection, given.force], axis=1), axis)
+    both = np.stack([given.deflection, given.force], axis=1)
+    rows, offsets = padded_rows(np.concatenate([both, given.friction_rows], axis=1), axis)
     return Meshes(
         coordinates=np.where(given.coordinates < 0, numbers.size, given.coordinates),
         slot=np.array([numbers.slot(int(c)) for c in given.coordinates[:, FRAME]], dtype=np.int64),
@@ -424,6 +425,10 @@ def _meshes(numbers: _Numbers, ends: Integers) -> Meshes:
         line_of_action=given.line_of_action,
         error_pieces=given.error_pieces,
         error=given.error,
+        friction_pieces=given.friction_pieces,
+        friction=given.friction,
+        friction_rows=given.friction_rows,
+        friction_speed=given.friction_speed,
         nominal=table.nominal[:, NOMINAL_DEFLECTION].copy(),
         table=table if (given.form == TABLE_FORM).any() else None,
     )

@@ -29,11 +29,14 @@ from exugear.system.kernels.meshes import (
     LAST_DEFLECTION,
     LAST_ENERGY,
     LAST_FORCE,
+    LAST_FRICTION,
+    LAST_FRICTION_POWER,
     LAST_MISALIGNMENT,
     LAST_OTHER,
     LAST_OUTSIDE,
     NON_CONSERVATIVE,
     OF_BEARING_RATES,
+    OF_FRICTION,
     OF_LOADS,
     OF_VARYING_STIFFNESS,
     Meshes,
@@ -102,6 +105,7 @@ def observe_meshes(meshes: Meshes, work: Work, columns: Columns, sample: Floats,
         energy[DISSIPATED] += state[LAST_DAMPED]
         energy[OF_VARYING_STIFFNESS] += state[LAST_CYCLE]
         energy[NON_CONSERVATIVE] += state[LAST_OTHER]
+        energy[OF_FRICTION] += state[LAST_FRICTION_POWER]
         if meshes.form[m] == TABLE_FORM:
             sample[columns.outside_table + m] = state[LAST_OUTSIDE]
             sample[columns.centre_distance_change + m] = state[LAST_CENTRE]
@@ -253,12 +257,13 @@ def observe_joints(
             j = joints.ends[m, end]
             if j >= 0:
                 force, row = acting_row(m, meshes, table, work)
-                x = row[BODY_SIZE * end]
-                y = row[BODY_SIZE * end + 1]
-                z = row[BODY_SIZE * end + AXIAL]
-                forces[3 * j] += force * (c * x - s * y)
-                forces[3 * j + 1] += force * (s * x + c * y)
-                forces[3 * j + 2] += force * z
+                across = work.mesh.states[m, LAST_FRICTION]
+                along_x = BODY_SIZE * end
+                x = force * row[along_x] + across * meshes.friction_rows[m, 0, along_x]
+                y = force * row[along_x + 1] + across * meshes.friction_rows[m, 0, along_x + 1]
+                forces[3 * j] += c * x - s * y
+                forces[3 * j + 1] += s * x + c * y
+                forces[3 * j + 2] += force * row[along_x + AXIAL]
     for j in range(joints.host.size):
         if joints.planet[j, 0] > 0.0:  # held on its orbit
             c = work.turns[joints.slot[j], COSINE]
@@ -340,7 +345,7 @@ def take_sample(
     sample: Floats,
     energy: Floats,
 ) -> None:
-    """Fill signals (columns,) and energies and powers (7,) of the state at time t (s) that was evaluated last.
+    """Fill signals (columns,) and energies and powers (8,) of the state at time t (s) that was evaluated last.
 
     Signals but those that a state has by itself (`exugear.transient.compiled.solver`); energies in the columns
     `KINETIC` and so on. Powers but those of meshes and loads stand for `stride` samples, none at 0: they take longer

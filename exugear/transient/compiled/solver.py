@@ -342,7 +342,7 @@ class CompiledSystem:
 
         Parameters
         ----------
-        signals, energies : (steps, columns) (steps, 7)
+        signals, energies : (steps, columns) (steps, 8)
             For what `exugear.transient.compiled.sampling.take_sample` fills. Powers but those of meshes stand for as
             many steps as make up the interval of powers; energies are not whole.
 
@@ -355,7 +355,7 @@ class CompiledSystem:
         return self._pass(np.empty(0), first, self._stride, *outcome)
 
     def observe(self, times: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-        """Signals (n, columns) and energies (n, 7) of given states q, v (n, size) at times (n,), s.
+        """Signals (n, columns) and energies (n, 8) of given states q, v (n, size) at times (n,), s.
 
         See `exugear.transient.compiled.sampling.take_sample`. The system itself stays where it is.
         """

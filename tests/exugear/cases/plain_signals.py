@@ -13,7 +13,16 @@ import numpy as np
 from exugear.gearbox.sections.entries import GROUND
 from exugear.system.kernels.coordinates import kinetic_energies
 from exugear.system.kernels.elastic import elastic_energies, scratch_for
-from exugear.system.kernels.meshes import DEFLECTION, ENERGY, FORCE, OUTSIDE, ROW_SIZE, STATE_SIZE
+from exugear.system.kernels.meshes import (
+    DEFLECTION,
+    ENERGY,
+    FORCE,
+    OUTSIDE,
+    ROW_SIZE,
+    STATE_SIZE,
+    mesh_pmc,
+    relative_spin,
+)
 from exugear.system.kernels.rolling import (
     CAGE_DAMPING,
     CAGE_TORQUE,
@@ -27,6 +36,7 @@ from exugear.system.kernels.turning import set_turning_motion, turning_energies,
 from exugear.system.modes import overall_row
 from exugear.system.signals import signal_layout
 from exugear.system.system import Assembly
+from exugear.system.tooth_mesh.laws.friction import friction_part, friction_size
 from exugear.system.tooth_mesh.laws.mesh_forces import MEMORY, pass_meshes
 from fe_ste.tools.compilation import compiled
 
@@ -60,8 +70,8 @@ def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 
 def energies_of(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Kinetic and elastic energy (J), powers (W) but the loads' of states q, v (samples, size), (samples, 6)."""
-    a, out = assembly, np.empty((q.shape[0], 6))
+    """Kinetic and elastic energy (J), powers (W) but the loads' of states q, v (samples, size), (samples, 7)."""
+    a, out = assembly, np.empty((q.shape[0], 7))
     energy_signals(*a.with_travelling(q, v), a.meshes, a.connectors, a.springs, a.inertia, out)
     add_elastic_signals(q, v, a.elastic, scratch_for(a.elastic), out)
     add_turning_signals(q, v, a.turning_arrays, turning_memory(a.turning_arrays), out)
@@ -121,13 +131,20 @@ def joint_signals(q, v, meshes, ends, hosts, planets, out) -> None:
             scalar, row = state[m, FORCE] / meshes.line_of_action[m], meshes.force[m]
             if scalar < 0.0 and meshes.table.shape[m, 0] > 0:  # the other flank pushes
                 scalar, row = -scalar, meshes.table.back[m]
+            acting = scalar * row
+            if meshes.friction_pieces[m] > 0:
+                index = meshes.coordinates[m]
+                sliding = relative_spin(v[n], index, 0) - relative_spin(v[n], index, 1)
+                across = friction_size(state[m, FORCE], sliding, meshes.friction_speed[m])
+                across *= friction_part(0, meshes.friction[m], meshes.friction_pieces[m], mesh_pmc(q[n], m, meshes))
+                acting = acting + across * meshes.friction_rows[m, 0]
             for end in range(2):
                 j = ends[m, end]
                 if j >= 0:
-                    x, y, z = row[6 * end : 6 * end + 3]
-                    out[n, 3 * j] += scalar * (cosine * x - sine * y)
-                    out[n, 3 * j + 1] += scalar * (sine * x + cosine * y)
-                    out[n, 3 * j + 2] += scalar * z
+                    x, y, z = acting[6 * end : 6 * end + 3]
+                    out[n, 3 * j] += cosine * x - sine * y
+                    out[n, 3 * j + 1] += sine * x + cosine * y
+                    out[n, 3 * j + 2] += z
         for j in range(hosts.size):
             if planets[j, 0] > 0.0:
                 c = int(planets[j, 3])
@@ -142,16 +159,16 @@ def joint_signals(q, v, meshes, ends, hosts, planets, out) -> None:
 
 @compiled
 def mesh_energies(q, v, meshes, state, out) -> None:
-    """Add elastic energy (J) and the powers (W) damped, of k(PMC), non-conservative to out (5,)."""
+    """Add elastic energy (J) and the powers (W) damped, of k(PMC), non-conservative, of friction to out (6,)."""
     mesh_states(q, v, meshes, state)
     for m in range(meshes.cycles.size):
-        for i in range(4):
+        for i in range(5):
             out[i] += state[m, ENERGY + i]
 
 
 @compiled
 def bearing_energies(q, v, connectors, out) -> None:
-    """Add elastic energy (J), damping power and power of the rate's own (W) of all bearings to out (5,).
+    """Add elastic energy (J), damping power and power of the rate's own (W) of all bearings to out (6,).
 
     The connector's rate is not the derivative of its displacement (see `connector_motion`): with stiffness that
     couples tilt and translation the elastic force then does a little work of its own, of second order.
@@ -163,21 +180,21 @@ def bearing_energies(q, v, connectors, out) -> None:
         offset = connectors.point_load[n] - connectors.stiffness[n] @ connectors.point_strain[n]
         elastic = connectors.stiffness[n] @ motion[0] + offset
         out[0] += 0.5 * np.dot(motion[0], elastic + offset)
-        out[4] += np.dot(elastic, motion[1] - motion[2])
+        out[5] += np.dot(elastic, motion[1] - motion[2])
         out[1] += np.dot(motion[1], connectors.damping[n] @ motion[1])
         if connectors.rolling.first[n] < connectors.rolling.first[n + 1]:
             turned = turn_between(q, n, connectors)
             rolling_forces(n, motion[0], motion[1], turned, connectors.rolling, forces)
             out[0] += forces[STORED]
             elastic = forces[ELASTIC_PART:DAMPED_PART]
-            out[4] += np.dot(elastic, motion[1]) - np.dot(elastic[:5], motion[2, :5])
+            out[5] += np.dot(elastic, motion[1]) - np.dot(elastic[:5], motion[2, :5])
             out[1] += np.dot(forces[DAMPED_PART:CAGE_TORQUE], motion[1])
             out[1] += forces[CAGE_DAMPING] * turn_between(v, n, connectors)
 
 
 @compiled
 def spring_energies(q, v, springs, out) -> None:
-    """Add elastic energy (J) and damping power (W) of all couplings to out (5,)."""
+    """Add elastic energy (J) and damping power (W) of all couplings to out (6,)."""
     for n in range(springs.coordinates.shape[0]):
         i, j = springs.coordinates[n]
         out[0] += 0.5 * springs.stiffness[n] * (q[j] - q[i]) ** 2
@@ -194,7 +211,7 @@ def energy_signals(
     inertia,
     out,
 ) -> None:
-    """Fill (samples, 6): kinetic and elastic energy (J); powers (W) as the terms of the account but the loads'."""
+    """Fill (samples, 7): kinetic and elastic energy (J); powers (W) as the terms of the account but the loads'."""
     state = np.empty((meshes.cycles.size, STATE_SIZE))
     kinetic = np.empty(inertia.body.size + inertia.spin.size)
     for n in range(q.shape[0]):
@@ -208,7 +225,7 @@ def energy_signals(
 
 @compiled
 def add_elastic_signals(q, v, elastic, scratch, out) -> None:
-    """Add kinetic and elastic energy (J) and the damped power (W) of elastic bodies to out (samples, 6)."""
+    """Add kinetic and elastic energy (J) and the damped power (W) of elastic bodies to out (samples, 7)."""
     for n in range(q.shape[0]):
         kinetic, stored, damped = elastic_energies(q[n], v[n], elastic, scratch)
         out[n, 0] += kinetic

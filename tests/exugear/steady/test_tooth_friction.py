@@ -25,7 +25,6 @@ from fe_ste.geometry.gears import GearPair
 from fe_ste.transmission_error.sliding import friction_over_cycle, table_loss_factor
 
 from ...fe_ste.cases.line_loads import state_of
-from ..cases.command import exugear
 from ..cases.spur import SPUR_CASE
 
 COEFFICIENT = 0.05
@@ -174,12 +173,3 @@ def test_friction_needs_line_loads_and_a_plausible_coefficient(grc: Gearbox, sti
         response(with_friction(grc), "rigid", stiffness)
     with pytest.raises(GearboxFileError, match="damping.tooth_friction = 0.9: must lie between 0 and 0.5"):
         with_friction(grc, 0.9)
-
-
-def test_the_command_names_friction_where_it_is_included(tmp_path) -> None:
-    path = tmp_path / "gearbox.toml"
-    path.write_text(SPUR_CASE + "\n[damping]\nmodal_percent = 2.0\ntooth_friction = 0.05\n", encoding="utf-8")
-    refused = exugear("steady", path, "--variant", "bushing", "--mesh-model", "iso6336", "--out", tmp_path / "out")
-    assert refused.exit_code == 2 and "has no line loads" in refused.stderr
-    ran = exugear("run", path, "--variant", "bushing", "--mesh-model", "iso6336", "--duration", 0.02, "--out", tmp_path)
-    assert "runs do not include the friction of teeth" in ran.stderr

@@ -35,7 +35,7 @@ def runs(assembly: Assembly, method: Method, step: float, factor: int) -> Simple
     start = accelerating_start(assembly, load, FASTEST_RPM * np.pi / 30.0)
     count, layout = round(0.16 / step), signal_layout(assembly)
     q, v = np.empty((2, count, assembly.size))
-    read, energies = np.empty((count, layout.count)), np.empty((count, 7))
+    read, energies = np.empty((count, layout.count)), np.empty((count, 8))
     CompiledSystem(assembly, start.q, start.v, LoadTable(load), step, method).advance(0, q, v, read, energies)
     observer = Observer(assembly, LoadTable(load))
     observer.complete(q, v, read)

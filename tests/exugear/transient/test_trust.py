@@ -26,7 +26,7 @@ from exugear.report.writer import write_report
 from exugear.results.run_file import load_run, verdict_of
 from exugear.system.build import assemble
 from exugear.system.kernels.table_law import piece_at
-from exugear.system.signals import MESH_TIMES
+from exugear.system.signals import BALANCE_TERMS, MESH_TIMES
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.transient.compiled.integrator import highest_rate
 from exugear.transient.outcome import LIMITS, LimitError, Progress, RunError, ValidityMonitor
@@ -168,7 +168,7 @@ def test_a_mesh_beside_unsolved_states_of_its_table_is_a_reason_not_to_trust() -
 
 def seen(judge: ValidityMonitor, deflection: float = 0.0, spin: float = 0.0, left: float = 0.0) -> tuple[str, ...]:
     """Judge one more state, of 100 J and some energy that is left over."""
-    account = np.array([[0.0, 50.0, 50.0 + left, 0.0, 0.0, 0.0, 0.0]])
+    account = np.array([[0.0, 50.0, 50.0 + left, *np.zeros(len(BALANCE_TERMS) - 3)]])
     judge.see(np.array([0.1]), np.array([[deflection]]), np.array([[spin, 0.0]]), np.array([0.1]), account)
     return judge.reasons(np.zeros((len(MESH_TIMES), 1)), 0.1)
 

@@ -4,7 +4,8 @@ Forms are numbered (`MeshArrays.form`). All except the model `table` depend on t
 implemented here; the model `table` also depends on the positions of the gears.
 
 The model itself is implemented once, in `row_law`: a model with its own force is a branch there. The other functions
-implement common parts: damping, resistance of teeth to misalignment, shuttling of the load. `row_force` with
+implement common parts: damping, resistance of teeth to misalignment, shuttling of the load. Friction of the teeth is
+added to the force of any model (`exugear.system.tooth_mesh.laws.friction`). `row_force` with
 `add_row_tangent` is the plain version, on unmodified coordinates. `add_row_mesh` is the version for loops over time, on
 the geometry that is optimised for speed (`exugear.system.kernels.meshes`). Tests check that they agree.
 """
@@ -59,6 +60,7 @@ from exugear.system.kernels.meshes import (
     load_way,
     mesh_pmc,
     net_deflection,
+    push_apart,
     rate_gradient,
     relative_spin,
     row_dot,
@@ -75,6 +77,7 @@ from exugear.system.kernels.table_law import (
     TableArrays,
     scratch_memory,
 )
+from exugear.system.tooth_mesh.laws.friction import add_friction, add_friction_loads
 from exugear.system.tooth_mesh.laws.line_of_action import CURVE_FORM, curve_law, stiffness_law
 from exugear.system.tooth_mesh.laws.table import (
     TABLE_FORM,
@@ -86,7 +89,6 @@ from exugear.system.tooth_mesh.laws.table import (
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.compilation import kernel
 from fe_ste.tools.inner_kernels import bundle, cached_struct
-from fe_ste.tools.octets import eight, put
 
 # Laws whose force depends on the deflection along a row and on the mesh cycle: both forms of their force
 
@@ -347,16 +349,6 @@ def keep_state(
 
 
 @kernel
-def push_apart(m: int, force: float, gradient: Floats, meshes: Meshes, work: MeshWork) -> None:
-    """Subtract a scalar force times its gradient from what acts on the gears of mesh m and on its frame."""
-    first = work.loads[meshes.ends[m, 0]]
-    second = work.loads[meshes.ends[m, 1]]
-    put(first, 0, eight(first, 0) - eight(gradient, 0) * force)
-    put(second, 0, eight(second, 0) - eight(gradient, PADDED) * force)
-    work.force[meshes.coordinates[m, FRAME]] -= force * gradient[PADDED_FRAME]
-
-
-@kernel
 def add_row_mesh(q: Floats, v: Floats, m: int, meshes: Meshes, work: MeshWork) -> None:
     """Add the force of a mesh with a law along a row."""
     index = meshes.coordinates[m]
@@ -470,6 +462,7 @@ def pass_meshes(
                 table_force(q, v, m, meshes, table, of_table, law_memory, state, acting)
             else:
                 row_force(q, v, m, meshes, memory, state, acting)
+            add_friction(q, v, m, meshes, memory[GRADIENT], memory[TURNING], state, acting)
             for i in range(STATE_SIZE if states.size > 0 else 0):
                 states[m, i] = state[i]
             for i in range(ROW_SIZE):
@@ -520,7 +513,7 @@ def add_mesh_jacobian(q: Floats, v: Floats, meshes: MeshArrays, jq: Floats, jv: 
 
 
 def mesh_state(q: Floats, v: Floats, meshes: MeshArrays, out: Floats) -> None:
-    """Fill (m, 10): what each mesh does; columns as named in `exugear.system.kernels.meshes`."""
+    """Fill (m, 11): what each mesh does; columns as named in `exugear.system.kernels.meshes`."""
     _pass(q, v, meshes, out, _NOTHING, _NO_ROWS, _NO_ROWS)
 
 
@@ -534,3 +527,4 @@ def add_meshes(q: Floats, v: Floats, meshes: Meshes, work: MeshWork) -> None:
             add_spinning_mesh(q, v, m, meshes, work)
         else:
             add_row_mesh(q, v, m, meshes, work)
+        add_friction_loads(q, v, m, meshes, work)

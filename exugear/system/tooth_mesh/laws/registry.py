@@ -35,6 +35,8 @@ class LawProperties:
     """Whether a run records the positions of the gears of each mesh."""
     moves_load: bool = False
     """Whether the load shuttles over the mesh cycle as in the table."""
+    has_line_loads: bool = False
+    """Whether it knows the line loads over the mesh cycle, which friction of the teeth needs."""
 
     @property
     def uses_single_load(self) -> bool:
@@ -56,6 +58,7 @@ _TABLE_OF_LAWS = (
         "load over deflection over the mesh cycle from secant and tangent of the table, stiffness against "
         "misalignment; all motions along the line of action",
         moves_load=True,
+        has_line_loads=True,
     ),
     LawProperties(
         "table",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from exugear.system.kernels.meshes import (
 )
 from exugear.system.kernels.table_law import NOMINAL_DEFLECTION
 from exugear.system.tooth_mesh.element import MeshCurve, MeshElement
+from exugear.system.tooth_mesh.laws.friction import FRICTION_PARTS, SLOW_SLIDING
 from exugear.system.tooth_mesh.laws.line_of_action import CURVE_FORM, STIFFNESS_FORM, curve_coefficients
 from exugear.system.tooth_mesh.laws.registry import LAWS, law_of
 from exugear.system.tooth_mesh.laws.table import pack_tables
@@ -65,6 +66,7 @@ def mesh_stiffness(
 # Mesh elements as arrays for the kernels
 
 _NO_COORDINATES = (-1,) * BODY_SIZE
+_NO_FRICTION = np.zeros((FRICTION_PARTS, 0))
 
 
 def pack(
@@ -97,6 +99,8 @@ def pack(
     resists = tilts[:, TILT_STIFFNESS] > 0.0
     moves = resists & (not averaged)
     ways = [e.load_ways if move else np.zeros((2, 0)) for move, e in zip(moves, elements, strict=True)]
+    simplified = averaged or linear or tangent
+    friction = [_NO_FRICTION if simplified else _friction(element) for element in elements]
     tables = pack_tables(elements, index, averaged, linear)
     if tangent:
         tables.nominal[:, NOMINAL_DEFLECTION] -= [element.rest for element in elements]
@@ -117,6 +121,10 @@ def pack(
         line_of_action=np.array([e.line_of_action for e in elements]),
         error_pieces=np.array([[len(error) for error in e.errors] for e in elements], dtype=np.int64).reshape(count, 2),
         error=_pack_errors(elements),
+        friction_pieces=np.array([part.shape[1] for part in friction], dtype=np.int64),
+        friction=_pack_friction(friction),
+        friction_rows=np.array([e.friction_rows for e in elements]).reshape(count, FRICTION_PARTS, FRAME),
+        friction_speed=np.array([SLOW_SLIDING / e.mesh.pair.transverse_base_pitch for e in elements]),
         table=tables,
     )
 
@@ -172,6 +180,21 @@ def _pack_ways(elements: tuple[MeshElement, ...], ways: list[Floats]) -> Floats:
         if added.size:
             moment = element.load * (of_load - added)
             block[: added.size] = np.hstack([periodic_cubic(added), periodic_cubic(moment)])
+    return coefficients
+
+
+def _friction(element: MeshElement) -> Floats:
+    """Friction over the mesh cycle, (3, n), per unit mesh force; empty without friction."""
+    if element.friction is None or element.friction_coefficient == 0.0:
+        return _NO_FRICTION
+    return element.friction_coefficient * element.friction
+
+
+def _pack_friction(parts: Sequence[Floats]) -> Floats:
+    """Fill `MeshArrays.friction` from the parts (3, n) of each mesh."""
+    coefficients = np.zeros((len(parts), max((own.shape[1] for own in parts), default=0), 4 * FRICTION_PARTS))
+    for block, own in zip(coefficients, parts, strict=True):
+        block[: own.shape[1]] = np.hstack([periodic_cubic(part) for part in own])
     return coefficients
 
 

@@ -53,6 +53,7 @@ def test_columns_of_energy_are_the_observed_terms_of_the_account() -> None:
         "dissipated_energy": sampling.DISSIPATED,
         "work_of_varying_stiffness": sampling.OF_VARYING_STIFFNESS,
         "non_conservative_work": sampling.NON_CONSERVATIVE,
+        "tooth_friction_work": sampling.OF_FRICTION,
         "bearing_rate_work": sampling.OF_BEARING_RATES,
     }
     assert names == {name: column for column, name in enumerate((*ENERGIES, *POWERS))}
