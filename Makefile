@@ -80,11 +80,12 @@ FIND_PYTHON := for candidate in $(if $(PYTHON),"$(PYTHON)",python3 python3.13 py
 	echo "exugear needs Python 3.11, 3.12 or 3.13; found: $$($(or $(PYTHON),python3) --version 2>&1)." >&2; \
 	echo "Install one, or specify it: make PYTHON=/path/to/python3.12 TARGET" >&2; exit 1
 
-.PHONY: test-browser help demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
+.PHONY: test-browser help install demo demo-short test validate validate-long benchmarks check check-web vendor-web docs dist wheel-test wheel-test-all lock clean
 
 help:
 	@echo "make demo        GRC 750 from gear data to waterfalls, modes and a report, into $(RESULTS)"
 	@echo "make demo-short  the same with 10 positions of the mesh cycle and 4 s of the run-up"
+	@echo "make install     install everything that other targets need into $(VENV)"
 	@echo "make test        tests and documentation examples"
 	@echo "make test PACKAGE=steady  tests of one package, such as steady"
 	@echo "make test-browser  tests of the report page in a browser, desktop and phone; requires chromium"
@@ -112,6 +113,9 @@ $(INSTALLED): pyproject.toml requirements.lock
 $(DOCS_INSTALLED): $(INSTALLED)
 	@$(PIP) install --constraint requirements.lock --editable ".[$(EXTRAS),docs]"
 	@touch $@
+
+# Everything that the other targets install into $(VENV), so that they can run side by side.
+install: $(DOCS_INSTALLED)
 
 demo: $(INSTALLED)
 	$(call begin,$(RESULTS))
