@@ -30,7 +30,6 @@ from exugear.system.kernels.table_law import (
     LAW_BY_MISALIGNMENT,
     LAW_FORCE,
     LAW_STIFFNESS,
-    OF_DISTANCE,
     ORDERS,
     TableArrays,
     scratch_memory,
@@ -38,7 +37,8 @@ from exugear.system.kernels.table_law import (
     surface_law,
     surface_tangent,
 )
-from exugear.system.tooth_mesh.laws.line_of_action import LINEAR_BELOW
+from exugear.system.tooth_mesh.laws.line_of_action import curve_of
+from exugear.system.tooth_mesh.laws.table import damped_forces, flank_tangent
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.compilation import compiled, kernel
 from fe_ste.tools.inner_kernels import cached_struct
@@ -111,16 +111,21 @@ def sample_curve(curve: Floats, readings: Floats, load: float) -> LawSamples:
     readings : (s, 2)
     load : N
     """
-    deflection, moved = readings.T
-    (k, k_slope), (n, n_slope) = _moved(curve[:3], moved), _moved(curve[3:], moved)
-    pressed = k * np.abs(deflection) / load
-    bent = pressed > LINEAR_BELOW
-    level = np.log(np.where(bent, pressed, LINEAR_BELOW))
-    force = k * np.exp(n * level) * deflection
-    tangent = k * np.exp(n * level) * (1.0 + bent * n)
-    by_position = force * (n_slope * level + (1.0 + bent * n) * k_slope / k)
-    slope = np.stack([tangent, by_position], axis=1)[:, None]
-    return LawSamples(force[:, None], slope, np.zeros_like(slope))
+    force = np.empty((len(readings), 1))
+    slope = np.zeros((len(readings), 1, 2))
+    _fill_curve(curve, readings, 1.0 / load, force[:, 0], slope[:, 0])
+    return LawSamples(force, slope, np.zeros_like(slope))
+
+
+@compiled
+def _fill_curve(curve: Floats, readings: Floats, per_load: float, force: Floats, slope: Floats) -> None:
+    for s in range(readings.shape[0]):
+        moved = readings[s, 1]
+        k = curve[0, s] + moved * (curve[1, s] + 0.5 * moved * curve[2, s])
+        n = curve[3, s] + moved * (curve[4, s] + 0.5 * moved * curve[5, s])
+        k_slope = curve[1, s] + moved * curve[2, s]
+        n_slope = curve[4, s] + moved * curve[5, s]
+        force[s], slope[s, 0], slope[s, 1], _, _ = curve_of(k, k_slope, n, n_slope, per_load, readings[s, 0])
 
 
 def sample_wandering_line(tangents: Floats, readings: Floats) -> LawSamples:
@@ -202,14 +207,13 @@ def _fill_flank(
     memory = scratch_memory()
     second = np.empty((4, 4))
     sizes = np.empty(DAMPING_SIZE)
-    along = np.ones(3)
-    moving = np.empty(3)
+    slopes = np.empty((3, 4))
+    by_rates = np.empty((3, 3))
     places = np.array([own, CENTRE, tilt, position])
     signs = np.array([1.0, 1.0, sense, side])
     piece = 0
     for s in range(readings.shape[0]):
         delta = readings[s, own]
-        rate = rates[s, own]
         if delta <= tables.lowest[m]:
             continue
         pmc = readings[s, position] if side > 0.0 else turned - readings[s, position]
@@ -232,26 +236,26 @@ def _fill_flank(
                 ramp = x * x * (3.0 - 2.0 * x)
                 ramp_slope = 6.0 * x * (1.0 - x) / whole
         surface_damping(t, piece, m, tables, memory, sizes)
-        # Along the three that teeth push along, in the axes of the table: the own one of misalignment has a sense.
-        along[1], along[2] = -sizes[BY_DISTANCE], -sizes[BY_MISALIGNMENT]
-        moving[0], moving[1], moving[2] = rate, rates[s, CENTRE], sense * rates[s, tilt]
-        approaching = moving[0] + along[1] * moving[1] + along[2] * moving[2]
-        force[s, own] += law[LAW_FORCE]
-        force[s, CENTRE] += law[LAW_BY_DISTANCE]
-        force[s, tilt] += sense * law[LAW_BY_MISALIGNMENT]
+        damped, along_centre, along_tilt, _ = damped_forces(
+            ramp * time, stiffness, sizes, rates[s, own], rates[s, CENTRE], sense * rates[s, tilt]
+        )
+        force[s, own] += law[LAW_FORCE] + damped
+        force[s, CENTRE] += law[LAW_BY_DISTANCE] + along_centre
+        force[s, tilt] += sense * (law[LAW_BY_MISALIGNMENT] + along_tilt)
+        flank_tangent(ramp * time, stiffness, damped, sizes, second, slopes, by_rates)
+        if ramp_slope > 0.0:
+            # First touch itself moves with centre distance, misalignment and position.
+            fading = damped * ramp_slope / ramp
+            for b in range(4):
+                touch = 1.0 if b == 0 else -cubic[b, 0]
+                slopes[0, b] += fading * touch
+                slopes[1, b] -= sizes[BY_DISTANCE] * fading * touch
+                slopes[2, b] -= sizes[BY_MISALIGNMENT] * fading * touch
         for a in range(3):
             for b in range(3):
-                by_rate = time * ramp * stiffness * along[a] * along[b]
-                if a > 0 and b > 0:
-                    by_rate += time * ramp * sizes[OF_DISTANCE + a + b - 2]
-                force[s, places[a]] += signs[a] * by_rate * moving[b]
-                damping[s, places[a], places[b]] += signs[a] * signs[b] * by_rate
-        for b in range(4):
-            # First touch itself moves with centre distance, misalignment and position.
-            touch = 1.0 if b == 0 else -cubic[b, 0]
-            changing = time * approaching * (ramp * second[3, b] + ramp_slope * touch * stiffness)
-            for a in range(3):
-                slope[s, places[a], places[b]] += signs[a] * signs[b] * (second[a, b] + along[a] * changing)
+                damping[s, places[a], places[b]] += signs[a] * signs[b] * by_rates[a, b]
+            for b in range(4):
+                slope[s, places[a], places[b]] += signs[a] * signs[b] * slopes[a, b]
 
 
 # The law of rolling bearings on many samples at once: forces and their slopes, by the kernel of runs in time

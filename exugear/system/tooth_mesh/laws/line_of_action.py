@@ -124,10 +124,32 @@ def curve_law(
     t = scaled - piece
     c = coefficients[piece]
     k = c[0] + t * (c[1] + t * (c[2] + t * c[3]))
-    k_rate = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces / k
+    k_slope = (c[1] + t * (2.0 * c[2] + t * 3.0 * c[3])) * pieces
     n = c[4] + t * (c[5] + t * (c[6] + t * c[7]))
     n_slope = (c[5] + t * (2.0 * c[6] + t * 3.0 * c[7])) * pieces
-    x = k * abs(delta) * c[PER_LOAD]
+    force, tangent, force_by_pmc, energy, energy_by_pmc = curve_of(k, k_slope, n, n_slope, c[PER_LOAD], delta)
+    return force, tangent, force_by_pmc, energy, -energy_by_pmc * cycling
+
+
+@kernel
+def curve_of(
+    k: float, k_slope: float, n: float, n_slope: float, per_load: float, delta: float
+) -> tuple[float, float, float, float, float]:
+    """Elastic force of a deflection (m) by a curve of load over deflection at one position in the mesh cycle.
+
+    Parameters
+    ----------
+    k, k_slope : load over deflection at the load of the table, N/m, and its slope per cycle
+    n, n_slope : exponent of the curve less one, and its slope per cycle
+    per_load : 1 over that load, 1/N
+
+    Returns
+    -------
+    force, tangent, force_by_pmc, energy, energy_by_pmc : float
+        N, N/m, N per cycle, J, J per cycle.
+    """
+    k_rate = k_slope / k
+    x = k * abs(delta) * per_load
     if x > LINEAR_BELOW:
         level = math.log(x)
         force = k * math.exp(n * level) * delta
@@ -144,10 +166,10 @@ def curve_law(
         energy = 0.5 * chord * delta * delta
         by_pmc = energy * rate
         # Where the line meets the curve, both have the same energy: it is less at the origin by this.
-        depth = 0.5 * chord / (2.0 + n) * (LINEAR_BELOW / (k * c[PER_LOAD])) ** 2
+        depth = 0.5 * chord / (2.0 + n) * (LINEAR_BELOW / (k * per_load)) ** 2
         energy -= n * depth
         by_pmc -= depth * (n * (rate - 2.0 * k_rate) + 2.0 * n_slope / (2.0 + n))
-    return force, tangent, force * rate, energy, -by_pmc * cycling
+    return force, tangent, force * rate, energy, by_pmc
 
 
 LAW = LineOfAction()

@@ -106,7 +106,8 @@ from fe_ste.transmission_error.table import TableError
 
 TABLE_FORM = 1
 GRADIENT, TURNING, BEND, CHANGING, PUSH, DAMPING, RATES = range(7)
-GRADIENTS, SLOPES, SECOND, TABLE_MEMORY = RATES + 3, RATES + 7, RATES + 11, RATES + 15
+GRADIENTS, SLOPES, SECOND, BY_ARGUMENTS = RATES + 3, RATES + 7, RATES + 11, RATES + 15
+BY_RATES, TABLE_MEMORY = BY_ARGUMENTS + 3, BY_ARGUMENTS + 6
 """Rows of the memory of `table_force` and `add_table_tangent`, (`TABLE_MEMORY`, 13)."""
 
 
@@ -189,6 +190,37 @@ def damped_forces(
     tilt = time * (damping[OF_BOTH] * centre_rate + damping[OF_MISALIGNMENT] * tilt_rate)
     lost = damped * approaching + centre * centre_rate + tilt * tilt_rate
     return damped, centre - by_distance * damped, tilt - by_misalignment * damped, lost
+
+
+@kernel
+def flank_tangent(
+    time: float, stiffness: float, damped: float, damping: Floats, second: Floats, slopes: Floats, by_rates: Floats
+) -> None:
+    """Slopes (3, 4) of a flank's force and of what it does along centre distance and misalignment, by its arguments.
+
+    They follow `surface_tangent` and `surface_damping`, in the axes of the table; those by the rates (3, 3) are apart.
+
+    Parameters
+    ----------
+    time : of the damping, s; zero for none
+    stiffness : slope of the force, N/m
+    damped : damping along the deflection, N
+
+    Notes
+    -----
+    The slope of the force changes with the place; that directions and the tangent at constant load do is left out,
+    which is a share of 1e-4 of damping, and of nothing at rest.
+    """
+    per_stiffness = damped / stiffness if stiffness > 0.0 else 0.0
+    for a in range(3):
+        along = 1.0 if a == 0 else -damping[BY_DISTANCE + a - 1]
+        for b in range(3):
+            across = 1.0 if b == 0 else -damping[BY_DISTANCE + b - 1]
+            by_rates[a, b] = time * stiffness * along * across
+            if a > 0 and b > 0:
+                by_rates[a, b] += time * damping[OF_DISTANCE + a + b - 2]
+        for b in range(4):
+            slopes[a, b] = second[a, b] + along * per_stiffness * second[3, b]
 
 
 @kernel
@@ -279,6 +311,7 @@ def add_table_tangent(
     gradients, slopes, second = rows[GRADIENTS:SLOPES], rows[SLOPES:SECOND], rows[SECOND:TABLE_MEMORY]
     turning, bend, changing, tilting = rows[TURNING], rows[BEND], rows[CHANGING], rows[PUSH]
     rates, damping = rows[RATES:GRADIENTS], rows[DAMPING]
+    by_arguments, by_rates = rows[BY_ARGUMENTS:BY_RATES], rows[BY_RATES:TABLE_MEMORY]
     delta = offset + net_deflection(q, m, meshes, row, float(side), gradients[0], turning, bend)
     if delta <= table.lowest[m]:
         return
@@ -309,13 +342,17 @@ def add_table_tangent(
         row_dot(index, gradients[1], v),
         row_dot(index, gradients[2], v),
     )
+    flank_tangent(time, law[LAW_STIFFNESS], damped, damping, second, by_arguments, by_rates)
     # Slopes of F, U_a and U_gamma over the coordinates, by the chain rule.
     for i in range(ROW_SIZE):
         for a in range(3):
             slopes[a, i] = 0.0
             for b in range(4):
-                slopes[a, i] += second[a, b] * gradients[b, i]
-    add_damping_slopes(time, law[LAW_STIFFNESS], damped, damping, gradients, rates, second, slopes, jv)
+                slopes[a, i] += by_arguments[a, b] * gradients[b, i]
+            for b in range(3):
+                slopes[a, i] += by_rates[a, b] * rates[b, i]
+                for j in range(ROW_SIZE):
+                    jv[i, j] += by_rates[a, b] * gradients[a, i] * gradients[b, j]
     for a in range(3):
         for i in range(ROW_SIZE):
             for j in range(ROW_SIZE):
@@ -328,40 +365,6 @@ def add_table_tangent(
         tilting[i] = apart * table.centre[m, i] + moment * tilting[i]
     frame_row(q, index, axis, tilting, gradients[0], turning)
     turn_rows(turning, bend, 1.0, jq)
-
-
-@kernel
-def add_damping_slopes(
-    time: float,
-    stiffness: float,
-    damped: float,
-    damping: Floats,
-    gradients: Floats,
-    rates: Floats,
-    second: Floats,
-    slopes: Floats,
-    jv: Floats,
-) -> None:
-    """Add what damping gives to the slopes over the coordinates, and its derivatives by the velocities, (13, 13).
-
-    The slope of the force changes with the place; that directions and the tangent at constant load do is left out,
-    which is a share of 1e-4 of damping, and of nothing at rest.
-    """
-    per_stiffness = damped / stiffness if stiffness > 0.0 else 0.0
-    for a in range(3):
-        along = 1.0 if a == 0 else -damping[BY_DISTANCE + a - 1]
-        for b in range(3):
-            across = 1.0 if b == 0 else -damping[BY_DISTANCE + b - 1]
-            by_rate = time * stiffness * along * across
-            if a > 0 and b > 0:
-                by_rate += time * damping[OF_DISTANCE + a + b - 2]
-            for i in range(ROW_SIZE):
-                slopes[a, i] += by_rate * rates[b, i]
-                for j in range(ROW_SIZE):
-                    jv[i, j] += by_rate * gradients[a, i] * gradients[b, j]
-        for b in range(4):
-            for i in range(ROW_SIZE):
-                slopes[a, i] += along * per_stiffness * second[3, b] * gradients[b, i]
 
 
 @kernel
