@@ -329,33 +329,6 @@ class ComparedPeak:
     """Rank among the peaks by the run-up's amplitude, 1 for the highest."""
 
 
-def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -> OrderCut:
-    """Amplitude and phase along an order, as `exugear.results.spectra.resonances` has them of run-ups; times are NaN.
-
-    Parameters
-    ----------
-    data : as `exugear.steady.steady_file.load_response` reads it
-    line : of a single mesh frequency or a combination
-
-    Raises
-    ------
-    SteadyError
-        The response has no such signal or order.
-    """
-    names = [str(name) for name in data["signal"].to_numpy()]
-    orders = data["order"].to_numpy()
-    if signal not in names:
-        raise SteadyError(f"no signal {signal!r}; signals are {', '.join(names)}")
-    place = line.place(orders)
-    if place is None:
-        nearest = orders[np.argmin(np.abs(orders - line.order))]
-        raise SteadyError(f"no line of order {line.order:g}; the nearest is {nearest:g}")
-    own = data.isel(line=place, signal=names.index(signal))
-    speed: Floats = data["speed"].to_numpy().astype(np.float64)
-    amplitude = own["amplitude"].to_numpy() * np.exp(1j * own["phase"].to_numpy())
-    return OrderCut(line, np.full(speed.shape, np.nan), speed, line.frequency(speed), amplitude.astype(np.complex128))
-
-
 def damping_at(data: xr.Dataset, peak: Peak) -> float | None:
     """Damping of the mode that the line of a peak crosses there, None where none is known."""
     orders = data["order"].to_numpy()

@@ -38,8 +38,8 @@ from exugear.system.kernels.connectors import (
     connector_strains,
     loads_at_rest,
 )
-from exugear.system.kernels.coordinates import InertiaArrays, SpringArrays, accelerations, add_spring_forces
-from exugear.system.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for, set_elastic_accelerations
+from exugear.system.kernels.coordinates import InertiaArrays, SpringArrays, add_spring_forces
+from exugear.system.kernels.elastic import ElasticArrays, add_elastic_forces, scratch_for
 from exugear.system.kernels.meshes import STATE_SIZE, MeshArrays, gear_positions
 from exugear.system.kernels.modal_damping import ModalArrays, add_modal_damping, modal_memory
 from exugear.system.kernels.rolling import no_rolling
@@ -359,18 +359,6 @@ class Assembly(ReprMixin):
                 raise VariantError(f"no rotating body {name!r} to load; bodies are {', '.join(self.spin)}")
             f[self.spin[name]] += torque
         return f
-
-    def accelerations(self, q: Floats, v: Floats, applied: Floats) -> Floats:
-        """Accelerations under all forces and the applied generalized forces, shape (size,)."""
-        out = np.zeros(self.size)
-        forces = self.forces(q, v) + applied
-        accelerations(q, v, self.inertia, forces, out)
-        if self.elastic_bodies:
-            set_elastic_accelerations(forces, self.elastic, scratch_for(self.elastic), out)
-        for name, body in self.turning.items():
-            elastic_slice = self.elastic_slices[name]
-            out[elastic_slice] = body.accelerations(q[elastic_slice], v[elastic_slice], forces[elastic_slice])
-        return out
 
     def with_travelling(self, q: Floats, v: Floats) -> tuple[Floats, Floats]:
         """States (..., size) as the laws of meshes read them: with the travelling seats' coordinates, if any."""

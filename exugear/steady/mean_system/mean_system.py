@@ -58,8 +58,6 @@ ELASTIC_RING = (
     "the ring gear is flexible: stiffness varies with the carrier angle, which the steady-state response cannot "
     "treat; set flexibility = 'none' for the ring's body"
 )
-LEAST_ENERGY = 1e-6
-"""Minimum share of the kinetic energy of an order for its mean torque to be evaluated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,47 +223,6 @@ def _with_equal_planets(assembly: Assembly, sets: tuple[PlanetSet, ...]) -> tupl
     ]
     connectors, spread = with_equal_planets(assembly.connectors, supports)
     return replace(assembly, connectors=connectors), max(spread, assembly.planet_spread)
-
-
-def torque_of_vibration(system: MeanSystem, speed: float, frequencies: Floats, motion: Complexes) -> float:
-    """Return the mean torque of the drive, N m, caused by a vibration in addition to that of the averaged system.
-
-    It is of second order in the vibration: bearing moments on tilting bodies do work along the kinematic rotation. A
-    time simulation without it gains or loses speed, 4e-5 per second at a lightly damped resonance of the GRC, which
-    shifts phases there by 1e-2.
-
-    Parameters
-    ----------
-    speed : of the input, rad/s
-    frequencies : (lines,) angular frequencies, rad/s
-    motion : (lines, size) coefficients about the static state, the mean first
-
-    Notes
-    -----
-    The mean power of all forces along the kinematic rotation has to vanish. Meshes contribute none: the rotation does
-    not deflect them. Products of two different orders have zero mean, so each relevant order is evaluated alone.
-    """
-    frame = system.frame
-    assembly = system.frame.assembly
-    load = assembly.torque_vector(assembly.gearbox.case.static_load.torques_N_m)
-    here = system.static_at(speed) + motion[0].real
-
-    def power(change: Complexes, frequency: float) -> float:
-        parts = change, 1j * frequency * change, -(frequency**2) * change
-        place, rate, bend = (np.asarray(part.real) for part in parts)
-        q, v, a = frame.state(0.0, speed, here + place, rate, bend)
-        missing = assembly.inertia_forces(q, v, a) - assembly.forces(q, v, frame.mean_meshes) - load
-        return float(assembly.rolling_velocity(q, frame.speeds) @ missing)
-
-    energies = frequencies**2 * (np.abs(motion) ** 2 @ np.abs(np.diag(system.mass)))
-    energies[0] = 0.0
-    still = power(np.zeros(system.size, dtype=complex), 0.0)
-    total = 0.0
-    for line in np.flatnonzero(energies > LEAST_ENERGY * energies.sum()):
-        for part in math.sqrt(2.0) * motion[line] * np.array([[1.0], [-1.0], [1j], [-1j]]):
-            total += 0.5 * (power(part, float(frequencies[line])) - still)
-    rolling = assembly.rolling_velocity(np.zeros(assembly.size), frame.speeds)
-    return total / float(rolling @ system.drive)
 
 
 def unsuitable(assembly: Assembly, elastic: Collection[str] = ()) -> str:

@@ -24,7 +24,7 @@ from exugear.system.kernels.products import (
     symmetric_tiles,
 )
 from fe_ste.tools.arrays import Floats, Integers
-from fe_ste.tools.compilation import kernel, summing_kernel
+from fe_ste.tools.compilation import kernel
 from fe_ste.tools.octets import SIZE, aligned_zeros, all_eight, eight, eight_at, put, sum_of
 
 
@@ -139,20 +139,6 @@ def elastic_motion(elastic: ElasticArrays) -> ElasticMotion:
         across=begins,
         gyroscopic=gyroscopic,
     )
-
-
-@summing_kernel
-def row_product(matrix: Floats, begin: int | np.uint64, given: Floats, count: int | np.uint64) -> float:
-    """Scalar product of entries of a flat matrix, from `begin` on, with the first entries of a vector.
-
-    Places without a sign spare the processor the question whether they count from the end, so that it takes several
-    products at once.
-    """
-    total = 0.0
-    start = np.uint64(begin)
-    for j in range(np.uint64(count)):
-        total += matrix[start + j] * given[j]
-    return total
 
 
 @kernel
@@ -298,53 +284,3 @@ def add_elastic_forces(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Fl
                 column += size
         for i in range(size):
             f[elastic.coordinate[begin + i]] -= sum_[i]
-
-
-@kernel
-def set_elastic_accelerations(f: Floats, elastic: ElasticArrays, scratch: Floats, out: Floats) -> None:
-    """Fill the accelerations of all elastic bodies under generalized forces f into out."""
-    sum_ = scratch[1]
-    for b in range(elastic.turning.size):
-        begin = elastic.first[b]
-        size = elastic.first[b + 1] - begin
-        for i in range(size):
-            sum_[i] = 0.0
-        column = elastic.square[b]
-        for j in range(size):
-            value = f[elastic.coordinate[begin + j]]
-            for i in range(size):
-                sum_[i] += elastic.inverse[column + i] * value
-            column += size
-        for i in range(size):
-            out[elastic.coordinate[begin + i]] = sum_[i]
-
-
-@kernel
-def block_energy(b: int, x: Floats, matrix: Floats, elastic: ElasticArrays) -> float:
-    """Scalar x' A x of a block's matrix with its own vector x."""
-    size = np.uint64(elastic.first[b + 1] - elastic.first[b])
-    total = 0.0
-    column = np.uint64(elastic.square[b])
-    for i in range(size):
-        total += x[i] * row_product(matrix, column, x, size)
-        column += size
-    return total
-
-
-@kernel
-def elastic_energies(q: Floats, v: Floats, elastic: ElasticArrays, scratch: Floats) -> tuple[float, float, float]:
-    """Kinetic and elastic energy (J) of all elastic bodies, and the power that they damp (W)."""
-    kinetic = 0.0
-    stored = 0.0
-    damped = 0.0
-    given = scratch[0]
-    for b in range(elastic.turning.size):
-        for i in range(elastic.first[b], elastic.first[b + 1]):
-            given[i - elastic.first[b]] = v[elastic.coordinate[i]]
-        kinetic += 0.5 * block_energy(b, given, elastic.mass, elastic)
-        deformation(b, q, v, 0.0, elastic, given)
-        stored += 0.5 * block_energy(b, given, elastic.stiffness, elastic)
-        # Damping is a time times the stiffness: its power is that of the rates, without the common turning.
-        deformation(b, v, v, 0.0, elastic, given)
-        damped += elastic.damping_time[b] * block_energy(b, given, elastic.stiffness, elastic)
-    return kinetic, stored, damped

@@ -483,7 +483,14 @@ def set_loads(t: float, q: Floats, v: Floats, loads: Loads, series: Integers, f:
 
 @kernel
 def set_accelerations(v: Floats, bodies: Bodies, work: Work) -> None:
-    """Solve the bodies' equations for `work.rate`; formula in `exugear.system.kernels.coordinates.accelerations`."""
+    """Solve the equations of motion of the bodies for the accelerations `work.rate` under the forces `work.force`.
+
+    Lagrange's equations of an axially symmetric body in Rxyz coordinates, with p = J_a (spin' + a' sin b), the angular
+    momentum about its axis:
+
+        J_t cos^2 b a'' = Q_a - Q_spin sin b - p b' cos b + 2 J_t a' b' sin b cos b
+        J_t b'' = Q_b - J_t a'^2 sin b cos b + p a' cos b,   spin'' = Q_spin / J_a - a'' sin b - a' b' cos b
+    """
     f = work.force
     out = work.rate
     for n in range(bodies.mass.size):

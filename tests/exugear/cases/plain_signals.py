@@ -11,8 +11,7 @@ import math
 import numpy as np
 
 from exugear.gearbox.sections.entries import GROUND
-from exugear.system.kernels.coordinates import kinetic_energies
-from exugear.system.kernels.elastic import elastic_energies, scratch_for
+from exugear.system.kernels.elastic import scratch_for
 from exugear.system.kernels.meshes import (
     DEFLECTION,
     ENERGY,
@@ -41,6 +40,7 @@ from exugear.system.tooth_mesh.laws.mesh_forces import MEMORY, pass_meshes
 from fe_ste.tools.compilation import compiled
 
 from .plain_connectors import connector_load, connector_motion, memory_for, turn_between
+from .plain_motion import elastic_energies, kinetic_energies
 
 
 def sampled(assembly: Assembly, q: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -6,18 +6,46 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from exugear.gearbox.choice import Choice
-from exugear.results.spectra.resonances import sweep_severity
+from exugear.results.spectra.resonances import OrderCut, sweep_severity
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.peaks import compared_peaks, damping_at, peaks, steady_cut
+from exugear.steady.peaks import compared_peaks, damping_at, peaks
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
 from exugear.steady.steady_response import response_of
 from exugear.system.build import assemble
 
 PLANETARY = OrderLine("planetary", 99.0)
+
+
+def steady_cut(data: xr.Dataset, line: OrderLine, signal: str = "overall_dte") -> OrderCut:
+    """Amplitude and phase along an order, as `exugear.results.spectra.resonances` has them of run-ups; times are NaN.
+
+    Parameters
+    ----------
+    data : as `exugear.steady.steady_file.load_response` reads it
+    line : of a single mesh frequency or a combination
+
+    Raises
+    ------
+    SteadyError
+        The response has no such signal or order.
+    """
+    names = [str(name) for name in data["signal"].to_numpy()]
+    orders = data["order"].to_numpy()
+    if signal not in names:
+        raise SteadyError(f"no signal {signal!r}; signals are {', '.join(names)}")
+    place = line.place(orders)
+    if place is None:
+        nearest = orders[np.argmin(np.abs(orders - line.order))]
+        raise SteadyError(f"no line of order {line.order:g}; the nearest is {nearest:g}")
+    own = data.isel(line=place, signal=names.index(signal))
+    speed = data["speed"].to_numpy().astype(np.float64)
+    amplitude = own["amplitude"].to_numpy() * np.exp(1j * own["phase"].to_numpy())
+    return OrderCut(line, np.full(speed.shape, np.nan), speed, line.frequency(speed), amplitude.astype(np.complex128))
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,6 @@
-"""Deviations as gaps: against geometry done point by point, and against the finite-element contact."""
+"""Gaps of single tooth pairs in the finite-element contact."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 import pytest
@@ -10,7 +8,6 @@ import pytest
 from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.flank import flank_compliance
 from fe_ste.elasticity.hexmesh import MeshSettings
-from fe_ste.flanks import displaced_axis, gaps_of_pairs, pitch_gap, runout_displacement
 from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.transmission_error.compliance import PairCompliance
 from fe_ste.transmission_error.search import contact_state
@@ -19,70 +16,6 @@ from fe_ste.transmission_error.transmission_error import solve_positions
 
 SPUR_GEAR = Gear(name="gear", teeth=50, normal_module=3e-3, face_width=20e-3, held_diameter=100e-3)
 SPUR = GearPair(name="spur", pinion=SPUR_GEAR, gear=SPUR_GEAR, centre_distance=150e-3)
-
-
-def gap_by_points(pair: GearPair, along: float, across: float) -> float:
-    """Least arc on the base circle by which gear 2, displaced, is off the flank of gear 1; no involute algebra.
-
-    Points of gear 1's flank are looked up on gear 2's flank at their radius, as measured from gear 2's new centre.
-    """
-    kind = -1.0 if pair.gear.internal else 1.0
-    angle = pair.working_pressure_angle
-    roll = math.tan(angle) + np.linspace(-0.05, 0.05, 200_001)
-    polar = math.tan(angle) - angle - (roll - np.arctan(roll))
-    radius = pair.pinion.base_radius * np.hypot(1.0, roll)
-    point = radius * np.exp(1j * polar)
-    centre = complex(kind * (pair.centre_distance + along), across)
-    seen = -kind * (point - centre)
-    roll_2 = np.sqrt((np.abs(seen) / pair.gear.base_radius) ** 2 - 1.0)
-    flank = math.tan(angle) - angle - (roll_2 - np.arctan(roll_2))
-    return float(np.min(kind * pair.gear.base_radius * (np.angle(seen) - flank)))
-
-
-@pytest.mark.parametrize(("along", "across"), [(1e-4, 0.0), (-1e-4, 0.0), (0.0, 1e-4), (0.0, -1e-4), (8e-5, -3e-5)])
-def test_displaced_axis_opens_the_flanks_as_points_on_them_say(
-    any_grc_pair: GearPair, along: float, across: float
-) -> None:
-    distance, gap = displaced_axis(any_grc_pair, along, across)
-    assert distance == pytest.approx(math.hypot(any_grc_pair.centre_distance + along, across), rel=1e-15)
-    # Of an internal pair the line of centres turns by across / distance, which the points follow exactly; the grid of
-    # points misses the least by less than a picometre.
-    assert gap == pytest.approx(gap_by_points(any_grc_pair, along, across), abs=2e-12)
-
-
-def test_displaced_axis_to_first_order(sun_planet: GearPair, ring_planet: GearPair) -> None:
-    for pair, sign in ((sun_planet, 1.0), (ring_planet, -1.0)):
-        angle = pair.working_pressure_angle
-        gap = displaced_axis(pair, 1e-6, 2e-6)[1]
-        assert gap == pytest.approx(1e-6 * (sign * math.sin(angle) + 2.0 * math.cos(angle)), rel=1e-4)
-
-
-def test_runout_goes_round_with_the_gear() -> None:
-    places = [runout_displacement(30e-6, 0.3, angle) for angle in np.linspace(0.0, 2.0 * np.pi, 9)]
-    assert [math.hypot(*place) for place in places] == pytest.approx([30e-6] * 9, rel=1e-12)
-    assert math.atan2(*places[2][::-1]) == pytest.approx(0.3 + math.pi / 2, rel=1e-12)
-
-
-def test_runout_seen_at_the_teeth_is_a_wave_of_the_pitch() -> None:
-    """A displaced gear's teeth stand off by a sine over the revolution, as wide as the eccentricity."""
-    teeth, eccentricity = SPUR_GEAR.teeth, 20e-6
-    gaps = [
-        displaced_axis(SPUR, *runout_displacement(eccentricity, 0.0, 2.0 * math.pi * tooth / teeth))[1]
-        for tooth in range(teeth)
-    ]
-    wave = np.fft.rfft(gaps) / teeth
-    assert 2.0 * abs(wave[1]) == pytest.approx(eccentricity, rel=1e-3)
-    # Second order: eccentricity over centre distance.
-    assert np.abs(wave[2:]).max() < 1e-3 * abs(wave[1])
-
-
-def test_each_combination_of_teeth_meets_once_in_the_hunting_period() -> None:
-    pinion, gear = np.arange(4.0), 10.0 * np.arange(7.0)
-    met = [gaps_of_pairs(pinion, gear, cycle, (0,))[0] for cycle in range(28)]
-    assert sorted(met) == sorted((pinion[:, None] + gear).ravel())
-    # What passes the pitch point now is ahead by one in the next cycle.
-    now, then = gaps_of_pairs(pinion, gear, 9, (-1, 0, 1)), gaps_of_pairs(pinion, gear, 10, (0, 1, 2))
-    assert list(now.values()) == list(then.values())
 
 
 @pytest.fixture(scope="module")
@@ -146,7 +79,3 @@ def test_a_pair_that_stands_far_back_carries_nothing(spur: PairCompliance) -> No
 def test_pairs_that_never_touch_are_refused(spur: PairCompliance) -> None:
     with pytest.raises(ValueError, match="tooth pair 40: only pairs"):
         spur.with_tooth_gaps({40: 1e-6})
-
-
-def test_pitch_deviation_is_an_arc_of_the_reference_circle() -> None:
-    assert pitch_gap(SPUR_GEAR, np.array([10e-6])) == pytest.approx([10e-6 * math.cos(math.radians(20.0))], rel=1e-12)

@@ -334,13 +334,9 @@ def add_table_tangent(
     surface_tangent(t, piece, m, table, law_memory, second)
     surface_damping(t, piece, m, table, law_memory, damping)
     law, time = law_memory.law, table.damping_time[m]
+    rate, centre_rate = row_dot(index, gradients[0], v), row_dot(index, gradients[1], v)
     damped, along_centre, along_tilt, _ = damped_forces(
-        time,
-        law[LAW_STIFFNESS],
-        damping,
-        row_dot(index, gradients[0], v),
-        row_dot(index, gradients[1], v),
-        row_dot(index, gradients[2], v),
+        time, law[LAW_STIFFNESS], damping, rate, centre_rate, row_dot(index, gradients[2], v)
     )
     flank_tangent(time, law[LAW_STIFFNESS], damped, damping, second, by_arguments, by_rates)
     # Slopes of F, U_a and U_gamma over the coordinates, by the chain rule.

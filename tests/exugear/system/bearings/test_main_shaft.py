@@ -26,6 +26,7 @@ from exugear.transient.compiled.solver import CompiledSystem
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...cases.assembled import assembled, modes_with_bodies
+from ...cases.plain_motion import accelerations_of
 
 TORQUE = {"main_shaft": 240e3}
 YOUNG, SHEAR, DENSITY = 206e9, 206e9 / 2.6, 7850.0
@@ -190,7 +191,7 @@ def test_both_solvers_join_the_shaft_to_the_carrier_at_its_seat(flexible: Assemb
     start = accelerating_start(flexible, TORQUE, 2.0)
     q = start.q + 1e-6 * np.random.default_rng(3).normal(size=flexible.size)
     compiled = CompiledSystem(flexible, q, start.v, LoadTable(TORQUE), 1e-5).accelerations()
-    plain = flexible.accelerations(q, start.v, flexible.torque_vector(TORQUE))
+    plain = accelerations_of(flexible, q, start.v, flexible.torque_vector(TORQUE))
     assert np.abs(compiled - plain).max() < 1e-9 * np.abs(plain).max()
 
 

@@ -20,6 +20,7 @@ from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ....optional_libraries import needs_meshio
 from ...cases.assembled import assembled, simulated
+from ...cases.plain_motion import accelerations_of
 from ...cases.plain_signals import energies_of, sampled
 from ...cases.ring import ring_content
 from ...cases.rounding import allowed_difference
@@ -112,7 +113,7 @@ def test_compiled_right_hand_side_is_that_of_the_plain_kernels(ringed: Assembly)
     q, v = turned(ringed, 0.4)
     loads = LoadTable(LOAD)
     found = CompiledSystem(ringed, q, v, loads, STEP).accelerations()
-    expected = ringed.accelerations(q, v, ringed.torque_vector(LOAD))
+    expected = accelerations_of(ringed, q, v, ringed.torque_vector(LOAD))
     # Rounding of places of 1 m, 1e-16 m each, of displacements of 1e-6 m.
     assert np.abs(found - expected).max() < 1e-9 * np.abs(expected).max()
     signals, energies, _ = Observer(ringed, loads).observe(np.zeros(1), q[None], v[None])

@@ -34,6 +34,7 @@ from ...cases.assembled import assembled, bodies_of, modes_with_bodies, simulate
 from ...cases.both_ways import assert_matrices_of_exudyn_are_those_of, compiled_states, exudyn_states, relative_error
 from ...cases.box import box_content
 from ...cases.limit import unchecked
+from ...cases.plain_motion import accelerations_of
 from ...cases.plain_signals import sampled
 
 pytestmark = needs_meshio
@@ -169,7 +170,7 @@ def test_matrices_of_exudyn_are_those_of_the_assembly(housed: Assembly) -> None:
 def test_the_compiled_solver_follows_exudyn_and_the_plain_kernels(housed: Assembly) -> None:
     q, v = moving(housed)
     system = CompiledSystem(housed, q, v, LoadTable(LOAD), STEP)
-    plain = housed.accelerations(q, v, housed.torque_vector(LOAD))
+    plain = accelerations_of(housed, q, v, housed.torque_vector(LOAD))
     assert np.abs(system.accelerations() - plain).max() < 1e-9 * np.abs(plain).max()
     found, expected = (
         sampled(housed, *states(housed, q, v, LOAD, 400, STEP)) for states in (compiled_states, exudyn_states)

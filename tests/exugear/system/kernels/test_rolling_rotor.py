@@ -13,10 +13,11 @@ import scipy.optimize
 from exugear.system.bearings.rolling.point_contact import rolling_arrays
 from exugear.system.bearings.rolling.rows import RollingRow
 from exugear.system.kernels.connectors import ConnectorArrays, add_connector_forces
-from exugear.system.kernels.coordinates import InertiaArrays, accelerations, kinetic_energies
+from exugear.system.kernels.coordinates import InertiaArrays
 from exugear.system.kernels.rolling import STORED, rolling_forces, rolling_memory, rolling_tangent
 
 from ...cases.plain_connectors import add_forces
+from ...cases.plain_motion import accelerations, kinetic_energies
 from ...cases.rolling import BALLS, CYLINDRICAL
 
 STEP = 1 / 60e3

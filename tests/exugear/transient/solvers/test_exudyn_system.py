@@ -18,6 +18,7 @@ from exugear.system.system import Assembly
 from exugear.transient.exudyn_model.system import ExudynSystem
 
 from ...cases.assembled import assembled
+from ...cases.plain_motion import accelerations_of
 
 LOAD = {"carrier": 240e3, "hss": -3000.0}
 STEP = 2.5e-5
@@ -90,7 +91,7 @@ def test_exudyn_follows_the_assemblys_equations_of_motion(grc: Gearbox, stiffnes
 
     def rate(state: np.ndarray) -> np.ndarray:
         at, velocity = state[: assembly.size], state[assembly.size :]
-        return np.concatenate([velocity, assembly.accelerations(at, velocity, applied)])
+        return np.concatenate([velocity, accelerations_of(assembly, at, velocity, applied)])
 
     y = np.concatenate([q, v])
     k1 = rate(y)
