@@ -438,6 +438,16 @@ def _faults_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSect
         yield f"{key}.matrix: is not positive semi-definite (negative eigenvalue); correct the matrix"
 
 
+def faults_of_seals(case: GearboxFile, bodies: Collection[str]) -> Iterator[str]:
+    """Yield an error for each seal between bodies that are not in the file, or between a body and itself."""
+    for name, seal in case.seals.items():
+        for key, body in (("body", seal.body), ("on", seal.on)):
+            if body not in bodies and not (key == "on" and body == GROUND):
+                yield f"seals.{name}.{key} = {body!r}: no such body; bodies are {', '.join(bodies)}"
+        if seal.body == seal.on:
+            yield f"seals.{name}.on = {seal.on!r}: is the body that the seal slides on; set another body, or remove on"
+
+
 def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | PointForce]]) -> Iterator[str]:
     """Yield an error for a name used twice among meshes, supports and couplings: these share one list in the results.
 

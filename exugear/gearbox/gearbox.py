@@ -521,6 +521,7 @@ def _checks_of_the_whole(gearbox: Gearbox) -> Iterator[checks.Check]:
             lambda: checks.faults_of_torsion(gearbox.spinning, gearbox.couplings, gearbox.bearings),
             ("couplings", "supports"),
         ),
+        ("seals", lambda: checks.faults_of_seals(case, list(gearbox.named_bodies)), ("ends",)),
         ("names", lambda: checks.faults_of_names(_elements(gearbox)), elements),
         ("axes", lambda: checks.faults_of_joints(gearbox.joints, gearbox.named_bodies), ("joints",)),
         (

@@ -1,9 +1,9 @@
 """Where the power goes: friction of teeth and bearings at one operating point, efficiency, and oil temperature.
 
-Meshes lose P mu_m H_V (`fe_ste.standards.mesh_loss`). Bearings have the frictional moment M = mu P d / 2 with the
-constant coefficients of friction that SKF prints for loads near a tenth of the basic dynamic rating, normal speeds and
-good lubrication (SKF, Rolling bearings, 2016, "Estimating the frictional moment", table 1). Churning, windage, seals
-and auxiliary pumps are not included.
+Meshes lose P mu_m H_V (`fe_ste.standards.mesh_loss`). Bearings have the frictional moment of SKF by series
+(`exugear.system.bearings.rolling.friction`); needle roller bearings, which it does not describe, have M = mu P d / 2
+with a constant coefficient. Radial shaft seals lose 7.69e-6 d^2 n (W, mm, rpm; ISO/TR 14179-2). Churning, windage and
+auxiliary pumps are not included.
 """
 
 from __future__ import annotations
@@ -12,14 +12,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
 import scipy.optimize
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import summarise_loads
 from exugear.gearbox.parts import Mesh
-from exugear.gearbox.units import RPM, UM
+from exugear.gearbox.units import MM, RPM, UM
 from exugear.life.gear_life import RZ_OF_RA, roughness_of
 from exugear.system.bearings.duty import BearingLoadState
+from exugear.system.bearings.rolling.friction import friction_series, frictional_moment
 from exugear.system.bearings.rolling.life import viscosity_at
 from fe_ste.standards.mesh_loss import (
     MeshOperation,
@@ -31,20 +33,10 @@ from fe_ste.standards.mesh_loss import (
 from fe_ste.transmission_error.sliding import table_friction, table_loss_factor
 from fe_ste.transmission_error.table import MeshTable
 
-BEARING_FRICTION = {
-    "deep_groove_ball": 0.0015,
-    "angular_contact_ball": 0.0020,
-    "four_point_ball": 0.0024,
-    "self_aligning_ball": 0.0010,
-    "cylindrical_roller": 0.0011,
-    "needle_roller": 0.0020,
-    "tapered_roller": 0.0018,
-    "spherical_roller": 0.0018,
-    "thrust_spherical_roller": 0.0018,
-}
-"""Coefficient of friction by type of bearing, with a cage and without contact seals."""
-FULL_COMPLEMENT_FRICTION = 0.0020
-"""The same of cylindrical roller bearings without a cage."""
+NEEDLE_FRICTION = 0.0020
+"""Coefficient of friction of needle roller bearings (SKF, Rolling bearings, "Estimating the frictional moment")."""
+SEAL_LOSS = 7.69e-6
+"""Loss of a radial shaft seal over the square of its diameter (mm) and its speed (rpm), W (ISO/TR 14179-2)."""
 EXPONENTS = {"ball": 3.0, "roller": 10.0 / 3.0}
 """Exponents of the basic rating life (ISO 281)."""
 USUAL_ROUGHNESS = 0.5 * UM
@@ -105,9 +97,25 @@ class BearingLoss:
     """This load over the basic dynamic rating."""
     speed: float
     """Of the inner ring relative to the outer ring, rad/s."""
-    friction: float
+    series: str
+    """Series whose constants are used; empty if unknown: `band` is then that of all series of the type."""
     loss: float
     """Of all bearings, W."""
+    band: tuple[float, float]
+    """Smallest and largest loss of all bearings, W."""
+
+
+@dataclass(frozen=True)
+class SealLoss:
+    """Loss of a radial shaft seal."""
+
+    name: str
+    diameter: float
+    """m."""
+    speed: float
+    """Of the shaft relative to the seal's housing, rad/s."""
+    loss: float
+    """W."""
 
 
 @dataclass(frozen=True)
@@ -124,6 +132,7 @@ class Losses:
     """Kinematic viscosity at that temperature, m2/s."""
     meshes: tuple[MeshLoss, ...]
     bearings: tuple[BearingLoss, ...]
+    seals: tuple[SealLoss, ...]
     without_data: tuple[str, ...]
     """Bearings without catalogue data, whose friction is not included."""
     assumed_roughness: bool
@@ -132,13 +141,15 @@ class Losses:
     @property
     def total(self) -> float:
         """All losses that are included, W."""
-        return sum(mesh.loss for mesh in self.meshes) + sum(bearing.loss for bearing in self.bearings)
+        meshes = sum(mesh.loss for mesh in self.meshes)
+        return meshes + sum(own.loss for own in self.bearings) + sum(seal.loss for seal in self.seals)
 
     @property
     def band(self) -> tuple[float, float]:
         """Smallest and largest sum of losses by the methods of friction, W."""
-        bearings = sum(bearing.loss for bearing in self.bearings)
-        return bearings + sum(m.band[0] for m in self.meshes), bearings + sum(m.band[1] for m in self.meshes)
+        seals = sum(seal.loss for seal in self.seals)
+        bands = [mesh.band for mesh in self.meshes] + [bearing.band for bearing in self.bearings]
+        return seals + sum(low for low, _ in bands), seals + sum(high for _, high in bands)
 
     @property
     def output_power(self) -> float:
@@ -221,7 +232,8 @@ def _at_temperature(
         oil_temperature=temperature,
         viscosity=kinematic,
         meshes=_mesh_losses(gearbox, tables, speeds, kinematic * density),
-        bearings=_bearing_losses(gearbox, duties, speeds),
+        bearings=_bearing_losses(gearbox, duties, speeds, kinematic),
+        seals=_seal_losses(gearbox, speeds),
         without_data=tuple(dict.fromkeys(b.family for b in gearbox.bearings if b.name in listed - known)),
         assumed_roughness=any(_roughness(gearbox, name) is None for name in _gears_in_mesh(gearbox)),
     )
@@ -279,8 +291,9 @@ def _mesh_losses(
 
 
 def _bearing_losses(
-    gearbox: Gearbox, duties: tuple[BearingLoadState, ...], speeds: Mapping[str, float]
+    gearbox: Gearbox, duties: tuple[BearingLoadState, ...], speeds: Mapping[str, float], viscosity: float
 ) -> tuple[BearingLoss, ...]:
+    """Compute the losses of the families of bearings; kinematic viscosity in m2/s."""
     supports = {support.name: support for support in gearbox.bearings}
     families: dict[str, list[BearingLoadState]] = {}
     for duty in duties:
@@ -288,17 +301,40 @@ def _bearing_losses(
             families.setdefault(duty.family, []).append(duty)
     found = []
     for family, members in families.items():
-        loads = [_equivalent_load(duty) for duty in members]
         support = supports[members[0].name]
         section = support.catalogue
         assert section is not None
         relative = abs(speeds.get(support.body, 0.0) - speeds.get(support.on, 0.0))
-        friction = BEARING_FRICTION[section.type]
-        if section.type == "cylindrical_roller" and section.full_complement:
-            friction = FULL_COMPLEMENT_FRICTION
-        loss = 0.5 * friction * sum(loads) * 1e-3 * section.bore_mm * relative
-        ratio = max(loads) / members[0].ratings.dynamic
-        found.append(BearingLoss(family, len(members), max(loads), ratio, relative, friction, loss))
+        if section.type == "needle_roller":
+            series = "needle roller"
+            moment = 0.5 * NEEDLE_FRICTION * sum(map(_equivalent_load, members)) * MM * section.bore_mm
+            moments = np.full(3, moment)
+        else:
+            series = friction_series(section)
+            moments = sum(
+                (
+                    np.array(
+                        frictional_moment(
+                            section, duty.radial_load, duty.axial_load, relative, viscosity, duty.ratings.static
+                        )
+                    )
+                    for duty in members
+                ),
+                np.zeros(3),
+            )
+        loss, low, high = (moments * relative).tolist()
+        largest = max(map(_equivalent_load, members))
+        ratio = largest / members[0].ratings.dynamic
+        found.append(BearingLoss(family, len(members), largest, ratio, relative, series, loss, (low, high)))
+    return tuple(found)
+
+
+def _seal_losses(gearbox: Gearbox, speeds: Mapping[str, float]) -> tuple[SealLoss, ...]:
+    found = []
+    for name, seal in gearbox.case.seals.items():
+        relative = abs(speeds.get(seal.body, 0.0) - speeds.get(seal.on, 0.0))
+        loss = SEAL_LOSS * seal.diameter_mm**2 * relative / RPM
+        found.append(SealLoss(name, MM * seal.diameter_mm, relative, loss))
     return tuple(found)
 
 

@@ -18,6 +18,7 @@ from exugear.gearbox.parts import Bearing, Body
 from exugear.gearbox.reading import GearboxFileError, fault_line, readable
 from exugear.gearbox.variant import Variant
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
+from exugear.system.bearings.rolling.friction import friction_series
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bearings.stiffness import elastic_names, linear_law, misplaced_factor, mounts_at_work, unsupported
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
@@ -246,6 +247,8 @@ def _narrowed_seats(gearbox: Gearbox) -> Iterator[str]:
 def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
     try:
         stiffness = linear_law(bearing, 0.0).stiffness
+        if bearing.catalogue is not None:
+            friction_series(bearing.catalogue)
     except BearingError as error:
         raise gearbox.fault(f"bearings.{bearing.family}.catalogue: {error}") from None
     if not np.all(np.isfinite(stiffness)):

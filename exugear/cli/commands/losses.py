@@ -20,7 +20,7 @@ from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from exugear.gearbox.gearbox import Gearbox
-    from exugear.life.losses import BearingLoss, Losses, MeshLoss
+    from exugear.life.losses import BearingLoss, Losses, MeshLoss, SealLoss
     from exugear.project import Project
     from fe_ste.transmission_error.table import MeshTable
 
@@ -29,13 +29,11 @@ MESH_LEGEND = (
     "by Schlenk. Band: also by Niemann and Winter and, with a table, by Xu and Kahraman."
 )
 BEARING_LEGEND = (
-    "P: equivalent dynamic load; C: basic dynamic load rating; mu: constant coefficient of friction (SKF), valid for "
-    "P/C near 0.1."
+    "P: equivalent dynamic load; C: basic dynamic load rating; series: the one whose constants SKF's frictional moment "
+    "takes, otherwise the mean and the band of all series of the type."
 )
 SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
 """Shares of speed and of torque of the efficiency map."""
-USUAL_RATIOS = (0.02, 0.3)
-"""Load over the basic dynamic rating outside which the constant coefficient of friction of a bearing is an estimate."""
 FASTEST = 1e6
 """Highest speed, rpm."""
 
@@ -66,10 +64,10 @@ def losses(
     allow_dir: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Compute losses of meshes and bearings, and the efficiency.
+    """Compute losses of meshes, bearings and seals, and the efficiency.
 
-    Uses the line loads of transmission error tables in the results folder. Churning, seals and windage are not
-    included. Writes no files.
+    Uses the line loads of transmission error tables in the results folder. Churning and windage are not included.
+    Writes no files.
     """
     with exit_codes():
         from exugear.gearbox.choice import Choice
@@ -162,10 +160,20 @@ def _summary(found: Losses) -> dict[str, Any]:
                 "equivalent_load_N": bearing.load,
                 "load_ratio": bearing.load_ratio,
                 "speed_rpm": bearing.speed / RPM,
-                "friction": bearing.friction,
+                "series": bearing.series,
                 "loss_W": bearing.loss,
+                "loss_band_W": list(bearing.band),
             }
             for bearing in found.bearings
+        ],
+        "seals": [
+            {
+                "name": seal.name,
+                "diameter_mm": 1e3 * seal.diameter,
+                "speed_rpm": seal.speed / RPM,
+                "loss_W": seal.loss,
+            }
+            for seal in found.seals
         ],
     }
 
@@ -178,6 +186,8 @@ def _print(gearbox: Gearbox, found: Losses, mapped: list[dict[str, float]]) -> N
     print_table(f"{title}: meshes", [_mesh_row(mesh) for mesh in found.meshes], legend=MESH_LEGEND)
     if found.bearings:
         print_table("Bearings", [_bearing_row(bearing) for bearing in found.bearings], legend=BEARING_LEGEND)
+    if found.seals:
+        print_table("Seals", [_seal_row(seal) for seal in found.seals])
     losses = f"{_kilowatts(found.total)} kW"
     if found.band[0] < found.band[1]:
         losses += f" (band {_band(*found.band, 4)})"
@@ -187,18 +197,19 @@ def _print(gearbox: Gearbox, found: Losses, mapped: list[dict[str, float]]) -> N
         f"{significant(1e6 * found.viscosity, 3)} mm²/s."
     )
     print_text(
-        "Not included: churning, windage, seals, pumps. They matter most at low torque and high speed, where the "
-        "efficiency is overestimated."
+        "Not included: churning, windage, pumps, and seals without a table [seals.NAME]. They matter most at low "
+        "torque and high speed, where the efficiency is overestimated."
     )
     if found.assumed_roughness:
         note("Roughness Ra 0.5 µm is assumed for gears without roughness_Ra_um or roughness_Rz_um in [rating.gears]")
     if found.without_data:
         note(f"Warning: no friction of bearings without a catalogue: {', '.join(found.without_data)}", style="yellow")
-    for bearing in found.bearings:
-        if bearing.loss > 0.0 and not USUAL_RATIOS[0] <= bearing.load_ratio <= USUAL_RATIOS[1]:
-            note(
-                f"Bearing {bearing.family}: P/C = {bearing.load_ratio:.2g} is far from 0.1; its friction is an estimate"
-            )
+    unknown = [bearing.family for bearing in found.bearings if not bearing.series]
+    if unknown:
+        note(
+            f"Unknown series of the bearings {', '.join(unknown)}: their friction is that of all series of the type; "
+            "set catalogue.designation or catalogue.series"
+        )
     if mapped:
         rows = []
         for torque in SHARES:
@@ -241,6 +252,18 @@ def _bearing_row(bearing: BearingLoss) -> dict[str, str]:
         "P\nkN": significant(1e-3 * bearing.load, 3),
         "P/C": f"{bearing.load_ratio:.2g}",
         "speed\nrpm": significant(bearing.speed / RPM),
-        "mu": f"{bearing.friction:.4f}",
+        "series": bearing.series or "–",
         "loss\nkW": _kilowatts(bearing.loss),
+        "band\nkW": _band(*bearing.band, 2),
+    }
+
+
+def _seal_row(seal: SealLoss) -> dict[str, str]:
+    from exugear.gearbox.units import RPM
+
+    return {
+        "seals": seal.name,
+        "diameter\nmm": significant(1e3 * seal.diameter),
+        "speed\nrpm": significant(seal.speed / RPM),
+        "loss\nkW": _kilowatts(seal.loss),
     }

@@ -20,6 +20,7 @@ from exugear.gearbox.sections.connections import (
     JointSection,
     MeshSection,
     MountSection,
+    SealSection,
 )
 from exugear.gearbox.sections.entries import (
     LONGEST_VALUE,
@@ -320,6 +321,8 @@ class GearboxFile(Section):
     """Elastic supports on the ground, by name."""
     couplings: Entries[CouplingSection] = {}
     """Torsional springs between bodies, by name."""
+    seals: Entries[SealSection] = {}
+    """Radial shaft seals, by name; they matter for losses only."""
     deviations: Entries[DeviationSection] = {}
     """Deviations of gears, by name."""
     pins: Entries[PinSection] = {}

@@ -159,6 +159,8 @@ class CatalogueSection(Section):
     """Type of the bearing."""
     designation: Text = ""
     """Designation for the user; `check` compares bore and outer diameter with ISO 15 and ISO 355."""
+    series: Text = ""
+    """Series whose constants the frictional moment takes; by default that of the designation."""
     bore_mm: q.LengthMm
     """Bore."""
     outer_diameter_mm: q.LengthMm
@@ -401,6 +403,17 @@ class CouplingSection(Section):
     """Torsional stiffness."""
     damping_N_m_s_per_rad: q.CouplingDamping | None = None
     """Torsional damping; proportional to the stiffness by default."""
+
+
+class SealSection(Section):
+    """Radial shaft seal, whose friction `exugear losses` includes."""
+
+    body: Name
+    """Shaft on which the lip slides."""
+    on: Name = GROUND
+    """Body that holds the seal: `ground`, a fixed body, a carrier, another shaft."""
+    diameter_mm: q.LengthMm
+    """Diameter of the shaft under the lip."""
 
 
 Phases = Annotated[

@@ -64,6 +64,7 @@ LIFE_SECTIONS = (
     loads.RatingSection,
     loads.StrengthSection,
     case.OperationSection,
+    connections.SealSection,
 )
 CASE_MODEL = (entries, gears, bodies, connections, case)
 """Modules of the case model."""

@@ -12,8 +12,9 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
-from exugear.life.losses import BEARING_FRICTION, Losses, losses_of, operating_speed
+from exugear.life.losses import Losses, losses_of, operating_speed
 from exugear.system.bearings.duty import BearingLoadState
+from exugear.system.bearings.rolling.friction import frictional_moment
 from exugear.system.build import assemble
 from exugear.system.operating_points import bearing_duties
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
@@ -49,7 +50,7 @@ def found(oiled: Gearbox, duties: tuple[BearingLoadState, ...]) -> Losses:
 
 def test_input_is_output_and_losses_by_element(oiled: Gearbox, found: Losses) -> None:
     assert found.input_power == pytest.approx(240e3 * 22.1 * RPM, rel=1e-12)
-    parts = [mesh.loss for mesh in found.meshes] + [bearing.loss for bearing in found.bearings]
+    parts = [part.loss for part in (*found.meshes, *found.bearings)]
     assert found.input_power == pytest.approx(found.output_power + sum(parts), rel=1e-12)
     assert found.efficiency == pytest.approx(1.0 - sum(parts) / found.input_power, rel=1e-12)
     assert 0.95 < found.efficiency < 0.98
@@ -88,10 +89,44 @@ def test_losses_of_a_mesh_and_of_a_bearing_by_hand(
     bearing = next(bearing for bearing in found.bearings if bearing.family == "hss_a")
     duty = next(duty for duty in duties if duty.name == "hss_a")
     assert bearing.speed == pytest.approx(omega, rel=1e-12)
-    # A cylindrical roller bearing without axial load: the equivalent load is the radial one.
-    moment = 0.5 * BEARING_FRICTION["cylindrical_roller"] * duty.radial_load
-    bore = next(own for own in oiled.bearings if own.name == "hss_a").catalogue.bore_mm
-    assert bearing.loss == pytest.approx(moment * 1e-3 * bore * omega, rel=0.05)
+    section = next(own for own in oiled.bearings if own.name == "hss_a").catalogue
+    own = frictional_moment(section, duty.radial_load, duty.axial_load, omega, found.viscosity, duty.ratings.static)
+    assert bearing.series == "22"
+    assert bearing.loss == bearing.band[0] == bearing.band[1] == pytest.approx(own[0] * omega, rel=1e-12)
+
+
+def test_every_bearing_of_the_gearbox_has_a_series(found: Losses) -> None:
+    series = {bearing.family: bearing.series for bearing in found.bearings}
+    assert series["plc_a"] == "full complement"
+    assert series["lss_bc"] == "329"
+    assert series["ims_bc"] == "320"
+    assert series["hss_bc"] == "322"
+
+
+def test_seals_lose_power_by_their_diameter_and_speed(oiled: Gearbox, found: Losses) -> None:
+    """7.69e-6 W per square millimetre and rpm (ISO/TR 14179-2): 110 mm at 1801 rpm."""
+    seals = {"output": {"body": "hss", "diameter_mm": 110.0}, "input": {"body": "carrier", "diameter_mm": 600.0}}
+    sealed = losses_of(oiled.varied({"seals": seals}), (), {}, operating_speed(oiled))
+    by_name = {seal.name: seal.loss for seal in sealed.seals}
+    assert by_name["output"] == pytest.approx(7.69e-6 * 110.0**2 * 22.1 * abs(oiled.train.ratio), rel=1e-9)
+    assert by_name["input"] == pytest.approx(7.69e-6 * 600.0**2 * 22.1, rel=1e-9)
+    meshes = sum(mesh.loss for mesh in found.meshes)
+    assert sealed.total == pytest.approx(meshes + sum(by_name.values()), rel=1e-12)
+    assert sealed.input_power == pytest.approx(sealed.output_power + sealed.total, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("seal", "message"),
+    [
+        ({"body": "shaft"}, r"seals.lip.body = 'shaft': no such body; bodies are"),
+        ({"body": "hss", "on": "lid"}, r"seals.lip.on = 'lid': no such body"),
+        ({"body": "hss", "on": "hss"}, r"seals.lip.on = 'hss': is the body that the seal slides on"),
+        ({"body": "hss", "diameter_mm": 0.0}, r"seals.lip.diameter_mm = 0"),
+    ],
+)
+def test_seals_that_cannot_be_meant_are_refused(oiled: Gearbox, seal: dict, message: str) -> None:
+    with pytest.raises(GearboxFileError, match=message):
+        oiled.varied({"seals": {"lip": {"diameter_mm": 100.0, **seal}}})
 
 
 def test_losses_of_meshes_grow_with_torque_to_the_power_of_six_fifths(oiled: Gearbox, found: Losses) -> None:

@@ -99,8 +99,9 @@ def pack(
     resists = tilts[:, TILT_STIFFNESS] > 0.0
     moves = resists & (not averaged)
     ways = [e.load_ways if move else np.zeros((2, 0)) for move, e in zip(moves, elements, strict=True)]
-    simplified = averaged or linear or tangent
-    friction = [_NO_FRICTION if simplified else _friction(element) for element in elements]
+    friction = [_NO_FRICTION] * count
+    if not (averaged or linear or tangent):
+        friction = [_friction(element) for element in elements]
     tables = pack_tables(elements, index, averaged, linear)
     if tangent:
         tables.nominal[:, NOMINAL_DEFLECTION] -= [element.rest for element in elements]
