@@ -200,7 +200,9 @@ class CatalogueSection(Section):
     profile: Profile = "standard"
     """Profile of rollers: that of ISO/TS 16281, straight, or a table of profile drops."""
     radial_clearance_mm: q.ClearanceMm = 0.0
-    """Diametral clearance, mounted and at operating temperature; negative for preload."""
+    """Diametral clearance, mounted and with both rings at one temperature; negative for preload."""
+    inner_ring_hotter_K: q.RingTemperatureK = 0.0
+    """Temperature of the inner ring above that of the outer ring, which reduces clearance or adds preload."""
     axial_preload_um: q.AxialPreloadUm = 0.0
     """Axial approach of both rows relative to zero clearance; negative for clearance."""
     dynamic_rating_kN: q.RatingKN | None = None

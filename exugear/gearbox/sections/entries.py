@@ -126,6 +126,9 @@ ModalDamping = ModalPercent | Annotated[tuple[ModalPoint, ...], Field(strict=Fal
 Friction = Annotated[float, Range(0.0, 0.5, (0.0, 0.12), "lubricated gears have 0.02 to 0.1")]
 ContactAngleDeg = Annotated[float, Range(0.0, 59.0, (0.0, 52.0))]
 ClearanceMm = Annotated[float, Range(-1.0, 5.0, (-0.2, 1.0), "on the diameter")]
+RingTemperatureK = Annotated[
+    float, Range(-100.0, 100.0, (-30.0, 30.0), "inner rings are usually 5 to 10 K hotter than outer rings")
+]
 RollingRows = Annotated[int, Range(1, 8, (1, 6))]
 RollingElements = Annotated[int, Range(3, 1000, (5, 300), "balls or rollers of one row")]
 GrooveRatio = Annotated[

@@ -36,6 +36,8 @@ ALIGNING = ("spherical_roller", "self_aligning_ball")
 """Types whose outer raceway is a sphere about the middle of the bearing."""
 SPHERES = (*ALIGNING, "thrust_spherical_roller")
 """Types whose outer raceway is a sphere about a point of the axis."""
+EXPANSION = 11e-6
+"""Coefficient of thermal expansion of bearing steel, 1/K, as catalogues use it for clearances."""
 
 
 @dataclass(frozen=True)
@@ -297,9 +299,15 @@ def _common(section: CatalogueSection) -> dict[str, Any]:
         "element_diameter": MM * diameter,
         "pitch_diameter": MM * pitch,
         "element_count": count,
-        "radial_clearance": MM * section.radial_clearance_mm,
+        "radial_clearance": MM * (section.radial_clearance_mm - _thermal_change(section)),
         "aligning": section.type in SPHERES,
     }
+
+
+def _thermal_change(section: CatalogueSection) -> float:
+    """Diametral clearance that a hotter inner ring takes, mm: alpha d_m times the difference of temperatures."""
+    mean = 0.5 * (section.bore_mm + section.outer_diameter_mm)
+    return EXPANSION * mean * section.inner_ring_hotter_K
 
 
 def _roller_row(section: CatalogueSection) -> RollerRow:

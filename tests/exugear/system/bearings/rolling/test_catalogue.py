@@ -323,6 +323,23 @@ def test_axial_preload_closes_a_pair_by_half_in_each_row():
         np.testing.assert_allclose(apart, expected, rtol=1e-12)
 
 
+def test_a_hotter_inner_ring_takes_clearance_and_preloads_pairs():
+    """alpha d_m times the difference of temperatures, 11e-6 70 mm 10 K = 7.7 um on the diameter."""
+    for kind in ("deep_groove_ball", "cylindrical_roller", "spherical_roller"):
+        cold, hot = (
+            catalogue_rows(section(kind, radial_clearance_mm=0.03, inner_ring_hotter_K=kelvin))[0]
+            for kelvin in (0.0, 10.0)
+        )
+        assert cold.radial_clearance - hot.radial_clearance == pytest.approx(7.7e-6, rel=1e-9)
+    angle = math.radians(15.0)
+    pair = {"arrangement": "O", "contact_angle_deg": 15.0}
+    hot = catalogue_rows(section("tapered_roller", inner_ring_hotter_K=10.0, **pair))
+    # The radial growth of a raceway on the cone is an axial approach of both rows by twice its cotangent.
+    preloaded = catalogue_rows(section("tapered_roller", axial_preload_um=7.7 / math.tan(angle), **pair))
+    for one, other in zip(hot, preloaded, strict=True):
+        assert one.radial_clearance == pytest.approx(other.radial_clearance, rel=1e-9)
+
+
 # -- profiles ------------------------------------------------------------------------------------------------------
 
 
