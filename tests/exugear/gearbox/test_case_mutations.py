@@ -121,3 +121,28 @@ def test_what_check_passes_modes_takes(starts: tuple[Path, dict[str, dict[str, A
     file, cases = starts
     for seed in seeds:
         survives_modes(cases, seed, file)
+
+
+@pytest.mark.parametrize(
+    "seeds",
+    [range(4), pytest.param(range(200, 350), marks=[pytest.mark.validation, pytest.mark.long])],
+    ids=str,
+)
+def test_losses_refuses_damaged_files_in_words(
+    starts: tuple[Path, dict[str, dict[str, Any]]], seeds: range, tmp_path: Path
+) -> None:
+    oil = {"viscosity_40_mm2_per_s": 220.0, "viscosity_100_mm2_per_s": 19.0, "temperature_C": 70.0}
+    _, cases = starts
+    for name, content in cases.items():
+        seals = {"lip": {"body": next(iter(content["bodies"])), "diameter_mm": 50.0}}
+        cases = {**cases, name: {**content, "lubricant": oil, "seals": seals}}
+    file = tmp_path / "mutant.toml"
+    for seed in seeds:
+        text, told = mutant(cases, seed)
+        file.write_text(text, encoding="utf-8", newline="")
+        outcome = exugear("losses", file, "--json", "--out", tmp_path / "none")
+        try:
+            assert is_refused_in_words(outcome, file) or json.loads(outcome.stdout)["losses_W"] >= 0.0
+        except (AssertionError, ValueError) as error:
+            raise AssertionError(f"{told}: {error}") from outcome.exception
+        assert not (tmp_path / "none").exists()
