@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from exugear.life.load_spectrum.counted import CountedLoads
     from exugear.life.rating.sheet import RatingSheet
     from exugear.life.static_balance import StaticBalance
+    from exugear.report.design_study import DesignStudy
     from exugear.report.writer import Report
     from exugear.results.solver_comparison import SolverComparison
     from exugear.steady.settings import SteadySettings
@@ -134,6 +135,10 @@ class Project(ReprMixin):
         """Return the same gearbox and folder with other settings: `variant`, `mesh_model`, `inertias`, `load_case`."""
         return replace(self, choice=replace(self.choice, **changes))
 
+    def replaced(self, gearbox: Gearbox, folder: Path) -> Self:
+        """Return another gearbox with another results folder and the same settings."""
+        return replace(self, gearbox=gearbox, folder=folder)
+
     def at_load_case(self, name: str) -> Self:
         """Return the same gearbox with the torques at the start of a load case as its static load.
 
@@ -154,7 +159,7 @@ class Project(ReprMixin):
         known = self.gearbox.load_cases
         if name not in known:
             raise self.gearbox.fault(f"no load case {name!r}; choose one of: {', '.join(known) or 'none in the file'}")
-        return replace(self, gearbox=gearbox_at_load(self.gearbox, known[name]), folder=self.folder / f"at-{name}")
+        return self.replaced(gearbox_at_load(self.gearbox, known[name]), self.folder / f"at-{name}")
 
     def _line(self) -> str:
         choice = self.choice
@@ -543,6 +548,21 @@ class Project(ReprMixin):
         given = {"duration": duration, "solver": "exudyn", "bodies": self.bodies(), **options}
         exudyn = simulate(self.gearbox, self.choice, self.stiffness(), beside, **given)
         return compare_solvers(self.run_directory / FINAL_NAME, exudyn.path)
+
+    def design_changes(self, progress: Callable[[int, int, str], None] | None = None) -> DesignStudy | None:
+        """Compute what design changes do to the first resonance in the operating range, each with the full check.
+
+        Tables, static state and steady-state response of each changed gearbox are stored in a subfolder; a repeated or
+        resumed study reads those that exist. None without a resonance in the range.
+
+        Parameters
+        ----------
+        progress : called with the number of finished changes, their total, and the description of the next one
+        """
+        from exugear.report.design_study import study_design_changes  # not needed by a run
+
+        with time_noted(self.folder, f"design changes, {self.choice.variant}"):
+            return study_design_changes(self, progress)
 
     def report(self, near: float | None = None, tell: Callable[[str], None] | None = None) -> Report:
         """Write the report of all results in the folder: see `exugear.report.writer.write_report`."""

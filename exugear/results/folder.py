@@ -29,6 +29,7 @@ from fe_ste.tools.stores import Layout, open_dataset
 CASE_FILE = "case.json"
 TIMES_FILE = "times.jsonl"
 REPORT_FILE = "report.html"
+DESIGN_CHANGES_FILE = "design_changes.json"
 _log = logging.getLogger(__name__)
 
 

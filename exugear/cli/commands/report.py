@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import Executor
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,8 +22,10 @@ from exugear.cli.console import (
     say,
 )
 from exugear.cli.tables import print_table
+from exugear.gearbox.units import RPM
 
 if TYPE_CHECKING:
+    from exugear.report.design_study import DesignStudy
     from exugear.report.writer import Report
 
 
@@ -32,6 +35,12 @@ def report(
         float | None,
         typer.Option(min=1.0, metavar="HZ", help="Target frequency to compare with modes. (default: gearbox file)"),
     ] = None,
+    levers: Annotated[
+        bool,
+        typer.Option(
+            "--levers", help="First compute what design changes do to the highest resonance, which takes minutes."
+        ),
+    ] = False,
     allow_dir: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -48,6 +57,9 @@ def report(
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
         folder = _results_of(folder)
+        study = None
+        if levers:
+            study = _design_changes(folder, allow_dir)
         try:
             with time_noted(folder, "report"), progress_bar() as bar, _parallel_worker() as executor:
                 task = bar.add_task("report", total=None)
@@ -59,7 +71,28 @@ def report(
                 written = write_report(folder, near, tell, allow_dir, executor)
         except ReportError as error:
             raise BadInputError(error) from error
-        _print_report(folder, written, as_json)
+        _print_report(folder, written, study, as_json)
+
+
+def _design_changes(folder: Path, allow_dir: Path | None) -> DesignStudy:
+    """Compute the design changes of the variant with most degrees of freedom that the file allows."""
+    from exugear.cli.watched import WatchedProject
+    from exugear.gearbox.choice import Choice
+    from exugear.gearbox.named_files import Permissions
+    from exugear.gearbox.variant import Variant
+    from exugear.results.folder import read_stored_gearbox
+    from exugear.system.readiness import lacking
+
+    gearbox = read_stored_gearbox(folder, Permissions(below=allow_dir))
+    variant = Variant.bushing
+    if lacking(gearbox, variant):
+        variant = Variant.rigid
+    project = WatchedProject(gearbox, folder, Choice(variant))
+    project.prepare()
+    study = project.design_changes(lambda done, total, words: note(f"Design change {done + 1} of {total}: {words}"))
+    if study is None:
+        raise BadInputError(f"{folder}: --levers: no resonance in the operating range; nothing to reduce")
+    return study
 
 
 def _results_of(folder: Path) -> Path:
@@ -83,7 +116,7 @@ def _parallel_worker() -> AbstractContextManager[Executor | None]:
     return nullcontext()
 
 
-def _print_report(folder: Path, written: Report, as_json: bool) -> None:
+def _print_report(folder: Path, written: Report, study: DesignStudy | None, as_json: bool) -> None:
     from exugear.results.folder import times_spent
 
     spent = times_spent(folder)
@@ -94,8 +127,11 @@ def _print_report(folder: Path, written: Report, as_json: bool) -> None:
     if as_json:
         times = {entry.step: entry.seconds for entry in spent}
         lists = {name: list(getattr(written, name)) for name in ("statements", "missing", "left_out")}
-        print_json({"report": str(written.path), **lists, "seconds": times})
+        changes = [asdict(result) for result in (study.results if study else ())]
+        print_json({"report": str(written.path), **lists, "design_changes": changes, "seconds": times})
         return
+    if study is not None:
+        _print_changes(study)
     for line in written.statements:
         say(f"- {line}")
     rows = [
@@ -104,6 +140,34 @@ def _print_report(folder: Path, written: Report, as_json: bool) -> None:
     ]
     print_table("Run time, last execution of each step", rows, legend="Parallel steps overlap.")
     say(f"Report: {written.path}")
+
+
+QUANTITIES = {"error": "TE", "force": "force", "acceleration": "accel."}
+"""Column titles of the quantities."""
+
+
+def _print_changes(study: DesignStudy) -> None:
+    """Print the effects of the design changes: on this peak, and on the highest amplitude in the operating range."""
+    from exugear.report.findings.design_changes import Effect
+
+    resonance = study.resonance
+    speed = abs(resonance.speed) / RPM
+    title = f"Design changes for {resonance.frequency:.3g} Hz at {speed:.4g} rpm, {resonance.line}, dB"
+    rows = []
+    for result in study.results:
+        row = {"change": result.change.words}
+        for name, words in QUANTITIES.items():
+            effect = result.effects.get(name, Effect(None, None))
+            row[f"{words}\nhere"] = _decibels(effect.this_peak)
+            row[f"{words}\nrange"] = _decibels(effect.highest)
+        rows.append({**row, "price": result.refusal or result.price})
+    print_table(title, rows, ("change", "price"), legend="here: this peak; range: highest amplitude of any order.")
+
+
+def _decibels(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value:+.1f}"
 
 
 def _megabytes(memory: float) -> str:

@@ -1,0 +1,149 @@
+"""Design changes: geometry that keeps the centre distance, effects on a peak and on the range, refusals, reuse."""
+
+from __future__ import annotations
+
+import json
+import math
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.project import Project
+from exugear.report import design_study
+from exugear.report.findings.design_changes import (
+    ChangeResult,
+    DesignChange,
+    Effect,
+    effects_of,
+    helix_change,
+    ordered,
+    peaks_of,
+    price_of,
+    propose_changes,
+)
+from exugear.report.findings.loudness import Resonance
+from exugear.system.tooth_mesh import tables
+
+from ...cases.spur import COARSE_INPUT, SPUR_CASE
+
+RESONANCE = Resonance("intermediate", 99.0, 2.4, 184.0, {})
+
+
+@pytest.mark.parametrize(
+    ("pair", "degrees"), [("intermediate", 17.4), ("high_speed", 16.4), ("sun_planet", 8.2), ("ring_planet", 8.2)]
+)
+def test_another_helix_angle_keeps_centre_distance_and_backlash(grc: Gearbox, pair: str, degrees: float) -> None:
+    """All gears of the planetary stage turn together; transverse sections keep their module."""
+    changed = grc.varied(helix_change(grc, pair, math.radians(degrees)))
+    assert abs(changed.gear_pairs[pair].pinion.helix_angle) == pytest.approx(math.radians(degrees), rel=1e-12)
+    for name, before in grc.gear_pairs.items():
+        after = changed.gear_pairs[name]
+        assert after.centre_distance == before.centre_distance
+        assert after.circumferential_backlash == pytest.approx(before.circumferential_backlash, rel=1e-3)
+        assert after.pinion.reference_radius == pytest.approx(before.pinion.reference_radius, rel=1e-12)
+
+
+def proposals(gearbox: Gearbox, families: list[str]) -> dict[str, DesignChange]:
+    found = propose_changes(gearbox, RESONANCE, families, {"intermediate": 30e-6}, ["hss_bc", "ims_a"])
+    return {change.name: change for change in found}
+
+
+def test_the_overlap_ratio_goes_to_the_next_whole_number(grc: Gearbox) -> None:
+    found = proposals(grc, ["intermediate"])
+    for name in ("intermediate-face-width", "intermediate-helix-angle"):
+        changed = grc.varied(found[name].keys)
+        assert changed.gear_pairs["intermediate"].overlap_ratio == pytest.approx(2.0, rel=2e-3)
+        assert "overlap ratio 2" in found[name].words
+    assert found["intermediate-tip-relief-15"].keys["gears.im_gear.modification.tip_relief_um"] == 15.0
+    assert found["intermediate-crowning-30"].keys == {"gears.im_pinion.modification.lead_crowning_um": 30.0}
+    angle = grc.case.bearings["hss_bc"].catalogue.contact_angle_deg
+    assert found["hss_bc-contact-angle"].keys == {"bearings.hss_bc.catalogue.contact_angle_deg": angle + 5.0}
+    assert found["hss_bc-preload"].group == "bearing"
+    assert found["housing-0.15"].group == found["housing-0.6"].group == "assumption"
+    for change in found.values():
+        grc.varied(change.keys) if change.name != "intermediate-face-width" else None
+
+
+def test_spur_gears_have_no_overlap_to_round_up() -> None:
+    spur = Gearbox.from_dict(tomllib.loads(SPUR_CASE))
+    found = propose_changes(spur, RESONANCE, ["spur"], {"spur": 10e-6}, ["bearing_1"])
+    names = {change.name for change in found}
+    assert not {name for name in names if "face" in name or "helix" in name}
+    assert {"bearing_1-stiffer", "bearing_1-softer", "spur-tip-relief-10"} <= names
+
+
+def response(heights: list[list[float]]) -> xr.Dataset:
+    """Overall transmission errors by speed and order, in m; the mean is order 0."""
+    amplitude = np.array(heights)[:, :, None]
+    return xr.Dataset(
+        {
+            "amplitude": (("point", "line", "signal"), np.pad(amplitude, ((0, 0), (1, 0), (0, 0)))),
+            "speed": (("point",), np.array([8.0, 10.0, 12.0])),
+            "order": (("line",), np.array([0.0, 20.0, 40.0])),
+        },
+        {"signal": ["overall_dte"]},
+    )
+
+
+def test_a_peak_that_only_moves_is_lower_here_but_not_in_the_range() -> None:
+    before = peaks_of(response([[1e-6, 0.0], [8e-6, 0.0], [1e-6, 0.0]]), 20.0, 10.0, (8.0, 12.0))
+    after = peaks_of(response([[1e-6, 0.0], [2e-6, 0.0], [9e-6, 0.0]]), 20.0, 10.0, (8.0, 12.0))
+    effect = effects_of(before, after)["error"]
+    assert effect.this_peak == pytest.approx(20.0 * math.log10(2.0 / 8.0), abs=1e-3)
+    assert effect.highest == pytest.approx(20.0 * math.log10(9.0 / 8.0), abs=1e-3)
+    outside = peaks_of(response([[1e-6, 0.0], [8e-6, 0.0], [99e-6, 0.0]]), 20.0, 10.0, (8.0, 11.0))
+    assert outside["error"][1] == 8e-6
+
+
+def test_changes_are_sorted_with_assumptions_and_refusals_behind() -> None:
+    change = DesignChange("a", "a", "gear", {})
+    worse = ChangeResult(change, {"error": Effect(3.0, 3.0)}, "")
+    better = ChangeResult(change, {"error": Effect(-1.0, -3.0)}, "")
+    assumed = ChangeResult(replace(change, group="assumption"), {"error": Effect(-20.0, -20.0)}, "")
+    refused = ChangeResult(change, {}, "", "does not fit")
+    assert ordered([refused, assumed, worse, better]) == [better, worse, assumed, refused]
+
+
+def test_the_price_names_mass_axial_force_stress_and_life(grc: Gearbox) -> None:
+    found = proposals(grc, ["intermediate"])
+    helix = price_of(grc, grc.varied(found["intermediate-helix-angle"].keys), (100.0, 90.0))
+    assert "axial force of intermediate" in helix
+    assert "shortest bearing life -10 %" in helix
+    assert "nominal contact stress of intermediate" in helix
+    assert price_of(grc, grc, (math.inf, math.inf)) == ""
+
+
+@pytest.mark.validation
+def test_a_study_computes_each_change_once_and_names_what_cannot_be_made(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(tables, "TableInput", COARSE_INPUT)
+    changes = [
+        DesignChange("crowned", "crowned", "modification", {"gears.pinion.modification.lead_crowning_um": 10.0}),
+        DesignChange("housing", "softer housing", "assumption", {"housing.factor": 0.25}),
+        DesignChange("wide", "too far apart", "gear", {"pairs.spur.centre_distance_mm": 90.0}),
+    ]
+    monkeypatch.setattr(design_study, "propose_changes", lambda *given: changes)
+    content = tomllib.loads(SPUR_CASE)
+    content["operation"] = {"speed_range_rpm": [300.0, 1500.0]}
+    project = Project(Gearbox.from_dict(content), tmp_path, Choice("bushing"))
+    told: list[str] = []
+    study = project.design_changes(lambda done, total, words: told.append(f"{done}/{total} {words}"))
+    assert study is not None
+    assert told == ["0/3 crowned", "1/3 softer housing", "2/3 too far apart"]
+    names = [result.change.name for result in study.results]
+    assert names == ["crowned", "housing", "wide"]
+    assert all(math.isfinite(effect.this_peak) for effect in study.results[0].effects.values())
+    assert study.results[2].refusal and not study.results[2].effects
+    stored = json.loads(study.path.read_text(encoding="utf-8"))
+    assert [result["change"]["name"] for result in stored["results"]] == names
+    # Repeated, everything is read: no file of a response or table is written again.
+    files = sorted((tmp_path / design_study.FOLDER).rglob("*.nc"))
+    before = [path.stat().st_mtime_ns for path in files]
+    again = project.design_changes()
+    assert [result.effects for result in again.results] == [result.effects for result in study.results]
+    assert [path.stat().st_mtime_ns for path in files] == before
