@@ -98,13 +98,6 @@ def unit_factor(unit: str, wanted: str) -> float | None:
     return float(f"{ratio:.15g}")
 
 
-def degree_sign(version: tuple[int, int]) -> str:
-    """Return the notation of degrees in a version."""
-    if version < (1, 4):
-        return "°"
-    return "deg"
-
-
 # Errors of a REXS file: one clear sentence each, reported together
 
 SHOWN_FAULTS = 20
@@ -177,6 +170,8 @@ def plain(text: object, longest: int = LONGEST_TEXT) -> str:
 
 # Content of a REXS file: components with attributes, relations between them, load cases
 
+OWN = "custom_exugear_"
+"""Prefix of attributes for which REXS has no name; other programs ignore them."""
 LARGEST_NUMBER = 1e40
 """Limit of numbers that represent physical quantities; files write 1e23 for rigid. Powers of it are still finite."""
 
@@ -307,6 +302,22 @@ class Component:
         if factor is None:
             raise RexsError(f"{self}: {key} has the unit '{plain(attribute.unit)}'; expected {unit} or a multiple")
         return factor
+
+
+AdditionValue = str | float | tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An attribute that is added to a component of an existing file."""
+
+    component: int
+    name: str
+    """Name in the version of the file."""
+    unit: str
+    value: AdditionValue
+    load_case: int | None = None
+    """Load case of the value; None for the component itself."""
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,11 @@ import xarray as xr
 
 import exugear
 from exugear.exchange.rexs import tree
-from exugear.exchange.rexs.additions import OWN
 from exugear.exchange.rexs.containers import read_rexs, with_additions
 from exugear.exchange.rexs.export.names import Origins, Results, origins_of, stiffness_names
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.to_case.notes import Rules
-from exugear.exchange.rexs.tree import Model, RexsError
+from exugear.exchange.rexs.tree import OWN, Model, RexsError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, seat_key

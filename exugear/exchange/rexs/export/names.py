@@ -6,13 +6,12 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from exugear.exchange.rexs.additions import OWN, Addition, AdditionValue, unit_in
 from exugear.exchange.rexs.to_case.bodies import GEARS, ends
 from exugear.exchange.rexs.to_case.conversion import Found
 from exugear.exchange.rexs.to_case.gear_blocks import Teeth, first_of_planets
 from exugear.exchange.rexs.to_case.notes import Block, Places
 from exugear.exchange.rexs.to_case.supports import BEARINGS, PLACE_TOLERANCE
-from exugear.exchange.rexs.tree import Component, Model
+from exugear.exchange.rexs.tree import OWN, Addition, AdditionValue, Component, Model
 from exugear.gearbox.units import MM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
@@ -82,6 +81,21 @@ def name_in(key: str, version: Version) -> str:
     if known:
         return known[-1]
     return OWN + key
+
+
+def unit_in(unit: str, version: tuple[int, int]) -> str:
+    """Return a unit in the notation of a REXS version.
+
+    Examples
+    --------
+    >>> unit_in("deg", (1, 1)), unit_in("deg", (1, 4)), unit_in("MPa", (1, 7))
+    ('°', 'deg', 'N / mm^2')
+    """
+    if unit == "deg" and version < (1, 4):
+        return "°"
+    if unit == "MPa" and version < (2, 0):
+        return "N / mm^2"
+    return unit
 
 
 def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, float]]:

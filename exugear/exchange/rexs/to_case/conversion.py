@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from exugear.exchange.rexs.additions import OWN
 from exugear.exchange.rexs.to_case.bodies import GEARS, JOINING, Bodies, Body, find_bodies
 from exugear.exchange.rexs.to_case.gear_blocks import (
     Teeth,
@@ -65,7 +64,7 @@ from exugear.exchange.rexs.to_case.supports import (
     joint_blocks,
 )
 from exugear.exchange.rexs.to_case.toothing import is_rigid, material_of, material_table
-from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
+from exugear.exchange.rexs.tree import OWN, Component, Model, RexsError, plain
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.system.readiness import check_parts
