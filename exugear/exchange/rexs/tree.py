@@ -8,9 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from exugear.gearbox.units import unit_of
 from fe_ste.tools.display import ReprMixin
 
-# Names and units in the versions of REXS: current names, and factors of units
+# Names in the versions of REXS
 
 LEAST_VERSION, LAST_VERSION = (1, 0), (2, 0)
 """Supported versions; names changed in between, as the tables below list."""
@@ -41,43 +42,6 @@ ROLES = {"side_1": "inner_part", "side_2": "outer_part"}
 RELATIONS = {"coupling": "side"}
 """Current name of a relation by its old name."""
 
-_UNITS = {
-    "none": ("number", 1.0),
-    "%": ("share", 0.01),
-    "mum": ("length", 1e-6),
-    "mm": ("length", 1e-3),
-    "m": ("length", 1.0),
-    "deg": ("angle", math.pi / 180.0),
-    "°": ("angle", math.pi / 180.0),
-    "rad": ("angle", 1.0),
-    "1 / min": ("speed", math.pi / 30.0),
-    "rad / s": ("speed", 1.0),
-    "N": ("force", 1.0),
-    "kN": ("force", 1e3),
-    "N mm": ("torque", 1e-3),
-    "N m": ("torque", 1.0),
-    "kN m": ("torque", 1e3),
-    "W": ("power", 1.0),
-    "kW": ("power", 1e3),
-    "N / m": ("stiffness", 1.0),
-    "N / mm": ("stiffness", 1e3),
-    "N / mum": ("stiffness", 1e6),
-    "N mm / rad": ("angular stiffness", 1e-3),
-    "N m / rad": ("angular stiffness", 1.0),
-    "Pa": ("stress", 1.0),
-    "MPa": ("stress", 1e6),
-    "N / mm^2": ("stress", 1e6),
-    "kg / dm^3": ("density", 1e3),
-    "kg / m^3": ("density", 1.0),
-    "kg": ("mass", 1.0),
-    "kg m^2": ("inertia", 1.0),
-    "m / s^2": ("acceleration", 1.0),
-    "h": ("time", 3600.0),
-    "s": ("time", 1.0),
-    "mm^2 / s": ("viscosity", 1e-6),
-    "C": ("temperature", 1.0),
-}
-
 
 def unit_factor(unit: str, wanted: str) -> float | None:
     """Factor from a unit to a wanted one; None if the quantities differ or the unit is unknown.
@@ -89,13 +53,14 @@ def unit_factor(unit: str, wanted: str) -> float | None:
     >>> unit_factor("mum", "mm"), unit_factor("", "mm"), unit_factor("furlong", "mm")
     (0.001, 1.0, None)
     """
-    unit = " ".join(unit.split())
-    if unit in ("", "none", wanted):
-        return 1.0
-    if unit not in _UNITS or _UNITS[unit][0] != _UNITS[wanted][0]:
+    source = unit_of(unit)
+    target = unit_of(wanted)
+    assert target is not None
+    if source is None or source.quantity not in ("number", target.quantity):
         return None
-    ratio = _UNITS[unit][1] / _UNITS[wanted][1]
-    return float(f"{ratio:.15g}")
+    if source.quantity == "number" or unit == wanted:
+        return 1.0
+    return float(f"{source.factor / target.factor:.15g}")
 
 
 # Errors of a REXS file: one clear sentence each, reported together
