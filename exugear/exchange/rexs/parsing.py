@@ -16,13 +16,8 @@ from xml.parsers import expat
 
 import numpy as np
 
+from exugear.exchange.rexs.mapping import ATTRIBUTES, LAST_VERSION, LEAST_VERSION, RELATIONS, ROLES, TYPES
 from exugear.exchange.rexs.tree import (
-    ATTRIBUTES,
-    LAST_VERSION,
-    LEAST_VERSION,
-    RELATIONS,
-    ROLES,
-    TYPES,
     Addition,
     Attribute,
     Component,

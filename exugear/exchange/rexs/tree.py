@@ -8,39 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from exugear.exchange.rexs.mapping import UNITS
 from exugear.gearbox.units import unit_of
 from fe_ste.tools.display import ReprMixin
-
-# Names in the versions of REXS
-
-LEAST_VERSION, LAST_VERSION = (1, 0), (2, 0)
-"""Supported versions; names changed in between, as the tables below list."""
-
-TYPES = {
-    "flank_geometry": "cylindrical_gear_flank",
-    "stage_gear_data": "cylindrical_stage_gear_data",
-    "fixed_coupling": "coupling",
-}
-"""Current name of a component type by its old name."""
-
-ATTRIBUTES = {
-    "axial_backlash": "operating_axial_bearing_clearance",
-    "base_circle_diameter": "base_diameter",
-    "dynamic_capacity": "radial_dynamic_load_rating",
-    "load_duration_fraction": "operating_time_fraction",
-    "radial_backlash": "operating_radial_bearing_clearance",
-    "reference_circle_diameter": "reference_diameter_cylindrical_gear",
-    "reference_diameter": "reference_diameter_rolling_bearing",
-    "static_capacity": "radial_static_load_rating",
-    "tip_radius_factor": "tip_corner_radius_factor_reference_profile",
-}
-"""Current name of an attribute by its old name, for those that are read."""
-
-ROLES = {"side_1": "inner_part", "side_2": "outer_part"}
-"""Current name of a role in a relation by its old name."""
-
-RELATIONS = {"coupling": "side"}
-"""Current name of a relation by its old name."""
 
 
 def unit_factor(unit: str, wanted: str) -> float | None:
@@ -135,8 +105,6 @@ def plain(text: object, longest: int = LONGEST_TEXT) -> str:
 
 # Content of a REXS file: components with attributes, relations between them, load cases
 
-OWN = "custom_exugear_"
-"""Prefix of attributes for which REXS has no name; other programs ignore them."""
 LARGEST_NUMBER = 1e40
 """Limit of numbers that represent physical quantities; files write 1e23 for rigid. Powers of it are still finite."""
 
@@ -175,8 +143,8 @@ class Component:
         attribute = self._attribute(key)
         return attribute is not None and attribute.value not in ("", ())
 
-    def quantity(self, key: str, unit: str = "none") -> float | None:
-        """Finite number in a unit; None if the file has no value.
+    def quantity(self, key: str, unit: str = "") -> float | None:
+        """Finite number in a unit, by default that of `UNITS`; None if the file has no value.
 
         Raises
         ------
@@ -186,7 +154,7 @@ class Component:
         attribute = self._attribute(key)
         if attribute is None or not self.given(key):
             return None
-        return self._number(key, attribute.value) * self._factor(key, attribute, unit)
+        return self._number(key, attribute.value) * self._factor(key, attribute, unit or UNITS.get(key, "none"))
 
     def whole(self, key: str) -> int | None:
         """Whole number; None if the file has no value.
@@ -322,6 +290,12 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
         """Return the components in the role `wanted` of all relations in which a component has a role."""
         found = self._relations_by_role.get((relation, role, number), ())
         return tuple(self.components[one.roles[wanted]] for one in found if wanted in one.roles)
+
+    def parts_of(self, owner: Component, kind: str) -> list[Component]:
+        """Return the parts of a type in the assembly of a component."""
+        relations = ("assembly", "ordered_assembly")
+        parts = [part for one in relations for part in self.related(one, "assembly", owner.number, "part")]
+        return [part for part in parts if part.type == kind]
 
     def relations_of(self, *types: str) -> Iterator[Relation]:
         """Yield the relations of some types."""

@@ -12,17 +12,17 @@ import numpy as np
 import xarray as xr
 
 import exugear
-from exugear.exchange.rexs import tree
 from exugear.exchange.rexs.containers import read_rexs, with_additions
 from exugear.exchange.rexs.export.names import Origins, Results, origins_of, stiffness_names
+from exugear.exchange.rexs.mapping import ATTRIBUTES, OWN
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.to_case.notes import Rules
-from exugear.exchange.rexs.tree import OWN, Model, RexsError
+from exugear.exchange.rexs.tree import Model, RexsError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, seat_key
 from exugear.gearbox.reading import GearboxFileError
-from exugear.gearbox.units import RPM
+from exugear.gearbox.units import KN, MPA
 from exugear.gearbox.variant import VariantError
 from exugear.results.folder import bodies_folder, read_duties
 from exugear.results.run_file import FINAL_NAME, load_run
@@ -189,63 +189,62 @@ def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
 def put_gears(results: Results, gearbox: Gearbox, target: Target) -> None:
     """Add the diameters of gears, and those inputs of the gearbox file that differ from the REXS file."""
     for name, gear in gearbox.gears.items():
+        normal = gear.normal_tooth_thickness
+        sine = abs(math.sin(gear.helix_angle))
+        values = {
+            "reference_diameter": 2.0 * gear.reference_radius,
+            "base_diameter": 2.0 * gear.base_radius,
+            "axial_pitch": math.pi * gear.normal_module / sine if sine else None,
+            "normal_tooth_thickness": normal,
+            "transverse_tooth_thickness": normal / math.cos(gear.helix_angle),
+            "normal_tooth_thickness_at_tip_diameter": gear.tip_thickness,
+        }
+        # Inputs that a REXS file may not specify, or that an import may have replaced.
+        inputs = {
+            "profile_shift": gear.profile_shift,
+            "tooth_thinning": gear.tooth_thinning,
+            "root_diameter": 2.0 * gear.root_radius,
+            "tool_tip_radius": gear.rack.tip_radius,
+        }
         for number in target.origins.gears[name]:
-            results.put(number, "reference_diameter", "mm", 2e3 * gear.reference_radius)
-            results.put(number, "base_diameter", "mm", 2e3 * gear.base_radius)
-            if gear.helix_angle:
-                results.put(
-                    number, "axial_pitch", "mm", 1e3 * math.pi * gear.normal_module / abs(math.sin(gear.helix_angle))
-                )
-            normal = gear.normal_tooth_thickness
-            results.put(number, "normal_tooth_thickness", "mm", 1e3 * normal)
-            results.put(number, "transverse_tooth_thickness", "mm", 1e3 * normal / math.cos(gear.helix_angle))
-            results.put(number, "normal_tooth_thickness_at_tip_diameter", "mm", 1e3 * gear.tip_thickness)
+            for key, value in values.items():
+                results.put(number, key, value)
             part = target.model.components[number]
             for key, radius in (("root_form_diameter", gear.form_radius), ("tip_diameter", gear.tip_radius)):
                 stated = part.quantity(key, "mm")
                 if stated is None and key == "root_form_diameter":
-                    results.put(number, key, "mm", 2e3 * radius)
+                    results.put(number, key, 2.0 * radius)
                 elif stated is None or not math.isclose(abs(stated), 2e3 * radius, rel_tol=EQUAL):
-                    results.put_own(number, key, "mm", 2e3 * radius)  # the value of the file is an input and is kept
-            for key, unit, value in _inputs(gear):
-                results.put_own(number, key, unit, value)
-
-
-def _inputs(gear: Gear) -> tuple[tuple[str, str, float], ...]:
-    """Return inputs that a REXS file may not specify, or that an import may have replaced."""
-    return (
-        ("profile_shift", "none", gear.profile_shift),
-        ("tooth_thinning", "mm", 1e3 * gear.tooth_thinning),
-        ("root_diameter", "mm", 2e3 * gear.root_radius),
-        ("tool_tip_radius", "none", gear.rack.tip_radius),
-    )
+                    results.put(number, key, 2.0 * radius, own=True)  # the value of the file is an input and is kept
+            for key, value in inputs.items():
+                results.put(number, key, value)
 
 
 def put_pairs(results: Results, gearbox: Gearbox, target: Target) -> None:
     """Add results of pairs: contact ratios, working pitch circles, clearances."""
     for name, spec in gearbox.pairs.items():
         pair = spec.pair
+        values = {
+            "gear_ratio": pair.ratio,
+            "transverse_contact_ratio": pair.transverse_contact_ratio,
+            "overlap_ratio": pair.overlap_ratio or None,  # REXS does not permit zero
+            "total_contact_ratio": pair.total_contact_ratio,
+            "length_of_path_of_contact": pair.path_end - pair.path_start,
+            "transverse_backlash": pair.circumferential_backlash,
+        }
         for stage in target.origins.pairs[name]:
-            results.put(stage, "gear_ratio", "none", pair.ratio)
-            results.put(stage, "transverse_contact_ratio", "none", pair.transverse_contact_ratio)
-            if pair.overlap_ratio > 0.0:  # REXS does not permit zero
-                results.put(stage, "overlap_ratio", "none", pair.overlap_ratio)
-            results.put(stage, "total_contact_ratio", "none", pair.total_contact_ratio)
-            length = pair.path_end - pair.path_start
-            results.put(stage, "length_of_path_of_contact", "mm", 1e3 * length)
-            results.put_own(stage, "transverse_backlash", "mm", 1e3 * pair.circumferential_backlash)
-            for gear, clearance, ends in (
-                (pair.pinion, pair.pinion_tip_clearance, _active(pair, pair.pinion)),
-                (pair.gear, pair.gear_tip_clearance, _active(pair, pair.gear)),
-            ):
+            for key, value in values.items():
+                results.put(stage, key, value)
+            for gear, clearance in ((pair.pinion, pair.pinion_tip_clearance), (pair.gear, pair.gear_tip_clearance)):
                 data = _gear_data(target, stage, gear)
                 if data is None:
                     continue
-                results.put(data, "pitch_diameter", "mm", 2e3 * pair.working_radius(gear))
-                results.put(data, "working_pressure_angle", "deg", math.degrees(pair.working_pressure_angle))
-                results.put(data, "active_root_diameter", "mm", 2e3 * ends[0])
-                results.put(data, "active_tip_diameter", "mm", 2e3 * ends[1])
-                results.put(data, "tip_clearance", "mm", 1e3 * clearance)
+                root, tip = _active(pair, gear)
+                results.put(data, "pitch_diameter", 2.0 * pair.working_radius(gear))
+                results.put(data, "working_pressure_angle", pair.working_pressure_angle)
+                results.put(data, "active_root_diameter", 2.0 * root)
+                results.put(data, "active_tip_diameter", 2.0 * tip)
+                results.put(data, "tip_clearance", clearance)
 
 
 def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
@@ -277,7 +276,7 @@ def put_static_forces(results: Results, gearbox: Gearbox, target: Target) -> Non
         instance = instance_of(mesh, one.family)
         stage = numbers[instance] if instance < len(numbers) else None
         if stage is not None:
-            results.put(stage, "tangential_force_at_base_circle", "N", abs(force), target.load_case)
+            results.put(stage, "tangential_force_at_base_circle", abs(force), target.load_case)
 
 
 def instance_of(name: str, family: str) -> int:
@@ -300,33 +299,28 @@ def put_tables(results: Results, gearbox: Gearbox, tables: Mapping[str, MeshTabl
         data = table.static_state
         pair = gearbox.pairs[name].pair
         case = target.load_case
-        positions = tuple(data["pmc"].to_numpy().tolist())
+        error = data["ste"]
+        stiffness = data["mesh_stiffness"]
+        along = load_along_face(data)
+        values = {
+            # REXS has no symbol for a missing value.
+            "transmission_error": None if error.isnull().any() else error,
+            "mesh_stiffness": None if stiffness.isnull().any() else stiffness,
+            "mesh_cycle_positions": data["pmc"],
+            "transmission_error_peak_to_peak": error.max() - error.min(),
+            "mean_mesh_stiffness": stiffness.mean(),
+            "contact_pressure_maximum": data["max_pressure"].max(),
+            "face_load_factor": face_load_factor(data),
+            "load_along_face": along,
+            "load_along_face_positions_from_middle": along["axial_position"],
+        }
         for stage in target.origins.pairs[name]:
-            series = {
-                "transmission_error": ("mum", 1e6 * data["ste"]),
-                "mesh_stiffness": ("N / mm", 1e-3 * data["mesh_stiffness"]),
-            }
-            for key, (unit, values) in series.items():
-                if bool(values.isnull().any()):
-                    continue  # REXS has no symbol for a missing value
-                results.put(stage, key, unit, tuple(values.to_numpy().tolist()), case)
-            error = data["ste"]
-            results.put_own(stage, "mesh_cycle_positions", "none", positions, case)
-            results.put_own(
-                stage, "transmission_error_peak_to_peak", "mum", float(1e6 * (error.max() - error.min())), case
-            )
-            results.put_own(stage, "mean_mesh_stiffness", "N / mm", float(1e-3 * data["mesh_stiffness"].mean()), case)
-            results.put_own(stage, "contact_pressure_maximum", "MPa", float(1e-6 * data["max_pressure"].max()), case)
-            results.put(stage, "face_load_factor", "none", float(face_load_factor(data)), case)
-            along = load_along_face(data)
-            places = tuple((1e3 * along["axial_position"]).to_numpy().tolist())
-            results.put_own(stage, "load_along_face", "N / mm", tuple((1e-3 * along).to_numpy().tolist()), case)
-            results.put_own(stage, "load_along_face_positions_from_middle", "mm", places, case)
+            for key, value in values.items():
+                results.put(stage, key, None if value is None else np.asarray(value), case)
             for gear in (pair.pinion, pair.gear):
                 place = _gear_data(target, stage, gear)
                 if place is not None:
-                    turned = tuple(360.0 / gear.teeth * position for position in positions)
-                    results.put(place, "mesh_positions", "deg", turned, case)
+                    results.put(place, "mesh_positions", 2.0 * math.pi / gear.teeth * data["pmc"].to_numpy(), case)
 
 
 # Results on shafts: speeds in each load case, and displacements at the static load
@@ -350,8 +344,8 @@ def put_speeds(results: Results, gearbox: Gearbox, target: Target) -> None:
                 part = target.model.components[number]
                 stated = part.attributes if case is None else {**part.attributes, **case.changes.get(number, {})}
                 if SPEED not in stated:
-                    speed = _sense(target, number) * speeds[body] / RPM
-                    results.put(number, SPEED, "1 / min", speed, None if case is None else case.number)
+                    speed = _sense(target, number) * speeds[body]
+                    results.put(number, SPEED, speed, None if case is None else case.number)
 
 
 def put_displacements(results: Results, assembly: Assembly, target: Target) -> None:
@@ -369,9 +363,9 @@ def put_displacements(results: Results, assembly: Assembly, target: Target) -> N
         heights, moved = zip(*nodes, strict=True)
         along = _sense(target, number) * (np.array(heights) - target.origins.places[number])
         own = np.array(moved) @ target.origins.axes[number].T
-        results.put(number, "node_positions", "mm", tuple((1e3 * along).tolist()), target.load_case)
+        results.put(number, "node_positions", along, target.load_case)
         for axis, column in zip("uvw", own.T, strict=True):
-            results.put(number, f"displacement_{axis}", "mum", tuple((1e6 * column).tolist()), target.load_case)
+            results.put(number, f"displacement_{axis}", column, target.load_case)
 
 
 def _is_shaft(target: Target, number: int) -> bool:
@@ -420,11 +414,12 @@ def put_bearings(results: Results, gearbox: Gearbox, duties: Sequence[Mapping[st
         if instance >= len(numbers):
             continue
         number = numbers[instance]
-        results.put_own(number, "radial_load", "kN", float(duty["radial_load_kN"]), case)
-        results.put_own(number, "axial_load", "kN", float(duty["axial_load_kN"]), case)
-        results.put(number, "contact_pressure", "MPa", duty["contact_pressure_MPa"], case)
-        results.put(number, "basic_rating_life", "MRev", duty["L10_Mrev"], case)
-        results.put(number, "reference_rating_life", "MRev", duty["L10r_Mrev"], case)
+        results.put(number, "radial_load", KN * float(duty["radial_load_kN"]), case)
+        results.put(number, "axial_load", KN * float(duty["axial_load_kN"]), case)
+        pressure = duty["contact_pressure_MPa"]
+        results.put(number, "contact_pressure", None if pressure is None else MPA * pressure, case)
+        results.put(number, "basic_rating_life", duty["L10_Mrev"], case)
+        results.put(number, "reference_rating_life", duty["L10r_Mrev"], case)
         stiffness = rotated_stiffness(np.array(duty["stiffness_matrix_N_m_rad"]), target.origins.axes[number])
         for key, row, column, unit, factor in stiffness_names(results.version):
             results.put_named(number, key, unit, factor * float(stiffness[row, column]), case)
@@ -448,7 +443,7 @@ def put_modes(results: Results, modes: Mapping[Choice, xr.Dataset], unit: int, l
         moving = data["frequency"].to_numpy() > 0.0
         for key, name, sign in (("eigenfrequencies", "frequency", "Hz"), ("damping_ratios", "damping_ratio", "none")):
             values = tuple(data[name].to_numpy()[moving].tolist())
-            results.put_own(unit, f"{key}_{model_suffix(choice)}", sign, values, load_case)
+            results.put_named(unit, f"{OWN}{key}_{model_suffix(choice)}", sign, values, load_case)
 
 
 def put_runs(results: Results, gearbox: Gearbox, runs: Mapping[Choice, xr.Dataset], target: Target) -> None:
@@ -512,10 +507,10 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     major, minor = model.version.split(".")[:2]
     results = Results((int(major), int(minor)))
     unit = next((part.number for part in model.components_of_type("gear_unit")), next(iter(model.components)))
-    results.put_own(unit, "program", "none", f"exugear {exugear.__version__}")
-    results.put_own(unit, "case", "none", gearbox.name)
+    results.put_named(unit, f"{OWN}program", "none", f"exugear {exugear.__version__}")
+    results.put_named(unit, f"{OWN}case", "none", gearbox.name)
     for body, torque in gearbox.case.static_load.torques_N_m.items():
-        results.put_own(unit, f"static_torque_{body}", "N m", torque, target.load_case)
+        results.put_named(unit, f"{OWN}static_torque_{body}", "N m", torque, target.load_case)
     put_gears(results, gearbox, target)
     put_pairs(results, gearbox, target)
     put_static_forces(results, gearbox, target)
@@ -549,6 +544,6 @@ def _replaced(model: Model, results: Results) -> tuple[str, ...]:
         part = model.components[addition.component]
         cases = {case.number: case.changes.get(addition.component, {}) for case in model.load_cases}
         there = part.attributes if addition.load_case is None else cases[addition.load_case]
-        if tree.ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
+        if ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
             entries.append(f"{part}: {addition.name}")
     return tuple(entries)

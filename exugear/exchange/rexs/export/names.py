@@ -3,70 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from exugear.exchange.rexs.to_case.bodies import GEARS, ends
+import numpy as np
+
+from exugear.exchange.rexs.mapping import BEARINGS, GEARS, OWN, RESULTS, Version
+from exugear.exchange.rexs.to_case.bodies import ends
 from exugear.exchange.rexs.to_case.conversion import Found
 from exugear.exchange.rexs.to_case.gear_blocks import Teeth, first_of_planets
 from exugear.exchange.rexs.to_case.notes import Block, Places
-from exugear.exchange.rexs.to_case.supports import BEARINGS, PLACE_TOLERANCE
-from exugear.exchange.rexs.tree import OWN, Addition, AdditionValue, Component, Model
-from exugear.gearbox.units import MM
+from exugear.exchange.rexs.to_case.supports import PLACE_TOLERANCE
+from exugear.exchange.rexs.tree import Addition, AdditionValue, Component, Model
+from exugear.gearbox.units import MM, unit_of
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
-
-Version = tuple[int, int]
-
-NAMES: Mapping[str, Sequence[tuple[Version, str]]] = {
-    # of gears
-    "reference_diameter": [((1, 1), "reference_circle_diameter"), ((2, 0), "reference_diameter_cylindrical_gear")],
-    "base_diameter": [((1, 1), "base_circle_diameter"), ((2, 0), "base_diameter")],
-    "axial_pitch": [((1, 1), "axial_pitch")],
-    "normal_tooth_thickness": [
-        ((1, 2), "normal_tooth_thickness_at_pitch_diameter"),
-        ((1, 5), "normal_tooth_thickness_at_reference_diameter"),
-    ],
-    "transverse_tooth_thickness": [
-        ((1, 2), "tooth_thickness_at_pitch_diameter"),
-        ((1, 5), "transverse_tooth_thickness_at_reference_diameter"),
-    ],
-    "root_form_diameter": [((1, 2), "root_form_diameter")],
-    "normal_tooth_thickness_at_tip_diameter": [((1, 5), "normal_tooth_thickness_at_tip_diameter")],
-    # of shafts
-    "rotational_speed": [((1, 0), "rotational_speed")],
-    "node_positions": [((1, 1), "u_coordinates_of_beam_nodes")],
-    "displacement_u": [((1, 1), "displacement_u_of_nodes")],
-    "displacement_v": [((1, 1), "displacement_v_of_nodes")],
-    "displacement_w": [((1, 1), "displacement_w_of_nodes")],
-    # of a gear in a stage
-    "pitch_diameter": [((1, 0), "pitch_diameter")],
-    "working_pressure_angle": [((1, 1), "operating_pressure_angle_in_the_transverse_section")],
-    "active_root_diameter": [((1, 1), "usable_root_circle_diameter"), ((2, 0), "active_root_diameter")],
-    "active_tip_diameter": [((1, 1), "usable_addendum_circle_diameter"), ((2, 0), "active_tip_diameter")],
-    "tip_clearance": [((1, 2), "tip_clearance")],
-    "mesh_positions": [((1, 5), "rotational_meshing_position")],
-    # of a stage
-    "gear_ratio": [((1, 1), "gear_ratio")],
-    "transverse_contact_ratio": [((1, 1), "radial_contact_ratio")],
-    "overlap_ratio": [((1, 1), "overlap_contact_ratio")],
-    "total_contact_ratio": [((1, 3), "total_contact_ratio")],
-    "length_of_path_of_contact": [((1, 3), "length_of_path_of_contact")],
-    "tangential_force_at_base_circle": [
-        ((1, 3), "nominal_tangential_force_at_base_circle"),
-        ((2, 0), "nominal_tangential_force_at_base_diameter"),
-    ],
-    "face_load_factor": [((1, 1), "face_load_factor_flank"), ((2, 0), "face_load_factor_contact_stress")],
-    "mesh_stiffness": [((1, 5), "meshing_stiffness_characteristic")],
-    # of bearings; up to 1.5 the unit of a life is not defined
-    "basic_rating_life": [((1, 6), "nominal_rating_life_rotations_iso_281_2007")],
-    "reference_rating_life": [
-        ((1, 6), "nominal_reference_rating_life_rotations_din_26281"),
-        ((1, 7), "nominal_reference_rating_life_rotations_iso_16281_2008"),
-    ],
-    "contact_pressure": [((1, 3), "maximum_hertzian_pressure_inner_ring")],
-}
-"""Names by the version that introduced them, from the attribute lists of REXS 1.0 to 2.0."""
 
 
 def name_in(key: str, version: Version) -> str:
@@ -77,7 +28,7 @@ def name_in(key: str, version: Version) -> str:
     >>> name_in("base_diameter", (1, 4)), name_in("base_diameter", (2, 0)), name_in("base_diameter", (1, 0))
     ('base_circle_diameter', 'base_diameter', 'custom_exugear_base_diameter')
     """
-    known = [name for since, name in NAMES.get(key, ()) if since <= version]
+    known = [name for since, name in RESULTS[key].names.items() if since <= version]
     if known:
         return known[-1]
     return OWN + key
@@ -128,22 +79,26 @@ class Results(ReprMixin, line=": {additions!n} attributes"):
     additions: list[Addition] = field(default_factory=list)
 
     def put(
-        self, component: int, key: str, unit: str, value: AdditionValue | None, load_case: int | None = None
+        self, component: int, key: str, value: float | Floats | None, load_case: int | None = None, own: bool = False
     ) -> None:
-        """Add a result under its REXS name, or a custom one if there is none; None is skipped."""
-        if value is not None:
-            self.put_named(component, name_in(key, self.version), unit, value, load_case)
+        """Add a result in SI (key of `RESULTS`) under its name in the version, or a custom one; None is skipped.
 
-    def put_own(self, component: int, key: str, unit: str, value: AdditionValue, load_case: int | None = None) -> None:
-        """Add a result for which REXS has no name."""
-        self.put_named(component, OWN + key, unit, value, load_case)
+        Parameters
+        ----------
+        own : whether the name is a custom one although REXS has one
+        """
+        if value is None:
+            return
+        unit = RESULTS[key].unit
+        known = unit_of(unit)
+        scaled = np.asarray(value, dtype=float) / (known.factor if known else 1.0)
+        name = OWN + key if own else name_in(key, self.version)
+        self.put_named(component, name, unit, tuple(scaled.tolist()) if scaled.ndim else float(scaled), load_case)
 
     def put_named(
         self, component: int, name: str, unit: str, value: AdditionValue, load_case: int | None = None
     ) -> None:
-        """Add a result under a name."""
-        value = tuple(map(float, value)) if isinstance(value, tuple) else value
-        value = float(value) if isinstance(value, int | float) else value
+        """Add a result in a unit under a name."""
         self.additions.append(Addition(component, name, unit_in(unit, self.version), value, load_case))
 
 

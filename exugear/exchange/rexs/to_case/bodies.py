@@ -6,31 +6,16 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from exugear.exchange.rexs.mapping import GEARS, JOINING, READ
 from exugear.exchange.rexs.to_case.notes import Notes, Places
 from exugear.exchange.rexs.tree import Component, Model, RexsError
-from exugear.gearbox.units import MM
 from fe_ste.tools.display import ReprMixin
 
-GEARS = ("cylindrical_gear", "ring_gear")
-JOINING = (
-    "coupling",
-    "switchable_coupling",
-    "cylindrical_interference_fit",
-    "tapered_interference_fit",
-    "feather_key_connection",
-    "involute_spline_connection",
-)
-"""Types of components that can rigidly connect their inner and outer part."""
+(TORSION,) = READ["torsion"]
 RIGID_TORSION = 1e12
 """Torsional stiffness (N m/rad) from which a connection counts as rigid; files use 1e17 for rigid."""
 RIGID_ABOVE = {"radial_stiffness": 1e14, "axial_stiffness": 1e14, "bending_stiffness": 1e11}
 """Stiffness (N/m, N m/rad) from which a value counts as rigid; no bearing is as stiff."""
-STIFFNESSES = {
-    "radial_stiffness": ("radial_N_per_m", "N / m", 1.0),
-    "axial_stiffness": ("axial_N_per_m", "N / m", 1.0),
-    "bending_stiffness": ("tilt_N_m_per_rad", "N mm / rad", 1e-3),
-}
-"""Attributes of bearings and couplings: key of the gearbox file, unit, and factor from it to SI."""
 COAXIAL = 2e-3
 """Largest distance of axes that count as coaxial, mm."""
 
@@ -105,10 +90,10 @@ class _Union:
 
 def torsional_stiffness(connection: Component) -> float | None:
     """Torsional stiffness of a coupling or fit, N m/rad; None if the file has no value."""
-    value = connection.quantity("rotational_stiffness", "N mm / rad")
+    value = connection.quantity(TORSION.attribute)
     if value is None:
         return None
-    return MM * value
+    return TORSION.factor * value
 
 
 def is_rigid_in_torsion(connection: Component) -> bool:
@@ -125,9 +110,9 @@ def is_one_piece(connection: Component) -> bool:
     """
     if not is_rigid_in_torsion(connection) or connection.flag("radial_force_absorption") is False:
         return False
-    for key, (_, unit, factor) in STIFFNESSES.items():
-        value = connection.quantity(key, unit)
-        if value is not None and factor * value < RIGID_ABOVE[key]:
+    for row in READ["stiffness"]:
+        value = connection.quantity(row.attribute)
+        if value is not None and row.factor * value < RIGID_ABOVE[row.attribute]:
             return False
     return True
 
@@ -250,7 +235,7 @@ def held_by_speed(model: Model) -> set[int]:
     for changes in [case.changes for case in model.load_cases] or [{}]:
         for shaft in model.components_of_type("shaft"):
             here = shaft.with_attributes(changes.get(shaft.number, {}))
-            speed = here.quantity("rotational_speed", "1 / min")
+            speed = here.quantity("rotational_speed")
             defined = here.flag("defines_speed")
             if defined or (speed is not None and defined is None):
                 speeds.setdefault(shaft.number, set()).add(speed or 0.0)
@@ -299,7 +284,7 @@ def _planet_sets(
         shaft = model.components[relation.roles["shaft"]]
         root = union.root(shaft.number)
         gears = sorted(
-            (part.whole("number_of_teeth") or 0, part.quantity("normal_module", "mm") or 0.0)
+            (part.whole("number_of_teeth") or 0, part.quantity("normal_module") or 0.0)
             for part in groups[root]
             if part.type in GEARS
         )

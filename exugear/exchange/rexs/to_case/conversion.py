@@ -13,7 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from exugear.exchange.rexs.to_case.bodies import GEARS, JOINING, Bodies, Body, find_bodies
+from exugear.exchange.rexs.mapping import (
+    GEARS,
+    JOINING,
+    OTHER_GEARS,
+    OWN,
+    READ_TYPES,
+    TYPES_OF_ROLES,
+    TYPES_WITHOUT_EFFECT,
+)
+from exugear.exchange.rexs.to_case.bodies import Bodies, Body, find_bodies
 from exugear.exchange.rexs.to_case.gear_blocks import (
     Teeth,
     axes_to_move,
@@ -32,7 +41,6 @@ from exugear.exchange.rexs.to_case.loads import (
     loads_of,
     static_load,
 )
-from exugear.exchange.rexs.to_case.meshing import MODIFICATIONS
 from exugear.exchange.rexs.to_case.notes import (
     Block,
     Entry,
@@ -47,7 +55,6 @@ from exugear.exchange.rexs.to_case.notes import (
 )
 from exugear.exchange.rexs.to_case.shafts import (
     Cylinder,
-    Inertia,
     gear_tube,
     inertia_of,
     is_continuous,
@@ -57,14 +64,12 @@ from exugear.exchange.rexs.to_case.shafts import (
     sections_of,
 )
 from exugear.exchange.rexs.to_case.supports import (
-    BEARINGS,
-    PLAIN_BEARINGS,
     bearing_blocks,
     coupling_blocks,
     joint_blocks,
 )
 from exugear.exchange.rexs.to_case.toothing import is_rigid, material_of, material_table
-from exugear.exchange.rexs.tree import OWN, Component, Model, RexsError, plain
+from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.system.readiness import check_parts
@@ -131,11 +136,16 @@ def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Seq
     if body.fixed:
         block.entries["fixed"] = read(True, "joined with the casing")
         return block
-    tubes = {number: _tube(model, body, teeth, number, sections, notes) for number in wheels}
+    tubes = {}
+    for number in wheels:
+        gear = teeth.gears[number]
+        seat = seat_diameter(sections, teeth.z[number], gear.face_width.value, gear.internal)
+        tubes[number] = gear_tube(model, gear, teeth.z[number], seat, notes)
     plates = [
         one for part in body.parts_of_type("side_plate") if (one := plate(model, places, part, notes)) is not None
     ]
-    inertia = inertia_of([*sections, *tubes.values(), *plates])
+    pieces = [*sections, *tubes.values(), *plates]
+    inertia = inertia_of(pieces)
     if inertia.mass <= 0.0:
         raise RexsError(f"{body.parts[0]}: inertia is not defined by sections, gears or plates")
     made_of = [
@@ -143,16 +153,22 @@ def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Seq
         for name, found in (("section", sections), ("gear tube", tubes), ("plate", plates))
         if found
     ]
-    block.blocks[f"inertia.{INERTIAS}"] = Block("", _inertia_entries(inertia, ", ".join(made_of)))
+    entries = {key: derived(value, "likewise") for key, value in _mass_entries(pieces).items()}
+    entries["mass_kg"] = derived(entries["mass_kg"].value, f"computed here from {', '.join(made_of)}")
+    entries["centre_of_mass_z_mm"] = derived(tidy(round(1e3 * inertia.centre, 4)), "likewise")
+    block.blocks[f"inertia.{INERTIAS}"] = Block("", entries)
     if _has_shape(model, body, sections):
         block.entries["flexibility"] = derived("elastic", "in the variant flexible: its sections in sequence")
-        block.blocks["shape"] = _shape(model, body, sections, notes)
-        block.blocks["shape.blanks"] = Block(
-            "gears as hollow cylinders from seat to reference diameter",
-            {teeth.names[number]: _blank(tube) for number, tube in tubes.items() if tube.mass > 0.0},
-        )
-        if not block.blocks["shape.blanks"].entries:
-            del block.blocks["shape.blanks"]
+        block.blocks["shape"] = _shape(model, body, sections)
+        blanks = {
+            teeth.names[number]: derived(
+                _mass_entries([tube]), f"{tube.outers[0]:.4g} x {tube.inners[0]:.4g} x {tube.length:g} mm"
+            )
+            for number, tube in tubes.items()
+            if inertia_of([tube]).mass > 0.0
+        }
+        if blanks:
+            block.blocks["shape.blanks"] = Block("gears as hollow cylinders from seat to reference diameter", blanks)
     return block
 
 
@@ -166,24 +182,12 @@ def _place(body: Body) -> dict[str, Entry]:
     }
 
 
-def _tube(model: Model, body: Body, teeth: Teeth, number: int, sections: Sequence[Cylinder], notes: Notes) -> Cylinder:
-    gear = teeth.gears[number]
-    z = teeth.z[number]
-    seat = seat_diameter(sections, z, gear.face_width.value, gear.internal)
-    return gear_tube(model, gear, z, seat, 0.0, notes)
-
-
-def _inertia_entries(inertia: Inertia, made_of: str) -> dict[str, Entry]:
-    return {
-        "mass_kg": derived(_digits(inertia.mass), f"computed here from {made_of}"),
-        "axial_kg_m2": derived(_digits(inertia.axial), "likewise"),
-        "transverse_kg_m2": derived(_digits(max(inertia.transverse, 0.5 * inertia.axial * (1.0 + 1e-5))), "likewise"),
-        "centre_of_mass_z_mm": derived(tidy(round(inertia.centre, 4)), "likewise"),
-    }
-
-
-def _digits(value: float) -> float:
-    return float(f"{value:.6g}")
+def _mass_entries(pieces: Sequence[Cylinder]) -> dict[str, float]:
+    """Mass and moments of inertia of pieces; the transverse one at least that of a thin disc."""
+    inertia = inertia_of(pieces)
+    transverse = max(inertia.transverse, 0.5 * inertia.axial * (1.0 + 1e-5))
+    values = {"mass_kg": inertia.mass, "axial_kg_m2": inertia.axial, "transverse_kg_m2": transverse}
+    return {key: float(f"{value:.6g}") for key, value in values.items()}
 
 
 def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
@@ -197,14 +201,17 @@ def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
     return plain_shaft and not rigid and len(set(materials)) == 1 and is_continuous(sections)
 
 
-def _shape(model: Model, body: Body, sections: Sequence[Cylinder], notes: Notes) -> Block:
-    pieces = [
-        {"length_mm": section.length, "outer_diameter_mm": section.outer}
-        | ({"inner_diameter_mm": section.inner} if section.inner else {})
-        | ({"outer_diameter_end_mm": section.outer_end} if section.outer_end not in (None, section.outer) else {})
-        | ({"inner_diameter_end_mm": section.inner_end} if section.inner_end not in (None, section.inner) else {})
-        for section in sections
-    ]
+def _shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> Block:
+    pieces = []
+    for one in sections:
+        piece = {"length_mm": one.length, "outer_diameter_mm": one.outers[0]}
+        if one.inners[0]:
+            piece["inner_diameter_mm"] = one.inners[0]
+        if one.outers[1] != one.outers[0]:
+            piece["outer_diameter_end_mm"] = one.outers[1]
+        if one.inners[1] != one.inners[0]:
+            piece["inner_diameter_end_mm"] = one.inners[1]
+        pieces.append(piece)
     entries = {
         "start_z_mm": read(sections[0].start, "support_vector of the shaft"),
         "sections": read(pieces, "shaft_section"),
@@ -213,18 +220,6 @@ def _shape(model: Model, body: Body, sections: Sequence[Cylinder], notes: Notes)
     if material is not None:
         entries["material"] = material
     return Block("", entries)
-
-
-def _blank(tube: Cylinder) -> Entry:
-    inertia = inertia_of([tube])
-    return derived(
-        {
-            "mass_kg": _digits(inertia.mass),
-            "axial_kg_m2": _digits(inertia.axial),
-            "transverse_kg_m2": _digits(max(inertia.transverse, 0.5 * inertia.axial * (1.0 + 1e-5))),
-        },
-        f"{tube.outer:.4g} x {tube.inner:.4g} x {tube.length:g} mm",
-    )
 
 
 def meshes_of_bodies(teeth: Teeth) -> dict[str, int]:
@@ -253,70 +248,9 @@ def gear_places(teeth: Teeth, bodies: Bodies) -> dict[str, float]:
 
 # Conversion of a REXS file to a gearbox file; all errors are reported together, and assumptions are marked
 
-OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
-"""Prefixes of the types of gears that are not cylindrical."""
 SPEED_TOLERANCE = 1e-3
 """Largest relative difference between a speed in the file and the kinematic speed."""
 _SHAPE_FAULT = re.compile(r"bodies\.(\w+)\.shape: (.*)")
-TYPES_OF_ROLES = {
-    ("stage", "gear_1"): GEARS,
-    ("stage", "gear_2"): GEARS,
-    ("stage", "stage"): ("cylindrical_stage",),
-    ("planet_shaft", "shaft"): ("shaft",),
-    ("planet_shaft", "planetary_stage"): ("planetary_stage",),
-    ("planet_pin", "shaft"): ("shaft",),
-    ("planet_pin", "planetary_stage"): ("planetary_stage",),
-    ("planet_carrier_shaft", "shaft"): ("shaft",),
-    ("planet_carrier_shaft", "planetary_stage"): ("planetary_stage",),
-    ("side", "assembly"): (*BEARINGS, *PLAIN_BEARINGS, *JOINING),
-}
-"""Required type of a component with a role in a relation; a wrong id refers to a component of another type."""
-READ_TYPES = frozenset(
-    (
-        *GEARS,
-        *BEARINGS,
-        *PLAIN_BEARINGS,
-        *JOINING,
-        "gear_unit",
-        "gear_casing",
-        "shaft",
-        "shaft_section",
-        "side_plate",
-        "planet_carrier",
-        "planetary_stage",
-        "cylindrical_stage",
-        "cylindrical_gear_flank",
-        "cylindrical_gear_manufacturing_settings",
-        "rack_shaped_tool",
-        "cutter_wheel_tool",
-        *MODIFICATIONS,
-        "material",
-        "rolling_bearing_row",
-        "rolling_element",
-        "external_load",
-        "lubricant",
-    )
-)
-"""Types of components from which data are read."""
-
-
-TYPES_WITHOUT_EFFECT = frozenset(
-    (
-        "assembly_group",
-        "cylindrical_stage_gear_data",
-        "element_list",
-        "involute_spline_gear_hub",
-        "involute_spline_gear_shaft",
-        "joint_section",
-        "meshing_contact_stage_data_set",
-        "notch_effect_shaft_hub_connection",
-        "point_list",
-        "reduction_point",
-        "shaft_shoulder",
-        "shaft_shoulder_with_undercut",
-    )
-)
-"""Types of components that group or rate others; they have no mass or stiffness and carry no load."""
 
 
 @dataclass(frozen=True)
@@ -558,10 +492,9 @@ def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str
         ),
     }
     for unit in model.components_of_type("gear_unit")[:1]:
-        keys = [f"direction_vector_gravity_{axis}" for axis in "uvw"]
-        direction = np.array([unit.quantity(key) or 0.0 for key in keys])
+        direction = np.array([unit.quantity(f"direction_vector_gravity_{axis}") or 0.0 for axis in "uvw"])
         if unit.flag("account_for_gravity") and np.linalg.norm(direction) > 0.0:
-            size = unit.quantity("gravitational_acceleration", "m / s^2") or 9.81
+            size = unit.quantity("gravitational_acceleration") or 9.81
             vector = places.turned(direction / np.linalg.norm(direction)) * size
             entry = read([tidy(round(value, 9)) for value in vector.tolist()], "direction_vector_gravity")
             blocks["gravity"] = Block("", {"acceleration_m_per_s2": entry})

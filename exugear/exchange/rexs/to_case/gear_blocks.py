@@ -133,7 +133,7 @@ def _stage(model: Model, roles: Mapping[str, int]) -> tuple[Component, list[Comp
 def _check_direction(places: Places, stage: Component, gears: Sequence[Component], notes: Notes) -> None:
     """Compare the direction of the line of centres with the positions."""
     one, other = (places.position(gear) for gear in gears)
-    stated = stage.quantity("rotating_angle_around_neg_u_axis", "deg")
+    stated = stage.quantity("rotating_angle_around_neg_u_axis")
     # Angle of the second gear's centre as seen from the first, zero along w and positive towards v.
     angle = math.degrees(math.atan2(other[0] - one[0], other[1] - one[1]))
     if stated is not None and abs(math.remainder(stated - angle, 360.0)) > ANGLE_TOLERANCE:
@@ -176,7 +176,7 @@ def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Tooth
         z = places.position(one.part)[2]
         low = max(low, z - 0.5 * one.face_width.value)
         high = min(high, z + 0.5 * one.face_width.value)
-    stated = stage.quantity("common_face_width", "mm")
+    stated = stage.quantity("common_face_width")
     overlap = tidy(round(high - low, 6))
     if stated is not None and stated < min(least, overlap) - FACE_TOLERANCE:
         return read(tidy(stated), "common_face_width")

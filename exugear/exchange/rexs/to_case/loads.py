@@ -122,7 +122,7 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, 
     speeds: dict[str, float] = {}
     for shaft in _changed(model.components_of_type("shaft"), changes):
         body = bodies.body_of(shaft)
-        speed = shaft.quantity("rotational_speed", "1 / min")
+        speed = shaft.quantity("rotational_speed")
         if body is not None and speed is not None and not body.fixed:
             speeds.setdefault(body.name, tidy(places.sense(shaft) * speed))
     torques: dict[str, float] = {}
@@ -137,7 +137,7 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, 
             torques[body.name] = torques.get(body.name, 0.0) + torque
     share = None
     for unit in _changed(model.components_of_type("gear_unit"), changes):
-        share = unit.quantity("operating_time_fraction", "%")
+        share = unit.quantity("operating_time_fraction")
     name = f"load_case_{case.number}" if case else "nominal"
     return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, forces, share)
 
@@ -158,7 +158,7 @@ def _point_force(model: Model, places: Places, bodies: Bodies, load: Component, 
         notes.lost.append(f"{load}: {size}; the body it acts on is fixed, is a planet, or is not imported")
         return None
     axes = places.axes(shaft)
-    z = places.position(shaft)[2] + places.sense(shaft) * (load.quantity("u_coordinate_on_shaft", "mm") or 0.0)
+    z = places.position(shaft)[2] + places.sense(shaft) * (load.quantity("u_coordinate_on_shaft") or 0.0)
     return PointForce(
         load,
         body.name,
@@ -193,10 +193,10 @@ def _torque(model: Model, places: Places, load: Component, speeds: Mapping[str, 
     body = _owner(model, bodies, load)
     if shaft is None or body is None:
         return None
-    torque = load.quantity("torque_around_u_axis", "N m")
+    torque = load.quantity("torque_around_u_axis")
     if torque is not None:
         return tidy(places.sense(shaft) * torque)
-    power = load.quantity("power", "kW")
+    power = load.quantity("power")
     speed = speeds.get(body.name)
     if power and speed:
         return tidy(1e3 * power / (speed * math.pi / 30.0))
@@ -383,9 +383,7 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
     speeds = [_input_speed(load, ends, ratio) * (ratio if body == ends.output else 1.0) for load in loads]
     if body is None or not sum(shares) or not all(speeds):
         return None
-    hours = next(
-        (h for unit in model.components_of_type("gear_unit") if (h := unit.quantity("operating_time", "h"))), None
-    )
+    hours = next((h for unit in model.components_of_type("gear_unit") if (h := unit.quantity("operating_time"))), None)
     life = assumed(USUAL_YEARS, "no operating_time in the file")
     if hours:
         life = derived(_rounded(hours / HOURS_PER_YEAR), f"operating_time of {hours:g} h")
@@ -403,7 +401,7 @@ def _lubricant(model: Model) -> Block | None:
     for oil in model.components_of_type("lubricant"):
         cold, hot = (oil.quantity(f"viscosity_at_{t}_degree_celsius", "mm^2 / s") for t in (40, 100))
         if cold and hot and hot < cold:
-            oils[cold] = hot, oil.quantity("density_at_15_degree_celsius", "kg / m^3")
+            oils[cold] = hot, oil.quantity("density_at_15_degree_celsius")
     if not oils:
         return None
     cold = min(oils)
@@ -416,7 +414,7 @@ def _lubricant(model: Model) -> Block | None:
         entries["density_15_kg_per_m3"] = read(tidy(density), "density_at_15_degree_celsius")
     casings = model.components_of_type("gear_casing")
     stated = [_changed(casings, changes) for changes in ({}, *(case.changes for case in model.load_cases))]
-    temperatures = [casing.quantity("temperature_lubricant", "C") for parts in stated for casing in parts]
+    temperatures = [casing.quantity("temperature_lubricant") for parts in stated for casing in parts]
     hottest = max((t for t in temperatures if t is not None), default=math.nan)
     if TEMPERATURES[0] <= hottest <= TEMPERATURES[1]:
         entries["temperature_C"] = read(tidy(hottest), "temperature_lubricant of the casing (hottest load case)")
@@ -426,9 +424,7 @@ def _lubricant(model: Model) -> Block | None:
 def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
     """Section on the rating: strength of gears by their materials, unless a limit is missing, and viscosity."""
     viscosities = [
-        one
-        for oil in model.components_of_type("lubricant")
-        if (one := oil.quantity("viscosity_at_40_degree_celsius", "mm^2 / s"))
+        one for oil in model.components_of_type("lubricant") if (one := oil.quantity("viscosity_at_40_degree_celsius"))
     ]
     viscosity = (
         read(tidy(min(viscosities)), "viscosity_at_40_degree_celsius of the lubricant")

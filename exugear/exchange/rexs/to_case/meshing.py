@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from exugear.exchange.rexs.mapping import IMPORTED_MODIFICATIONS, MODIFICATIONS, READ, SHAPES
 from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, derived, read, tidy
 from exugear.exchange.rexs.to_case.toothing import EQUAL, Tool, Toothing
 from exugear.exchange.rexs.tree import Component, Model, RexsError
@@ -64,7 +65,7 @@ def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothi
     RexsError
         The file has two different distances, and neither profile shifts nor rules decide between them.
     """
-    stated = stage.quantity("center_distance", "mm")
+    stated = stage.quantity("center_distance")
     if apart <= PLACE_TOLERANCE:
         raise RexsError(f"{stage}: both gears are on one axis; correct support_vector of one of them")
     if stated is None:
@@ -554,28 +555,6 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
 
 # Flank modifications of a REXS file: reliefs and crownings that are equal on both flanks
 
-READ = ("tip_relief", "root_relief", "profile_crowning", "helix_crowning")
-"""Modifications that are imported."""
-MODIFICATIONS = (
-    *READ,
-    "triangular_tip_relief",
-    "triangular_root_relief",
-    "profile_slope",
-    "profile_twist",
-    "helix_slope",
-    "end_relief_datum_face",
-    "end_relief_non_datum_face",
-    "topographical_modification",
-)
-UNSIGNED = {"helix_slope": "helix_slope_um", "profile_slope": "profile_slope_um", "profile_twist": "twist_um"}
-"""Modifications with undefined sign, by the attribute of their amount, and the corresponding key.
-
-Database and schema of REXS (1.2 to 2.0.0) permit both signs and call it an amount. No public text defines at which end
-of the flank a positive value removes material. A wrong sign would be worse than no value.
-"""
-SHAPES = {"linear": "linear", "parabolic": "parabolic", "circular": "parabolic"}
-"""Shapes of a relief, REXS to exugear; a circle and its parabola differ by the square of depth over length."""
-
 
 def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Entry]:
     """Entries of a gear's table of modifications; empty for none.
@@ -587,10 +566,10 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
     """
     left, right = (_modification_by_type(model, gear.part, side) for side in ("left", "right"))
     for kind, part in {**right, **left}.items():
-        if kind not in READ and kind not in UNSIGNED:
+        if kind not in (*IMPORTED_MODIFICATIONS, *(row.attribute for row in READ["unsigned"])):
             notes.changed.append(f"{part} of {gear.part}: not imported; set it in [gears.NAME.modification]")
     entries: dict[str, Entry] = {}
-    for kind in READ:
+    for kind in IMPORTED_MODIFICATIONS:
         one = left.get(kind)
         other = right.get(kind)
         if one is None and other is None:
@@ -608,9 +587,9 @@ def _blanks(
     gear: Toothing, left: dict[str, Component], right: dict[str, Component], notes: Notes
 ) -> Iterator[tuple[str, Entry]]:
     """Yield slopes of the file as zeros to be completed, since their signs are not defined; skip zero slopes."""
-    for kind, key in UNSIGNED.items():
+    for kind, key in ((row.attribute, row.key) for row in READ["unsigned"]):
         part = left.get(kind) or right.get(kind)
-        amounts = [one[kind].quantity(kind, "mm") for one in (left, right) if kind in one]
+        amounts = [one[kind].quantity(kind) for one in (left, right) if kind in one]
         if part is None or not any(amounts):
             continue
         said = ", ".join(dict.fromkeys(f"{_um(amount):g} um" for amount in amounts if amount))
@@ -637,7 +616,7 @@ def _entries(gear: Toothing, part: Component, notes: Notes) -> Iterator[tuple[st
     if part.type.endswith("_relief"):
         yield from _relief(gear, part)
     elif part.type == "profile_crowning":
-        ends = [part.quantity(f"profile_crowning_at_{end}", "mm") for end in ("tip", "root")]
+        ends = [part.quantity(f"profile_crowning_at_{end}") for end in ("tip", "root")]
         if ends[0] is not None and ends[1] is not None and abs(ends[0] - ends[1]) < EQUAL:
             yield "profile_crowning_um", read(_um(ends[0]), f"profile_crowning_at_tip and _root of {part}")
     else:
@@ -647,8 +626,8 @@ def _entries(gear: Toothing, part: Component, notes: Notes) -> Iterator[tuple[st
 def _lead_crowning(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry]]:
     """Lead crowning scaled to the ends of the face, with the square of the distance from the middle."""
     sides = ("datum_face", "non_datum_face")
-    amounts = [part.quantity(f"helix_crowning_amount_{side}", "mm") for side in sides]
-    quantities = [part.quantity(f"coordinate_where_helix_crowning_is_specified_{side}", "mm") for side in sides]
+    amounts = [part.quantity(f"helix_crowning_amount_{side}") for side in sides]
+    quantities = [part.quantity(f"coordinate_where_helix_crowning_is_specified_{side}") for side in sides]
     if None in amounts or None in quantities:
         return
     (one, other), (low, high) = [[value or 0.0 for value in pair] for pair in (amounts, quantities)]
@@ -661,14 +640,14 @@ def _lead_crowning(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry
 def _relief(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry]]:
     """Relief from its datum diameter, scaled to the end of the flank if its depth is specified elsewhere."""
     kind = part.type.removesuffix("_relief")
-    depth, datum = (part.quantity(f"{part.type}_{key}", "mm") for key in ("depth", "datum_diameter"))
+    depth, datum = (part.quantity(f"{part.type}_{key}") for key in ("depth", "datum_diameter"))
     shape = SHAPES.get(part.text("shape_of_relief"))
     geometry = unchecked("", gear)
     base = 2e3 * geometry.base_radius
     if not depth or datum is None or abs(datum) <= base or shape is None:
         return
     end = 2e3 * (geometry.tip_radius if kind == "tip" else geometry.form_radius)
-    stated = abs(part.quantity(f"{part.type}_evaluation_reference", "mm") or end)
+    stated = abs(part.quantity(f"{part.type}_evaluation_reference") or end)
     start, stated_at, ends_at = (math.sqrt(max((d / base) ** 2 - 1.0, 0.0)) for d in (abs(datum), stated, end))
     if abs(stated_at - start) < EQUAL:
         return

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from exugear.exchange.rexs.mapping import Row
 from exugear.exchange.rexs.tree import Component, Faults, Model, RexsError
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
@@ -51,6 +52,21 @@ def derived(value: Any, source: str) -> Entry:
 def assumed(value: Any, source: str) -> Entry:
     """Value that is assumed because the file does not specify it."""
     return Entry(value, source, ASSUMED)
+
+
+def entries_of(part: Component | None, rows: Sequence[Row], zeros: bool = False) -> dict[str, Entry]:
+    """Entries of those attributes that a component has, by key; the first one counts if several have one key.
+
+    Parameters
+    ----------
+    zeros : whether zero is a value, too; it otherwise counts as missing
+    """
+    entries: dict[str, Entry] = {}
+    for row in rows:
+        value = part.quantity(row.attribute) if part else None
+        if value or (zeros and value is not None):
+            entries.setdefault(row.key, read(tidy(row.factor * value), row.attribute))
+    return entries
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, needed, read, tidy, within
+from exugear.exchange.rexs.mapping import READ
+from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, entries_of, needed, read, tidy, within
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 
 PLAUSIBLE_TIP = (0.5, 2.0)
@@ -85,7 +86,7 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
     flank = _flank(model, gear)
     steps = _steps(model, gear)
     tool = _root_tool(steps, internal)
-    chamfer = (flank.quantity("tooth_tip_chamfer", "mm") if flank else None) or 0.0
+    chamfer = (flank.quantity("tooth_tip_chamfer") if flank else None) or 0.0
     angle = _pressure_angle(gear, flank)
     helix = _helix_angle(gear, mates)
     allowances = _allowances(gear, math.radians(angle.value), math.radians(helix.value), internal)
@@ -116,13 +117,13 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
 
 def _length(gear: Component, key: str) -> float:
     """Return a required length of a gear, mm."""
-    return within(needed(gear.quantity(key, "mm"), gear, key), gear, key, *LENGTHS)
+    return within(needed(gear.quantity(key), gear, key), gear, key, *LENGTHS)
 
 
 def _chamfer(gear: Component, stated: float) -> float:
     """Height of the tip chamfer, mm: specified, or from the tip form diameter."""
-    tip = gear.quantity("tip_diameter", "mm")
-    form = gear.quantity("tip_form_diameter", "mm")
+    tip = gear.quantity("tip_diameter")
+    form = gear.quantity("tip_form_diameter")
     if stated or not tip or not form:
         return tidy(stated)
     return tidy(max(0.0, round(0.5 * (abs(tip) - abs(form)) * (-1.0 if gear.type == "ring_gear" else 1.0), 9)))
@@ -133,13 +134,9 @@ def _flank(model: Model, gear: Component) -> Component | None:
     left, right = (model.related("flank", "gear", gear.number, side) for side in ("left", "right"))
     if not left or not right:
         return (left or right or (None,))[0]
-    for key, unit in (
-        ("addendum_modification_coefficient", "none"),
-        ("normal_pressure_angle", "deg"),
-        ("tooth_tip_chamfer", "mm"),
-    ):
-        quantity = left[0].quantity(key, unit)
-        other = right[0].quantity(key, unit)
+    for key in (row.attribute for row in READ["flank"]):
+        quantity = left[0].quantity(key)
+        other = right[0].quantity(key)
         if quantity != other and (quantity is None or other is None or abs(quantity - other) > EQUAL):
             raise RexsError(
                 f"{gear}: left and right flank differ in {key} ({quantity} and {other}); "
@@ -184,28 +181,22 @@ def _racks(steps: Sequence[tuple[Component, Component | None]], module: float) -
         depth = tool.quantity("addendum_coefficient_reference_profile")
         if tool.type != "rack_shaped_tool" or not depth or depth < 0.0:
             continue
-        amount = (tool.quantity("protuberance_amount", "mm") or 0.0) / module
+        amount = (tool.quantity("protuberance_amount") or 0.0) / module
+        allowance = settings.quantity("machining_allowance") if settings else None
         yield Tool(
             part=tool,
             depth=depth,
             tip_radius=max(tool.quantity("tip_corner_radius_factor_reference_profile") or 0.0, 0.0),
             protuberance=amount or tool.quantity("protuberance_amount_factor") or 0.0,
-            protuberance_angle=math.radians(tool.quantity("protuberance_angle", "deg") or USUAL_PROTUBERANCE_ANGLE),
-            allowance=_allowance(settings) / module,
+            protuberance_angle=math.radians(tool.quantity("protuberance_angle") or USUAL_PROTUBERANCE_ANGLE),
+            allowance=(allowance or 0.0) / module,
         )
-
-
-def _allowance(settings: Component | None) -> float:
-    """Machining allowance of a tool on each flank, mm."""
-    if settings is None:
-        return 0.0
-    return settings.quantity("machining_allowance", "mm") or 0.0
 
 
 def _pressure_angle(gear: Component, flank: Component | None) -> Entry:
     key = "normal_pressure_angle"
     for part in (flank, gear):
-        value = part.quantity(key, "deg") if part else None
+        value = part.quantity(key) if part else None
         if part is not None and value is not None:
             return read(tidy(within(value, part, key, *PRESSURE_ANGLES)), f"{key} of the flank")
     return assumed(20.0, "not in the file")
@@ -221,7 +212,7 @@ def _helix_angle(gear: Component, mates: Sequence[Component]) -> Entry:
 
 
 def _helix(gear: Component, key: str) -> float:
-    return within(needed(gear.quantity(key, "deg"), gear, key), gear, key, *HELIX_ANGLES)
+    return within(needed(gear.quantity(key), gear, key), gear, key, *HELIX_ANGLES)
 
 
 def _shift(flank: Component | None, internal: bool) -> Entry | None:
@@ -233,7 +224,7 @@ def _shift(flank: Component | None, internal: bool) -> Entry | None:
 
 
 def _diameter(gear: Component, key: str) -> Entry | None:
-    value = gear.quantity(key, "mm")
+    value = gear.quantity(key)
     if value:
         return read(tidy(abs(value)), key)
     return None
@@ -253,14 +244,14 @@ def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | N
     teeth = tool.whole("number_of_teeth") if tool else None
     if tool is None or tool.type != "cutter_wheel_tool" or not teeth:
         return None
-    radius = tool.quantity("tip_corner_radius_cutter", "mm")
+    radius = tool.quantity("tip_corner_radius_cutter")
     factor = tool.quantity("tip_corner_radius_factor_reference_profile") if radius is None else radius / module
     rounded = _rounded(assumed(LEAST_RADIUS, "none given") if factor is None else read(tidy(factor), ""))
     shift = tool.quantity("addendum_modification_coefficient")
     cutter = {"teeth": abs(teeth), "tip_radius": rounded.value, "profile_shift": tidy(shift or 0.0)}
-    tip = tool.quantity("tip_diameter", "mm")
+    tip = tool.quantity("tip_diameter")
     addendum = tool.quantity("addendum_coefficient_reference_profile")
-    if not gear.quantity("root_diameter", "mm"):
+    if not gear.quantity("root_diameter"):
         if tip:
             cutter["tip_diameter_mm"] = tidy(abs(tip))
         elif addendum:
@@ -299,7 +290,7 @@ def _allowances(gear: Component, angle: float, helix: float, internal: bool) -> 
         "{}_backlash_allowance_referenced_to_span": 1.0 / math.cos(angle),
     }
     for key, factor in list(sources.items())[: 2 if internal else 3]:
-        upper, lower = (gear.quantity(key.format(end), "mm") for end in ("upper", "lower"))
+        upper, lower = (gear.quantity(key.format(end)) for end in ("upper", "lower"))
         if upper is not None and lower is not None and lower <= upper <= 0.0:
             ends = {"upper": upper, "lower": lower}
             table = {f"{end}_allowance_um": tidy(round(1e3 * factor * one, 6)) for end, one in ends.items()}
@@ -325,7 +316,7 @@ def material_of(model: Model, part: Component) -> Component | None:
 
 def is_rigid(material: Component | None) -> bool:
     """Return whether a material represents a rigid body."""
-    modulus = material.quantity("elastic_modulus", "MPa") if material else None
+    modulus = material.quantity("elastic_modulus") if material else None
     return modulus is not None and modulus > RIGID_MODULUS
 
 
@@ -333,12 +324,7 @@ def material_table(material: Component | None) -> Entry | None:
     """Inline table of a material with its specified values; None if it represents a rigid body."""
     if material is None or is_rigid(material):
         return None
-    values = {
-        "youngs_modulus_GPa": (material.quantity("elastic_modulus", "MPa"), 1e-3),
-        "poissons_ratio": (material.quantity("poisson_ratio"), 1.0),
-        "density_kg_per_m3": (material.quantity("density", "kg / m^3"), 1.0),
-    }
-    given = {key: tidy(value * factor) for key, (value, factor) in values.items() if value is not None}
-    if given:
-        return read(given, str(material))
+    values = {key: entry.value for key, entry in entries_of(material, READ["material"], zeros=True).items()}
+    if values:
+        return read(values, str(material))
     return None
