@@ -27,15 +27,17 @@ class Row(NamedTuple):
     """Key of the gearbox file for the same quantity."""
     older: str = ""
     """Name in older versions."""
+    scale: float = 1.0
+    """Factor to the quantity of the key, such as 6 from Ra to Rz (ISO 6336-2)."""
 
     @property
     def factor(self) -> float:
-        """Factor from the unit to that of the key."""
+        """Factor from the unit to the quantity of the key in its unit."""
         source = unit_of(self.unit)
         target = unit_of_key(self.key)
         if source is None or target is None:
-            return 1.0
-        return float(f"{source.factor / target.factor:.15g}")
+            return self.scale
+        return float(f"{self.scale * source.factor / target.factor:.15g}")
 
 
 READ: Mapping[str, Sequence[Row]] = {
@@ -115,8 +117,8 @@ READ: Mapping[str, Sequence[Row]] = {
         Row("arithmetic_mean_roughness_flank_iso_4287_1997", "mum", "roughness_Ra_um"),
         Row("averaged_peak_to_valley_height_root", "mum", "root_roughness_Rz_um"),
         Row("mean_peak_to_valley_roughness_root_iso_4287_1997", "mum", "root_roughness_Rz_um"),
-        Row("arithmetic_average_roughness_root", "mum", "root_roughness_Ra_um"),
-        Row("arithmetic_mean_roughness_root_iso_4287_1997", "mum", "root_roughness_Ra_um"),
+        Row("arithmetic_average_roughness_root", "mum", "root_roughness_Rz_um", scale=6.0),
+        Row("arithmetic_mean_roughness_root_iso_4287_1997", "mum", "root_roughness_Rz_um", scale=6.0),
     ),
     "tolerance class": (
         Row("tolerance_class_according_to_iso_1328_2013", key="tolerance_class"),

@@ -144,13 +144,7 @@ class Component:
         return attribute is not None and attribute.value not in ("", ())
 
     def quantity(self, key: str, unit: str = "") -> float | None:
-        """Finite number in a unit, by default that of `UNITS`; None if the file has no value.
-
-        Raises
-        ------
-        RexsError
-            The value is not a number, or its unit is of another quantity.
-        """
+        """Finite number in a unit, by default that of `UNITS`; None if the file has no value."""
         attribute = self._attribute(key)
         if attribute is None or not self.given(key):
             return None

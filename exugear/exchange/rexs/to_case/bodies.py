@@ -134,13 +134,7 @@ def ends(model: Model, connection: Component) -> tuple[Component, Component] | N
 
 
 def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
-    """Group components into bodies.
-
-    Raises
-    ------
-    RexsError
-        Planets are not equal, or their carrier is not defined.
-    """
+    """Group components into bodies."""
     union = _joined(model, notes)
     held = held_by_speed(model)
     groups: dict[int, list[Component]] = {}

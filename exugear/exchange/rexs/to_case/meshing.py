@@ -126,13 +126,7 @@ def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
 
 
 def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
-    """Complete the profile shifts that a file omits for one or both gears of a pair, from the centre distance.
-
-    Raises
-    ------
-    RexsError
-        Shifts and centre distance contradict each other.
-    """
+    """Complete the profile shifts that a file omits for one or both gears of a pair, from the centre distance."""
     solved = _solved(gears, stages)
     wrong = [stage for stage in stages if _contradicts_distance(solved, stage)]
     for replaced in (_zeros_with_followers(gears, stages, wrong, notes), _replaceable(gears, stages, wrong, notes)):

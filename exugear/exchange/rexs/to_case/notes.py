@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -54,18 +55,27 @@ def assumed(value: Any, source: str) -> Entry:
     return Entry(value, source, ASSUMED)
 
 
-def entries_of(part: Component | None, rows: Sequence[Row], zeros: bool = False) -> dict[str, Entry]:
-    """Entries of those attributes that a component has, by key; the first one counts if several have one key.
+def entries_of(
+    rows: Sequence[Row],
+    *parts: Component | None,
+    zeros: bool = False,
+    limits: tuple[float, float] = (-math.inf, math.inf),
+) -> dict[str, Entry]:
+    """Entries of those attributes that components have, by key; the first row and the first component have priority.
 
     Parameters
     ----------
     zeros : whether zero is a value, too; it otherwise counts as missing
+    limits : range outside of which a value is ignored
     """
     entries: dict[str, Entry] = {}
     for row in rows:
-        value = part.quantity(row.attribute) if part else None
-        if value or (zeros and value is not None):
-            entries.setdefault(row.key, read(tidy(row.factor * value), row.attribute))
+        if row.key in entries:
+            continue
+        found = (part.quantity(row.attribute) for part in parts if part is not None)
+        value = next((row.factor * one for one in found if one or (zeros and one is not None)), None)
+        if value is not None and limits[0] <= value <= limits[1]:
+            entries[row.key] = read(tidy(value), row.attribute)
     return entries
 
 

@@ -224,7 +224,7 @@ def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:
         found = {"arrangement": read("tandem", source), "locates_towards": read(towards, source)}
     else:
         return {}
-    found |= entries_of(part, READ["row distance"])
+    found |= entries_of(READ["row distance"], part)
     preload = part.quantity("preload_distance")
     play = part.quantity("operating_axial_bearing_clearance")
     if found["arrangement"].value != "tandem" and (preload or play):
@@ -246,7 +246,7 @@ def _rib_stiffness(part: Component, catalogue: Mapping[str, Entry]) -> dict[str,
 
 def _sizes(part: Component, kind: str | None, notes: Notes) -> dict[str, Entry]:
     """Boundary dimensions from the file, or else from the designation; empty if neither defines them."""
-    given = entries_of(part, READ["bearing size"])
+    given = entries_of(READ["bearing size"], part)
     if len(given) == len(READ["bearing size"]):
         return given
     boundary = boundary_of(_designation(part))
@@ -288,8 +288,8 @@ def _catalogue(
     if row is not None:
         entries |= _elements(model, row, kind, notes)
     entries |= arrangement
-    entries |= entries_of(part, READ["clearance"])
-    entries |= entries_of(part, READ["axial rating"] if kind == "thrust_spherical_roller" else READ["radial rating"])
+    entries |= entries_of(READ["clearance"], part)
+    entries |= entries_of(READ["axial rating"] if kind == "thrust_spherical_roller" else READ["radial rating"], part)
     limit, static = (entries.get(key) for key in ("fatigue_load_limit_kN", "static_rating_kN"))
     if limit is not None and static is not None and limit.value >= static.value:
         notes.changed.append(
@@ -326,10 +326,10 @@ def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str
     if count:
         entries["element_count"] = read(count, "number_of_rolling_elements")
     element = next(iter(model.parts_of(row, "rolling_element")), None)
-    entries |= entries_of(element, READ["rolling element"])
+    entries |= entries_of(READ["rolling element"], element)
     if kind not in TYPES_OF_KEYS["element_length_mm"][0]:
         entries.pop("element_length_mm", None)
-    entries |= entries_of(row, READ["bearing row"])
+    entries |= entries_of(READ["bearing row"], row)
     diameter, pitch = (entries.get(key) for key in ("element_diameter_mm", "pitch_diameter_mm"))
     if count and diameter is not None and pitch is not None and 0.0 < diameter.value < pitch.value:
         most = int(math.pi / math.asin(diameter.value / pitch.value))

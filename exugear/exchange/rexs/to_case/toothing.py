@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from exugear.exchange.rexs.mapping import READ
 from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, entries_of, needed, read, tidy, within
@@ -82,11 +82,10 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         A value is missing, or left and right flanks differ.
     """
     internal = gear.type == "ring_gear"
-    module = _length(gear, "normal_module")
+    module = _required(gear, "normal_module", LENGTHS)
     flank = _flank(model, gear)
     steps = _steps(model, gear)
     tool = _root_tool(steps, internal)
-    chamfer = (flank.quantity("tooth_tip_chamfer") if flank else None) or 0.0
     angle = _pressure_angle(gear, flank)
     helix = _helix_angle(gear, mates)
     allowances = _allowances(gear, math.radians(angle.value), math.radians(helix.value), internal)
@@ -96,32 +95,33 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
     return Toothing(
         part=gear,
         teeth=teeth,
-        module=read(tidy(module), "normal_module"),
+        module=module,
         pressure_angle=angle,
         helix_angle=helix,
-        face_width=read(_length(gear, "face_width"), "face_width"),
+        face_width=_required(gear, "face_width", LENGTHS),
         shift=_shift(flank, internal),
-        tip=_tip(gear, teeth * module, notes),
+        tip=_tip(gear, teeth * module.value, notes),
         root=_diameter(gear, "root_diameter"),
         dedendum=_tool_factor(tool, internal, "addendum_coefficient_reference_profile", 1.25),
         tip_radius=_rounded(_tool_factor(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
-        thinning=_thinning(gear, module, allowances, math.radians(helix.value)),
+        thinning=_thinning(gear, module.value, allowances, math.radians(helix.value)),
         allowances=allowances,
-        cutter=_cutter(gear, tool, module) if internal else None,
-        chamfer=_chamfer(gear, chamfer),
+        cutter=_cutter(gear, tool, module.value) if internal else None,
+        chamfer=_chamfer(gear, flank),
         root_form=_diameter(gear, "root_form_diameter"),
-        tools=() if internal else tuple(_racks(steps, module)),
+        tools=() if internal else tuple(_racks(steps, module.value)),
         internal=internal,
     )
 
 
-def _length(gear: Component, key: str) -> float:
-    """Return a required length of a gear, mm."""
-    return within(needed(gear.quantity(key), gear, key), gear, key, *LENGTHS)
+def _required(part: Component, key: str, limits: tuple[float, float]) -> Entry:
+    """Return a required value, which must be possible for a gear."""
+    return read(tidy(within(needed(part.quantity(key), part, key), part, key, *limits)), key)
 
 
-def _chamfer(gear: Component, stated: float) -> float:
+def _chamfer(gear: Component, flank: Component | None) -> float:
     """Height of the tip chamfer, mm: specified, or from the tip form diameter."""
+    stated = (flank.quantity("tooth_tip_chamfer") if flank else None) or 0.0
     tip = gear.quantity("tip_diameter")
     form = gear.quantity("tip_form_diameter")
     if stated or not tip or not form:
@@ -196,9 +196,8 @@ def _racks(steps: Sequence[tuple[Component, Component | None]], module: float) -
 def _pressure_angle(gear: Component, flank: Component | None) -> Entry:
     key = "normal_pressure_angle"
     for part in (flank, gear):
-        value = part.quantity(key) if part else None
-        if part is not None and value is not None:
-            return read(tidy(within(value, part, key, *PRESSURE_ANGLES)), f"{key} of the flank")
+        if part is not None and part.quantity(key) is not None:
+            return replace(_required(part, key, PRESSURE_ANGLES), source=f"{key} of the flank")
     return assumed(20.0, "not in the file")
 
 
@@ -206,13 +205,9 @@ def _helix_angle(gear: Component, mates: Sequence[Component]) -> Entry:
     """Helix angle, right hand positive; for a ring gear from its mating gears, since programs differ in its sign."""
     key = "helix_angle_reference_diameter"
     if gear.type == "ring_gear" and mates:
-        angle = _helix(mates[0], key)
-        return read(tidy(angle), f"{key}, with the hand of {mates[0]}, as internal pairs have")
-    return read(tidy(_helix(gear, key)), key)
-
-
-def _helix(gear: Component, key: str) -> float:
-    return within(needed(gear.quantity(key), gear, key), gear, key, *HELIX_ANGLES)
+        angle = _required(mates[0], key, HELIX_ANGLES)
+        return replace(angle, source=f"{key}, with the hand of {mates[0]}, as internal pairs have")
+    return _required(gear, key, HELIX_ANGLES)
 
 
 def _shift(flank: Component | None, internal: bool) -> Entry | None:
@@ -324,7 +319,7 @@ def material_table(material: Component | None) -> Entry | None:
     """Inline table of a material with its specified values; None if it represents a rigid body."""
     if material is None or is_rigid(material):
         return None
-    values = {key: entry.value for key, entry in entries_of(material, READ["material"], zeros=True).items()}
+    values = {key: entry.value for key, entry in entries_of(READ["material"], material, zeros=True).items()}
     if values:
         return read(values, str(material))
     return None
