@@ -139,9 +139,11 @@ READ: Mapping[str, Sequence[Row]] = {
     ),
     "clearance": (Row("operating_radial_bearing_clearance", "mm", "radial_clearance_mm", older="radial_backlash"),),
     "row distance": (Row("distance_between_bearing_rows", "mm", "row_distance_mm"),),
-    "bearing": (
-        Row("operating_axial_bearing_clearance", "mm", older="axial_backlash"),
+    "preload": (
         Row("preload_distance", "mm", "axial_preload_um"),
+        Row("operating_axial_bearing_clearance", "mm", "axial_preload_um", "axial_backlash", -1.0),
+    ),
+    "bearing": (
         Row("pressure_angle", "deg", "contact_angle_deg"),
         Row("u_coordinate_on_shaft_inner_side", "mm"),
         Row("u_coordinate_on_shaft_outer_side", "mm"),
@@ -227,14 +229,10 @@ RESULTS: Mapping[str, Result] = {
     "axial_pitch": Result("mm", {(1, 1): "axial_pitch"}),
     "normal_tooth_thickness": Result(
         "mm",
-        {
-            (1, 2): "normal_tooth_thickness_at_pitch_diameter",
-            (1, 5): "normal_tooth_thickness_at_reference_diameter",
-        },
+        {(1, 2): "normal_tooth_thickness_at_pitch_diameter", (1, 5): "normal_tooth_thickness_at_reference_diameter"},
     ),
     "transverse_tooth_thickness": Result(
-        "mm",
-        {(1, 2): "tooth_thickness_at_pitch_diameter", (1, 5): "transverse_tooth_thickness_at_reference_diameter"},
+        "mm", {(1, 2): "tooth_thickness_at_pitch_diameter", (1, 5): "transverse_tooth_thickness_at_reference_diameter"}
     ),
     "normal_tooth_thickness_at_tip_diameter": Result("mm", {(1, 5): "normal_tooth_thickness_at_tip_diameter"}),
     "root_form_diameter": Result("mm", {(1, 2): "root_form_diameter"}),
@@ -264,8 +262,7 @@ RESULTS: Mapping[str, Result] = {
     "length_of_path_of_contact": Result("mm", {(1, 3): "length_of_path_of_contact"}),
     "transverse_backlash": Result("mm"),
     "tangential_force_at_base_circle": Result(
-        "N",
-        {(1, 3): "nominal_tangential_force_at_base_circle", (2, 0): "nominal_tangential_force_at_base_diameter"},
+        "N", {(1, 3): "nominal_tangential_force_at_base_circle", (2, 0): "nominal_tangential_force_at_base_diameter"}
     ),
     "face_load_factor": Result("none", {(1, 1): "face_load_factor_flank", (2, 0): "face_load_factor_contact_stress"}),
     "mesh_stiffness": Result("N / mm", {(1, 5): "meshing_stiffness_characteristic"}),

@@ -52,13 +52,7 @@ def unit_in(unit: str, version: tuple[int, int]) -> str:
 def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, float]]:
     """Yield entries of a bearing's stiffness: name, row and column over (u, v, w) and rotations, unit, SI to unit."""
     forces = (("f_u", 0), ("f_v", 1), ("f_w", 2), ("m_v", 4), ("m_w", 5))
-    motions = (
-        ("d_u", 0),
-        ("d_v", 1),
-        ("d_w", 2),
-        ("rot_v", 4),
-        ("rot_w", 5),
-    )
+    motions = (("d_u", 0), ("d_v", 1), ("d_w", 2), ("rot_v", 4), ("rot_w", 5))
     for force, row in forces:
         for motion, column in motions:
             turned = row > 3, column > 3

@@ -63,13 +63,9 @@ from exugear.exchange.rexs.to_case.shafts import (
     seat_diameter,
     sections_of,
 )
-from exugear.exchange.rexs.to_case.supports import (
-    bearing_blocks,
-    coupling_blocks,
-    joint_blocks,
-)
+from exugear.exchange.rexs.to_case.supports import bearing_blocks, coupling_blocks, joint_blocks
 from exugear.exchange.rexs.to_case.toothing import is_rigid, material_of, material_table
-from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
+from exugear.exchange.rexs.tree import Model, RexsError, plain
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.system.readiness import check_parts
@@ -111,24 +107,18 @@ def levelled_under_seats(
     }
 
 
-def body_blocks(
-    model: Model,
-    places: Places,
-    bodies: Bodies,
-    teeth: Teeth,
-    sections: Mapping[str, Sequence[Cylinder]],
-    notes: Notes,
-) -> dict[str, Block]:
-    """Tables of all bodies by name."""
-    blocks = {}
-    for body in bodies.members:
-        with notes.faults.gathered():
-            blocks[body.name] = _block(model, places, body, teeth, sections[body.name], notes)
-    return blocks
-
-
-def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Sequence[Cylinder], notes: Notes) -> Block:
-    block = Block(", ".join(str(part) for part in body.parts), _place(body))
+def _body_block(
+    model: Model, places: Places, body: Body, teeth: Teeth, sections: Sequence[Cylinder], notes: Notes
+) -> Block:
+    """Table of a body with its inertia and shape."""
+    block = Block(", ".join(str(part) for part in body.parts))
+    if body.carrier:
+        block.entries["carrier"] = Entry(body.carrier)
+        block.entries["orbit_radius_mm"] = read(body.orbit, "support_vector of the planet shafts")
+        angles = [tidy(round(angle, 6)) for angle in body.angles]
+        block.entries["planet_angles_deg"] = read(angles, "support_vector")
+    else:
+        block.entries["axis_position_mm"] = read([*body.axis], "support_vector")
     wheels = [number for number, owner in teeth.bodies.items() if owner is body]
     if wheels:
         z = {teeth.names[number]: teeth.z[number] for number in wheels}
@@ -170,16 +160,6 @@ def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Seq
         if blanks:
             block.blocks["shape.blanks"] = Block("gears as hollow cylinders from seat to reference diameter", blanks)
     return block
-
-
-def _place(body: Body) -> dict[str, Entry]:
-    if not body.carrier:
-        return {"axis_position_mm": read([*body.axis], "support_vector")}
-    return {
-        "carrier": Entry(body.carrier),
-        "orbit_radius_mm": read(body.orbit, "support_vector of the planet shafts"),
-        "planet_angles_deg": read([tidy(round(angle, 6)) for angle in body.angles], "support_vector"),
-    }
 
 
 def _mass_entries(pieces: Sequence[Cylinder]) -> dict[str, float]:
@@ -303,7 +283,10 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
         The model cannot be imported; the reasons are one sentence each.
     """
     notes = Notes(rules or Rules())
-    model = _without_splines_as_stages(model)
+    # Some programs pair shaft and hub of a spline like the gears of a stage; the spline itself states what it connects.
+    splines = {part.number for part in model.components_of_type(*JOINING)}
+    relations = (one for one in model.relations if one.type != "stage" or one.roles.get("stage") not in splines)
+    model = dataclasses.replace(model, relations=tuple(relations))
     _refuse_types(model, notes)
     _refuse_misplaced(model, notes)
     notes.faults.tell()
@@ -315,7 +298,9 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     gearbox = draft.checked(draft.text(source, {}), path)
     ratio = gearbox.train.ratio
     cases = load_case_blocks(draft.loads, draft.ends, static, ratio)
-    life = life_blocks(model, draft.loads, draft.ends, ratio, draft.rated_gears())
+    met = [number for stage in draft.teeth.stages.values() for number in (stage.pinion, stage.gear)]
+    gears = {name: (model.components[number], met.count(number) > 1) for number, name in draft.teeth.names.items()}
+    life = life_blocks(model, draft.loads, draft.ends, ratio, gears)
     draft.settings |= life.blocks
     _compare_speeds(gearbox, draft.loads, draft.ends, notes)
     notes.faults.tell()
@@ -325,16 +310,6 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     changed, lost, checked = (tuple(dict.fromkeys(lines)) for lines in (notes.changed, notes.lost, notes.checked))
     ignored = (*lost, *notes.ignored)
     return Imported(text, gearbox, changed, ignored, lost, checked, draft.found, life.spectrum)
-
-
-def _without_splines_as_stages(model: Model) -> Model:
-    """Remove relations that pair shaft and hub of a spline like the gears of a stage.
-
-    The spline connection itself specifies the connected parts.
-    """
-    splines = {part.number for part in model.components_of_type(*JOINING)}
-    relations = tuple(one for one in model.relations if one.type != "stage" or one.roles.get("stage") not in splines)
-    return dataclasses.replace(model, relations=relations)
 
 
 def _refuse_types(model: Model, notes: Notes) -> None:
@@ -375,20 +350,25 @@ class _Draft:
         self.loads = loads_of(model, places, bodies, notes)
         self.ends = ends_of(model, bodies, self.loads, meshes_of_bodies(self.teeth))
         self.static = static_load(self.loads, self.ends)
+        gears = gear_blocks(model, self.teeth, sections, notes)
+        body_blocks = {}
+        for body in bodies.members:
+            with notes.faults.gathered():
+                body_blocks[body.name] = _body_block(model, places, body, self.teeth, sections[body.name], notes)
+        joints = joint_blocks(bodies, bearings, gear_places(self.teeth, bodies))
         self.groups = [
-            ("gears", _named("gears", gear_blocks(model, self.teeth, sections, notes))),
+            ("gears", _named("gears", gears)),
             ("pairs", _named("pairs", pair_blocks(self.teeth))),
-            ("bodies", _named("bodies", body_blocks(model, places, bodies, self.teeth, sections, notes))),
+            ("bodies", _named("bodies", body_blocks)),
             ("meshes", _named("meshes", mesh_blocks(self.teeth))),
             ("forces on bodies", _named("forces", force_blocks(self.loads, self.ends, notes))),
             ("couplings", _named("couplings", coupling_blocks(model, bodies, bearings))),
-            (
-                "variant `rigid`: ideal joints",
-                _named("joints", joint_blocks(bodies, bearings, gear_places(self.teeth, bodies))),
-            ),
+            ("variant `rigid`: ideal joints", _named("joints", joints)),
             ("variants `bushing` and `flexible`: bearings", _named("bearings", bearings)),
         ]
-        self.settings = _settings(model, places, self.ends, self.static, self._output_gear())
+        at_output = (n for n, body in self.teeth.bodies.items() if body.name == self.ends.output)
+        gear = next(at_output, next(iter(self.teeth.names)))
+        self.settings = _settings(model, places, self.ends, self.static, self.teeth.names[gear])
 
     def checked(self, text: str, path: str | Path) -> Gearbox:
         """Read the gearbox file and build its parts; errors name the REXS components concerned.
@@ -403,9 +383,8 @@ class _Draft:
             gearbox = Gearbox.from_dict(content, str(path))
             check_parts(gearbox)
         except GearboxFileError as error:
-            raise RexsError(
-                *(self._with_components(fault.removeprefix(f"{path}: ")) for fault in error.faults)
-            ) from None
+            faults = [self._with_components(fault.removeprefix(f"{path}: ")) for fault in error.faults]
+            raise RexsError(*faults) from None
         return gearbox
 
     def _with_components(self, fault: str) -> str:
@@ -432,17 +411,6 @@ class _Draft:
         for body, reason in reasons.items():
             self.notes.changed.append(f"bodies.{body}: also rigid in the variant flexible: {reason}")
             blocks[f"bodies.{body}"].entries["flexibility"] = assumed("none", "its sections define no seats, see above")
-
-    def rated_gears(self) -> dict[str, tuple[Component, bool]]:
-        """Gears by name, and whether their teeth are loaded in reversed bending, as with several mating gears."""
-        met = [number for stage in self.teeth.stages.values() for number in (stage.pinion, stage.gear)]
-        return {name: (self.model.components[n], met.count(n) > 1) for n, name in self.teeth.names.items()}
-
-    def _output_gear(self) -> str:
-        for number, body in self.teeth.bodies.items():
-            if body.name == self.ends.output:
-                return self.teeth.names[number]
-        return next(iter(self.teeth.names.values()))
 
     def text(self, source: str, cases: Mapping[str, Block]) -> str:
         if not cases:
@@ -485,10 +453,7 @@ def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str
         ),
         "damping": Block(
             "percent of critical damping; measured gearboxes have 1 to 4",
-            {
-                "modal_percent": assumed(2.0, "usual value"),
-                "modal_band_percent": assumed([1.0, 4.0], "usual range"),
-            },
+            {"modal_percent": assumed(2.0, "usual value"), "modal_band_percent": assumed([1.0, 4.0], "usual range")},
         ),
     }
     for unit in model.components_of_type("gear_unit")[:1]:

@@ -10,17 +10,7 @@ import numpy as np
 
 from exugear.exchange.rexs.mapping import READ
 from exugear.exchange.rexs.to_case.bodies import Bodies, Body
-from exugear.exchange.rexs.to_case.notes import (
-    Block,
-    Entry,
-    Notes,
-    Places,
-    assumed,
-    derived,
-    entries_of,
-    read,
-    tidy,
-)
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, entries_of, read, tidy
 from exugear.exchange.rexs.to_case.toothing import material_of
 from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, RexsError
 from exugear.gearbox.units import RPM

@@ -16,17 +16,7 @@ from exugear.exchange.rexs.to_case.bodies import (
     is_rigid_in_torsion,
     torsional_stiffness,
 )
-from exugear.exchange.rexs.to_case.notes import (
-    Block,
-    Entry,
-    Notes,
-    Places,
-    assumed,
-    derived,
-    entries_of,
-    read,
-    tidy,
-)
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, entries_of, read, tidy
 from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
 from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS
 from exugear.gearbox.units import MM
@@ -220,16 +210,12 @@ def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:
     if held in (["negative", "positive"], ["positive", "negative"]):
         found = {"arrangement": read("X" if held[0] == "negative" else "O", source)}
     elif held in (["positive", "positive"], ["negative", "negative"]):
-        towards = "+z" if (held[0] == "positive") == (sense > 0) else "-z"
-        found = {"arrangement": read("tandem", source), "locates_towards": read(towards, source)}
+        found = {"arrangement": read("tandem", source), "locates_towards": read(_direction(held[0], sense), source)}
     else:
         return {}
     found |= entries_of(READ["row distance"], part)
-    preload = part.quantity("preload_distance")
-    play = part.quantity("operating_axial_bearing_clearance")
-    if found["arrangement"].value != "tandem" and (preload or play):
-        key = "preload_distance" if preload else "operating_axial_bearing_clearance"
-        found["axial_preload_um"] = read(tidy(1e3 * (preload or -(play or 0.0))), key)
+    if found["arrangement"].value != "tandem":
+        found |= entries_of(READ["preload"], part)
     return found
 
 
@@ -304,19 +290,24 @@ def _catalogue(
 def _note_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry], notes: Notes) -> None:
     """Add the axial locating direction of a bearing, or a note if the model of its type locates in both directions."""
     absorbed = part.text("axial_force_absorption")
-    if kind in TYPES_OF_KEYS["locates_towards"][0] and absorbed in ("positive", "negative"):
-        towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
-        entries["locates_towards"] = read(towards, f"axial_force_absorption {absorbed}")
+    one_way = absorbed in ("positive", "negative")
+    towards = read(_direction(absorbed, sense), f"axial_force_absorption {absorbed}")
+    if kind in TYPES_OF_KEYS["locates_towards"][0] and one_way:
+        entries["locates_towards"] = towards
     elif kind in CYLINDERS:
         if absorbed == "both_directions" and not part.quantity("axial_stiffness"):
             entries["ribs"] = read("both", "axial_force_absorption both_directions")
-        elif absorbed in ("positive", "negative"):
-            towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
-            entries["ribs"] = read(towards, f"axial_force_absorption {absorbed}")
-    elif absorbed in ("positive", "negative", "no_direction"):
+        elif one_way:
+            entries["ribs"] = towards
+    elif one_way or absorbed == "no_direction":
         notes.changed.append(
             f"{part}: axial_force_absorption {absorbed}, but the model of a {kind} locates in both directions"
         )
+
+
+def _direction(absorbed: str, sense: int) -> str:
+    """Return the direction along z for one along the u axis, which has a sense."""
+    return "+z" if (absorbed == "positive") == (sense > 0) else "-z"
 
 
 def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
