@@ -184,11 +184,11 @@ READ: Mapping[str, Sequence[Row]] = {
         Row("power", "kW"),
         Row("rotational_speed", "1 / min"),
     ),
-    "lubricant": (
+    "viscosity": (
         Row("viscosity_at_40_degree_celsius", "mm^2 / s", "viscosity_40_mm2_per_s"),
         Row("viscosity_at_100_degree_celsius", "mm^2 / s", "viscosity_100_mm2_per_s"),
-        Row("density_at_15_degree_celsius", "kg / m^3", "density_15_kg_per_m3"),
     ),
+    "oil density": (Row("density_at_15_degree_celsius", "kg / m^3", "density_15_kg_per_m3"),),
     "operation": (
         Row("operating_time_fraction", "%", older="load_duration_fraction"),
         Row("operating_time", "h"),

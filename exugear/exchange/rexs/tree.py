@@ -150,6 +150,19 @@ class Component:
             return None
         return self._number(key, attribute.value) * self._factor(key, attribute, unit or UNITS.get(key, "none"))
 
+    def required(self, key: str) -> float:
+        """Finite number in the unit of `UNITS`.
+
+        Raises
+        ------
+        RexsError
+            The file has no value, or as in `quantity`.
+        """
+        value = self.quantity(key)
+        if value is None:
+            raise RexsError(f"{self}: {key} is missing")
+        return value
+
     def whole(self, key: str) -> int | None:
         """Whole number; None if the file has no value.
 

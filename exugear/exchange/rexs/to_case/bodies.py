@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from exugear.exchange.rexs.mapping import GEARS, JOINING, READ
@@ -142,7 +142,7 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
         groups.setdefault(union.root(part.number), []).append(part)
     working = _working(model, union)
     sets = _planet_sets(model, places, union, groups)
-    planets = {root for members in sets for root, _ in members}
+    planets = {root for _, members in sets for root, _ in members}
     pins = {one.roles["shaft"] for one in model.relations_of("planet_pin") if "shaft" in one.roles}
     names = _names(
         {root: parts for root, parts in groups.items() if root in working - planets}, _carriers(model, union)
@@ -158,14 +158,26 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
         elif root not in planets and not _is_fixed(parts, held):
             notes.lost.append(f"{', '.join(str(part) for part in parts)}: in no mesh, rotates without load")
     by_root = {union.root(part.number): body for body in bodies for part in body.parts}
-    carried = [
-        one for members in sets for one in _split_by_orbit(places, members, _carrier(model, union, by_root, members))
-    ]
+    carried: list[tuple[Body, list[_Planet]]] = []
+    for stage, members in sets:
+        carrier = _carrier(model, union, by_root, stage, members[0][1])
+        carried += [(carrier, orbit) for orbit in _orbits(places, members, carrier.axis)]
     planet_bodies: list[Body] = []
     for number, (carrier, placed) in enumerate(carried):
-        name = _lettered("planet", number, len(carried))
         placed = _order_by_mating_planets(model, groups, placed, planet_bodies)
-        planet_bodies.append(_planet_body(places, carrier, placed, name, groups))
+        first, *others = (tuple(_axial(groups[planet.root])) for planet in placed)
+        x, y, _ = places.position(placed[0].shaft)
+        planet_bodies.append(
+            Body(
+                name=_lettered("planet", number, len(carried)),
+                parts=first,
+                axis=(x, y),
+                others=tuple(others),
+                angles=tuple(planet.angle for planet in placed),
+                orbit=round(placed[0].radius, 6),
+                carrier=carrier.name,
+            )
+        )
     return Bodies([*bodies, *planet_bodies])
 
 
@@ -269,23 +281,23 @@ def _axis(places: Places, parts: Sequence[Component], pins: set[int]) -> tuple[f
 
 def _planet_sets(
     model: Model, places: Places, union: _Union, groups: Mapping[int, list[Component]]
-) -> list[list[tuple[int, Component]]]:
-    """Group the planets into sets of equal ones: (root, shaft) of each."""
-    sets: dict[tuple[object, ...], list[tuple[int, Component]]] = {}
+) -> list[tuple[int, list[tuple[int, Component]]]]:
+    """Group the planets into sets of equal ones: number of the stage, and (root, shaft) of each."""
+    sets: dict[tuple[object, ...], tuple[int, list[tuple[int, Component]]]] = {}
     for relation in model.relations_of("planet_shaft"):
         if not {"shaft", "planetary_stage"} <= relation.roles.keys() or relation.roles["shaft"] not in union:
             raise RexsError("a relation 'planet_shaft' lacks the shaft or the planetary_stage")
         shaft = model.components[relation.roles["shaft"]]
+        stage = relation.roles["planetary_stage"]
         root = union.root(shaft.number)
         gears = sorted(
             (part.whole("number_of_teeth") or 0, part.quantity("normal_module") or 0.0)
             for part in groups[root]
             if part.type in GEARS
         )
-        if not gears:
-            continue
-        key = (relation.roles.get("planetary_stage"), *gears, places.position(shaft)[2])
-        sets.setdefault(key, []).append((root, shaft))
+        if gears:
+            key = (stage, *gears, places.position(shaft)[2])
+            sets.setdefault(key, (stage, []))[1].append((root, shaft))
     return list(sets.values())
 
 
@@ -299,37 +311,29 @@ class _Planet:
     shaft: Component
 
 
-def _carrier(
-    model: Model, union: _Union, by_root: Mapping[int, Body], members: Sequence[tuple[int, Component]]
-) -> Body:
-    """Carrier of a set of planets."""
-    shaft = members[0][1]
-    stage = next(
-        one.roles["planetary_stage"] for one in model.relations_of("planet_shaft") if one.roles["shaft"] == shaft.number
-    )
+def _carrier(model: Model, union: _Union, by_root: Mapping[int, Body], stage: int, shaft: Component) -> Body:
+    """Carrier of the planets of a stage, of which one has the shaft."""
     held = [
-        one
+        one.number
         for kind in ("planet_carrier_shaft", "planet_pin")
         for one in model.related(kind, "planetary_stage", stage, "shaft")
     ]
-    roots = dict.fromkeys(union.root(one.number) for one in held if one.number in union)
-    carriers = [by_root[root] for root in roots if root in by_root]
-    if not carriers:
+    carriers = (by_root.get(union.root(number)) for number in held if number in union)
+    carrier = next((body for body in carriers if body is not None), None)
+    if carrier is None:
         raise RexsError(
             f"{model.components[stage]}: no planet_carrier_shaft or planet_pin defines the carrier of {shaft}"
         )
-    return carriers[0]
+    return carrier
 
 
-def _split_by_orbit(
-    places: Places, members: Sequence[tuple[int, Component]], carrier: Body
-) -> Iterator[tuple[Body, list[_Planet]]]:
-    """Yield sets of planets at equal distance from the carrier axis, ordered by angle; a Ravigneaux set has two."""
+def _orbits(places: Places, members: Sequence[tuple[int, Component]], axis: tuple[float, float]) -> list[list[_Planet]]:
+    """Return sets of planets at equal distance from the carrier axis, ordered by angle; a Ravigneaux set has two."""
     orbits: list[list[_Planet]] = []
     for root, shaft in members:
         x, y, _ = places.position(shaft)
-        dx = x - carrier.axis[0]
-        dy = y - carrier.axis[1]
+        dx = x - axis[0]
+        dy = y - axis[1]
         angle = round(math.degrees(math.atan2(dy, dx)) % 360.0, 9) % 360.0
         planet = _Planet(angle, math.hypot(dx, dy), root, shaft)
         orbit = next((one for one in orbits if abs(one[0].radius - planet.radius) <= COAXIAL), None)
@@ -337,8 +341,8 @@ def _split_by_orbit(
             orbits.append([planet])
         else:
             orbit.append(planet)
-    for orbit in sorted(orbits, key=lambda one: one[0].radius):
-        yield carrier, sorted(orbit, key=lambda planet: planet.angle)
+    orbits.sort(key=lambda one: one[0].radius)
+    return [sorted(orbit, key=lambda planet: planet.angle) for orbit in orbits]
 
 
 def _order_by_mating_planets(
@@ -358,22 +362,6 @@ def _order_by_mating_planets(
                     return placed[-number:] + placed[:-number]
                 return placed
     return placed
-
-
-def _planet_body(
-    places: Places, carrier: Body, placed: Sequence[_Planet], name: str, groups: Mapping[int, list[Component]]
-) -> Body:
-    parts = [tuple(_axial(groups[planet.root])) for planet in placed]
-    x, y, _ = places.position(placed[0].shaft)
-    return Body(
-        name,
-        parts[0],
-        (x, y),
-        others=tuple(parts[1:]),
-        angles=tuple(planet.angle for planet in placed),
-        orbit=round(placed[0].radius, 6),
-        carrier=carrier.name,
-    )
 
 
 def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[int, str]:

@@ -367,24 +367,22 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
 
 def _lubricant(model: Model) -> Block | None:
     """Section on the oil if the file specifies its viscosity at both temperatures; for several oils, the thinnest."""
-    oils = [entries_of(READ["lubricant"], oil) for oil in model.components_of_type("lubricant")]
-    cold_key = "viscosity_40_mm2_per_s"
-    hot_key = "viscosity_100_mm2_per_s"
-    oils = [oil for oil in oils if cold_key in oil and hot_key in oil and oil[hot_key].value < oil[cold_key].value]
+    cold = "viscosity_40_mm2_per_s"
+    hot = "viscosity_100_mm2_per_s"
+    oils = [(entries_of(READ["viscosity"], oil), oil) for oil in model.components_of_type("lubricant")]
+    oils = [(stated, oil) for stated, oil in oils if len(stated) == 2 and stated[hot].value < stated[cold].value]
     if not oils:
         return None
-    oil = min(oils, key=lambda one: one[cold_key].value)
-    oil[cold_key] = replace(oil[cold_key], source=f"{oil[cold_key].source} of the lubricant")
-    density = oil.get("density_15_kg_per_m3")
-    if density is not None and not DENSITIES[0] <= density.value <= DENSITIES[1]:
-        del oil["density_15_kg_per_m3"]
+    entries, oil = min(oils, key=lambda one: one[0][cold].value)
+    entries[cold] = replace(entries[cold], source=f"{entries[cold].source} of the lubricant")
+    entries |= entries_of(READ["oil density"], oil, limits=DENSITIES)
     casings = model.components_of_type("gear_casing")
-    stated = [_changed(casings, changes) for changes in ({}, *(case.changes for case in model.load_cases))]
-    temperatures = [casing.quantity("temperature_lubricant") for parts in stated for casing in parts]
+    changes = ({}, *(case.changes for case in model.load_cases))
+    temperatures = [one.quantity("temperature_lubricant") for each in changes for one in _changed(casings, each)]
     hottest = max((t for t in temperatures if t is not None), default=math.nan)
     if TEMPERATURES[0] <= hottest <= TEMPERATURES[1]:
-        oil["temperature_C"] = read(tidy(hottest), "temperature_lubricant of the casing (hottest load case)")
-    return Block("", oil)
+        entries["temperature_C"] = read(tidy(hottest), "temperature_lubricant of the casing (hottest load case)")
+    return Block("", entries)
 
 
 def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:

@@ -15,11 +15,13 @@ from exugear.exchange.rexs.mapping import IMPORTED_MODIFICATIONS, MODIFICATIONS,
 from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, derived, read, tidy
 from exugear.exchange.rexs.to_case.toothing import EQUAL, Tool, Toothing
 from exugear.exchange.rexs.tree import Component, Model, RexsError
+from exugear.gearbox.gear_parts import pinion_cutter
+from exugear.gearbox.sections.gears import CutterSection
 from exugear.gearbox.units import MM
 from fe_ste.geometry import pair_relations
 from fe_ste.geometry.checks import GeometryError, check_gear
 from fe_ste.geometry.gear_relations import BasicRack, GearInputs
-from fe_ste.geometry.involute import PinionCutter, involute
+from fe_ste.geometry.involute import involute
 from fe_ste.geometry.pair_relations import UncheckedPair
 
 SHIFT_TOLERANCE = 1e-3
@@ -133,7 +135,12 @@ def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: N
         again = _reopened(gears, stages, replaced)
         if replaced and not any(_contradicts_distance(again, stage) for stage in stages):
             solved = again
-            notes.changed += [_replacement(gears[number], again[number]) for number in replaced]
+            for before, after in ((gears[number], again[number]) for number in replaced):
+                assert before.shift is not None and after.shift is not None
+                notes.changed.append(
+                    f"{before.part}: addendum_modification_coefficient = {before.shift.value:g} contradicts the centre "
+                    f"distances and is treated as missing: {after.shift.value:.6f} for zero backlash"
+                )
             break
     for stage in stages:
         with notes.faults.gathered():
@@ -176,8 +183,8 @@ def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int,
     solved = dict(gears)
     open_stages = list(stages)
     while open_stages:
-        ready = [open_stage for open_stage in open_stages if _given(solved, open_stage)] or open_stages[:1]
-        for stage in ready:
+        ready = [one for one in open_stages if solved[one.pinion].shift or solved[one.gear].shift]
+        for stage in ready or open_stages[:1]:
             open_stages.remove(stage)
             _complete(solved, stage)
     return solved
@@ -216,18 +223,6 @@ def _replaceable(
         elif notes.rules.shifts == "centre-distance":
             found += zeros or free[:1]
     return list(dict.fromkeys(found))
-
-
-def _replacement(before: Toothing, after: Toothing) -> str:
-    assert before.shift is not None and after.shift is not None
-    return (
-        f"{before.part}: addendum_modification_coefficient = {before.shift.value:g} contradicts the centre distances "
-        f"and is treated as missing: {after.shift.value:.6f} for zero backlash"
-    )
-
-
-def _given(gears: Mapping[int, Toothing], stage: Stage) -> bool:
-    return gears[stage.pinion].shift is not None or gears[stage.gear].shift is not None
 
 
 def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
@@ -345,6 +340,7 @@ def _relative_to_mating_rack(mate: Toothing, gear: Toothing) -> Toothing:
 
 def unchecked(name: str, gear: Toothing) -> GearInputs:
     """Build the gear with its geometric relations."""
+    cutter = CutterSection.model_construct(**gear.cutter.value) if gear.cutter else None
     plain = GearInputs(
         name=name,
         teeth=gear.teeth,
@@ -360,23 +356,11 @@ def unchecked(name: str, gear: Toothing) -> GearInputs:
         root_diameter=MM * gear.root.value if gear.root else None,
         tooth_thinning=MM * gear.thinning.value,
         root_form_diameter=MM * gear.root_form.value if gear.root_form else None,
-        cutter=_cutter(gear),
+        cutter=pinion_cutter(cutter, gear.module.value, gear.helix_angle.value),
     )
     if not gear.chamfer:
         return plain
     return dataclasses.replace(plain, tip_form_diameter=2.0 * (plain.tip_radius - MM * plain.outward * gear.chamfer))
-
-
-def _cutter(gear: Toothing) -> PinionCutter | None:
-    """Build the cutter of a ring gear."""
-    if gear.cutter is None:
-        return None
-    given = gear.cutter.value
-    tip = gear.cutter.value.get("tip_diameter_mm")
-    if "addendum" in given:
-        reference = given["teeth"] / math.cos(math.radians(gear.helix_angle.value))
-        tip = gear.module.value * (reference + 2.0 * (given["profile_shift"] + given["addendum"]))
-    return PinionCutter(given["teeth"], given["tip_radius"], given["profile_shift"], None if tip is None else MM * tip)
 
 
 @contextmanager

@@ -119,32 +119,6 @@ def tidy(value: float) -> float:
     return float(f"{value:.12g}") + 0.0
 
 
-def needed(value: float | None, part: object, key: str) -> float:
-    """Return a value, or raise an error if it is missing.
-
-    Raises
-    ------
-    RexsError
-        The value is None.
-    """
-    if value is None:
-        raise RexsError(f"{part}: {key} is missing")
-    return value
-
-
-def within(value: float, part: object, key: str, low: float, high: float) -> float:
-    """Return a value, or raise an error if it is impossible for a gear.
-
-    Raises
-    ------
-    RexsError
-        The value is below `low` or above `high`.
-    """
-    if not low <= value <= high:
-        raise RexsError(f"{part}: {key} = {value:g} is impossible; expected {low:g} to {high:g}")
-    return value
-
-
 @dataclass
 class Block:
     """Table of the gearbox file with its entries and the tables inside it."""

@@ -8,9 +8,8 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from exugear.exchange.rexs.mapping import READ
 from exugear.exchange.rexs.to_case.bodies import Body
-from exugear.exchange.rexs.to_case.notes import Notes, Places, needed, tidy
+from exugear.exchange.rexs.to_case.notes import Notes, Places, tidy
 from exugear.exchange.rexs.to_case.toothing import Toothing, is_rigid, material_of
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 from exugear.gearbox.units import MM
@@ -101,13 +100,13 @@ def sections_of(model: Model, places: Places, shaft: Component, body: Body, note
         if not section.attributes:
             notes.ignored.append(f"{section}: has no values")
             continue
-        start, length, begin, end, bore, bore_end = (section.quantity(row.attribute) for row in READ["section"])
-        if start is None and len(sections) == 1:
-            start = 0.0
-        start = needed(start, section, "u_coordinate_on_shaft")
-        length = needed(length, section, "length")
-        begin = needed(begin, section, "outer_diameter_begin")
-        bore = bore or 0.0
+        alone = len(sections) == 1 and not section.given("u_coordinate_on_shaft")
+        start = 0.0 if alone else section.required("u_coordinate_on_shaft")
+        length = section.required("length")
+        begin = section.required("outer_diameter_begin")
+        end = section.quantity("outer_diameter_end")
+        bore = section.quantity("inner_diameter_begin") or 0.0
+        bore_end = section.quantity("inner_diameter_end")
         outers = (begin, begin if end is None else end)
         inners = (bore, bore if bore_end is None else bore_end)
         if length <= 0.0 or min(outers) <= 0.0 or inners[0] >= outers[0] or inners[1] >= outers[1]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from exugear.exchange.rexs.mapping import READ
-from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, entries_of, needed, read, tidy, within
+from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, entries_of, read, tidy
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 
 PLAUSIBLE_TIP = (0.5, 2.0)
@@ -116,7 +116,10 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
 
 def _required(part: Component, key: str, limits: tuple[float, float]) -> Entry:
     """Return a required value, which must be possible for a gear."""
-    return read(tidy(within(needed(part.quantity(key), part, key), part, key, *limits)), key)
+    value = part.required(key)
+    if not limits[0] <= value <= limits[1]:
+        raise RexsError(f"{part}: {key} = {value:g} is impossible; expected {limits[0]:g} to {limits[1]:g}")
+    return read(tidy(value), key)
 
 
 def _chamfer(gear: Component, flank: Component | None) -> float:
