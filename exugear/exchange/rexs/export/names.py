@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
-
-import numpy as np
+from dataclasses import dataclass
 
 from exugear.exchange.rexs.mapping import BEARINGS, GEARS, OWN, RESULTS, Version
 from exugear.exchange.rexs.to_case.bodies import ends
@@ -14,8 +12,8 @@ from exugear.exchange.rexs.to_case.conversion import Found
 from exugear.exchange.rexs.to_case.gear_blocks import Teeth, first_of_planets
 from exugear.exchange.rexs.to_case.notes import Block, Places
 from exugear.exchange.rexs.to_case.supports import PLACE_TOLERANCE
-from exugear.exchange.rexs.tree import Addition, AdditionValue, Component, Model
-from exugear.gearbox.units import MM, unit_of
+from exugear.exchange.rexs.tree import Component, Model
+from exugear.gearbox.units import MM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 
@@ -62,38 +60,6 @@ def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, floa
                 old = motion if motion.startswith("d_") else f"d_{motion[-1]}_rot"
                 end = f"d{force.upper()[0]}_{force[-1]}_{old}"
             yield f"operating_point_stiffness_{end}", row, column, unit, 1e3 if all(turned) else 1.0
-
-
-@dataclass
-class Results(ReprMixin, line=": {additions!n} attributes"):
-    """Attributes collected for a file."""
-
-    version: Version
-    """(int, int) version of REXS."""
-    additions: list[Addition] = field(default_factory=list)
-
-    def put(
-        self, component: int, key: str, value: float | Floats | None, load_case: int | None = None, own: bool = False
-    ) -> None:
-        """Add a result in SI (key of `RESULTS`) under its name in the version, or a custom one; None is skipped.
-
-        Parameters
-        ----------
-        own : whether the name is a custom one although REXS has one
-        """
-        if value is None:
-            return
-        unit = RESULTS[key].unit
-        known = unit_of(unit)
-        scaled = np.asarray(value, dtype=float) / (known.factor if known else 1.0)
-        name = OWN + key if own else name_in(key, self.version)
-        self.put_named(component, name, unit, tuple(scaled.tolist()) if scaled.ndim else float(scaled), load_case)
-
-    def put_named(
-        self, component: int, name: str, unit: str, value: AdditionValue, load_case: int | None = None
-    ) -> None:
-        """Add a result in a unit under a name."""
-        self.additions.append(Addition(component, name, unit_in(unit, self.version), value, load_case))
 
 
 # Components of a REXS file from which the parts of the gearbox file originate, for the export of results
