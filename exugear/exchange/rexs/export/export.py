@@ -312,17 +312,17 @@ def put_static_forces(results: Results) -> None:
     """Add the static mesh forces, which equal planets share evenly."""
     meshes = {mesh.name: mesh for mesh in results.gearbox.meshes}
     for name, force in results.gearbox.train.static_mesh_forces().items():
-        stage = of_instance(results.origins.pairs[meshes[name].pair.name], name, meshes[name].family)
+        stage = member_of(results.origins.pairs[meshes[name].pair.name], name, meshes[name].family)
         if stage is not None:
             results.put(stage, "tangential_force_at_base_circle", abs(force), results.static_case)
 
 
-def of_instance(members: Sequence[Member], name: str, family: str) -> Member | None:
+def member_of(members: Sequence[Member], name: str, family: str) -> Member | None:
     """Return the member of a planet, whose number is in the name of its part; None if there are fewer members.
 
     Examples
     --------
-    >>> of_instance([7, 8, 9], "sun_planet_3", "sun_planet"), of_instance([7], "stage_1", "stage_1")
+    >>> member_of([7, 8, 9], "sun_planet_3", "sun_planet"), member_of([7], "stage_1", "stage_1")
     (9, 7)
     """
     number = name.removeprefix(family).removeprefix("_")
@@ -391,7 +391,7 @@ def put_displacements(results: Results, assembly: Assembly) -> None:
     """Add the displacements of shafts at the static load, in their own axes, at the positions of gears and bearings."""
     q = static_state(assembly).q
     for body in assembly.bodies:
-        members = of_instance(results.origins.bodies.get(body.family, ()), body.name, body.family) or ()
+        members = member_of(results.origins.bodies.get(body.family, ()), body.name, body.family) or ()
         shafts = [n for n in members if n in results.origins.axes and results.model.components[n].type == "shaft"]
         nodes = sorted(_nodes(assembly, q, body), key=lambda node: node[0])
         if len(shafts) != 1 or not nodes or body.fixed:
@@ -435,7 +435,7 @@ def put_bearings(results: Results, duties: Sequence[Mapping[str, Any]]) -> None:
     for duty in duties:
         name = str(duty["bearing"])
         family = families.get(name, name)
-        number = of_instance(results.origins.bearings.get(family, ()), name, family)
+        number = member_of(results.origins.bearings.get(family, ()), name, family)
         if number is None:
             continue
         results.put(number, "radial_load", KN * float(duty["radial_load_kN"]), case)
@@ -479,7 +479,7 @@ def put_runs(results: Results, runs: Mapping[Choice, xr.Dataset]) -> None:
         ending = model_suffix(choice) if case is not None else f"{model_suffix(choice)}_{choice.load_case}"
         for name in data["mesh"].to_numpy().tolist():
             mesh = families[str(name)]
-            stage = of_instance(results.origins.pairs[mesh.pair.name], mesh.name, mesh.family)
+            stage = member_of(results.origins.pairs[mesh.pair.name], mesh.name, mesh.family)
             force = data["mesh_force"].sel(mesh=name)
             for key, value in (("mesh_force_maximum", force.max()), ("mesh_force_mean", force.mean())):
                 if stage is not None and math.isfinite(float(value)):
