@@ -61,10 +61,8 @@ def parsed(content: bytes, path: str | Path) -> Model:
     RexsError
         As in `read_rexs`.
     """
-    try:
+    with _errors_naming(path):
         return parse_model(_member(content)[1])
-    except RexsError as error:
-        raise RexsError(*(f"{path}: {fault}" for fault in error.faults)) from None
 
 
 def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
@@ -92,8 +90,9 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
         if addition.name in named:
             raise RexsError(f"component {number}: two results have the name {addition.name}")
         named[addition.name] = replace(addition, value=rounded(addition.value))
-    member, unpacked = _member(content)
-    new = put_additions(unpacked, placed)
+    with _errors_naming(path):
+        member, unpacked = _member(content)
+        new = put_additions(unpacked, placed)
     if _is_archive(content):
         return _repacked(content, member, new)
     return new
@@ -140,11 +139,18 @@ def _bytes_of(path: str | Path) -> bytes:
             content = file.read(LARGEST + 1)
     except FileError as error:
         raise RexsError(str(error)) from None
-    try:
+    with _errors_naming(path):
         _check_size(len(content))
-    except RexsError as error:
-        raise RexsError(f"{path}: {error}") from None
     return content
+
+
+@contextmanager
+def _errors_naming(path: str | Path) -> Iterator[None]:
+    """Put the path of a file before its errors."""
+    try:
+        yield
+    except RexsError as error:
+        raise RexsError(*(f"{path}: {fault}" for fault in error.faults)) from None
 
 
 def _is_archive(content: bytes) -> bool:

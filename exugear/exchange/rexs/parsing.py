@@ -7,9 +7,9 @@ import binascii
 import codecs
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.parsers import expat
@@ -103,6 +103,7 @@ MOST_ELEMENTS = 500_000
 """Maximum number of elements of an XML file; the largest known file has 20,000."""
 LONGEST_WHOLE = 30
 """Number of digits from which a whole number of JSON is read as a float."""
+TOO_DEEP = "the file is nested far deeper than any REXS file"
 CODES = {"int32": "<i4", "float32": "<f4", "float64": "<f8"}
 """Formats of numbers packed as base64 (since 1.4): little-endian, matrices row by row."""
 _JSON_KINDS: Mapping[type, str] = {str: "string", float: "floating_point", tuple: "floating_point_array"}
@@ -119,33 +120,11 @@ _XML_PATHS = {
 }
 
 
-class Document(Protocol):
-    """A parsed file; its nodes are elements of XML or objects of JSON."""
-
-    model: Any
-    """Node of the whole model."""
-
-    def children(self, node: Any, kind: str) -> Sequence[Any]:
-        """Nodes of a kind (key of `_XML_PATHS`) in a node, in the order of the file."""
-
-    def head(self, node: Any) -> Mapping[str, Any]:
-        """Id, type and similar data of a node."""
-
-    def attributes(self, component: Any) -> Iterator[tuple[str, Attribute]]:
-        """Yield the attributes of a component by the names of the file."""
-
-    def put(self, component: Any, additions: Mapping[str, Addition], depth: int) -> None:
-        """Add attributes to a component at a depth of nesting, or replace those of the same names."""
-
-    def new_change(self, case: Any, component: Any) -> Any:
-        """Add an empty node for a component of the model to a load case."""
-
-    def content(self) -> bytes:
-        """Bytes of the document in its encoding, with its comments."""
-
-
 class _Xml:
-    """Tree of elements, whose names include their prefix; a DOCTYPE and entities are refused."""
+    """Tree of elements, whose names include their prefix; a DOCTYPE and entities are refused.
+
+    `model` is the node of the whole model.
+    """
 
     def __init__(self, content: bytes) -> None:
         self._source = decoded(content)
@@ -188,26 +167,30 @@ class _Xml:
         except expat.ExpatError as error:
             reason = expat.errors.messages.get(error.code, "cannot be parsed")
             raise RexsError(f"not an XML file: {reason} in line {error.lineno}") from None
-        self.model = builder.close()
+        self.model: Any = builder.close()
         self._before = raw[: positions[0]].decode("utf-8")
         if _local(self.model) != "model":
             raise RexsError(f"not a REXS file: the root element is '{plain(_local(self.model))}', not 'model'")
 
-    def children(self, node: Element, kind: str) -> list[Element]:
+    def children(self, node: Element, kind: str) -> list[Any]:
+        """Nodes of a kind (key of `_XML_PATHS`) in a node, in the order of the file."""
         found = [node]
         for tag in _XML_PATHS[kind]:
             found = [child for parent in found for child in parent if _local(child) == tag]
         return found
 
     def head(self, node: Element) -> Mapping[str, Any]:
+        """Id, type and similar data of a node."""
         return node.attrib
 
     def attributes(self, component: Element) -> Iterator[tuple[str, Attribute]]:
+        """Yield the attributes of a component by the names of the file."""
         for node in self.children(component, "attributes"):
             value = next((_xml_value(child) for child in _elements(node)), _text(node))
             yield node.get("id", ""), Attribute(value, node.get("unit", ""))
 
     def put(self, component: Element, additions: Mapping[str, Addition], depth: int) -> None:
+        """Add attributes to a component at a depth of nesting, or replace those of the same names."""
         prefix = component.tag.removesuffix("component")
         there = {node.get("id"): node for node in self.children(component, "attributes")}
         for name, addition in additions.items():
@@ -225,12 +208,14 @@ class _Xml:
             else:
                 _append(component, node, depth + 1)
 
-    def new_change(self, case: Element, component: Element) -> Element:
+    def new_change(self, case: Element, component: Element) -> Any:
+        """Add an empty node for a component of the model to a load case."""
         node = Element(component.tag, component.attrib)
         _append(case, node, 3)
         return node
 
     def content(self) -> bytes:
+        """Bytes of the document in its encoding, with its comments."""
         mark, encoding, source = self._source
         text = self._before + ElementTree.tostring(self.model, encoding="unicode") + self._after
         if " />" not in source:
@@ -275,7 +260,7 @@ def _xml_value(node: Element) -> Value:
 
 
 class _Json:
-    """Tree of objects."""
+    """Tree of objects, with the methods of `_Xml`."""
 
     def __init__(self, content: bytes) -> None:
         self._mark = codecs.BOM_UTF8 if content.startswith(codecs.BOM_UTF8) else b""
@@ -287,12 +272,12 @@ class _Json:
         except json.JSONDecodeError as error:
             raise RexsError(f"not a JSON file: {error.msg} in line {error.lineno}") from None
         except RecursionError:
-            raise RexsError("the file is nested far deeper than any REXS file") from None
-        self.model = _table(_table(self._tree, "the file").get("model"), "model")
+            raise RexsError(TOO_DEEP) from None
+        self.model: Any = _table(_table(self._tree, "the file").get("model"), "model")
         indent = re.search(r"\n([ \t]+)", text)
         self._indent = indent[1] if indent else None
 
-    def children(self, node: Mapping[str, Any], kind: str) -> list[dict[str, Any]]:
+    def children(self, node: Mapping[str, Any], kind: str) -> list[Any]:
         key = _JSON_KEYS.get(kind, kind)
         values = node.get(key) or []
         if kind == "spectra" and not isinstance(values, list):
@@ -318,7 +303,7 @@ class _Json:
         ]
         component["attributes"] = [node for node in nodes if node.get("id") not in additions] + new
 
-    def new_change(self, case: dict[str, Any], component: Mapping[str, Any]) -> dict[str, Any]:
+    def new_change(self, case: dict[str, Any], component: Mapping[str, Any]) -> Any:
         node = {key: component[key] for key in ("id", "type", "name") if key in component}
         case["components"] = [*self.children(case, "changes"), node]
         return node
@@ -328,7 +313,9 @@ class _Json:
             text = json.dumps(self._tree, ensure_ascii=False, indent=self._indent, allow_nan=False)
         except ValueError:
             raise RexsError("the file has a number beyond 1e308, which cannot be written; correct it") from None
-        return self._mark + text.encode()
+        except RecursionError:
+            raise RexsError(TOO_DEEP) from None
+        return self._mark + text.encode("utf-8", errors="backslashreplace")
 
 
 def _whole_number(digits: str) -> int | float:
@@ -382,6 +369,9 @@ def _unpacked(code: str, text: str, rows: int | None) -> tuple[Value, ...]:
     if rows < 1 or len(values) % rows:
         raise RexsError(f"a packed matrix of {len(values)} numbers cannot have {rows} rows")
     return tuple(tuple(row) for row in values.reshape(rows, -1).tolist())
+
+
+Document = _Xml | _Json
 
 
 def document_of(content: bytes) -> Document:

@@ -58,15 +58,8 @@ class RexsError(ValueError):
         super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
 
 
-class Faults(ReprMixin, line=": {_found!n}"):
+class Faults(list[str]):
     """Errors collected over several attempts."""
-
-    def __init__(self) -> None:
-        self._found: list[str] = []
-
-    def add(self, sentence: str) -> None:
-        """Add an error."""
-        self._found.append(sentence)
 
     @contextmanager
     def gathered(self) -> Iterator[None]:
@@ -74,7 +67,7 @@ class Faults(ReprMixin, line=": {_found!n}"):
         try:
             yield
         except RexsError as error:
-            self._found += error.faults
+            self.extend(error.faults)
 
     def tell(self) -> None:
         """Raise the collected errors, if any.
@@ -84,8 +77,8 @@ class Faults(ReprMixin, line=": {_found!n}"):
         RexsError
             There are errors; the exception holds all of them.
         """
-        if self._found:
-            raise RexsError(*self._found)
+        if self:
+            raise RexsError(*self)
 
 
 def plain(text: object, longest: int = LONGEST_TEXT) -> str:

@@ -319,10 +319,10 @@ def _refuse_types(model: Model, notes: Notes) -> None:
         parts = [part for part in parts if part.type.endswith(("_gear", "_wheel", "_stage"))]
         if parts:
             names = ", ".join(str(part) for part in parts)
-            notes.faults.add(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
+            notes.faults.append(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
     notes.faults.tell()
     if not any(True for _ in model.relations_of("stage")) or not model.components_of_type(*GEARS):
-        notes.faults.add("the file has no stage of two cylindrical gears; nothing to import")
+        notes.faults.append("the file has no stage of two cylindrical gears; nothing to import")
 
 
 def _refuse_misplaced(model: Model, notes: Notes) -> None:
@@ -331,7 +331,7 @@ def _refuse_misplaced(model: Model, notes: Notes) -> None:
         for role, number in relation.roles.items():
             wanted = TYPES_OF_ROLES.get((relation.type, role))
             if wanted is not None and model.components[number].type not in wanted:
-                notes.faults.add(
+                notes.faults.append(
                     f"a relation '{relation.type}' has {model.components[number]} as {role}; expected a component of "
                     f"type {' or '.join(wanted[:3])}: correct the id"
                 )
@@ -514,7 +514,7 @@ def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes:
                 f"{load.name}: {body} rotates at {speed:.6g} rpm, kinematics result in {rolls:.6g} rpm"
             )
             if abs(rolls - speed) > SPEED_TOLERANCE * max(abs(rolls), abs(speed)):
-                notes.faults.add(
+                notes.faults.append(
                     f"{load.name}: the file has {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
                     f"kinematics result in {rolls:g} rpm"
                 )

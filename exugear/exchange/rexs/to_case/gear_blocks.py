@@ -79,9 +79,9 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
         with notes.faults.gathered():
             gears[number] = toothing_of(model, model.components[number], partners, notes)
     notes.faults.tell()
-    stages = _ordered(model, places, met.values(), gears, notes)
+    stages = _ordered(places, met.values(), gears, notes)
     notes.faults.tell()
-    _check_equal_planets(model, bodies, first, gears, notes)
+    _check_equal_planets(model, first, gears, notes)
     gears = with_equal_racks(gears, stages, notes)
     gears = with_shifts(gears, stages, notes)
     for number, gear in gears.items():
@@ -137,11 +137,7 @@ def _check_direction(places: Places, stage: Component, gears: Sequence[Component
 
 
 def _ordered(
-    model: Model,
-    places: Places,
-    met: Iterable[tuple[Component, list[Component]]],
-    gears: Mapping[int, Toothing],
-    notes: Notes,
+    places: Places, met: Iterable[tuple[Component, list[Component]]], gears: Mapping[int, Toothing], notes: Notes
 ) -> list[Stage]:
     stages = []
     for part, (one, other) in met:
@@ -179,9 +175,7 @@ def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Tooth
     return None
 
 
-def _check_equal_planets(
-    model: Model, bodies: Bodies, first: Mapping[int, int], gears: Mapping[int, Toothing], notes: Notes
-) -> None:
+def _check_equal_planets(model: Model, first: Mapping[int, int], gears: Mapping[int, Toothing], notes: Notes) -> None:
     for number, own in first.items():
         if own not in gears:
             continue
@@ -189,7 +183,7 @@ def _check_equal_planets(
         mate = gears[own]
         for key in ("module", "face_width", "helix_angle", "pressure_angle"):
             if abs(getattr(other, key).value - getattr(mate, key).value) > 1e-9:
-                notes.faults.add(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
+                notes.faults.append(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
     notes.faults.tell()
 
 

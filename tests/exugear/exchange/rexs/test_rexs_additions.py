@@ -92,11 +92,33 @@ def test_comments_around_and_in_xml_stay(tmp_path):
     )
 
 
-def test_a_number_of_json_that_cannot_be_written_is_refused(tmp_path):
+def json_with(tmp_path, text):
     path = tmp_path / "gearbox.rexsj"
-    path.write_text('{"model": {"version": "1.4", "components": [{"id": 1, "type": "shaft"}], "a": 1e999}}')
+    path.write_text(f'{{\n "model": {{"version": "1.4", "components": [{{"id": 1, "type": "shaft"}}], "a": {text}}}}}')
+    return path
+
+
+def test_a_number_of_json_that_cannot_be_written_is_refused(tmp_path):
     with pytest.raises(RexsError, match="the file has a number beyond 1e308, which cannot be written; correct it"):
-        with_additions(path, [Addition(1, "a", "mm", 1.0)])
+        with_additions(json_with(tmp_path, "1e999"), [Addition(1, "a", "mm", 1.0)])
+
+
+def test_json_of_any_depth_is_written_or_refused(tmp_path):
+    refused = 0
+    for depth in (100, *range(800, 1000, 10), 2000):
+        path = json_with(tmp_path, "[" * depth + "]" * depth)
+        try:
+            with_additions(path, [Addition(1, "a", "mm", 1.0)])
+        except RexsError as error:
+            assert "the file is nested far deeper than any REXS file" in str(error)
+            refused += 1
+    assert 0 < refused < 22
+
+
+def test_half_a_character_of_json_stays_as_it_is(tmp_path):
+    path = json_with(tmp_path, r'"\ud800 \u00e4"')
+    new = with_additions(path, [Addition(1, "a", "mm", 1.0)])
+    assert json.loads(new)["model"]["a"] == "\ud800 ä"
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1"])
