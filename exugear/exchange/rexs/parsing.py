@@ -295,13 +295,13 @@ class _Json:
             if value is not None:
                 yield str(node.get("id", "")), Attribute(_json_value(value), str(node.get("unit") or ""))
 
-    def put(self, component: dict[str, Any], additions: Mapping[str, Addition], depth: int) -> None:  # noqa: ARG002
+    def put(self, component: dict[str, Any], additions: Mapping[str, Addition], depth: int) -> None:
         nodes = self.children(component, "attributes")
         new = [
             {"id": name, "unit": addition.unit, _JSON_KINDS[type(addition.value)]: addition.value}
             for name, addition in additions.items()
         ]
-        component["attributes"] = [node for node in nodes if node.get("id") not in additions] + new
+        component["attributes"] = [node for node in nodes if str(node.get("id", "")) not in additions] + new
 
     def new_change(self, case: dict[str, Any], component: Mapping[str, Any]) -> Any:
         node = {key: component[key] for key in ("id", "type", "name") if key in component}

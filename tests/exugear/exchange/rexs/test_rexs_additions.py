@@ -148,7 +148,7 @@ def test_an_archive_keeps_its_other_members():
 
 def test_json_without_attributes_or_spaces_takes_them(tmp_path):
     content = {"model": {"version": "1.4", "relations": [], "components": [{"id": 1, "type": "shaft"}, {"id": 2}]}}
-    content["model"]["components"][1]["attributes"] = []
+    content["model"]["components"][1]["attributes"] = [{"id": [1], "string": "odd"}]
     path = tmp_path / "gearbox.rexsj"
     path.write_text(json.dumps(content, separators=(",", ":")))
     new = with_additions(path, [Addition(1, "a", "mm", 1.0), Addition(2, "b", "mm", (1.0,)), Addition(2, "c", "", "x")])
