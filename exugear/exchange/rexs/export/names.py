@@ -118,7 +118,7 @@ def _stages(
     model: Model, teeth: Teeth, first: Mapping[int, int], gears: Mapping[str, tuple[int, ...]]
 ) -> dict[str, tuple[int, ...]]:
     """Stages of each pair, one per planet."""
-    pairs = {frozenset((stage.pinion, stage.gear)): name for name, stage in teeth.stages.items()}
+    pairs = {frozenset(stage.both): name for name, stage in teeth.stages.items()}
     found: dict[str, list[tuple[int, int]]] = {name: [] for name in teeth.stages}
     for relation in model.relations_of("stage"):
         both = [relation.roles[role] for role in ("gear_1", "gear_2")]

@@ -206,7 +206,7 @@ def meshes_of_bodies(teeth: Teeth) -> dict[str, int]:
     """Count the meshes of each rotating body other than planets, in the order of the stages."""
     counts: dict[str, int] = {}
     for stage in teeth.stages.values():
-        for number in (stage.pinion, stage.gear):
+        for number in stage.both:
             body = teeth.bodies[number]
             if not body.fixed and not body.carrier:
                 counts[body.name] = counts.get(body.name, 0) + 1
@@ -298,7 +298,7 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     gearbox = draft.checked(draft.text(source, {}), path)
     ratio = gearbox.train.ratio
     cases = load_case_blocks(draft.loads, draft.ends, static, ratio)
-    met = [number for stage in draft.teeth.stages.values() for number in (stage.pinion, stage.gear)]
+    met = [number for stage in draft.teeth.stages.values() for number in stage.both]
     gears = {name: (model.components[number], met.count(number) > 1) for number, name in draft.teeth.names.items()}
     life = life_blocks(model, draft.loads, draft.ends, ratio, gears)
     draft.settings |= life.blocks

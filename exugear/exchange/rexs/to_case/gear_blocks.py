@@ -206,10 +206,8 @@ def axes_to_move(
     settled = set(_coaxial(bodies, teeth.bodies[first.pinion]))
     open_stages = list(teeth.stages.values())
     while open_stages:
-        stage = next(
-            (s for s in open_stages if settled & {teeth.bodies[s.pinion].name, teeth.bodies[s.gear].name}),
-            open_stages[0],
-        )
+        touching = (s for s in open_stages if settled & {teeth.bodies[number].name for number in s.both})
+        stage = next(touching, open_stages[0])
         open_stages.remove(stage)
         one = teeth.bodies[stage.pinion]
         other = teeth.bodies[stage.gear]
@@ -265,11 +263,11 @@ def _gear_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: 
     central = {
         number
         for stage in stages
-        for number, mate in ((stage.pinion, stage.gear), (stage.gear, stage.pinion))
+        for number, mate in (stage.both, stage.both[::-1])
         if owners[mate].carrier and not owners[number].carrier
     }
     roles: dict[str, list[int]] = {}
-    for number in dict.fromkeys(number for stage in stages for number in (stage.pinion, stage.gear)):
+    for number in dict.fromkeys(number for stage in stages for number in stage.both):
         if gears[number].internal:
             role = "ring"
         elif owners[number].carrier:
@@ -287,7 +285,7 @@ def _gear_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: 
 def _pair_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, Body]) -> list[str]:
     names: list[str] = []
     for number, stage in enumerate(stages, 1):
-        planet = next((owners[one].name for one in (stage.pinion, stage.gear) if owners[one].carrier), "")
+        planet = next((owners[one].name for one in stage.both if owners[one].carrier), "")
         both = owners[stage.pinion].carrier and owners[stage.gear].carrier
         mate = "ring" if gears[stage.gear].internal else "sun"
         name = f"{mate}_{planet}" if planet and not both else ""

@@ -58,6 +58,11 @@ class Stage:
     common_face: Entry | None = None
     """Common face width of the gears if less than the narrower face width, mm."""
 
+    @property
+    def both(self) -> tuple[int, int]:
+        """Numbers of pinion and gear."""
+        return self.pinion, self.gear
+
 
 def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothing], notes: Notes) -> Entry:
     """Centre distance of a stage with a given distance of the axes (mm), according to the rules of the import.
@@ -99,9 +104,9 @@ def _confirmed(
 ) -> Literal["agreeing", "positions", "file"]:
     """Return which of two distances agrees with the profile shifts of both gears; "agreeing" for both or neither."""
     pinion, gear = pair
-    if pinion.shift is None or gear.shift is None:
+    if pinion.signed_shift is None or gear.signed_shift is None:
         return "agreeing"
-    total = pinion.shift.value + (-gear.shift.value if gear.internal else gear.shift.value)
+    total = pinion.signed_shift + gear.signed_shift
     asked = [pair_relations.shift_sum(unchecked("", pinion), unchecked("", gear), MM * one) for one in (apart, stated)]
     fits = [one is not None and abs(one - total) <= SHIFT_TOLERANCE for one in asked]
     if fits[0] == fits[1]:
@@ -167,14 +172,13 @@ def _zeros_with_followers(
         return []
     found: list[int] = []
     for stage in wrong:
-        both = (stage.pinion, stage.gear)
-        zeros = [number for number in both if (shift := gears[number].shift) is not None and shift.value == 0.0]
+        zeros = [number for number in stage.both if gears[number].signed_shift == 0.0]
         if len(zeros) == 1:
             found += zeros
     again = _reopened(gears, stages, found)
     for stage in stages:
         if found and stage not in wrong and _contradicts_distance(again, stage):
-            found += [number for number in (stage.pinion, stage.gear) if number not in found]
+            found += [number for number in stage.both if number not in found]
     return list(dict.fromkeys(found))
 
 
@@ -183,7 +187,7 @@ def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int,
     solved = dict(gears)
     open_stages = list(stages)
     while open_stages:
-        ready = [one for one in open_stages if solved[one.pinion].shift or solved[one.gear].shift]
+        ready = [one for one in open_stages if any(solved[number].shift for number in one.both)]
         for stage in ready or open_stages[:1]:
             open_stages.remove(stage)
             _complete(solved, stage)
@@ -200,9 +204,8 @@ def _shift_sums(gears: Mapping[int, Toothing], stage: Stage) -> tuple[float, flo
     """Sum of the existing shifts, and the sum that the centre distance requires."""
     pinion = gears[stage.pinion]
     gear = gears[stage.gear]
-    assert pinion.shift is not None and gear.shift is not None
-    stated = pinion.shift.value + (-gear.shift.value if gear.internal else gear.shift.value)
-    return stated, shift_sum(pinion, gear, stage.distance.value)
+    assert pinion.signed_shift is not None and gear.signed_shift is not None
+    return pinion.signed_shift + gear.signed_shift, shift_sum(pinion, gear, stage.distance.value)
 
 
 def _replaceable(
@@ -215,9 +218,8 @@ def _replaceable(
     """
     found: list[int] = []
     for stage in wrong:
-        both = (stage.pinion, stage.gear)
-        free = [number for number in both if all(one in wrong for one in stages if number in (one.pinion, one.gear))]
-        zeros = [number for number in free if (shift := gears[number].shift) is not None and shift.value == 0.0]
+        free = [number for number in stage.both if all(one in wrong for one in stages if number in one.both)]
+        zeros = [number for number in free if gears[number].signed_shift == 0.0]
         if len(zeros) == 1:
             found += zeros
         elif notes.rules.shifts == "centre-distance":
@@ -227,20 +229,17 @@ def _replaceable(
 
 def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
     """Give both gears of a stage a shift; if neither has one, the gear gets zero and the pinion the whole sum."""
-    pinion = gears[stage.pinion]
-    gear = gears[stage.gear]
-    sign = -1.0 if gear.internal else 1.0
-    total = shift_sum(pinion, gear, stage.distance.value)
-    if pinion.shift is None and gear.shift is None:
-        gear = dataclasses.replace(gear, shift=assumed(0.0, "not in the file for either gear of the stage"))
-        gears[stage.gear] = gear
-    if pinion.shift is None and gear.shift is not None:
-        shift = derived(tidy(round(total - sign * gear.shift.value, 9)), "from the centre distance, without backlash")
-        gears[stage.pinion] = dataclasses.replace(pinion, shift=shift)
-    elif gear.shift is None and pinion.shift is not None:
-        missing = tidy(round(sign * (total - pinion.shift.value), 9))
-        shift = derived(missing, "from the centre distance, without backlash")
-        gears[stage.gear] = dataclasses.replace(gear, shift=shift)
+    total = shift_sum(gears[stage.pinion], gears[stage.gear], stage.distance.value)
+    if all(gears[number].shift is None for number in stage.both):
+        zero = assumed(0.0, "not in the file for either gear of the stage")
+        gears[stage.gear] = dataclasses.replace(gears[stage.gear], shift=zero)
+    for number, mate in (stage.both, stage.both[::-1]):
+        gear = gears[number]
+        counted = gears[mate].signed_shift
+        if gear.shift is None and counted is not None:
+            rest = counted - total if gear.internal else total - counted
+            shift = derived(tidy(round(rest, 9)), "from the centre distance, without backlash")
+            gears[number] = dataclasses.replace(gear, shift=shift)
 
 
 def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> None:
@@ -267,11 +266,9 @@ def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], not
     open_stages = list(stages)
     settled: set[int] = set()
     while open_stages:
-        stage = next(
-            (open_stage for open_stage in open_stages if {open_stage.pinion, open_stage.gear} & settled), open_stages[0]
-        )
+        stage = next((one for one in open_stages if settled & {*one.both}), open_stages[0])
         open_stages.remove(stage)
-        keep, other = (stage.gear, stage.pinion) if stage.gear in settled else (stage.pinion, stage.gear)
+        keep, other = stage.both[::-1] if stage.gear in settled else stage.both
         settled |= {keep, other}
         if _have_one_rack(same[keep], same[other]) or not _have_one_base_pitch(same[keep], same[other]):
             continue
@@ -291,13 +288,14 @@ def _have_one_rack(toothing: Toothing, other: Toothing) -> bool:
 
 
 def _have_one_base_pitch(toothing: Toothing, other: Toothing) -> bool:
-    cosines = [math.cos(math.radians(gear.pressure_angle.value)) for gear in (toothing, other)]
-    pitches = [gear.module.value * cosine for gear, cosine in zip((toothing, other), cosines, strict=True)]
-    sines = [
-        abs(math.sin(math.radians(gear.helix_angle.value))) * cosine
-        for gear, cosine in zip((toothing, other), cosines, strict=True)
-    ]
-    return abs(pitches[0] - pitches[1]) <= PITCH_TOLERANCE * pitches[1] and abs(sines[0] - sines[1]) <= PITCH_TOLERANCE
+    (pitch, sine), (other_pitch, other_sine) = (_base_pitch(gear) for gear in (toothing, other))
+    return abs(pitch - other_pitch) <= PITCH_TOLERANCE * other_pitch and abs(sine - other_sine) <= PITCH_TOLERANCE
+
+
+def _base_pitch(gear: Toothing) -> tuple[float, float]:
+    """Return the normal base pitch divided by pi (mm), and the sine of the base helix angle."""
+    cosine = math.cos(math.radians(gear.pressure_angle.value))
+    return gear.module.value * cosine, abs(math.sin(math.radians(gear.helix_angle.value))) * cosine
 
 
 def _relative_to_mating_rack(mate: Toothing, gear: Toothing) -> Toothing:
@@ -496,7 +494,7 @@ def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: 
     """
     cleared = dict(gears)
     for stage in stages:
-        for tip, mate in ((stage.gear, stage.pinion), (stage.pinion, stage.gear)):
+        for tip, mate in (stage.both[::-1], stage.both):
             with reports_impossible(cleared[tip], cleared[mate]):
                 bound = _tip_bound(cleared, stage, tip)
             if bound is None:

@@ -72,6 +72,13 @@ class Toothing:
     """Racks that generate an external gear, in the order of manufacture."""
     internal: bool
 
+    @property
+    def signed_shift(self) -> float | None:
+        """Profile shift as it counts in the sum of a pair, negative for a larger ring gear; None if unspecified."""
+        if self.shift is None:
+            return None
+        return float(-self.shift.value if self.internal else self.shift.value)
+
 
 def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes: Notes) -> Toothing:
     """Collect the data of a gear; `mates` are its mating gears.
