@@ -298,8 +298,8 @@ TYPES = {
 """Current name of a component type by its old name."""
 ROLES = {"side_1": "inner_part", "side_2": "outer_part"}
 """Current name of a role in a relation by its old name."""
-RELATIONS = {"coupling": "side"}
-"""Current name of a relation by its old name."""
+RELATIONS = {"coupling": "side", "ordered_assembly": "assembly"}
+"""Relations that are read as others: an old name, and assemblies in an order."""
 OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
 """Prefixes of the types of gears that are not cylindrical."""
 GEARS = ("cylindrical_gear", "ring_gear")

@@ -293,9 +293,7 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
 
     def parts_of(self, owner: Component, kind: str) -> list[Component]:
         """Return the parts of a type in the assembly of a component."""
-        relations = ("assembly", "ordered_assembly")
-        parts = [part for one in relations for part in self.related(one, "assembly", owner.number, "part")]
-        return [part for part in parts if part.type == kind]
+        return [part for part in self.related("assembly", "assembly", owner.number, "part") if part.type == kind]
 
     def relations_of(self, *types: str) -> Iterator[Relation]:
         """Yield the relations of some types."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from exugear.exchange.rexs.mapping import BEARINGS, GEARS, OWN, RESULTS, Version
@@ -91,7 +91,10 @@ def origins_of(found: Found) -> Origins:
     }
     held = {name: _bearings(found, block) for name, block in found.bearings.items() if block.number}
     bodies = {
-        body.name: tuple(_shafts_and_gears(each) for each in (body.parts, *body.others))
+        body.name: tuple(
+            tuple(part.number for part in parts if part.type in ("shaft", *GEARS))
+            for parts in (body.parts, *body.others)
+        )
         for body in found.bodies.members
     }
     turning = [number for each in bodies.values() for numbers in each for number in numbers]
@@ -108,10 +111,6 @@ def origins_of(found: Found) -> Origins:
         {part.number: places.axes(part) for part in placed},
         {part.number: MM * _z(places, part) for part in placed},
     )
-
-
-def _shafts_and_gears(parts: Iterable[Component]) -> tuple[int, ...]:
-    return tuple(part.number for part in parts if part.type in ("shaft", *GEARS))
 
 
 def _stages(

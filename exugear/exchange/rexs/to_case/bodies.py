@@ -188,7 +188,7 @@ def _joined(model: Model, notes: Notes) -> _Union:
     for casing in casings[1:]:
         union.join(casings[0], casing)
     carriers: dict[int, int] = {}
-    for relation in model.relations_of("assembly", "ordered_assembly"):
+    for relation in model.relations_of("assembly"):
         owner = relation.roles.get("assembly", -1)
         part = relation.roles.get("part", -1)
         if owner in union and part in union and model.components[owner].type == "shaft":

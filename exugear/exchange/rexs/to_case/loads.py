@@ -159,9 +159,7 @@ def _changed(parts: Sequence[Component], changes: Mapping[int, Mapping[str, Attr
 
 
 def _shaft(model: Model, load: Component) -> Component | None:
-    owners = [
-        one for kind in ("assembly", "ordered_assembly") for one in model.related(kind, "part", load.number, "assembly")
-    ]
+    owners = model.related("assembly", "part", load.number, "assembly")
     return next((owner for owner in owners if owner.type in ("shaft", "side_plate", "planet_carrier")), None)
 
 

@@ -178,17 +178,11 @@ def toml_value(value: Any) -> str:
     >>> toml_value({"sun": 1.0, "names": ["a", True]})
     '{ sun = 1.0, names = ["a", true] }'
     """
-    if isinstance(value, bool):
-        if value:
-            return "true"
-        return "false"
-    if isinstance(value, int | float):
-        return repr(value)
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + " }"
-    return "[" + ", ".join(toml_value(entry) for entry in value) + "]"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 # Positions and directions of components in the axes of the gearbox file, z along the shafts
