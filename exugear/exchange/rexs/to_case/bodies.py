@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from exugear.exchange.rexs.mapping import GEARS, JOINING, READ
@@ -117,13 +117,6 @@ def is_one_piece(connection: Component) -> bool:
     return True
 
 
-def is_engaged(model: Model, connection: Component) -> bool:
-    """Return whether a switchable coupling is engaged in the selected gear of the file."""
-    unit = model.components_of_type("gear_unit")
-    shift = (unit[0].whole("gear_shift_index") if unit else None) or 1
-    return connection.type != "switchable_coupling" or connection.flag("is_engaged", shift - 1) is not False
-
-
 def ends(model: Model, connection: Component) -> tuple[Component, Component] | None:
     """Inner and outer part of a bearing, coupling or fit; None unless the file specifies both."""
     inner = model.related("side", "assembly", connection.number, "inner_part")
@@ -131,6 +124,18 @@ def ends(model: Model, connection: Component) -> tuple[Component, Component] | N
     if inner and outer:
         return (inner[0], outer[0])
     return None
+
+
+def connections(model: Model) -> Iterator[tuple[Component, Component, Component]]:
+    """Yield couplings and fits with inner and outer part, unless they are not engaged in the selected gear."""
+    for part in model.components_of_type(*JOINING):
+        both = ends(model, part)
+        if both is None:
+            continue
+        unit = model.components_of_type("gear_unit")
+        shift = (unit[0].whole("gear_shift_index") if unit else None) or 1
+        if part.type != "switchable_coupling" or part.flag("is_engaged", shift - 1) is not False:
+            yield part, *both
 
 
 def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
@@ -196,17 +201,14 @@ def _joined(model: Model, notes: Notes) -> _Union:
         elif part in union and owner in model.components and model.components[owner].type == "planet_carrier":
             union.join(carriers.setdefault(owner, part), part)
     stiff = [
-        (connection, both)
-        for connection in model.components_of_type(*JOINING)
-        if is_rigid_in_torsion(connection)
-        and is_engaged(model, connection)
-        and (both := ends(model, connection)) is not None
-        and all(end.number in union for end in both)
+        (connection, inner, outer)
+        for connection, inner, outer in connections(model)
+        if is_rigid_in_torsion(connection) and inner.number in union and outer.number in union
     ]
-    for connection, (inner, outer) in stiff:
+    for connection, inner, outer in stiff:
         if is_one_piece(connection):
             union.join(inner.number, outer.number)
-    for connection, (inner, outer) in stiff:
+    for connection, inner, outer in stiff:
         held = {union.root(end.number) for end in (inner, outer)}
         if casings and union.root(casings[0]) in held and len(held) > 1:
             notes.changed.append(
@@ -222,11 +224,11 @@ def _working(model: Model, union: _Union) -> set[int]:
     """Roots of components that mesh or carry planets, and of those connected to them with some torsional stiffness."""
     numbers = {role for relation in model.relations_of("stage") for role in relation.roles.values()}
     working = {union.root(number) for number in numbers if number in union} | _carriers(model, union)
-    ties = []
-    for connection in model.components_of_type(*JOINING):
-        both = ends(model, connection)
-        if both and torsional_stiffness(connection) != 0.0 and is_engaged(model, connection):
-            ties.append({union.root(end.number) for end in both if end.number in union and end.type != "gear_casing"})
+    ties = [
+        {union.root(end.number) for end in both if end.number in union and end.type != "gear_casing"}
+        for connection, *both in connections(model)
+        if torsional_stiffness(connection) != 0.0
+    ]
     for _ in ties:
         working |= {root for tie in ties if tie & working for root in tie}
     return working

@@ -10,8 +10,8 @@ from exugear.exchange.rexs.to_case.bodies import (
     RIGID_ABOVE,
     Bodies,
     Body,
+    connections,
     ends,
-    is_engaged,
     is_one_piece,
     is_rigid_in_torsion,
     torsional_stiffness,
@@ -109,13 +109,9 @@ def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[s
 
 def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Component, Body, Body]]:
     """Yield couplings and fits between two separate bodies, once for equal planets."""
-    for part in model.components_of_type(*JOINING):
-        both = ends(model, part)
-        if both is None or is_one_piece(part) or not is_engaged(model, part):
-            continue
-        inner = bodies.of(both[0])
-        outer = bodies.of(both[1])
-        if inner is not None and outer is not None and inner is not outer:
+    for part, *both in connections(model):
+        inner, outer = (bodies.of(end) for end in both)
+        if not is_one_piece(part) and inner is not None and outer is not None and inner is not outer:
             yield part, inner, outer
 
 
