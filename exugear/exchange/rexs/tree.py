@@ -286,6 +286,12 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
         """Return all components of some types, in the order of the file."""
         return tuple(component for component in self.components.values() if component.type in types)
 
+    def components_in(self, case: LoadCase | None, *types: str) -> list[Component]:
+        """Return all components of some types with the attributes that a load case replaces; None for no load case."""
+        changes = case.changes if case else {}
+        parts = self.components_of_type(*types)
+        return [part.with_attributes(changes[part.number]) if part.number in changes else part for part in parts]
+
     def related(self, relation: str, role: str, number: int, wanted: str) -> tuple[Component, ...]:
         """Return the components in the role `wanted` of all relations in which a component has a role."""
         found = self._relations_by_role.get((relation, role, number), ())

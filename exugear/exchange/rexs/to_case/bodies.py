@@ -240,11 +240,10 @@ def held_by_speed(model: Model) -> set[int]:
     Some programs omit the speed zero although they state that a shaft defines its speed.
     """
     speeds: dict[int, set[float]] = {}
-    for changes in [case.changes for case in model.load_cases] or [{}]:
-        for shaft in model.components_of_type("shaft"):
-            here = shaft.with_attributes(changes.get(shaft.number, {}))
-            speed = here.quantity("rotational_speed")
-            defined = here.flag("defines_speed")
+    for case in model.load_cases or (None,):
+        for shaft in model.components_in(case, "shaft"):
+            speed = shaft.quantity("rotational_speed")
+            defined = shaft.flag("defines_speed")
             if defined or (speed is not None and defined is None):
                 speeds.setdefault(shaft.number, set()).add(speed or 0.0)
             elif speed:

@@ -12,7 +12,7 @@ from exugear.exchange.rexs.mapping import READ
 from exugear.exchange.rexs.to_case.bodies import Bodies, Body
 from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, entries_of, read, tidy
 from exugear.exchange.rexs.to_case.toothing import material_of
-from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, RexsError
+from exugear.exchange.rexs.tree import Component, LoadCase, Model, RexsError
 from exugear.gearbox.units import RPM
 
 FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
@@ -97,16 +97,15 @@ def loads_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> list
 
 
 def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, notes: Notes) -> Loads:
-    changes = case.changes if case else {}
     speeds: dict[str, float] = {}
-    for shaft in _changed(model.components_of_type("shaft"), changes):
+    for shaft in model.components_in(case, "shaft"):
         body = bodies.body_of(shaft)
         speed = shaft.quantity("rotational_speed")
         if body is not None and speed is not None and not body.fixed:
             speeds.setdefault(body.name, tidy(places.sense(shaft) * speed))
     torques: dict[str, float] = {}
     forces: dict[int, PointForce] = {}
-    for load in _changed(model.components_of_type("external_load"), changes):
+    for load in model.components_in(case, "external_load"):
         owner = _shaft(model, load)
         body = _free_body(bodies, owner)
         force = _point_force(places, load, owner, body, notes)
@@ -122,7 +121,7 @@ def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, 
         if torque and load.flag("transmits_torque") is not False:
             torques[body.name] = torques.get(body.name, 0.0) + torque
     share = None
-    for unit in _changed(model.components_of_type("gear_unit"), changes):
+    for unit in model.components_in(case, "gear_unit"):
         share = unit.quantity("operating_time_fraction")
     name = f"load_case_{case.number}" if case else "nominal"
     return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, forces, share)
@@ -152,10 +151,6 @@ def _point_force(
         tuple(tidy(round(value, 6)) for value in (force @ axes).tolist()),
         tuple(tidy(round(value, 6)) for value in (moment @ axes).tolist()[:2]),
     )
-
-
-def _changed(parts: Sequence[Component], changes: Mapping[int, Mapping[str, Attribute]]) -> list[Component]:
-    return [part.with_attributes(changes[part.number]) if part.number in changes else part for part in parts]
 
 
 def _shaft(model: Model, load: Component) -> Component | None:
@@ -374,9 +369,8 @@ def _lubricant(model: Model) -> Block | None:
     entries, oil = min(oils, key=lambda one: one[0][cold].value)
     entries[cold] = replace(entries[cold], source=f"{entries[cold].source} of the lubricant")
     entries |= entries_of(READ["oil density"], oil, limits=DENSITIES)
-    casings = model.components_of_type("gear_casing")
-    changes = ({}, *(case.changes for case in model.load_cases))
-    temperatures = [one.quantity("temperature_lubricant") for each in changes for one in _changed(casings, each)]
+    casings = [one for case in (None, *model.load_cases) for one in model.components_in(case, "gear_casing")]
+    temperatures = [one.quantity("temperature_lubricant") for one in casings]
     hottest = max((t for t in temperatures if t is not None), default=math.nan)
     if TEMPERATURES[0] <= hottest <= TEMPERATURES[1]:
         entries["temperature_C"] = read(tidy(hottest), "temperature_lubricant of the casing (hottest load case)")
