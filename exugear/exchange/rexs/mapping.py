@@ -1,4 +1,8 @@
-"""Attributes of REXS with their units, keys of the gearbox file and names in the versions; types of components."""
+"""Attributes of REXS with their units, keys of the gearbox file and names in the versions; types of components.
+
+Import and export read these tables: a new attribute gets a row in `READ`, a new result one in `RESULTS`. The function
+`entries_of` of `exugear.exchange.rexs.to_case.notes` converts rows with a key.
+"""
 
 from __future__ import annotations
 
