@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,86 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
+from exugear.gearbox.units import Unit, unit_of
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 
-# Units in load files, and their factors to SI
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit of a load file."""
-
-    quantity: str
-    """Physical quantity: torque, force, speed, time, angle, velocity, or another."""
-    factor: float
-    """Factor to SI."""
-
-
-_RPM = math.pi / 30.0
-_TURN = 2.0 * math.pi
-UNITS: dict[str, Unit] = {
-    "s": Unit("time", 1.0),
-    "sec": Unit("time", 1.0),
-    "ms": Unit("time", 1e-3),
-    "min": Unit("time", 60.0),
-    "h": Unit("time", 3600.0),
-    "hr": Unit("time", 3600.0),
-    "m/s": Unit("velocity", 1.0),
-    "m/sec": Unit("velocity", 1.0),
-    "km/h": Unit("velocity", 1.0 / 3.6),
-    "n": Unit("force", 1.0),
-    "kn": Unit("force", 1e3),
-    "mn": Unit("force", 1e6),
-    "nm": Unit("torque", 1.0),
-    "n-m": Unit("torque", 1.0),
-    "knm": Unit("torque", 1e3),
-    "kn-m": Unit("torque", 1e3),
-    "mnm": Unit("torque", 1e6),
-    "mn-m": Unit("torque", 1e6),
-    "rpm": Unit("speed", _RPM),
-    "1/min": Unit("speed", _RPM),
-    "rad/s": Unit("speed", 1.0),
-    "rad/sec": Unit("speed", 1.0),
-    "deg/s": Unit("speed", _TURN / 360.0),
-    "deg/sec": Unit("speed", _TURN / 360.0),
-    "hz": Unit("speed", _TURN),
-    "deg": Unit("angle", _TURN / 360.0),
-    "rad": Unit("angle", 1.0),
-}
-"""Supported units, in lower case and in the form of `plain_unit`."""
 SI_NAMES = {"torque": "N m", "force": "N", "speed": "rad/s", "time": "s", "angle": "rad", "velocity": "m/s"}
 USUAL_NAMES = {"torque": "kN-m", "force": "kN", "speed": "rpm", "time": "s", "angle": "deg", "velocity": "m/s"}
 """Units that a message states as examples."""
-
-
-def plain_unit(text: str) -> str:
-    """Return a unit in lower case, without brackets and blanks; multiplication is a hyphen or nothing.
-
-    Examples
-    --------
-    >>> plain_unit("(kN·m)"), plain_unit(" [kN m] "), plain_unit("(kN-m)"), plain_unit("INVALID")
-    ('kn-m', 'knm', 'kn-m', 'invalid')
-    """
-    bare = text.strip().strip("()[]").strip().lower()
-    return bare.replace("·", "-").replace("*", "-").replace(" ", "")
-
-
-def unit_of(text: str) -> Unit | None:
-    """Look up a unit; None for an unknown one, including mN, which must not be confused with MN.
-
-    Examples
-    --------
-    >>> unit_of("(kN·m)"), unit_of("furlong"), unit_of("mNm")
-    (Unit(quantity='torque', factor=1000.0), None, None)
-    """
-    if text.strip(" ()[]").startswith("mN"):
-        return None
-    return UNITS.get(plain_unit(text))
-
-
-# Channels over time: names and units are read at once, values in blocks on demand
-
 ALIASES: tuple[tuple[str, ...], ...] = (
     ("rottorq", "lsshfttq", "lsshftmxa", "lsshftmxs", "lssgagmxa", "lssgagmxs"),
     ("rotspeed", "lssspeed", "lssgagvxa"),
@@ -194,13 +120,13 @@ class Channels(ReprMixin):
             )
 
     def _second(self) -> float:
-        unit = unit_of(self.time_unit) if self.time_unit.strip("() []") else Unit("time", 1.0)
+        unit = unit_of(self.time_unit.strip("() []") or "s", any_case=True)
         if unit is None or unit.quantity != "time":
             raise LoadFileError(f"{self.path}: time has the unit {self.time_unit!r}; expected s, ms, min or h")
         return unit.factor
 
     def _unit(self, place: int, quantity: str) -> Unit:
-        unit = unit_of(self.units[place])
+        unit = unit_of(self.units[place], any_case=True)
         if unit is None or unit.quantity != quantity:
             written = self.units[place] or "none"
             raise LoadFileError(

@@ -188,10 +188,7 @@ class _Table:
 
 # Tables of numbers as text: OpenFAST's text output, and comma-separated tables whose headings contain units
 
-ENDINGS = {
-    "_N_m": "N-m", "_kN_m": "kN-m", "_MN_m": "MN-m", "_N": "N", "_kN": "kN", "_MN": "MN", "_rpm": "rpm",
-    "_rad_per_s": "rad/s", "_m_per_s": "m/s", "_s": "s", "_ms": "ms", "_min": "min", "_h": "h",
-}  # fmt: skip
+ENDINGS = ("_N_m", "_kN_m", "_MN_m", "_N", "_kN", "_MN", "_rpm", "_rad_per_s", "_m_per_s", "_s", "_ms", "_min", "_h")
 """Units at the end of headings of comma-separated tables; longer ones first if one ends with another."""
 _MOST_HEADER_LINES = 40
 MOST_ROWS = 1_000_000
@@ -294,7 +291,7 @@ def _reader(path: Path, headings: Sequence[str], skipped: int, separator: str | 
 def _unit_of_heading(path: Path, heading: str) -> str:
     for ending in sorted(ENDINGS, key=len, reverse=True):
         if heading.endswith(ending):
-            return ENDINGS[ending]
+            return ending.replace("_per_", "/").replace("_", " ").strip()
     raise LoadFileError(f"{path}: heading {heading!r} ends in no unit; endings are {', '.join(ENDINGS)}")
 
 

@@ -18,6 +18,7 @@ from exugear.gearbox.reading import Origin, part_of_each, parts_of_each
 from exugear.gearbox.sections.connections import MeshSection
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.sections.gears import (
+    CutterSection,
     DeviationSection,
     GearSection,
     MeshStiffnessSection,
@@ -240,19 +241,18 @@ def _unchecked(name: str, section: GearSection) -> GearInputs:
         ),
         tip_form_diameter=None if section.tip_form_diameter_mm is None else section.tip_form_diameter_mm * MM,
         root_form_diameter=None if section.root_form_diameter_mm is None else section.root_form_diameter_mm * MM,
-        cutter=_cutter(section),
+        cutter=pinion_cutter(section.cutter, section.normal_module_mm, section.helix_angle_deg),
     )
 
 
-def _cutter(section: GearSection) -> PinionCutter | None:
+def pinion_cutter(cutter: CutterSection | None, module_mm: float, helix_angle_deg: float) -> PinionCutter | None:
     """Pinion-type cutter of a ring gear; its addendum follows from d_a0 = m_n (z_0 / cos(beta) + 2 (x_0 + h_a0*))."""
-    cutter = section.cutter
     if cutter is None:
         return None
     tip_mm = cutter.tip_diameter_mm
     if cutter.addendum is not None:
-        reference = cutter.teeth / math.cos(math.radians(section.helix_angle_deg))
-        tip_mm = section.normal_module_mm * (reference + 2.0 * (cutter.profile_shift + cutter.addendum))
+        reference = cutter.teeth / math.cos(math.radians(helix_angle_deg))
+        tip_mm = module_mm * (reference + 2.0 * (cutter.profile_shift + cutter.addendum))
     return PinionCutter(cutter.teeth, cutter.tip_radius, cutter.profile_shift, None if tip_mm is None else MM * tip_mm)
 
 

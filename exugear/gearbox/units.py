@@ -1,9 +1,9 @@
-"""Units of the input files in SI units: a number times its unit, `MM * length_mm`. Keys end with their unit."""
+"""Units of all files in SI units: a number times its unit, `MM * length_mm`. Keys end with their unit."""
 
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 MM: Final = 1e-3
 """A millimetre, m."""
@@ -15,7 +15,83 @@ MPA: Final = 1e6
 """A megapascal, Pa."""
 GPA: Final = 1e9
 """A gigapascal, Pa."""
-
-
-RPM = math.pi / 30.0
+RPM: Final = math.pi / 30.0
 """One revolution per minute, rad/s."""
+DEG: Final = math.pi / 180.0
+"""One degree, rad."""
+
+
+class Unit(NamedTuple):
+    """A unit of a physical quantity."""
+
+    quantity: str
+    factor: float
+    """Factor to SI."""
+
+
+_BY_QUANTITY: Final[dict[str, dict[str, float]]] = {
+    "number": {"": 1.0, "none": 1.0},
+    "share": {"%": 0.01},
+    "length": {"m": 1.0, "mm": MM, "um": UM},
+    "angle": {"rad": 1.0, "deg": DEG, "°": DEG},
+    "speed": {
+        "rad/s": 1.0,
+        "rad/sec": 1.0,
+        "deg/s": DEG,
+        "deg/sec": DEG,
+        "rpm": RPM,
+        "1/min": RPM,
+        "Hz": 2.0 * math.pi,
+    },
+    "velocity": {"m/s": 1.0, "m/sec": 1.0, "km/h": 1.0 / 3.6},
+    "acceleration": {"m/s2": 1.0},
+    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "hr": 3600.0},
+    "force": {"N": 1.0, "kN": KN, "MN": 1e6},
+    "torque": {"Nm": 1.0, "Nmm": MM, "kNm": KN, "MNm": 1e6},
+    "power": {"W": 1.0, "kW": 1e3},
+    "stiffness": {"N/m": 1.0, "N/mm": 1e3, "N/um": 1e6},
+    "angular stiffness": {"Nm/rad": 1.0, "Nmm/rad": MM},
+    "stress": {"Pa": 1.0, "MPa": MPA, "GPa": GPA, "N/mm2": MPA},
+    "mass": {"kg": 1.0},
+    "density": {"kg/m3": 1.0, "kg/dm3": 1e3},
+    "inertia": {"kgm2": 1.0},
+    "viscosity": {"mm2/s": 1e-6},
+    "temperature": {"C": 1.0},
+}
+UNITS: Final = {text: Unit(quantity, size) for quantity, sizes in _BY_QUANTITY.items() for text, size in sizes.items()}
+"""Units by their text without blanks, brackets and signs of multiplication and power."""
+_UNIT_IN_ANY_CASE: Final = {text.lower(): unit for text, unit in UNITS.items()}
+_PLAIN: Final = str.maketrans({"µ": "u", **dict.fromkeys(" ·*-^_()[]", "")})
+
+
+def unit_of(text: str, any_case: bool = False) -> Unit | None:
+    """Look up a unit; None for an unknown one.
+
+    Parameters
+    ----------
+    any_case : whether capital and small letters are equal; mN is then unknown, because it must not be confused with MN
+
+    Examples
+    --------
+    >>> unit_of("(kN·m)"), unit_of("N mm / rad"), unit_of("kg / dm^3").factor, unit_of("furlong")
+    (Unit(quantity='torque', factor=1000.0), Unit(quantity='angular stiffness', factor=0.001), 1000.0, None)
+    >>> unit_of("KN-M"), unit_of("KN-M", any_case=True).factor, unit_of("mNm", any_case=True)
+    (None, 1000.0, None)
+    """
+    plain = "".join(text.split()).translate(_PLAIN).replace("mum", "um")
+    if any_case and not plain.startswith("mN"):
+        return _UNIT_IN_ANY_CASE.get(plain.lower())
+    return UNITS.get(plain)
+
+
+def unit_of_key(key: str) -> Unit | None:
+    """Look up the unit that the suffix of a key or heading indicates; None if it indicates none.
+
+    Examples
+    --------
+    >>> unit_of_key("stiffness_N_m_per_rad"), unit_of_key("viscosity_40_mm2_per_s").factor, unit_of_key("row_count")
+    (Unit(quantity='angular stiffness', factor=1.0), 1e-06, None)
+    """
+    parts = key.replace("_per_", "/").split("_")
+    texts = ("".join(parts[start:]) for start in range(1, len(parts)))
+    return next((UNITS[text] for text in texts if text in UNITS), None)

@@ -8,14 +8,13 @@ import lzma
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
-from exugear.exchange.rexs import json_additions, xml_additions
-from exugear.exchange.rexs.additions import Addition, group_by_place
-from exugear.exchange.rexs.parsing import is_json, parse_model
-from exugear.exchange.rexs.tree import Model, RexsError, plain
+from exugear.exchange.rexs.parsing import parse_model, put_additions
+from exugear.exchange.rexs.tree import Addition, AdditionValue, Model, RexsError, plain
 from fe_ste.tools.files import FileError, open_regular
 
 LARGEST = 64_000_000
@@ -62,14 +61,12 @@ def parsed(content: bytes, path: str | Path) -> Model:
     RexsError
         As in `read_rexs`.
     """
-    try:
-        return parse_model(_member(content)[1] if _is_archive(content) else content)
-    except RexsError as error:
-        raise RexsError(*(f"{path}: {fault}" for fault in error.faults)) from None
+    with _errors_naming(path):
+        return parse_model(_member(content)[1])
 
 
 def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
-    """Return the bytes of a REXS file with added attributes; format, version, encoding and the rest are unchanged.
+    """Return the bytes of a REXS file with added attributes; format, version, encoding, values and comments are kept.
 
     An existing attribute of the same name is replaced. Other members of an archive are kept.
 
@@ -80,17 +77,40 @@ def with_additions(path: str | Path, additions: Iterable[Addition]) -> bytes:
     """
     content = _bytes_of(path)
     model = parsed(content, path)
-    placed = group_by_place(additions)
     cases = {case.number for case in model.load_cases}
-    for case, component in placed:
-        if component not in model.components or not (case is None or case in cases):
+    placed: dict[tuple[int | None, int], dict[str, Addition]] = {}
+    for addition in additions:
+        case = addition.load_case
+        number = addition.component
+        if number not in model.components or not (case is None or case in cases):
             raise RexsError(
-                f"{path}: component {component} does not exist" + ("" if case is None else f", load case {case}")
+                f"{path}: component {number} does not exist" + ("" if case is None else f", load case {case}")
             )
-    if not _is_archive(content):
-        return _put_in(content, placed)
-    member, unpacked = _member(content)
-    return _repacked(content, member, _put_in(unpacked, placed))
+        named = placed.setdefault((case, number), {})
+        if addition.name in named:
+            raise RexsError(f"component {number}: two results have the name {addition.name}")
+        named[addition.name] = replace(addition, value=rounded(addition.value))
+    with _errors_naming(path):
+        member, unpacked = _member(content)
+        new = put_additions(unpacked, placed)
+    if _is_archive(content):
+        return _repacked(content, member, new)
+    return new
+
+
+def rounded(value: AdditionValue) -> AdditionValue:
+    """Round numbers to ten digits for a file.
+
+    Examples
+    --------
+    >>> rounded(-0.0), rounded((1e20, 1.0 / 3.0)), rounded("text")
+    (0.0, (1e+20, 0.3333333333), 'text')
+    """
+    if isinstance(value, str):
+        return value
+    if isinstance(value, tuple):
+        return tuple(float(f"{one:.10g}") + 0.0 for one in value)
+    return float(f"{value:.10g}") + 0.0
 
 
 def _repacked(content: bytes, member: str, new: bytes) -> bytes:
@@ -113,23 +133,24 @@ def _repacked(content: bytes, member: str, new: bytes) -> bytes:
     return packed.getvalue()
 
 
-def _put_in(content: bytes, placed: Mapping[tuple[int | None, int], Mapping[str, Addition]]) -> bytes:
-    if is_json(content):
-        return json_additions.with_additions(content, placed)
-    return xml_additions.with_additions(content, placed)
-
-
 def _bytes_of(path: str | Path) -> bytes:
     try:
         with open_regular(Path(path)) as file:
             content = file.read(LARGEST + 1)
     except FileError as error:
         raise RexsError(str(error)) from None
-    try:
+    with _errors_naming(path):
         _check_size(len(content))
-    except RexsError as error:
-        raise RexsError(f"{path}: {error}") from None
     return content
+
+
+@contextmanager
+def _errors_naming(path: str | Path) -> Iterator[None]:
+    """Put the path of a file before its errors."""
+    try:
+        yield
+    except RexsError as error:
+        raise RexsError(*(f"{path}: {fault}" for fault in error.faults)) from None
 
 
 def _is_archive(content: bytes) -> bool:
@@ -142,7 +163,9 @@ def _check_size(size: int) -> None:
 
 
 def _member(content: bytes) -> tuple[str, bytes]:
-    """Name and bytes of the single model in an archive."""
+    """Name and bytes of the single model in an archive; any other file is the model itself."""
+    if not _is_archive(content):
+        return "", content
     with _damage_reported(), zipfile.ZipFile(io.BytesIO(content)) as archive:
         members = archive.infolist()
         if len(members) > MOST_MEMBERS:

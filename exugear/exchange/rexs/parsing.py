@@ -1,4 +1,4 @@
-"""Conversion of REXS files in XML and JSON to the tree of a model, with limits for untrusted files."""
+"""Documents of REXS in XML and JSON: reading of the model and adding of attributes, with limits for untrusted files."""
 
 from __future__ import annotations
 
@@ -7,16 +7,27 @@ import binascii
 import codecs
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 from xml.parsers import expat
 
 import numpy as np
 
-from exugear.exchange.rexs import tree as synonyms
-from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, Relation, RexsError, Value, plain
+from exugear.exchange.rexs.mapping import ATTRIBUTES, LAST_VERSION, LEAST_VERSION, RELATIONS, ROLES, TYPES
+from exugear.exchange.rexs.tree import (
+    Addition,
+    Attribute,
+    Component,
+    LoadCase,
+    Model,
+    Relation,
+    RexsError,
+    Value,
+    plain,
+)
 
 # Encodings of XML: decoding of the bytes of a REXS file, and encoding of edited text
 
@@ -84,7 +95,7 @@ def _without_mark(content: bytes) -> str:
     raise RexsError(f"the file declares the encoding '{plain(name)}', which is not supported; expected UTF-8")
 
 
-# Conversion of REXS files in XML and JSON to the tree of a model, with limits for untrusted files
+# Documents: one interface for both formats, with names and values as in the file
 
 DEEPEST = 24
 """Maximum depth of nesting; a REXS file has nine levels."""
@@ -92,160 +103,219 @@ MOST_ELEMENTS = 500_000
 """Maximum number of elements of an XML file; the largest known file has 20,000."""
 LONGEST_WHOLE = 30
 """Number of digits from which a whole number of JSON is read as a float."""
+TOO_DEEP = "the file is nested far deeper than any REXS file"
 CODES = {"int32": "<i4", "float32": "<f4", "float64": "<f8"}
 """Formats of numbers packed as base64 (since 1.4): little-endian, matrices row by row."""
-_FORBIDDEN = ("data_source", "referenced_component_id")
+_JSON_KINDS: Mapping[type, str] = {str: "string", float: "floating_point", tuple: "floating_point_array"}
+"""JSON key of a value by its type."""
+_JSON_KEYS = {"spectra": "load_spectrum", "changes": "components"}
+_XML_PATHS = {
+    "relations": ("relations", "relation"),
+    "refs": ("ref",),
+    "components": ("components", "component"),
+    "attributes": ("attribute",),
+    "spectra": ("load_spectrum",),
+    "load_cases": ("load_case",),
+    "changes": ("component",),
+}
 
 
-def parse_model(content: bytes) -> Model:
-    """Read the model from the bytes of an XML or JSON file.
+class _Xml:
+    """Tree of elements, whose names include their prefix; a DOCTYPE and entities are refused.
 
-    Raises
-    ------
-    RexsError
-        The file has errors.
+    `model` is the node of the whole model.
     """
-    if is_json(content):
-        return _model(_header_of_json(content))
-    if _start(content) == b"<":
-        return _model(_header_of_xml(content))
-    raise RexsError("not a REXS file: neither XML nor JSON nor a zip archive of one of them")
+
+    def __init__(self, content: bytes) -> None:
+        self._source = decoded(content)
+        raw = self._source.text.encode("utf-8")
+        builder = ElementTree.TreeBuilder(insert_comments=True, insert_pis=True)
+        parser = expat.ParserCreate("utf-8")
+        positions: list[int] = []
+        depth = 0
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            nonlocal depth
+            depth += 1
+            positions.append(parser.CurrentByteIndex)
+            if len(positions) > MOST_ELEMENTS or depth > DEEPEST:
+                raise RexsError("the file has more elements, or deeper ones, than any REXS file")
+            builder.start(tag, attributes)
+
+        def end(tag: str) -> None:
+            nonlocal depth
+            depth -= 1
+            builder.end(tag)
+            if not depth:
+                last = parser.CurrentByteIndex
+                last = raw.index(b">", last) + 1 if raw.startswith(b"</", last) else last
+                self._after = raw[last:].decode("utf-8")
+
+        def refuse(*_: object) -> None:
+            raise RexsError("the file has a DOCTYPE or an entity, which REXS files must not have")
+
+        parser.buffer_text = True
+        parser.StartElementHandler = start
+        parser.EndElementHandler = end
+        parser.CharacterDataHandler = builder.data
+        parser.CommentHandler = builder.comment
+        parser.ProcessingInstructionHandler = builder.pi
+        parser.StartDoctypeDeclHandler = refuse
+        parser.EntityDeclHandler = refuse
+        try:
+            parser.Parse(raw, True)
+        except expat.ExpatError as error:
+            reason = expat.errors.messages.get(error.code, "cannot be parsed")
+            raise RexsError(f"not an XML file: {reason} in line {error.lineno}") from None
+        self.model: Any = builder.close()
+        self._before = raw[: positions[0]].decode("utf-8")
+        if _local(self.model) != "model":
+            raise RexsError(f"not a REXS file: the root element is '{plain(_local(self.model))}', not 'model'")
+
+    def children(self, node: Element, kind: str) -> list[Any]:
+        """Nodes of a kind (key of `_XML_PATHS`) in a node, in the order of the file."""
+        found = [node]
+        for tag in _XML_PATHS[kind]:
+            found = [child for parent in found for child in parent if _local(child) == tag]
+        return found
+
+    def head(self, node: Element) -> Mapping[str, Any]:
+        """Id, type and similar data of a node."""
+        return node.attrib
+
+    def attributes(self, component: Element) -> Iterator[tuple[str, Attribute]]:
+        """Yield the attributes of a component by the names of the file."""
+        for node in self.children(component, "attributes"):
+            value = next((_xml_value(child) for child in _elements(node)), _text(node))
+            yield node.get("id", ""), Attribute(value, node.get("unit", ""))
+
+    def put(self, component: Element, additions: Mapping[str, Addition], depth: int) -> None:
+        """Add attributes to a component at a depth of nesting, or replace those of the same names."""
+        prefix = component.tag.removesuffix("component")
+        there = {node.get("id"): node for node in self.children(component, "attributes")}
+        for name, addition in additions.items():
+            node = Element(f"{prefix}attribute", {"id": name, "unit": addition.unit})
+            value = addition.value
+            if isinstance(value, tuple):
+                array = ElementTree.SubElement(node, f"{prefix}array")
+                for number in value:
+                    ElementTree.SubElement(array, f"{prefix}c").text = repr(number)
+            else:
+                node.text = str(value)
+            if name in there:
+                node.tail = there[name].tail
+                component[list(component).index(there[name])] = node
+            else:
+                _append(component, node, depth + 1)
+
+    def new_change(self, case: Element, component: Element) -> Any:
+        """Add an empty node for a component of the model to a load case."""
+        node = Element(component.tag, component.attrib)
+        _append(case, node, 3)
+        return node
+
+    def content(self) -> bytes:
+        """Bytes of the document in its encoding, with its comments."""
+        mark, encoding, source = self._source
+        text = self._before + ElementTree.tostring(self.model, encoding="unicode") + self._after
+        if " />" not in source:
+            text = text.replace(" />", "/>")
+        if "\r\n" in source:
+            text = re.sub("\r?\n", "\r\n", text)
+        return mark + text.encode(encoding, errors="xmlcharrefreplace")
 
 
-def is_json(content: bytes) -> bool:
-    """Return whether the bytes of a file begin like JSON."""
-    return _start(content) in (b"{", b"[")
+def _local(node: Element) -> str:
+    """Return the name of an element without its prefix; that of a comment equals none of an element."""
+    return str(node.tag).rpartition(":")[2]
 
 
-def _start(content: bytes) -> bytes:
-    return content[:200].lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n\x00")[:1]
+def _elements(node: Element) -> list[Element]:
+    """Return the children of an element without comments."""
+    return [child for child in node if isinstance(child.tag, str)]
 
 
-@dataclass
-class _Raw:
-    """A model before conversion, equal for both formats: plain values, and names as in the file."""
-
-    version: str
-    program: str
-    relations: list[tuple[dict[str, Any], list[dict[str, Any]]]]
-    components: list[tuple[dict[str, Any], list[tuple[str, Attribute]]]]
-    load_cases: list[tuple[dict[str, Any], list[tuple[dict[str, Any], list[tuple[str, Attribute]]]]]]
+def _text(node: Element) -> str:
+    """Return the text of an element around its children and comments."""
+    return "".join([node.text or "", *(child.tail or "" for child in node)]).strip()
 
 
-# -- the tree ------------------------------------------------------------------------------------------------
+def _append(parent: Element, node: Element, depth: int) -> None:
+    """Append an element at a depth of nesting, with the indentation of its siblings."""
+    if len(parent):
+        node.tail = parent[-1].tail
+        parent[-1].tail = parent.text
+    else:
+        node.tail = "\n" + "  " * (depth - 1)
+        parent.text = "\n" + "  " * depth
+    parent.append(node)
 
 
-def _model(raw: _Raw) -> Model:
-    _check_version(raw.version)
-    faults: list[str] = []
-    components: dict[int, Component] = {}
-    for head, attributes in raw.components:
-        number = _identifier(head.get("id"), "a component")
-        if number in components:
-            faults.append(f"two components have the id {number}")
-        kind = str(head.get("type", ""))
-        named = _present_names(attributes)
-        components[number] = Component(number, synonyms.TYPES.get(kind, kind), str(head.get("name") or ""), named)
-        outside = [key for key in _FORBIDDEN if key in named]
-        if outside:
-            faults.append(f"{components[number]}: {outside[0]} refers to data outside the file, which are not read")
-    relations = [_relation(head, references, components, faults) for head, references in raw.relations]
-    if faults:
-        raise RexsError(*faults)
-    cases = tuple(
-        LoadCase(
-            _identifier(head.get("id"), "a load case"),
-            {_identifier(one.get("id"), "a component"): _present_names(attributes) for one, attributes in parts},
-        )
-        for head, parts in raw.load_cases
-    )
-    return Model(raw.version, raw.program, components, tuple(relations), cases)
+def _xml_value(node: Element) -> Value:
+    """Value of an array, a matrix or an array of arrays."""
+    if "code" in node.attrib:
+        rows = _identifier(node.get("rows"), "rows") if _local(node) == "matrix" else None
+        return _unpacked(node.attrib["code"], _text(node), rows)
+    return tuple(_xml_value(child) if _local(child) in ("r", "array") else _text(child) for child in _elements(node))
 
 
-def _check_version(version: str) -> None:
-    match = re.fullmatch(r"(\d{1,3})\.(\d{1,3})(\.\d{1,3})?", version)
-    number = (int(match[1]), int(match[2])) if match else (0, 0)
-    if not synonyms.LEAST_VERSION <= number <= synonyms.LAST_VERSION:
-        least, last = (".".join(map(str, one)) for one in (synonyms.LEAST_VERSION, synonyms.LAST_VERSION))
-        raise RexsError(f"the file is of REXS version '{plain(version)}'; versions {least} to {last} can be read")
+class _Json:
+    """Tree of objects, with the methods of `_Xml`."""
 
+    def __init__(self, content: bytes) -> None:
+        self._mark = codecs.BOM_UTF8 if content.startswith(codecs.BOM_UTF8) else b""
+        try:
+            text = content.decode("utf-8-sig")
+            self._tree = json.loads(text, parse_constant=_no_number, parse_int=_whole_number)
+        except UnicodeDecodeError:
+            raise RexsError("the file is not UTF-8, as JSON must be") from None
+        except json.JSONDecodeError as error:
+            raise RexsError(f"not a JSON file: {error.msg} in line {error.lineno}") from None
+        except RecursionError:
+            raise RexsError(TOO_DEEP) from None
+        self.model: Any = _table(_table(self._tree, "the file").get("model"), "model")
+        indent = re.search(r"\n([ \t]+)", text)
+        self._indent = indent[1] if indent else None
 
-def _relation(
-    head: Mapping[str, Any],
-    references: Sequence[Mapping[str, Any]],
-    components: Mapping[int, Component],
-    faults: list[str],
-) -> Relation:
-    kind = str(head.get("type", ""))
-    roles = {}
-    for reference in references:
-        role = str(reference.get("role", ""))
-        number = _identifier(reference.get("id"), "a reference")
-        roles[synonyms.ROLES.get(role, role)] = number
-        if number not in components:
-            faults.append(f"relation {plain(head.get('id'))} ({plain(kind)}): component {number} does not exist")
-    order = head.get("order")
-    return Relation(synonyms.RELATIONS.get(kind, kind), 0 if order is None else _identifier(order, "an order"), roles)
+    def children(self, node: Mapping[str, Any], kind: str) -> list[Any]:
+        key = _JSON_KEYS.get(kind, kind)
+        values = node.get(key) or []
+        if kind == "spectra" and not isinstance(values, list):
+            values = [values]
+        if not isinstance(values, list):
+            raise RexsError(f"not a REXS file: {key} is not a list")
+        return [_table(value, f"an entry of {key}") for value in values]
 
+    def head(self, node: Mapping[str, Any]) -> Mapping[str, Any]:
+        return node
 
-def _present_names(attributes: Sequence[tuple[str, Attribute]]) -> dict[str, Attribute]:
-    """Attributes by their current names; if an old and a current name occur together, the current one has priority."""
-    named = {synonyms.ATTRIBUTES.get(key, key): attribute for key, attribute in attributes}
-    return named | {key: attribute for key, attribute in attributes if key in named}
+    def attributes(self, component: Mapping[str, Any]) -> Iterator[tuple[str, Attribute]]:
+        for node in self.children(component, "attributes"):
+            value = next((value for key, value in node.items() if key not in ("id", "unit")), None)
+            if value is not None:
+                yield str(node.get("id", "")), Attribute(_json_value(value), str(node.get("unit") or ""))
 
+    def put(self, component: dict[str, Any], additions: Mapping[str, Addition], depth: int) -> None:
+        nodes = self.children(component, "attributes")
+        new = [
+            {"id": name, "unit": addition.unit, _JSON_KINDS[type(addition.value)]: addition.value}
+            for name, addition in additions.items()
+        ]
+        component["attributes"] = [node for node in nodes if str(node.get("id", "")) not in additions] + new
 
-def _identifier(value: Any, what: str) -> int:
-    try:
-        number = float(value)
-        if number == int(number) and abs(number) < 1e15:
-            return int(number)
-    except (TypeError, ValueError, OverflowError):
-        pass
-    raise RexsError(f"{what} has the id '{plain(value)}'; expected a whole number")
+    def new_change(self, case: dict[str, Any], component: Mapping[str, Any]) -> Any:
+        node = {key: component[key] for key in ("id", "type", "name") if key in component}
+        case["components"] = [*self.children(case, "changes"), node]
+        return node
 
-
-def _unpacked(code: str, text: str, rows: int | None) -> tuple[Value, ...]:
-    """Numbers of a base64 text; those of a matrix as its rows.
-
-    A truncated text is refused; REXS requires no padding.
-    """
-    if code not in CODES:
-        raise RexsError(f"an array is packed as '{plain(code)}'; expected one of {', '.join(CODES)}")
-    try:
-        content = base64.b64decode("".join(text.split()), validate=True)
-        values = np.frombuffer(content, CODES[code]).astype(float)
-    except (binascii.Error, ValueError) as error:
-        raise RexsError(f"an array packed as base64 is damaged: {error}") from None
-    if rows is None:
-        return tuple(float(value) for value in values)
-    if rows < 1 or len(values) % rows:
-        raise RexsError(f"a packed matrix of {len(values)} numbers cannot have {rows} rows")
-    return tuple(tuple(float(value) for value in row) for row in values.reshape(rows, -1))
-
-
-# -- JSON ----------------------------------------------------------------------------------------------------
-
-
-def _header_of_json(content: bytes) -> _Raw:
-    try:
-        tree = json.loads(content.decode("utf-8-sig"), parse_constant=_no_number, parse_int=_whole_number)
-    except UnicodeDecodeError:
-        raise RexsError("the file is not UTF-8, as JSON must be") from None
-    except json.JSONDecodeError as error:
-        raise RexsError(f"not a JSON file: {error.msg} in line {error.lineno}") from None
-    except RecursionError:
-        raise RexsError("the file is nested far deeper than any REXS file") from None
-    model = _table(_table(tree, "the file").get("model"), "model")
-    spectra = model.get("load_spectrum") or []
-    spectra = spectra if isinstance(spectra, list) else [spectra]
-    cases = [case for spectrum in spectra for case in _tables(spectrum, "load_cases")]
-    return _Raw(
-        str(model.get("version", "")),
-        f"{model.get('applicationId', '')} {model.get('applicationVersion', '')}".strip(),
-        [(table, list(_tables(table, "refs"))) for table in _tables(model, "relations")],
-        [(table, list(_json_attributes(table))) for table in _tables(model, "components")],
-        [(case, [(table, list(_json_attributes(table))) for table in _tables(case, "components")]) for case in cases],
-    )
+    def content(self) -> bytes:
+        try:
+            text = json.dumps(self._tree, ensure_ascii=False, indent=self._indent, allow_nan=False)
+        except ValueError:
+            raise RexsError("the file has a number beyond 1e308, which cannot be written; correct it") from None
+        except RecursionError:
+            raise RexsError(TOO_DEEP) from None
+        return self._mark + text.encode("utf-8", errors="backslashreplace")
 
 
 def _whole_number(digits: str) -> int | float:
@@ -265,21 +335,6 @@ def _table(value: Any, what: str) -> dict[str, Any]:
     return value
 
 
-def _tables(parent: Mapping[str, Any], key: str) -> Iterator[dict[str, Any]]:
-    """Yield the objects of a list, which may be missing."""
-    values = _table(parent, key).get(key) or []
-    if not isinstance(values, list):
-        raise RexsError(f"not a REXS file: {key} is not a list")
-    return (_table(value, f"an entry of {key}") for value in values)
-
-
-def _json_attributes(component: Mapping[str, Any]) -> Iterator[tuple[str, Attribute]]:
-    for attribute in _tables(component, "attributes"):
-        values = [value for key, value in attribute.items() if key not in ("id", "unit")]
-        if values and values[0] is not None:
-            yield str(attribute.get("id", "")), Attribute(_json_value(values[0]), str(attribute.get("unit") or ""))
-
-
 def _json_value(value: Any, depth: int = 0) -> Value:
     if isinstance(value, list):
         if depth > 2:
@@ -297,89 +352,162 @@ def _json_value(value: Any, depth: int = 0) -> Value:
     return ""
 
 
-# -- XML -----------------------------------------------------------------------------------------------------
+def _unpacked(code: str, text: str, rows: int | None) -> tuple[Value, ...]:
+    """Numbers of a base64 text; those of a matrix as its rows.
 
-
-@dataclass
-class _Element:
-    tag: str
-    attributes: dict[str, str]
-    children: list[_Element] = field(default_factory=list)
-    texts: list[str] = field(default_factory=list)
-
-    @property
-    def text(self) -> str:
-        return "".join(self.texts).strip()
-
-    def all(self, tag: str) -> Iterator[_Element]:
-        return (child for child in self.children if child.tag == tag)
-
-
-def _header_of_xml(content: bytes) -> _Raw:
-    model = _elements(content)
-    if model.tag != "model":
-        raise RexsError(f"not a REXS file: the root element is '{plain(model.tag)}', not 'model'")
-    get = model.attributes.get
-    relations = [one for group in model.all("relations") for one in group.all("relation")]
-    components = [one for group in model.all("components") for one in group.all("component")]
-    cases = [one for spectrum in model.all("load_spectrum") for one in spectrum.all("load_case")]
-    return _Raw(
-        get("version", ""),
-        f"{get('applicationId', '')} {get('applicationVersion', '')}".strip(),
-        [
-            (relation.attributes, [dict(reference.attributes) for reference in relation.all("ref")])
-            for relation in relations
-        ],
-        [(component.attributes, list(_xml_attributes(component))) for component in components],
-        [
-            (case.attributes, [(one.attributes, list(_xml_attributes(one))) for one in case.all("component")])
-            for case in cases
-        ],
-    )
-
-
-def _xml_attributes(component: _Element) -> Iterator[tuple[str, Attribute]]:
-    for one in component.all("attribute"):
-        value = _xml_value(one.children[0]) if one.children else one.text
-        yield one.attributes.get("id", ""), Attribute(value, one.attributes.get("unit", ""))
-
-
-def _xml_value(element: _Element) -> Value:
-    """Value of an array, a matrix or an array of arrays."""
-    if "code" in element.attributes:
-        rows = _identifier(element.attributes.get("rows"), "rows") if element.tag == "matrix" else None
-        return _unpacked(element.attributes["code"], element.text, rows)
-    return tuple(_xml_value(child) if child.tag in ("r", "array") else child.text for child in element.children)
-
-
-def _elements(content: bytes) -> _Element:
-    """Tree of an XML file; a file with declarations of its own is refused."""
-    top = _Element("", {})
-    open_elements = [top]
-    count = 0
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal count
-        count += 1
-        if count > MOST_ELEMENTS or len(open_elements) > DEEPEST:
-            raise RexsError("the file has more elements, or deeper ones, than any REXS file")
-        element = _Element(tag.rpartition(":")[2], attributes)
-        open_elements[-1].children.append(element)
-        open_elements.append(element)
-
-    def refuse(*_: object) -> None:
-        raise RexsError("the file has a DOCTYPE or an entity, which REXS files must not have")
-
-    parser = expat.ParserCreate("utf-8")
-    parser.buffer_text = True
-    parser.StartElementHandler = start
-    parser.EndElementHandler = lambda _: open_elements.pop()
-    parser.CharacterDataHandler = lambda text: open_elements[-1].texts.append(text)
-    parser.StartDoctypeDeclHandler = refuse
-    parser.EntityDeclHandler = refuse
+    A truncated text is refused; REXS requires no padding.
+    """
+    if code not in CODES:
+        raise RexsError(f"an array is packed as '{plain(code)}'; expected one of {', '.join(CODES)}")
     try:
-        parser.Parse(decoded(content).text, True)
-    except expat.ExpatError as error:
-        reason = expat.errors.messages.get(error.code, "cannot be parsed")
-        raise RexsError(f"not an XML file: {reason} in line {error.lineno}") from None
-    return top.children[0]
+        content = base64.b64decode("".join(text.split()), validate=True)
+        values = np.frombuffer(content, CODES[code]).astype(float)
+    except (binascii.Error, ValueError) as error:
+        raise RexsError(f"an array packed as base64 is damaged: {error}") from None
+    if rows is None:
+        return tuple(values.tolist())
+    if rows < 1 or len(values) % rows:
+        raise RexsError(f"a packed matrix of {len(values)} numbers cannot have {rows} rows")
+    return tuple(tuple(row) for row in values.reshape(rows, -1).tolist())
+
+
+Document = _Xml | _Json
+
+
+def document_of(content: bytes) -> Document:
+    """Parse the bytes of an XML or JSON file.
+
+    Raises
+    ------
+    RexsError
+        The file is neither, or has errors.
+    """
+    start = content[:200].lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n\x00")[:1]
+    if start in (b"{", b"["):
+        return _Json(content)
+    if start == b"<":
+        return _Xml(content)
+    raise RexsError("not a REXS file: neither XML nor JSON nor a zip archive of one of them")
+
+
+# Model of a document
+
+_FORBIDDEN = ("data_source", "referenced_component_id")
+
+
+def parse_model(content: bytes) -> Model:
+    """Read the model from the bytes of an XML or JSON file.
+
+    Raises
+    ------
+    RexsError
+        The file has errors.
+    """
+    document = document_of(content)
+    head = document.head(document.model)
+    version = str(head.get("version", ""))
+    _check_version(version)
+    faults: list[str] = []
+    components: dict[int, Component] = {}
+    for node in document.children(document.model, "components"):
+        component = _component(document, node)
+        if component.number in components:
+            faults.append(f"two components have the id {component.number}")
+        components[component.number] = component
+        outside = [key for key in _FORBIDDEN if key in component.attributes]
+        if outside:
+            faults.append(f"{component}: {outside[0]} refers to data outside the file, which are not read")
+    relations = [
+        _relation(document, node, components, faults) for node in document.children(document.model, "relations")
+    ]
+    if faults:
+        raise RexsError(*faults)
+    cases = tuple(
+        LoadCase(
+            number,
+            {
+                _component_number(document, one): _attributes(document, one)
+                for one in document.children(node, "changes")
+            },
+        )
+        for number, node in _load_cases(document)
+    )
+    program = f"{head.get('applicationId', '')} {head.get('applicationVersion', '')}".strip()
+    return Model(version, program, components, tuple(relations), cases)
+
+
+def _check_version(version: str) -> None:
+    match = re.fullmatch(r"(\d{1,3})\.(\d{1,3})(\.\d{1,3})?", version)
+    number = (int(match[1]), int(match[2])) if match else (0, 0)
+    if not LEAST_VERSION <= number <= LAST_VERSION:
+        least, last = (".".join(map(str, one)) for one in (LEAST_VERSION, LAST_VERSION))
+        raise RexsError(f"the file is of REXS version '{plain(version)}'; versions {least} to {last} can be read")
+
+
+def _component(document: Document, node: Any) -> Component:
+    head = document.head(node)
+    kind = str(head.get("type", ""))
+    number = _component_number(document, node)
+    return Component(number, TYPES.get(kind, kind), str(head.get("name") or ""), _attributes(document, node))
+
+
+def _component_number(document: Document, node: Any) -> int:
+    return _identifier(document.head(node).get("id"), "a component")
+
+
+def _load_cases(document: Document) -> Iterator[tuple[int, Any]]:
+    """Yield number and node of all load cases of all spectra."""
+    for spectrum in document.children(document.model, "spectra"):
+        for node in document.children(spectrum, "load_cases"):
+            yield _identifier(document.head(node).get("id"), "a load case"), node
+
+
+def _relation(document: Document, node: Any, components: Mapping[int, Component], faults: list[str]) -> Relation:
+    head = document.head(node)
+    kind = str(head.get("type", ""))
+    roles = {}
+    for reference in map(document.head, document.children(node, "refs")):
+        role = str(reference.get("role", ""))
+        number = _identifier(reference.get("id"), "a reference")
+        roles[ROLES.get(role, role)] = number
+        if number not in components:
+            faults.append(f"relation {plain(head.get('id'))} ({plain(kind)}): component {number} does not exist")
+    order = head.get("order")
+    return Relation(RELATIONS.get(kind, kind), 0 if order is None else _identifier(order, "an order"), roles)
+
+
+def _attributes(document: Document, node: Any) -> dict[str, Attribute]:
+    """Attributes by their current names; if an old and a current name occur together, the current one has priority."""
+    attributes = list(document.attributes(node))
+    named = {ATTRIBUTES.get(key, key): attribute for key, attribute in attributes}
+    return named | {key: attribute for key, attribute in attributes if key in named}
+
+
+def _identifier(value: Any, what: str) -> int:
+    try:
+        number = float(value)
+        if number == int(number) and abs(number) < 1e15:
+            return int(number)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise RexsError(f"{what} has the id '{plain(value)}'; expected a whole number")
+
+
+def put_additions(content: bytes, placed: Mapping[tuple[int | None, int], Mapping[str, Addition]]) -> bytes:
+    """Return the bytes of a valid XML or JSON file with added attributes, which replace others of the same name.
+
+    Parameters
+    ----------
+    placed : mapping of (load case, component) to attributes by name; all of them exist in the file
+    """
+    document = document_of(content)
+    parts = {_component_number(document, node): node for node in document.children(document.model, "components")}
+    cases = dict(_load_cases(document))
+    for (case, number), additions in placed.items():
+        if case is None:
+            document.put(parts[number], additions, 2)
+            continue
+        changes = {_component_number(document, node): node for node in document.children(cases[case], "changes")}
+        node = changes[number] if number in changes else document.new_change(cases[case], parts[number])
+        document.put(node, additions, 3)
+    return document.content()

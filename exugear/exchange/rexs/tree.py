@@ -8,75 +8,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from exugear.exchange.rexs.mapping import UNITS
+from exugear.gearbox.units import unit_of
 from fe_ste.tools.display import ReprMixin
-
-# Names and units in the versions of REXS: current names, and factors of units
-
-LEAST_VERSION, LAST_VERSION = (1, 0), (2, 0)
-"""Supported versions; names changed in between, as the tables below list."""
-
-TYPES = {
-    "flank_geometry": "cylindrical_gear_flank",
-    "stage_gear_data": "cylindrical_stage_gear_data",
-    "fixed_coupling": "coupling",
-}
-"""Current name of a component type by its old name."""
-
-ATTRIBUTES = {
-    "axial_backlash": "operating_axial_bearing_clearance",
-    "base_circle_diameter": "base_diameter",
-    "dynamic_capacity": "radial_dynamic_load_rating",
-    "load_duration_fraction": "operating_time_fraction",
-    "radial_backlash": "operating_radial_bearing_clearance",
-    "reference_circle_diameter": "reference_diameter_cylindrical_gear",
-    "reference_diameter": "reference_diameter_rolling_bearing",
-    "static_capacity": "radial_static_load_rating",
-    "tip_radius_factor": "tip_corner_radius_factor_reference_profile",
-}
-"""Current name of an attribute by its old name, for those that are read."""
-
-ROLES = {"side_1": "inner_part", "side_2": "outer_part"}
-"""Current name of a role in a relation by its old name."""
-
-RELATIONS = {"coupling": "side"}
-"""Current name of a relation by its old name."""
-
-_UNITS = {
-    "none": ("number", 1.0),
-    "%": ("share", 0.01),
-    "mum": ("length", 1e-6),
-    "mm": ("length", 1e-3),
-    "m": ("length", 1.0),
-    "deg": ("angle", math.pi / 180.0),
-    "°": ("angle", math.pi / 180.0),
-    "rad": ("angle", 1.0),
-    "1 / min": ("speed", math.pi / 30.0),
-    "rad / s": ("speed", 1.0),
-    "N": ("force", 1.0),
-    "kN": ("force", 1e3),
-    "N mm": ("torque", 1e-3),
-    "N m": ("torque", 1.0),
-    "kN m": ("torque", 1e3),
-    "W": ("power", 1.0),
-    "kW": ("power", 1e3),
-    "N / m": ("stiffness", 1.0),
-    "N / mm": ("stiffness", 1e3),
-    "N / mum": ("stiffness", 1e6),
-    "N mm / rad": ("angular stiffness", 1e-3),
-    "N m / rad": ("angular stiffness", 1.0),
-    "Pa": ("stress", 1.0),
-    "MPa": ("stress", 1e6),
-    "N / mm^2": ("stress", 1e6),
-    "kg / dm^3": ("density", 1e3),
-    "kg / m^3": ("density", 1.0),
-    "kg": ("mass", 1.0),
-    "kg m^2": ("inertia", 1.0),
-    "m / s^2": ("acceleration", 1.0),
-    "h": ("time", 3600.0),
-    "s": ("time", 1.0),
-    "mm^2 / s": ("viscosity", 1e-6),
-    "C": ("temperature", 1.0),
-}
 
 
 def unit_factor(unit: str, wanted: str) -> float | None:
@@ -89,20 +23,14 @@ def unit_factor(unit: str, wanted: str) -> float | None:
     >>> unit_factor("mum", "mm"), unit_factor("", "mm"), unit_factor("furlong", "mm")
     (0.001, 1.0, None)
     """
-    unit = " ".join(unit.split())
-    if unit in ("", "none", wanted):
-        return 1.0
-    if unit not in _UNITS or _UNITS[unit][0] != _UNITS[wanted][0]:
+    source = unit_of(unit)
+    target = unit_of(wanted)
+    assert target is not None
+    if source is None or source.quantity not in ("number", target.quantity):
         return None
-    ratio = _UNITS[unit][1] / _UNITS[wanted][1]
-    return float(f"{ratio:.15g}")
-
-
-def degree_sign(version: tuple[int, int]) -> str:
-    """Return the notation of degrees in a version."""
-    if version < (1, 4):
-        return "°"
-    return "deg"
+    if source.quantity == "number" or unit == wanted:
+        return 1.0
+    return float(f"{source.factor / target.factor:.15g}")
 
 
 # Errors of a REXS file: one clear sentence each, reported together
@@ -130,15 +58,8 @@ class RexsError(ValueError):
         super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
 
 
-class Faults(ReprMixin, line=": {_found!n}"):
+class Faults(list[str]):
     """Errors collected over several attempts."""
-
-    def __init__(self) -> None:
-        self._found: list[str] = []
-
-    def add(self, sentence: str) -> None:
-        """Add an error."""
-        self._found.append(sentence)
 
     @contextmanager
     def gathered(self) -> Iterator[None]:
@@ -146,7 +67,7 @@ class Faults(ReprMixin, line=": {_found!n}"):
         try:
             yield
         except RexsError as error:
-            self._found += error.faults
+            self.extend(error.faults)
 
     def tell(self) -> None:
         """Raise the collected errors, if any.
@@ -156,8 +77,8 @@ class Faults(ReprMixin, line=": {_found!n}"):
         RexsError
             There are errors; the exception holds all of them.
         """
-        if self._found:
-            raise RexsError(*self._found)
+        if self:
+            raise RexsError(*self)
 
 
 def plain(text: object, longest: int = LONGEST_TEXT) -> str:
@@ -215,18 +136,25 @@ class Component:
         attribute = self._attribute(key)
         return attribute is not None and attribute.value not in ("", ())
 
-    def quantity(self, key: str, unit: str = "none") -> float | None:
-        """Finite number in a unit; None if the file has no value.
+    def quantity(self, key: str, unit: str = "") -> float | None:
+        """Finite number in a unit, by default that of `UNITS`; None if the file has no value."""
+        attribute = self._attribute(key)
+        if attribute is None or not self.given(key):
+            return None
+        return self._number(key, attribute.value) * self._factor(key, attribute, unit or UNITS.get(key, "none"))
+
+    def required(self, key: str) -> float:
+        """Finite number in the unit of `UNITS`.
 
         Raises
         ------
         RexsError
-            The value is not a number, or its unit is of another quantity.
+            The file has no value, or as in `quantity`.
         """
-        attribute = self._attribute(key)
-        if attribute is None or not self.given(key):
-            return None
-        return self._number(key, attribute.value) * self._factor(key, attribute, unit)
+        value = self.quantity(key)
+        if value is None:
+            raise RexsError(f"{self}: {key} is missing")
+        return value
 
     def whole(self, key: str) -> int | None:
         """Whole number; None if the file has no value.
@@ -309,6 +237,22 @@ class Component:
         return factor
 
 
+AdditionValue = str | float | tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Addition:
+    """An attribute that is added to a component of an existing file."""
+
+    component: int
+    name: str
+    """Name in the version of the file."""
+    unit: str
+    value: AdditionValue
+    load_case: int | None = None
+    """Load case of the value; None for the component itself."""
+
+
 @dataclass(frozen=True)
 class Relation:
     """Relation between components: their numbers by role."""
@@ -342,10 +286,20 @@ class Model(ReprMixin, line=" REXS {version}: {components!n} components, {relati
         """Return all components of some types, in the order of the file."""
         return tuple(component for component in self.components.values() if component.type in types)
 
+    def components_in(self, case: LoadCase | None, *types: str) -> list[Component]:
+        """Return all components of some types with the attributes that a load case replaces; None for no load case."""
+        changes = case.changes if case else {}
+        parts = self.components_of_type(*types)
+        return [part.with_attributes(changes[part.number]) if part.number in changes else part for part in parts]
+
     def related(self, relation: str, role: str, number: int, wanted: str) -> tuple[Component, ...]:
         """Return the components in the role `wanted` of all relations in which a component has a role."""
         found = self._relations_by_role.get((relation, role, number), ())
         return tuple(self.components[one.roles[wanted]] for one in found if wanted in one.roles)
+
+    def parts_of(self, owner: Component, kind: str) -> list[Component]:
+        """Return the parts of a type in the assembly of a component."""
+        return [part for part in self.related("assembly", "assembly", owner.number, "part") if part.type == kind]
 
     def relations_of(self, *types: str) -> Iterator[Relation]:
         """Yield the relations of some types."""

@@ -10,20 +10,20 @@ from typing import Any, TypeVar
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 import exugear
-from exugear.exchange.rexs import tree
-from exugear.exchange.rexs.additions import OWN
 from exugear.exchange.rexs.containers import read_rexs, with_additions
-from exugear.exchange.rexs.export.names import Origins, Results, origins_of, stiffness_names
+from exugear.exchange.rexs.export.names import Origins, name_in, origins_of, stiffness_names, unit_in
+from exugear.exchange.rexs.mapping import ATTRIBUTES, OWN, RESULTS, Version
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.to_case.notes import Rules
-from exugear.exchange.rexs.tree import Model, RexsError
+from exugear.exchange.rexs.tree import Addition, AdditionValue, Model, RexsError
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Body, seat_key
 from exugear.gearbox.reading import GearboxFileError
-from exugear.gearbox.units import RPM
+from exugear.gearbox.units import KN, MPA, unit_of
 from exugear.gearbox.variant import VariantError
 from exugear.results.folder import bodies_folder, read_duties
 from exugear.results.run_file import FINAL_NAME, load_run
@@ -47,6 +47,7 @@ from fe_ste.transmission_error.table import MeshTable, TableError
 # Results in a folder that belong to a gearbox; files computed from other input are skipped and reported
 
 Result = TypeVar("Result")
+Member = TypeVar("Member")
 _UNFIT = (GearboxFileError, MeshError, VariantError, BearingError, BalanceError, FileError, KeyError, ValueError)
 """Errors of reading a result file or of assembling the gearbox with its model settings."""
 
@@ -149,13 +150,60 @@ EQUAL = 1e-9
 """Largest relative difference at which numbers count as equal in both files."""
 
 
-@dataclass(frozen=True)
-class Target:
-    """Destination of results: the REXS model, its parts, and the load case of the static load (None: the model)."""
+@dataclass
+class Results(ReprMixin, line=": {additions!n} attributes"):
+    """Results of a gearbox, collected for the REXS file from which it was imported."""
 
+    gearbox: Gearbox
     model: Model
     origins: Origins
-    load_case: int | None
+    static_case: int | None
+    """Load case of the file with the static load; None if there is none, so that its results belong to the model."""
+    additions: list[Addition] = field(default_factory=list)
+
+    @property
+    def version(self) -> Version:
+        """Version of the file."""
+        major, minor = self.model.version.split(".")[:2]
+        return int(major), int(minor)
+
+    def put(
+        self, component: int, key: str, value: ArrayLike | None, load_case: int | None = None, own: bool = False
+    ) -> None:
+        """Add a result in SI (key of `RESULTS`) under its name in the version, or a custom one; None is skipped.
+
+        Parameters
+        ----------
+        own : whether the name is a custom one although REXS has one
+        """
+        if value is None:
+            return
+        unit = RESULTS[key].unit
+        known = unit_of(unit)
+        scaled = np.asarray(value, dtype=float) / (known.factor if known else 1.0)
+        name = OWN + key if own else name_in(key, self.version)
+        self.put_named(component, name, unit, tuple(scaled.tolist()) if scaled.ndim else float(scaled), load_case)
+
+    def put_named(
+        self, component: int, name: str, unit: str, value: AdditionValue, load_case: int | None = None
+    ) -> None:
+        """Add a result in a unit under a name."""
+        self.additions.append(Addition(component, name, unit_in(unit, self.version), value, load_case))
+
+    def sense(self, component: int) -> int:
+        """Sense of a component's u axis: 1 along +z, -1 against it."""
+        axes = self.origins.axes.get(component)
+        if axes is None or axes[0, 2] > 0.0:
+            return 1
+        return -1
+
+    def gear_data(self, stage: int, gear: Gear) -> int | None:
+        """Component with the data of a gear in a stage."""
+        numbers = self.origins.gears[gear.name]
+        for relation in self.model.relations_of("stage_gear_data"):
+            if relation.roles.get("stage") == stage and relation.roles.get("gear") in numbers:
+                return relation.roles.get("stage_gear_data")
+        return None
 
 
 def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
@@ -187,66 +235,65 @@ def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
         raise RexsError(*faults)
 
 
-def put_gears(results: Results, gearbox: Gearbox, target: Target) -> None:
+def put_gears(results: Results) -> None:
     """Add the diameters of gears, and those inputs of the gearbox file that differ from the REXS file."""
-    for name, gear in gearbox.gears.items():
-        for number in target.origins.gears[name]:
-            results.put(number, "reference_diameter", "mm", 2e3 * gear.reference_radius)
-            results.put(number, "base_diameter", "mm", 2e3 * gear.base_radius)
-            if gear.helix_angle:
-                results.put(
-                    number, "axial_pitch", "mm", 1e3 * math.pi * gear.normal_module / abs(math.sin(gear.helix_angle))
-                )
-            normal = gear.normal_tooth_thickness
-            results.put(number, "normal_tooth_thickness", "mm", 1e3 * normal)
-            results.put(number, "transverse_tooth_thickness", "mm", 1e3 * normal / math.cos(gear.helix_angle))
-            results.put(number, "normal_tooth_thickness_at_tip_diameter", "mm", 1e3 * gear.tip_thickness)
-            part = target.model.components[number]
+    for name, gear in results.gearbox.gears.items():
+        normal = gear.normal_tooth_thickness
+        sine = abs(math.sin(gear.helix_angle))
+        values = {
+            "reference_diameter": 2.0 * gear.reference_radius,
+            "base_diameter": 2.0 * gear.base_radius,
+            "axial_pitch": math.pi * gear.normal_module / sine if sine else None,
+            "normal_tooth_thickness": normal,
+            "transverse_tooth_thickness": normal / math.cos(gear.helix_angle),
+            "normal_tooth_thickness_at_tip_diameter": gear.tip_thickness,
+        }
+        # Inputs that a REXS file may not specify, or that an import may have replaced.
+        inputs = {
+            "profile_shift": gear.profile_shift,
+            "tooth_thinning": gear.tooth_thinning,
+            "root_diameter": 2.0 * gear.root_radius,
+            "tool_tip_radius": gear.rack.tip_radius,
+        }
+        for number in results.origins.gears[name]:
+            for key, value in values.items():
+                results.put(number, key, value)
+            part = results.model.components[number]
             for key, radius in (("root_form_diameter", gear.form_radius), ("tip_diameter", gear.tip_radius)):
                 stated = part.quantity(key, "mm")
                 if stated is None and key == "root_form_diameter":
-                    results.put(number, key, "mm", 2e3 * radius)
+                    results.put(number, key, 2.0 * radius)
                 elif stated is None or not math.isclose(abs(stated), 2e3 * radius, rel_tol=EQUAL):
-                    results.put_own(number, key, "mm", 2e3 * radius)  # the value of the file is an input and is kept
-            for key, unit, value in _inputs(gear):
-                results.put_own(number, key, unit, value)
+                    results.put(number, key, 2.0 * radius, own=True)  # the value of the file is an input and is kept
+            for key, value in inputs.items():
+                results.put(number, key, value)
 
 
-def _inputs(gear: Gear) -> tuple[tuple[str, str, float], ...]:
-    """Return inputs that a REXS file may not specify, or that an import may have replaced."""
-    return (
-        ("profile_shift", "none", gear.profile_shift),
-        ("tooth_thinning", "mm", 1e3 * gear.tooth_thinning),
-        ("root_diameter", "mm", 2e3 * gear.root_radius),
-        ("tool_tip_radius", "none", gear.rack.tip_radius),
-    )
-
-
-def put_pairs(results: Results, gearbox: Gearbox, target: Target) -> None:
+def put_pairs(results: Results) -> None:
     """Add results of pairs: contact ratios, working pitch circles, clearances."""
-    for name, spec in gearbox.pairs.items():
+    for name, spec in results.gearbox.pairs.items():
         pair = spec.pair
-        for stage in target.origins.pairs[name]:
-            results.put(stage, "gear_ratio", "none", pair.ratio)
-            results.put(stage, "transverse_contact_ratio", "none", pair.transverse_contact_ratio)
-            if pair.overlap_ratio > 0.0:  # REXS does not permit zero
-                results.put(stage, "overlap_ratio", "none", pair.overlap_ratio)
-            results.put(stage, "total_contact_ratio", "none", pair.total_contact_ratio)
-            length = pair.path_end - pair.path_start
-            results.put(stage, "length_of_path_of_contact", "mm", 1e3 * length)
-            results.put_own(stage, "transverse_backlash", "mm", 1e3 * pair.circumferential_backlash)
-            for gear, clearance, ends in (
-                (pair.pinion, pair.pinion_tip_clearance, _active(pair, pair.pinion)),
-                (pair.gear, pair.gear_tip_clearance, _active(pair, pair.gear)),
-            ):
-                data = _gear_data(target, stage, gear)
+        values = {
+            "gear_ratio": pair.ratio,
+            "transverse_contact_ratio": pair.transverse_contact_ratio,
+            "overlap_ratio": pair.overlap_ratio or None,  # REXS does not permit zero
+            "total_contact_ratio": pair.total_contact_ratio,
+            "length_of_path_of_contact": pair.path_end - pair.path_start,
+            "transverse_backlash": pair.circumferential_backlash,
+        }
+        for stage in results.origins.pairs[name]:
+            for key, value in values.items():
+                results.put(stage, key, value)
+            for gear, clearance in ((pair.pinion, pair.pinion_tip_clearance), (pair.gear, pair.gear_tip_clearance)):
+                data = results.gear_data(stage, gear)
                 if data is None:
                     continue
-                results.put(data, "pitch_diameter", "mm", 2e3 * pair.working_radius(gear))
-                results.put(data, "working_pressure_angle", "deg", math.degrees(pair.working_pressure_angle))
-                results.put(data, "active_root_diameter", "mm", 2e3 * ends[0])
-                results.put(data, "active_tip_diameter", "mm", 2e3 * ends[1])
-                results.put(data, "tip_clearance", "mm", 1e3 * clearance)
+                root, tip = _active(pair, gear)
+                results.put(data, "pitch_diameter", 2.0 * pair.working_radius(gear))
+                results.put(data, "working_pressure_angle", pair.working_pressure_angle)
+                results.put(data, "active_root_diameter", 2.0 * root)
+                results.put(data, "active_tip_diameter", 2.0 * tip)
+                results.put(data, "tip_clearance", clearance)
 
 
 def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
@@ -261,73 +308,56 @@ def _active(pair: GearPair, gear: Gear) -> tuple[float, float]:
     return (low, high)
 
 
-def _gear_data(target: Target, stage: int, gear: Gear) -> int | None:
-    """Component with the data of a gear in a stage."""
-    numbers = target.origins.gears[gear.name]
-    for relation in target.model.relations_of("stage_gear_data"):
-        if relation.roles.get("stage") == stage and relation.roles.get("gear") in numbers:
-            return relation.roles.get("stage_gear_data")
-    return None
-
-
-def put_static_forces(results: Results, gearbox: Gearbox, target: Target) -> None:
+def put_static_forces(results: Results) -> None:
     """Add the static mesh forces, which equal planets share evenly."""
-    for mesh, force in gearbox.train.static_mesh_forces().items():
-        one = next(each for each in gearbox.meshes if each.name == mesh)
-        numbers = target.origins.pairs[one.pair.name]
-        instance = instance_of(mesh, one.family)
-        stage = numbers[instance] if instance < len(numbers) else None
+    meshes = {mesh.name: mesh for mesh in results.gearbox.meshes}
+    for name, force in results.gearbox.train.static_mesh_forces().items():
+        stage = member_of(results.origins.pairs[meshes[name].pair.name], name, meshes[name].family)
         if stage is not None:
-            results.put(stage, "tangential_force_at_base_circle", "N", abs(force), target.load_case)
+            results.put(stage, "tangential_force_at_base_circle", abs(force), results.static_case)
 
 
-def instance_of(name: str, family: str) -> int:
-    """Return the number of a planet, from 0, from the name of its part.
+def member_of(members: Sequence[Member], name: str, family: str) -> Member | None:
+    """Return the member of a planet, whose number is in the name of its part; None if there are fewer members.
 
     Examples
     --------
-    >>> instance_of("sun_planet_3", "sun_planet"), instance_of("stage_1", "stage_1")
-    (2, 0)
+    >>> member_of([7, 8, 9], "sun_planet_3", "sun_planet"), member_of([7], "stage_1", "stage_1")
+    (9, 7)
     """
     number = name.removeprefix(family).removeprefix("_")
-    if number.isdigit():
-        return int(number) - 1
-    return 0
+    place = int(number) - 1 if number.isdigit() else 0
+    return members[place] if place < len(members) else None
 
 
-def put_tables(results: Results, gearbox: Gearbox, tables: Mapping[str, MeshTable], target: Target) -> None:
+def put_tables(results: Results, tables: Mapping[str, MeshTable]) -> None:
     """Add transmission error, mesh stiffness and load distribution along the face width in the static state."""
     for name, table in tables.items():
         data = table.static_state
-        pair = gearbox.pairs[name].pair
-        case = target.load_case
-        positions = tuple(data["pmc"].to_numpy().tolist())
-        for stage in target.origins.pairs[name]:
-            series = {
-                "transmission_error": ("mum", 1e6 * data["ste"]),
-                "mesh_stiffness": ("N / mm", 1e-3 * data["mesh_stiffness"]),
-            }
-            for key, (unit, values) in series.items():
-                if bool(values.isnull().any()):
-                    continue  # REXS has no symbol for a missing value
-                results.put(stage, key, unit, tuple(values.to_numpy().tolist()), case)
-            error = data["ste"]
-            results.put_own(stage, "mesh_cycle_positions", "none", positions, case)
-            results.put_own(
-                stage, "transmission_error_peak_to_peak", "mum", float(1e6 * (error.max() - error.min())), case
-            )
-            results.put_own(stage, "mean_mesh_stiffness", "N / mm", float(1e-3 * data["mesh_stiffness"].mean()), case)
-            results.put_own(stage, "contact_pressure_maximum", "MPa", float(1e-6 * data["max_pressure"].max()), case)
-            results.put(stage, "face_load_factor", "none", float(face_load_factor(data)), case)
-            along = load_along_face(data)
-            places = tuple((1e3 * along["axial_position"]).to_numpy().tolist())
-            results.put_own(stage, "load_along_face", "N / mm", tuple((1e-3 * along).to_numpy().tolist()), case)
-            results.put_own(stage, "load_along_face_positions_from_middle", "mm", places, case)
+        pair = results.gearbox.pairs[name].pair
+        case = results.static_case
+        error = data["ste"]
+        stiffness = data["mesh_stiffness"]
+        along = load_along_face(data)
+        values = {
+            # REXS has no symbol for a missing value.
+            "transmission_error": None if error.isnull().any() else error,
+            "mesh_stiffness": None if stiffness.isnull().any() else stiffness,
+            "mesh_cycle_positions": data["pmc"],
+            "transmission_error_peak_to_peak": error.max() - error.min(),
+            "mean_mesh_stiffness": stiffness.mean(),
+            "contact_pressure_maximum": data["max_pressure"].max(),
+            "face_load_factor": face_load_factor(data),
+            "load_along_face": along,
+            "load_along_face_positions_from_middle": along["axial_position"],
+        }
+        for stage in results.origins.pairs[name]:
+            for key, value in values.items():
+                results.put(stage, key, value, case)
             for gear in (pair.pinion, pair.gear):
-                place = _gear_data(target, stage, gear)
+                place = results.gear_data(stage, gear)
                 if place is not None:
-                    turned = tuple(360.0 / gear.teeth * position for position in positions)
-                    results.put(place, "mesh_positions", "deg", turned, case)
+                    results.put(place, "mesh_positions", 2.0 * math.pi / gear.teeth * data["pmc"], case)
 
 
 # Results on shafts: speeds in each load case, and displacements at the static load
@@ -335,56 +365,45 @@ def put_tables(results: Results, gearbox: Gearbox, tables: Mapping[str, MeshTabl
 SPEED = "rotational_speed"
 
 
-def put_speeds(results: Results, gearbox: Gearbox, target: Target) -> None:
+def put_speeds(results: Results) -> None:
     """Add the kinematic speeds of shafts and gears where the file does not specify them.
 
     Speeds of planets are omitted, because REXS does not define whether they are relative to the carrier.
     """
-    for case in target.model.load_cases or (None,):
+    for case in results.model.load_cases or (None,):
         name = "nominal" if case is None else f"load_case_{case.number}"
-        known = gearbox.load_cases.get(name)
+        known = results.gearbox.load_cases.get(name)
         if known is None or not known.start_speed:
             continue
-        speeds = gearbox.train.rolling({gearbox.case.overall.input: known.start_speed, **known.start_speeds})
-        for body, members in target.origins.bodies.items():
+        speeds = results.gearbox.train.rolling(
+            {results.gearbox.case.overall.input: known.start_speed, **known.start_speeds}
+        )
+        for body, members in results.origins.bodies.items():
             for number in members[0] if body in speeds else ():
-                part = target.model.components[number]
+                part = results.model.components[number]
                 stated = part.attributes if case is None else {**part.attributes, **case.changes.get(number, {})}
                 if SPEED not in stated:
-                    speed = _sense(target, number) * speeds[body] / RPM
-                    results.put(number, SPEED, "1 / min", speed, None if case is None else case.number)
+                    speed = results.sense(number) * speeds[body]
+                    results.put(number, SPEED, speed, None if case is None else case.number)
 
 
-def put_displacements(results: Results, assembly: Assembly, target: Target) -> None:
+def put_displacements(results: Results, assembly: Assembly) -> None:
     """Add the displacements of shafts at the static load, in their own axes, at the positions of gears and bearings."""
     q = static_state(assembly).q
     for body in assembly.bodies:
-        members = target.origins.bodies.get(body.family, ())
-        instance = instance_of(body.name, body.family)
-        shafts = [n for n in (members[instance] if instance < len(members) else ()) if _is_shaft(target, n)]
+        members = member_of(results.origins.bodies.get(body.family, ()), body.name, body.family) or ()
+        shafts = [n for n in members if n in results.origins.axes and results.model.components[n].type == "shaft"]
         nodes = sorted(_nodes(assembly, q, body), key=lambda node: node[0])
         if len(shafts) != 1 or not nodes or body.fixed:
             continue
         number = shafts[0]
-        nodes = nodes[:: _sense(target, number)]
+        nodes = nodes[:: results.sense(number)]
         heights, moved = zip(*nodes, strict=True)
-        along = _sense(target, number) * (np.array(heights) - target.origins.places[number])
-        own = np.array(moved) @ target.origins.axes[number].T
-        results.put(number, "node_positions", "mm", tuple((1e3 * along).tolist()), target.load_case)
+        along = results.sense(number) * (np.array(heights) - results.origins.places[number])
+        own = np.array(moved) @ results.origins.axes[number].T
+        results.put(number, "node_positions", along, results.static_case)
         for axis, column in zip("uvw", own.T, strict=True):
-            results.put(number, f"displacement_{axis}", "mum", tuple((1e6 * column).tolist()), target.load_case)
-
-
-def _is_shaft(target: Target, number: int) -> bool:
-    return target.model.components[number].type == "shaft" and number in target.origins.axes
-
-
-def _sense(target: Target, number: int) -> int:
-    """Sense of a component's u axis: 1 along +z, -1 against it."""
-    axes = target.origins.axes.get(number)
-    if axes is None or axes[0, 2] > 0.0:
-        return 1
-    return -1
+            results.put(number, f"displacement_{axis}", column, results.static_case)
 
 
 def _nodes(assembly: Assembly, q: Floats, body: Body) -> Iterator[tuple[float, Floats]]:
@@ -409,24 +428,23 @@ def _nodes(assembly: Assembly, q: Floats, body: Body) -> Iterator[tuple[float, F
 # Results on bearings, modes and runs
 
 
-def put_bearings(results: Results, gearbox: Gearbox, duties: Sequence[Mapping[str, Any]], target: Target) -> None:
+def put_bearings(results: Results, duties: Sequence[Mapping[str, Any]]) -> None:
     """Add results of catalogue bearings: loads, stiffness at the operating point, contact stress and life."""
-    families = {bearing.name: bearing.family for bearing in gearbox.bearings}
-    case = target.load_case
+    families = {bearing.name: bearing.family for bearing in results.gearbox.bearings}
+    case = results.static_case
     for duty in duties:
         name = str(duty["bearing"])
         family = families.get(name, name)
-        numbers = target.origins.bearings.get(family, ())
-        instance = instance_of(name, family)
-        if instance >= len(numbers):
+        number = member_of(results.origins.bearings.get(family, ()), name, family)
+        if number is None:
             continue
-        number = numbers[instance]
-        results.put_own(number, "radial_load", "kN", float(duty["radial_load_kN"]), case)
-        results.put_own(number, "axial_load", "kN", float(duty["axial_load_kN"]), case)
-        results.put(number, "contact_pressure", "MPa", duty["contact_pressure_MPa"], case)
-        results.put(number, "basic_rating_life", "MRev", duty["L10_Mrev"], case)
-        results.put(number, "reference_rating_life", "MRev", duty["L10r_Mrev"], case)
-        stiffness = rotated_stiffness(np.array(duty["stiffness_matrix_N_m_rad"]), target.origins.axes[number])
+        results.put(number, "radial_load", KN * float(duty["radial_load_kN"]), case)
+        results.put(number, "axial_load", KN * float(duty["axial_load_kN"]), case)
+        pressure = duty["contact_pressure_MPa"]
+        results.put(number, "contact_pressure", None if pressure is None else MPA * pressure, case)
+        results.put(number, "basic_rating_life", duty["L10_Mrev"], case)
+        results.put(number, "reference_rating_life", duty["L10r_Mrev"], case)
+        stiffness = rotated_stiffness(np.array(duty["stiffness_matrix_N_m_rad"]), results.origins.axes[number])
         for key, row, column, unit, factor in stiffness_names(results.version):
             results.put_named(number, key, unit, factor * float(stiffness[row, column]), case)
 
@@ -443,28 +461,28 @@ def model_suffix(choice: Choice) -> str:
     return "_".join(str(part) for part in (choice.variant, choice.mesh_model, choice.inertias)).replace("-", "_")
 
 
-def put_modes(results: Results, modes: Mapping[Choice, xr.Dataset], unit: int, load_case: int | None) -> None:
+def put_modes(results: Results, modes: Mapping[Choice, xr.Dataset], unit: int) -> None:
     """Add eigenfrequencies and damping of the variants to the gear unit."""
     for choice, data in modes.items():
         moving = data["frequency"].to_numpy() > 0.0
         for key, name, sign in (("eigenfrequencies", "frequency", "Hz"), ("damping_ratios", "damping_ratio", "none")):
             values = tuple(data[name].to_numpy()[moving].tolist())
-            results.put_own(unit, f"{key}_{model_suffix(choice)}", sign, values, load_case)
+            results.put_named(unit, f"{OWN}{key}_{model_suffix(choice)}", sign, values, results.static_case)
 
 
-def put_runs(results: Results, gearbox: Gearbox, runs: Mapping[Choice, xr.Dataset], target: Target) -> None:
+def put_runs(results: Results, runs: Mapping[Choice, xr.Dataset]) -> None:
     """Add the maximum and mean mesh forces of runs to the stages."""
-    families = {mesh.name: mesh for mesh in gearbox.meshes}
-    numbers = {f"load_case_{case.number}": case.number for case in target.model.load_cases}
+    families = {mesh.name: mesh for mesh in results.gearbox.meshes}
+    numbers = {f"load_case_{case.number}": case.number for case in results.model.load_cases}
     for choice, data in runs.items():
         case = numbers.get(str(choice.load_case))
         ending = model_suffix(choice) if case is not None else f"{model_suffix(choice)}_{choice.load_case}"
         for name in data["mesh"].to_numpy().tolist():
             mesh = families[str(name)]
-            stage = target.origins.pairs[mesh.pair.name][instance_of(mesh.name, mesh.family)]
+            stage = member_of(results.origins.pairs[mesh.pair.name], mesh.name, mesh.family)
             force = data["mesh_force"].sel(mesh=name)
             for key, value in (("mesh_force_maximum", force.max()), ("mesh_force_mean", force.mean())):
-                if math.isfinite(float(value)):
+                if stage is not None and math.isfinite(float(value)):
                     results.put_named(stage, f"{OWN}{key}_{ending}", "N", float(value), case)
 
 
@@ -508,28 +526,26 @@ def with_results(gearbox: Gearbox, folder: Path, path: str | Path, rules: Rules 
     model = read_rexs(path)
     imported = to_case(model, Path(path).name, rules=rules)
     check_same_gears(gearbox, imported.gearbox)
-    target = Target(model, origins_of(imported.found), _static_load_case(gearbox, model))
+    results = Results(gearbox, model, origins_of(imported.found), _static_load_case(gearbox, model))
     stored = StoredResults(gearbox, folder)
-    major, minor = model.version.split(".")[:2]
-    results = Results((int(major), int(minor)))
     unit = next((part.number for part in model.components_of_type("gear_unit")), next(iter(model.components)))
-    results.put_own(unit, "program", "none", f"exugear {exugear.__version__}")
-    results.put_own(unit, "case", "none", gearbox.name)
+    results.put_named(unit, f"{OWN}program", "none", f"exugear {exugear.__version__}")
+    results.put_named(unit, f"{OWN}case", "none", gearbox.name)
     for body, torque in gearbox.case.static_load.torques_N_m.items():
-        results.put_own(unit, f"static_torque_{body}", "N m", torque, target.load_case)
-    put_gears(results, gearbox, target)
-    put_pairs(results, gearbox, target)
-    put_static_forces(results, gearbox, target)
-    put_tables(results, gearbox, stored.tables(), target)
-    put_speeds(results, gearbox, target)
-    put_bearings(results, gearbox, stored.duties(), target)
-    put_modes(results, stored.modes(), unit, target.load_case)
-    put_runs(results, gearbox, stored.runs(), target)
+        results.put_named(unit, f"{OWN}static_torque_{body}", "N m", torque, results.static_case)
+    put_gears(results)
+    put_pairs(results)
+    put_static_forces(results)
+    put_tables(results, stored.tables())
+    put_speeds(results)
+    put_bearings(results, stored.duties())
+    put_modes(results, stored.modes(), unit)
+    put_runs(results, stored.runs())
     if stored.loaded is not None:
-        put_displacements(results, stored.loaded, target)
+        put_displacements(results, stored.loaded)
     content = with_additions(path, results.additions)
     own = sum(addition.name.startswith(OWN) for addition in results.additions)
-    return Exported(content, own, len(results.additions) - own, _replaced(model, results), tuple(stored.left_out))
+    return Exported(content, own, len(results.additions) - own, _replaced(results), tuple(stored.left_out))
 
 
 def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
@@ -543,13 +559,13 @@ def _static_load_case(gearbox: Gearbox, model: Model) -> int | None:
     return None
 
 
-def _replaced(model: Model, results: Results) -> tuple[str, ...]:
+def _replaced(results: Results) -> tuple[str, ...]:
     """Results in the file that are replaced."""
     entries = []
     for addition in results.additions:
-        part = model.components[addition.component]
-        cases = {case.number: case.changes.get(addition.component, {}) for case in model.load_cases}
+        part = results.model.components[addition.component]
+        cases = {case.number: case.changes.get(addition.component, {}) for case in results.model.load_cases}
         there = part.attributes if addition.load_case is None else cases[addition.load_case]
-        if tree.ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
+        if ATTRIBUTES.get(addition.name, addition.name) in there and not addition.name.startswith(OWN):
             entries.append(f"{part}: {addition.name}")
     return tuple(entries)

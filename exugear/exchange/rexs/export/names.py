@@ -3,71 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
-from exugear.exchange.rexs.additions import OWN, Addition, AdditionValue, unit_in
-from exugear.exchange.rexs.to_case.bodies import GEARS, ends
+from exugear.exchange.rexs.mapping import BEARINGS, GEARS, OWN, RESULTS, Version
+from exugear.exchange.rexs.to_case.bodies import ends
 from exugear.exchange.rexs.to_case.conversion import Found
 from exugear.exchange.rexs.to_case.gear_blocks import Teeth, first_of_planets
 from exugear.exchange.rexs.to_case.notes import Block, Places
-from exugear.exchange.rexs.to_case.supports import BEARINGS, PLACE_TOLERANCE
+from exugear.exchange.rexs.to_case.supports import PLACE_TOLERANCE
 from exugear.exchange.rexs.tree import Component, Model
 from exugear.gearbox.units import MM
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
-
-Version = tuple[int, int]
-
-NAMES: Mapping[str, Sequence[tuple[Version, str]]] = {
-    # of gears
-    "reference_diameter": [((1, 1), "reference_circle_diameter"), ((2, 0), "reference_diameter_cylindrical_gear")],
-    "base_diameter": [((1, 1), "base_circle_diameter"), ((2, 0), "base_diameter")],
-    "axial_pitch": [((1, 1), "axial_pitch")],
-    "normal_tooth_thickness": [
-        ((1, 2), "normal_tooth_thickness_at_pitch_diameter"),
-        ((1, 5), "normal_tooth_thickness_at_reference_diameter"),
-    ],
-    "transverse_tooth_thickness": [
-        ((1, 2), "tooth_thickness_at_pitch_diameter"),
-        ((1, 5), "transverse_tooth_thickness_at_reference_diameter"),
-    ],
-    "root_form_diameter": [((1, 2), "root_form_diameter")],
-    "normal_tooth_thickness_at_tip_diameter": [((1, 5), "normal_tooth_thickness_at_tip_diameter")],
-    # of shafts
-    "rotational_speed": [((1, 0), "rotational_speed")],
-    "node_positions": [((1, 1), "u_coordinates_of_beam_nodes")],
-    "displacement_u": [((1, 1), "displacement_u_of_nodes")],
-    "displacement_v": [((1, 1), "displacement_v_of_nodes")],
-    "displacement_w": [((1, 1), "displacement_w_of_nodes")],
-    # of a gear in a stage
-    "pitch_diameter": [((1, 0), "pitch_diameter")],
-    "working_pressure_angle": [((1, 1), "operating_pressure_angle_in_the_transverse_section")],
-    "active_root_diameter": [((1, 1), "usable_root_circle_diameter"), ((2, 0), "active_root_diameter")],
-    "active_tip_diameter": [((1, 1), "usable_addendum_circle_diameter"), ((2, 0), "active_tip_diameter")],
-    "tip_clearance": [((1, 2), "tip_clearance")],
-    "mesh_positions": [((1, 5), "rotational_meshing_position")],
-    # of a stage
-    "gear_ratio": [((1, 1), "gear_ratio")],
-    "transverse_contact_ratio": [((1, 1), "radial_contact_ratio")],
-    "overlap_ratio": [((1, 1), "overlap_contact_ratio")],
-    "total_contact_ratio": [((1, 3), "total_contact_ratio")],
-    "length_of_path_of_contact": [((1, 3), "length_of_path_of_contact")],
-    "tangential_force_at_base_circle": [
-        ((1, 3), "nominal_tangential_force_at_base_circle"),
-        ((2, 0), "nominal_tangential_force_at_base_diameter"),
-    ],
-    "face_load_factor": [((1, 1), "face_load_factor_flank"), ((2, 0), "face_load_factor_contact_stress")],
-    "mesh_stiffness": [((1, 5), "meshing_stiffness_characteristic")],
-    # of bearings; up to 1.5 the unit of a life is not defined
-    "basic_rating_life": [((1, 6), "nominal_rating_life_rotations_iso_281_2007")],
-    "reference_rating_life": [
-        ((1, 6), "nominal_reference_rating_life_rotations_din_26281"),
-        ((1, 7), "nominal_reference_rating_life_rotations_iso_16281_2008"),
-    ],
-    "contact_pressure": [((1, 3), "maximum_hertzian_pressure_inner_ring")],
-}
-"""Names by the version that introduced them, from the attribute lists of REXS 1.0 to 2.0."""
 
 
 def name_in(key: str, version: Version) -> str:
@@ -78,22 +26,31 @@ def name_in(key: str, version: Version) -> str:
     >>> name_in("base_diameter", (1, 4)), name_in("base_diameter", (2, 0)), name_in("base_diameter", (1, 0))
     ('base_circle_diameter', 'base_diameter', 'custom_exugear_base_diameter')
     """
-    known = [name for since, name in NAMES.get(key, ()) if since <= version]
+    known = [name for since, name in RESULTS[key].names.items() if since <= version]
     if known:
         return known[-1]
     return OWN + key
 
 
+def unit_in(unit: str, version: tuple[int, int]) -> str:
+    """Return a unit in the notation of a REXS version.
+
+    Examples
+    --------
+    >>> unit_in("deg", (1, 1)), unit_in("deg", (1, 4)), unit_in("MPa", (1, 7))
+    ('°', 'deg', 'N / mm^2')
+    """
+    if unit == "deg" and version < (1, 4):
+        return "°"
+    if unit == "MPa" and version < (2, 0):
+        return "N / mm^2"
+    return unit
+
+
 def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, float]]:
     """Yield entries of a bearing's stiffness: name, row and column over (u, v, w) and rotations, unit, SI to unit."""
     forces = (("f_u", 0), ("f_v", 1), ("f_w", 2), ("m_v", 4), ("m_w", 5))
-    motions = (
-        ("d_u", 0),
-        ("d_v", 1),
-        ("d_w", 2),
-        ("rot_v", 4),
-        ("rot_w", 5),
-    )
+    motions = (("d_u", 0), ("d_v", 1), ("d_w", 2), ("rot_v", 4), ("rot_w", 5))
     for force, row in forces:
         for motion, column in motions:
             turned = row > 3, column > 3
@@ -103,34 +60,6 @@ def stiffness_names(version: Version) -> Iterator[tuple[str, int, int, str, floa
                 old = motion if motion.startswith("d_") else f"d_{motion[-1]}_rot"
                 end = f"d{force.upper()[0]}_{force[-1]}_{old}"
             yield f"operating_point_stiffness_{end}", row, column, unit, 1e3 if all(turned) else 1.0
-
-
-@dataclass
-class Results(ReprMixin, line=": {additions!n} attributes"):
-    """Attributes collected for a file."""
-
-    version: Version
-    """(int, int) version of REXS."""
-    additions: list[Addition] = field(default_factory=list)
-
-    def put(
-        self, component: int, key: str, unit: str, value: AdditionValue | None, load_case: int | None = None
-    ) -> None:
-        """Add a result under its REXS name, or a custom one if there is none; None is skipped."""
-        if value is not None:
-            self.put_named(component, name_in(key, self.version), unit, value, load_case)
-
-    def put_own(self, component: int, key: str, unit: str, value: AdditionValue, load_case: int | None = None) -> None:
-        """Add a result for which REXS has no name."""
-        self.put_named(component, OWN + key, unit, value, load_case)
-
-    def put_named(
-        self, component: int, name: str, unit: str, value: AdditionValue, load_case: int | None = None
-    ) -> None:
-        """Add a result under a name."""
-        value = tuple(map(float, value)) if isinstance(value, tuple) else value
-        value = float(value) if isinstance(value, int | float) else value
-        self.additions.append(Addition(component, name, unit_in(unit, self.version), value, load_case))
 
 
 # Components of a REXS file from which the parts of the gearbox file originate, for the export of results
@@ -162,7 +91,10 @@ def origins_of(found: Found) -> Origins:
     }
     held = {name: _bearings(found, block) for name, block in found.bearings.items() if block.number}
     bodies = {
-        body.name: tuple(_shafts_and_gears(each) for each in (body.parts, *body.others))
+        body.name: tuple(
+            tuple(part.number for part in parts if part.type in ("shaft", *GEARS))
+            for parts in (body.parts, *body.others)
+        )
         for body in found.bodies.members
     }
     turning = [number for each in bodies.values() for numbers in each for number in numbers]
@@ -181,15 +113,11 @@ def origins_of(found: Found) -> Origins:
     )
 
 
-def _shafts_and_gears(parts: Iterable[Component]) -> tuple[int, ...]:
-    return tuple(part.number for part in parts if part.type in ("shaft", *GEARS))
-
-
 def _stages(
     model: Model, teeth: Teeth, first: Mapping[int, int], gears: Mapping[str, tuple[int, ...]]
 ) -> dict[str, tuple[int, ...]]:
     """Stages of each pair, one per planet."""
-    pairs = {frozenset((stage.pinion, stage.gear)): name for name, stage in teeth.stages.items()}
+    pairs = {frozenset(stage.both): name for name, stage in teeth.stages.items()}
     found: dict[str, list[tuple[int, int]]] = {name: [] for name in teeth.stages}
     for relation in model.relations_of("stage"):
         both = [relation.roles[role] for role in ("gear_1", "gear_2")]

@@ -6,31 +6,16 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from exugear.exchange.rexs.mapping import GEARS, JOINING, READ
 from exugear.exchange.rexs.to_case.notes import Notes, Places
 from exugear.exchange.rexs.tree import Component, Model, RexsError
-from exugear.gearbox.units import MM
 from fe_ste.tools.display import ReprMixin
 
-GEARS = ("cylindrical_gear", "ring_gear")
-JOINING = (
-    "coupling",
-    "switchable_coupling",
-    "cylindrical_interference_fit",
-    "tapered_interference_fit",
-    "feather_key_connection",
-    "involute_spline_connection",
-)
-"""Types of components that can rigidly connect their inner and outer part."""
+(TORSION,) = READ["torsion"]
 RIGID_TORSION = 1e12
 """Torsional stiffness (N m/rad) from which a connection counts as rigid; files use 1e17 for rigid."""
 RIGID_ABOVE = {"radial_stiffness": 1e14, "axial_stiffness": 1e14, "bending_stiffness": 1e11}
 """Stiffness (N/m, N m/rad) from which a value counts as rigid; no bearing is as stiff."""
-STIFFNESSES = {
-    "radial_stiffness": ("radial_N_per_m", "N / m", 1.0),
-    "axial_stiffness": ("axial_N_per_m", "N / m", 1.0),
-    "bending_stiffness": ("tilt_N_m_per_rad", "N mm / rad", 1e-3),
-}
-"""Attributes of bearings and couplings: key of the gearbox file, unit, and factor from it to SI."""
 COAXIAL = 2e-3
 """Largest distance of axes that count as coaxial, mm."""
 
@@ -105,10 +90,10 @@ class _Union:
 
 def torsional_stiffness(connection: Component) -> float | None:
     """Torsional stiffness of a coupling or fit, N m/rad; None if the file has no value."""
-    value = connection.quantity("rotational_stiffness", "N mm / rad")
+    value = connection.quantity(TORSION.attribute)
     if value is None:
         return None
-    return MM * value
+    return TORSION.factor * value
 
 
 def is_rigid_in_torsion(connection: Component) -> bool:
@@ -125,18 +110,11 @@ def is_one_piece(connection: Component) -> bool:
     """
     if not is_rigid_in_torsion(connection) or connection.flag("radial_force_absorption") is False:
         return False
-    for key, (_, unit, factor) in STIFFNESSES.items():
-        value = connection.quantity(key, unit)
-        if value is not None and factor * value < RIGID_ABOVE[key]:
+    for row in READ["stiffness"]:
+        value = connection.quantity(row.attribute)
+        if value is not None and row.factor * value < RIGID_ABOVE[row.attribute]:
             return False
     return True
-
-
-def is_engaged(model: Model, connection: Component) -> bool:
-    """Return whether a switchable coupling is engaged in the selected gear of the file."""
-    unit = model.components_of_type("gear_unit")
-    shift = (unit[0].whole("gear_shift_index") if unit else None) or 1
-    return connection.type != "switchable_coupling" or connection.flag("is_engaged", shift - 1) is not False
 
 
 def ends(model: Model, connection: Component) -> tuple[Component, Component] | None:
@@ -148,14 +126,20 @@ def ends(model: Model, connection: Component) -> tuple[Component, Component] | N
     return None
 
 
-def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
-    """Group components into bodies.
+def connections(model: Model) -> Iterator[tuple[Component, Component, Component]]:
+    """Yield couplings and fits with inner and outer part, unless they are not engaged in the selected gear."""
+    for part in model.components_of_type(*JOINING):
+        both = ends(model, part)
+        if both is None:
+            continue
+        unit = model.components_of_type("gear_unit")
+        shift = (unit[0].whole("gear_shift_index") if unit else None) or 1
+        if part.type != "switchable_coupling" or part.flag("is_engaged", shift - 1) is not False:
+            yield part, *both
 
-    Raises
-    ------
-    RexsError
-        Planets are not equal, or their carrier is not defined.
-    """
+
+def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
+    """Group components into bodies."""
     union = _joined(model, notes)
     held = held_by_speed(model)
     groups: dict[int, list[Component]] = {}
@@ -163,7 +147,7 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
         groups.setdefault(union.root(part.number), []).append(part)
     working = _working(model, union)
     sets = _planet_sets(model, places, union, groups)
-    planets = {root for members in sets for root, _ in members}
+    planets = {root for _, members in sets for root, _ in members}
     pins = {one.roles["shaft"] for one in model.relations_of("planet_pin") if "shaft" in one.roles}
     names = _names(
         {root: parts for root, parts in groups.items() if root in working - planets}, _carriers(model, union)
@@ -179,14 +163,26 @@ def find_bodies(model: Model, places: Places, notes: Notes) -> Bodies:
         elif root not in planets and not _is_fixed(parts, held):
             notes.lost.append(f"{', '.join(str(part) for part in parts)}: in no mesh, rotates without load")
     by_root = {union.root(part.number): body for body in bodies for part in body.parts}
-    carried = [
-        one for members in sets for one in _split_by_orbit(places, members, _carrier(model, union, by_root, members))
-    ]
+    carried: list[tuple[Body, list[_Planet]]] = []
+    for stage, members in sets:
+        carrier = _carrier(model, union, by_root, stage, members[0][1])
+        carried += [(carrier, orbit) for orbit in _orbits(places, members, carrier.axis)]
     planet_bodies: list[Body] = []
     for number, (carrier, placed) in enumerate(carried):
-        name = _lettered("planet", number, len(carried))
         placed = _order_by_mating_planets(model, groups, placed, planet_bodies)
-        planet_bodies.append(_planet_body(places, carrier, placed, name, groups))
+        first, *others = (tuple(_axial(groups[planet.root])) for planet in placed)
+        x, y, _ = places.position(placed[0].shaft)
+        planet_bodies.append(
+            Body(
+                name=_lettered("planet", number, len(carried)),
+                parts=first,
+                axis=(x, y),
+                others=tuple(others),
+                angles=tuple(planet.angle for planet in placed),
+                orbit=round(placed[0].radius, 6),
+                carrier=carrier.name,
+            )
+        )
     return Bodies([*bodies, *planet_bodies])
 
 
@@ -197,7 +193,7 @@ def _joined(model: Model, notes: Notes) -> _Union:
     for casing in casings[1:]:
         union.join(casings[0], casing)
     carriers: dict[int, int] = {}
-    for relation in model.relations_of("assembly", "ordered_assembly"):
+    for relation in model.relations_of("assembly"):
         owner = relation.roles.get("assembly", -1)
         part = relation.roles.get("part", -1)
         if owner in union and part in union and model.components[owner].type == "shaft":
@@ -205,17 +201,14 @@ def _joined(model: Model, notes: Notes) -> _Union:
         elif part in union and owner in model.components and model.components[owner].type == "planet_carrier":
             union.join(carriers.setdefault(owner, part), part)
     stiff = [
-        (connection, both)
-        for connection in model.components_of_type(*JOINING)
-        if is_rigid_in_torsion(connection)
-        and is_engaged(model, connection)
-        and (both := ends(model, connection)) is not None
-        and all(end.number in union for end in both)
+        (connection, inner, outer)
+        for connection, inner, outer in connections(model)
+        if is_rigid_in_torsion(connection) and inner.number in union and outer.number in union
     ]
-    for connection, (inner, outer) in stiff:
+    for connection, inner, outer in stiff:
         if is_one_piece(connection):
             union.join(inner.number, outer.number)
-    for connection, (inner, outer) in stiff:
+    for connection, inner, outer in stiff:
         held = {union.root(end.number) for end in (inner, outer)}
         if casings and union.root(casings[0]) in held and len(held) > 1:
             notes.changed.append(
@@ -231,11 +224,11 @@ def _working(model: Model, union: _Union) -> set[int]:
     """Roots of components that mesh or carry planets, and of those connected to them with some torsional stiffness."""
     numbers = {role for relation in model.relations_of("stage") for role in relation.roles.values()}
     working = {union.root(number) for number in numbers if number in union} | _carriers(model, union)
-    ties = []
-    for connection in model.components_of_type(*JOINING):
-        both = ends(model, connection)
-        if both and torsional_stiffness(connection) != 0.0 and is_engaged(model, connection):
-            ties.append({union.root(end.number) for end in both if end.number in union and end.type != "gear_casing"})
+    ties = [
+        {union.root(end.number) for end in both if end.number in union and end.type != "gear_casing"}
+        for connection, *both in connections(model)
+        if torsional_stiffness(connection) != 0.0
+    ]
     for _ in ties:
         working |= {root for tie in ties if tie & working for root in tie}
     return working
@@ -247,11 +240,10 @@ def held_by_speed(model: Model) -> set[int]:
     Some programs omit the speed zero although they state that a shaft defines its speed.
     """
     speeds: dict[int, set[float]] = {}
-    for changes in [case.changes for case in model.load_cases] or [{}]:
-        for shaft in model.components_of_type("shaft"):
-            here = shaft.with_attributes(changes.get(shaft.number, {}))
-            speed = here.quantity("rotational_speed", "1 / min")
-            defined = here.flag("defines_speed")
+    for case in model.load_cases or (None,):
+        for shaft in model.components_in(case, "shaft"):
+            speed = shaft.quantity("rotational_speed")
+            defined = shaft.flag("defines_speed")
             if defined or (speed is not None and defined is None):
                 speeds.setdefault(shaft.number, set()).add(speed or 0.0)
             elif speed:
@@ -290,23 +282,23 @@ def _axis(places: Places, parts: Sequence[Component], pins: set[int]) -> tuple[f
 
 def _planet_sets(
     model: Model, places: Places, union: _Union, groups: Mapping[int, list[Component]]
-) -> list[list[tuple[int, Component]]]:
-    """Group the planets into sets of equal ones: (root, shaft) of each."""
-    sets: dict[tuple[object, ...], list[tuple[int, Component]]] = {}
+) -> list[tuple[int, list[tuple[int, Component]]]]:
+    """Group the planets into sets of equal ones: number of the stage, and (root, shaft) of each."""
+    sets: dict[tuple[object, ...], tuple[int, list[tuple[int, Component]]]] = {}
     for relation in model.relations_of("planet_shaft"):
         if not {"shaft", "planetary_stage"} <= relation.roles.keys() or relation.roles["shaft"] not in union:
             raise RexsError("a relation 'planet_shaft' lacks the shaft or the planetary_stage")
         shaft = model.components[relation.roles["shaft"]]
+        stage = relation.roles["planetary_stage"]
         root = union.root(shaft.number)
         gears = sorted(
-            (part.whole("number_of_teeth") or 0, part.quantity("normal_module", "mm") or 0.0)
+            (part.whole("number_of_teeth") or 0, part.quantity("normal_module") or 0.0)
             for part in groups[root]
             if part.type in GEARS
         )
-        if not gears:
-            continue
-        key = (relation.roles.get("planetary_stage"), *gears, places.position(shaft)[2])
-        sets.setdefault(key, []).append((root, shaft))
+        if gears:
+            key = (stage, *gears, places.position(shaft)[2])
+            sets.setdefault(key, (stage, []))[1].append((root, shaft))
     return list(sets.values())
 
 
@@ -320,37 +312,29 @@ class _Planet:
     shaft: Component
 
 
-def _carrier(
-    model: Model, union: _Union, by_root: Mapping[int, Body], members: Sequence[tuple[int, Component]]
-) -> Body:
-    """Carrier of a set of planets."""
-    shaft = members[0][1]
-    stage = next(
-        one.roles["planetary_stage"] for one in model.relations_of("planet_shaft") if one.roles["shaft"] == shaft.number
-    )
+def _carrier(model: Model, union: _Union, by_root: Mapping[int, Body], stage: int, shaft: Component) -> Body:
+    """Carrier of the planets of a stage, of which one has the shaft."""
     held = [
-        one
+        one.number
         for kind in ("planet_carrier_shaft", "planet_pin")
         for one in model.related(kind, "planetary_stage", stage, "shaft")
     ]
-    roots = dict.fromkeys(union.root(one.number) for one in held if one.number in union)
-    carriers = [by_root[root] for root in roots if root in by_root]
-    if not carriers:
+    carriers = (by_root.get(union.root(number)) for number in held if number in union)
+    carrier = next((body for body in carriers if body is not None), None)
+    if carrier is None:
         raise RexsError(
             f"{model.components[stage]}: no planet_carrier_shaft or planet_pin defines the carrier of {shaft}"
         )
-    return carriers[0]
+    return carrier
 
 
-def _split_by_orbit(
-    places: Places, members: Sequence[tuple[int, Component]], carrier: Body
-) -> Iterator[tuple[Body, list[_Planet]]]:
-    """Yield sets of planets at equal distance from the carrier axis, ordered by angle; a Ravigneaux set has two."""
+def _orbits(places: Places, members: Sequence[tuple[int, Component]], axis: tuple[float, float]) -> list[list[_Planet]]:
+    """Return sets of planets at equal distance from the carrier axis, ordered by angle; a Ravigneaux set has two."""
     orbits: list[list[_Planet]] = []
     for root, shaft in members:
         x, y, _ = places.position(shaft)
-        dx = x - carrier.axis[0]
-        dy = y - carrier.axis[1]
+        dx = x - axis[0]
+        dy = y - axis[1]
         angle = round(math.degrees(math.atan2(dy, dx)) % 360.0, 9) % 360.0
         planet = _Planet(angle, math.hypot(dx, dy), root, shaft)
         orbit = next((one for one in orbits if abs(one[0].radius - planet.radius) <= COAXIAL), None)
@@ -358,8 +342,8 @@ def _split_by_orbit(
             orbits.append([planet])
         else:
             orbit.append(planet)
-    for orbit in sorted(orbits, key=lambda one: one[0].radius):
-        yield carrier, sorted(orbit, key=lambda planet: planet.angle)
+    orbits.sort(key=lambda one: one[0].radius)
+    return [sorted(orbit, key=lambda planet: planet.angle) for orbit in orbits]
 
 
 def _order_by_mating_planets(
@@ -379,22 +363,6 @@ def _order_by_mating_planets(
                     return placed[-number:] + placed[:-number]
                 return placed
     return placed
-
-
-def _planet_body(
-    places: Places, carrier: Body, placed: Sequence[_Planet], name: str, groups: Mapping[int, list[Component]]
-) -> Body:
-    parts = [tuple(_axial(groups[planet.root])) for planet in placed]
-    x, y, _ = places.position(placed[0].shaft)
-    return Body(
-        name,
-        parts[0],
-        (x, y),
-        others=tuple(parts[1:]),
-        angles=tuple(planet.angle for planet in placed),
-        orbit=round(placed[0].radius, 6),
-        carrier=carrier.name,
-    )
 
 
 def _names(groups: Mapping[int, list[Component]], carriers: set[int]) -> dict[int, str]:

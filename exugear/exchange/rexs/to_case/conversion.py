@@ -13,8 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from exugear.exchange.rexs.additions import OWN
-from exugear.exchange.rexs.to_case.bodies import GEARS, JOINING, Bodies, Body, find_bodies
+from exugear.exchange.rexs.mapping import (
+    GEARS,
+    JOINING,
+    OTHER_GEARS,
+    OWN,
+    READ_TYPES,
+    TYPES_OF_ROLES,
+    TYPES_WITHOUT_EFFECT,
+)
+from exugear.exchange.rexs.to_case.bodies import Bodies, Body, find_bodies
 from exugear.exchange.rexs.to_case.gear_blocks import (
     Teeth,
     axes_to_move,
@@ -33,7 +41,6 @@ from exugear.exchange.rexs.to_case.loads import (
     loads_of,
     static_load,
 )
-from exugear.exchange.rexs.to_case.meshing import MODIFICATIONS
 from exugear.exchange.rexs.to_case.notes import (
     Block,
     Entry,
@@ -48,7 +55,6 @@ from exugear.exchange.rexs.to_case.notes import (
 )
 from exugear.exchange.rexs.to_case.shafts import (
     Cylinder,
-    Inertia,
     gear_tube,
     inertia_of,
     is_continuous,
@@ -57,15 +63,9 @@ from exugear.exchange.rexs.to_case.shafts import (
     seat_diameter,
     sections_of,
 )
-from exugear.exchange.rexs.to_case.supports import (
-    BEARINGS,
-    PLAIN_BEARINGS,
-    bearing_blocks,
-    coupling_blocks,
-    joint_blocks,
-)
+from exugear.exchange.rexs.to_case.supports import bearing_blocks, coupling_blocks, joint_blocks
 from exugear.exchange.rexs.to_case.toothing import is_rigid, material_of, material_table
-from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
+from exugear.exchange.rexs.tree import Model, RexsError, plain
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.system.readiness import check_parts
@@ -107,24 +107,18 @@ def levelled_under_seats(
     }
 
 
-def body_blocks(
-    model: Model,
-    places: Places,
-    bodies: Bodies,
-    teeth: Teeth,
-    sections: Mapping[str, Sequence[Cylinder]],
-    notes: Notes,
-) -> dict[str, Block]:
-    """Tables of all bodies by name."""
-    blocks = {}
-    for body in bodies.members:
-        with notes.faults.gathered():
-            blocks[body.name] = _block(model, places, body, teeth, sections[body.name], notes)
-    return blocks
-
-
-def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Sequence[Cylinder], notes: Notes) -> Block:
-    block = Block(", ".join(str(part) for part in body.parts), _place(body))
+def _body_block(
+    model: Model, places: Places, body: Body, teeth: Teeth, sections: Sequence[Cylinder], notes: Notes
+) -> Block:
+    """Table of a body with its inertia and shape."""
+    block = Block(", ".join(str(part) for part in body.parts))
+    if body.carrier:
+        block.entries["carrier"] = Entry(body.carrier)
+        block.entries["orbit_radius_mm"] = read(body.orbit, "support_vector of the planet shafts")
+        angles = [tidy(round(angle, 6)) for angle in body.angles]
+        block.entries["planet_angles_deg"] = read(angles, "support_vector")
+    else:
+        block.entries["axis_position_mm"] = read([*body.axis], "support_vector")
     wheels = [number for number, owner in teeth.bodies.items() if owner is body]
     if wheels:
         z = {teeth.names[number]: teeth.z[number] for number in wheels}
@@ -132,11 +126,16 @@ def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Seq
     if body.fixed:
         block.entries["fixed"] = read(True, "joined with the casing")
         return block
-    tubes = {number: _tube(model, body, teeth, number, sections, notes) for number in wheels}
+    tubes = {}
+    for number in wheels:
+        gear = teeth.gears[number]
+        seat = seat_diameter(sections, teeth.z[number], gear.face_width.value, gear.internal)
+        tubes[number] = gear_tube(model, gear, teeth.z[number], seat, notes)
     plates = [
         one for part in body.parts_of_type("side_plate") if (one := plate(model, places, part, notes)) is not None
     ]
-    inertia = inertia_of([*sections, *tubes.values(), *plates])
+    pieces = [*sections, *tubes.values(), *plates]
+    inertia = inertia_of(pieces)
     if inertia.mass <= 0.0:
         raise RexsError(f"{body.parts[0]}: inertia is not defined by sections, gears or plates")
     made_of = [
@@ -144,47 +143,31 @@ def _block(model: Model, places: Places, body: Body, teeth: Teeth, sections: Seq
         for name, found in (("section", sections), ("gear tube", tubes), ("plate", plates))
         if found
     ]
-    block.blocks[f"inertia.{INERTIAS}"] = Block("", _inertia_entries(inertia, ", ".join(made_of)))
+    entries = {key: derived(value, "likewise") for key, value in _mass_entries(pieces).items()}
+    entries["mass_kg"] = derived(entries["mass_kg"].value, f"computed here from {', '.join(made_of)}")
+    entries["centre_of_mass_z_mm"] = derived(tidy(round(1e3 * inertia.centre, 4)), "likewise")
+    block.blocks[f"inertia.{INERTIAS}"] = Block("", entries)
     if _has_shape(model, body, sections):
         block.entries["flexibility"] = derived("elastic", "in the variant flexible: its sections in sequence")
-        block.blocks["shape"] = _shape(model, body, sections, notes)
-        block.blocks["shape.blanks"] = Block(
-            "gears as hollow cylinders from seat to reference diameter",
-            {teeth.names[number]: _blank(tube) for number, tube in tubes.items() if tube.mass > 0.0},
-        )
-        if not block.blocks["shape.blanks"].entries:
-            del block.blocks["shape.blanks"]
+        block.blocks["shape"] = _shape(model, body, sections)
+        blanks = {
+            teeth.names[number]: derived(
+                _mass_entries([tube]), f"{tube.outers[0]:.4g} x {tube.inners[0]:.4g} x {tube.length:g} mm"
+            )
+            for number, tube in tubes.items()
+            if inertia_of([tube]).mass > 0.0
+        }
+        if blanks:
+            block.blocks["shape.blanks"] = Block("gears as hollow cylinders from seat to reference diameter", blanks)
     return block
 
 
-def _place(body: Body) -> dict[str, Entry]:
-    if not body.carrier:
-        return {"axis_position_mm": read([*body.axis], "support_vector")}
-    return {
-        "carrier": Entry(body.carrier),
-        "orbit_radius_mm": read(body.orbit, "support_vector of the planet shafts"),
-        "planet_angles_deg": read([tidy(round(angle, 6)) for angle in body.angles], "support_vector"),
-    }
-
-
-def _tube(model: Model, body: Body, teeth: Teeth, number: int, sections: Sequence[Cylinder], notes: Notes) -> Cylinder:
-    gear = teeth.gears[number]
-    z = teeth.z[number]
-    seat = seat_diameter(sections, z, gear.face_width.value, gear.internal)
-    return gear_tube(model, gear, z, seat, 0.0, notes)
-
-
-def _inertia_entries(inertia: Inertia, made_of: str) -> dict[str, Entry]:
-    return {
-        "mass_kg": derived(_digits(inertia.mass), f"computed here from {made_of}"),
-        "axial_kg_m2": derived(_digits(inertia.axial), "likewise"),
-        "transverse_kg_m2": derived(_digits(max(inertia.transverse, 0.5 * inertia.axial * (1.0 + 1e-5))), "likewise"),
-        "centre_of_mass_z_mm": derived(tidy(round(inertia.centre, 4)), "likewise"),
-    }
-
-
-def _digits(value: float) -> float:
-    return float(f"{value:.6g}")
+def _mass_entries(pieces: Sequence[Cylinder]) -> dict[str, float]:
+    """Mass and moments of inertia of pieces; the transverse one at least that of a thin disc."""
+    inertia = inertia_of(pieces)
+    transverse = max(inertia.transverse, 0.5 * inertia.axial * (1.0 + 1e-5))
+    values = {"mass_kg": inertia.mass, "axial_kg_m2": inertia.axial, "transverse_kg_m2": transverse}
+    return {key: float(f"{value:.6g}") for key, value in values.items()}
 
 
 def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
@@ -198,14 +181,17 @@ def _has_shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> bool:
     return plain_shaft and not rigid and len(set(materials)) == 1 and is_continuous(sections)
 
 
-def _shape(model: Model, body: Body, sections: Sequence[Cylinder], notes: Notes) -> Block:
-    pieces = [
-        {"length_mm": section.length, "outer_diameter_mm": section.outer}
-        | ({"inner_diameter_mm": section.inner} if section.inner else {})
-        | ({"outer_diameter_end_mm": section.outer_end} if section.outer_end not in (None, section.outer) else {})
-        | ({"inner_diameter_end_mm": section.inner_end} if section.inner_end not in (None, section.inner) else {})
-        for section in sections
-    ]
+def _shape(model: Model, body: Body, sections: Sequence[Cylinder]) -> Block:
+    pieces = []
+    for one in sections:
+        piece = {"length_mm": one.length, "outer_diameter_mm": one.outers[0]}
+        if one.inners[0]:
+            piece["inner_diameter_mm"] = one.inners[0]
+        if one.outers[1] != one.outers[0]:
+            piece["outer_diameter_end_mm"] = one.outers[1]
+        if one.inners[1] != one.inners[0]:
+            piece["inner_diameter_end_mm"] = one.inners[1]
+        pieces.append(piece)
     entries = {
         "start_z_mm": read(sections[0].start, "support_vector of the shaft"),
         "sections": read(pieces, "shaft_section"),
@@ -216,23 +202,11 @@ def _shape(model: Model, body: Body, sections: Sequence[Cylinder], notes: Notes)
     return Block("", entries)
 
 
-def _blank(tube: Cylinder) -> Entry:
-    inertia = inertia_of([tube])
-    return derived(
-        {
-            "mass_kg": _digits(inertia.mass),
-            "axial_kg_m2": _digits(inertia.axial),
-            "transverse_kg_m2": _digits(max(inertia.transverse, 0.5 * inertia.axial * (1.0 + 1e-5))),
-        },
-        f"{tube.outer:.4g} x {tube.inner:.4g} x {tube.length:g} mm",
-    )
-
-
 def meshes_of_bodies(teeth: Teeth) -> dict[str, int]:
     """Count the meshes of each rotating body other than planets, in the order of the stages."""
     counts: dict[str, int] = {}
     for stage in teeth.stages.values():
-        for number in (stage.pinion, stage.gear):
+        for number in stage.both:
             body = teeth.bodies[number]
             if not body.fixed and not body.carrier:
                 counts[body.name] = counts.get(body.name, 0) + 1
@@ -254,70 +228,9 @@ def gear_places(teeth: Teeth, bodies: Bodies) -> dict[str, float]:
 
 # Conversion of a REXS file to a gearbox file; all errors are reported together, and assumptions are marked
 
-OTHER_GEARS = {"bevel": "bevel gears", "worm": "worm gears", "hypoid": "hypoid gears"}
-"""Prefixes of the types of gears that are not cylindrical."""
 SPEED_TOLERANCE = 1e-3
 """Largest relative difference between a speed in the file and the kinematic speed."""
 _SHAPE_FAULT = re.compile(r"bodies\.(\w+)\.shape: (.*)")
-TYPES_OF_ROLES = {
-    ("stage", "gear_1"): GEARS,
-    ("stage", "gear_2"): GEARS,
-    ("stage", "stage"): ("cylindrical_stage",),
-    ("planet_shaft", "shaft"): ("shaft",),
-    ("planet_shaft", "planetary_stage"): ("planetary_stage",),
-    ("planet_pin", "shaft"): ("shaft",),
-    ("planet_pin", "planetary_stage"): ("planetary_stage",),
-    ("planet_carrier_shaft", "shaft"): ("shaft",),
-    ("planet_carrier_shaft", "planetary_stage"): ("planetary_stage",),
-    ("side", "assembly"): (*BEARINGS, *PLAIN_BEARINGS, *JOINING),
-}
-"""Required type of a component with a role in a relation; a wrong id refers to a component of another type."""
-READ_TYPES = frozenset(
-    (
-        *GEARS,
-        *BEARINGS,
-        *PLAIN_BEARINGS,
-        *JOINING,
-        "gear_unit",
-        "gear_casing",
-        "shaft",
-        "shaft_section",
-        "side_plate",
-        "planet_carrier",
-        "planetary_stage",
-        "cylindrical_stage",
-        "cylindrical_gear_flank",
-        "cylindrical_gear_manufacturing_settings",
-        "rack_shaped_tool",
-        "cutter_wheel_tool",
-        *MODIFICATIONS,
-        "material",
-        "rolling_bearing_row",
-        "rolling_element",
-        "external_load",
-        "lubricant",
-    )
-)
-"""Types of components from which data are read."""
-
-
-TYPES_WITHOUT_EFFECT = frozenset(
-    (
-        "assembly_group",
-        "cylindrical_stage_gear_data",
-        "element_list",
-        "involute_spline_gear_hub",
-        "involute_spline_gear_shaft",
-        "joint_section",
-        "meshing_contact_stage_data_set",
-        "notch_effect_shaft_hub_connection",
-        "point_list",
-        "reduction_point",
-        "shaft_shoulder",
-        "shaft_shoulder_with_undercut",
-    )
-)
-"""Types of components that group or rate others; they have no mass or stiffness and carry no load."""
 
 
 @dataclass(frozen=True)
@@ -370,7 +283,10 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
         The model cannot be imported; the reasons are one sentence each.
     """
     notes = Notes(rules or Rules())
-    model = _without_splines_as_stages(model)
+    # Some programs pair shaft and hub of a spline like the gears of a stage; the spline itself states what it connects.
+    splines = {part.number for part in model.components_of_type(*JOINING)}
+    relations = (one for one in model.relations if one.type != "stage" or one.roles.get("stage") not in splines)
+    model = dataclasses.replace(model, relations=tuple(relations))
     _refuse_types(model, notes)
     _refuse_misplaced(model, notes)
     notes.faults.tell()
@@ -382,7 +298,9 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     gearbox = draft.checked(draft.text(source, {}), path)
     ratio = gearbox.train.ratio
     cases = load_case_blocks(draft.loads, draft.ends, static, ratio)
-    life = life_blocks(model, draft.loads, draft.ends, ratio, draft.rated_gears())
+    met = [number for stage in draft.teeth.stages.values() for number in stage.both]
+    gears = {name: (model.components[number], met.count(number) > 1) for number, name in draft.teeth.names.items()}
+    life = life_blocks(model, draft.loads, draft.ends, ratio, gears)
     draft.settings |= life.blocks
     _compare_speeds(gearbox, draft.loads, draft.ends, notes)
     notes.faults.tell()
@@ -394,16 +312,6 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     return Imported(text, gearbox, changed, ignored, lost, checked, draft.found, life.spectrum)
 
 
-def _without_splines_as_stages(model: Model) -> Model:
-    """Remove relations that pair shaft and hub of a spline like the gears of a stage.
-
-    The spline connection itself specifies the connected parts.
-    """
-    splines = {part.number for part in model.components_of_type(*JOINING)}
-    relations = tuple(one for one in model.relations if one.type != "stage" or one.roles.get("stage") not in splines)
-    return dataclasses.replace(model, relations=relations)
-
-
 def _refuse_types(model: Model, notes: Notes) -> None:
     """Raise an error for a file that is not a gearbox of cylindrical gears."""
     for begin, words in OTHER_GEARS.items():
@@ -411,10 +319,10 @@ def _refuse_types(model: Model, notes: Notes) -> None:
         parts = [part for part in parts if part.type.endswith(("_gear", "_wheel", "_stage"))]
         if parts:
             names = ", ".join(str(part) for part in parts)
-            notes.faults.add(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
+            notes.faults.append(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
     notes.faults.tell()
     if not any(True for _ in model.relations_of("stage")) or not model.components_of_type(*GEARS):
-        notes.faults.add("the file has no stage of two cylindrical gears; nothing to import")
+        notes.faults.append("the file has no stage of two cylindrical gears; nothing to import")
 
 
 def _refuse_misplaced(model: Model, notes: Notes) -> None:
@@ -423,7 +331,7 @@ def _refuse_misplaced(model: Model, notes: Notes) -> None:
         for role, number in relation.roles.items():
             wanted = TYPES_OF_ROLES.get((relation.type, role))
             if wanted is not None and model.components[number].type not in wanted:
-                notes.faults.add(
+                notes.faults.append(
                     f"a relation '{relation.type}' has {model.components[number]} as {role}; expected a component of "
                     f"type {' or '.join(wanted[:3])}: correct the id"
                 )
@@ -442,20 +350,25 @@ class _Draft:
         self.loads = loads_of(model, places, bodies, notes)
         self.ends = ends_of(model, bodies, self.loads, meshes_of_bodies(self.teeth))
         self.static = static_load(self.loads, self.ends)
+        gears = gear_blocks(model, self.teeth, sections, notes)
+        body_blocks = {}
+        for body in bodies.members:
+            with notes.faults.gathered():
+                body_blocks[body.name] = _body_block(model, places, body, self.teeth, sections[body.name], notes)
+        joints = joint_blocks(bodies, bearings, gear_places(self.teeth, bodies))
         self.groups = [
-            ("gears", _named("gears", gear_blocks(model, self.teeth, sections, notes))),
+            ("gears", _named("gears", gears)),
             ("pairs", _named("pairs", pair_blocks(self.teeth))),
-            ("bodies", _named("bodies", body_blocks(model, places, bodies, self.teeth, sections, notes))),
+            ("bodies", _named("bodies", body_blocks)),
             ("meshes", _named("meshes", mesh_blocks(self.teeth))),
             ("forces on bodies", _named("forces", force_blocks(self.loads, self.ends, notes))),
             ("couplings", _named("couplings", coupling_blocks(model, bodies, bearings))),
-            (
-                "variant `rigid`: ideal joints",
-                _named("joints", joint_blocks(bodies, bearings, gear_places(self.teeth, bodies))),
-            ),
+            ("variant `rigid`: ideal joints", _named("joints", joints)),
             ("variants `bushing` and `flexible`: bearings", _named("bearings", bearings)),
         ]
-        self.settings = _settings(model, places, self.ends, self.static, self._output_gear())
+        at_output = (n for n, body in self.teeth.bodies.items() if body.name == self.ends.output)
+        gear = next(at_output, next(iter(self.teeth.names)))
+        self.settings = _settings(model, places, self.ends, self.static, self.teeth.names[gear])
 
     def checked(self, text: str, path: str | Path) -> Gearbox:
         """Read the gearbox file and build its parts; errors name the REXS components concerned.
@@ -470,9 +383,8 @@ class _Draft:
             gearbox = Gearbox.from_dict(content, str(path))
             check_parts(gearbox)
         except GearboxFileError as error:
-            raise RexsError(
-                *(self._with_components(fault.removeprefix(f"{path}: ")) for fault in error.faults)
-            ) from None
+            faults = [self._with_components(fault.removeprefix(f"{path}: ")) for fault in error.faults]
+            raise RexsError(*faults) from None
         return gearbox
 
     def _with_components(self, fault: str) -> str:
@@ -499,17 +411,6 @@ class _Draft:
         for body, reason in reasons.items():
             self.notes.changed.append(f"bodies.{body}: also rigid in the variant flexible: {reason}")
             blocks[f"bodies.{body}"].entries["flexibility"] = assumed("none", "its sections define no seats, see above")
-
-    def rated_gears(self) -> dict[str, tuple[Component, bool]]:
-        """Gears by name, and whether their teeth are loaded in reversed bending, as with several mating gears."""
-        met = [number for stage in self.teeth.stages.values() for number in (stage.pinion, stage.gear)]
-        return {name: (self.model.components[n], met.count(n) > 1) for n, name in self.teeth.names.items()}
-
-    def _output_gear(self) -> str:
-        for number, body in self.teeth.bodies.items():
-            if body.name == self.ends.output:
-                return self.teeth.names[number]
-        return next(iter(self.teeth.names.values()))
 
     def text(self, source: str, cases: Mapping[str, Block]) -> str:
         if not cases:
@@ -552,17 +453,13 @@ def _settings(model: Model, places: Places, ends: Ends, static: Entry, gear: str
         ),
         "damping": Block(
             "percent of critical damping; measured gearboxes have 1 to 4",
-            {
-                "modal_percent": assumed(2.0, "usual value"),
-                "modal_band_percent": assumed([1.0, 4.0], "usual range"),
-            },
+            {"modal_percent": assumed(2.0, "usual value"), "modal_band_percent": assumed([1.0, 4.0], "usual range")},
         ),
     }
     for unit in model.components_of_type("gear_unit")[:1]:
-        keys = [f"direction_vector_gravity_{axis}" for axis in "uvw"]
-        direction = np.array([unit.quantity(key) or 0.0 for key in keys])
+        direction = np.array([unit.quantity(f"direction_vector_gravity_{axis}") or 0.0 for axis in "uvw"])
         if unit.flag("account_for_gravity") and np.linalg.norm(direction) > 0.0:
-            size = unit.quantity("gravitational_acceleration", "m / s^2") or 9.81
+            size = unit.quantity("gravitational_acceleration") or 9.81
             vector = places.turned(direction / np.linalg.norm(direction)) * size
             entry = read([tidy(round(value, 9)) for value in vector.tolist()], "direction_vector_gravity")
             blocks["gravity"] = Block("", {"acceleration_m_per_s2": entry})
@@ -617,7 +514,7 @@ def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes:
                 f"{load.name}: {body} rotates at {speed:.6g} rpm, kinematics result in {rolls:.6g} rpm"
             )
             if abs(rolls - speed) > SPEED_TOLERANCE * max(abs(rolls), abs(speed)):
-                notes.faults.add(
+                notes.faults.append(
                     f"{load.name}: the file has {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
                     f"kinematics result in {rolls:g} rpm"
                 )

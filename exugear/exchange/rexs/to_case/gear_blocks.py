@@ -23,13 +23,7 @@ from exugear.exchange.rexs.to_case.meshing import (
 )
 from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
 from exugear.exchange.rexs.to_case.shafts import Cylinder, seat_diameter
-from exugear.exchange.rexs.to_case.toothing import (
-    Toothing,
-    is_rigid,
-    material_of,
-    material_table,
-    toothing_of,
-)
+from exugear.exchange.rexs.to_case.toothing import Toothing, is_rigid, material_of, material_table, toothing_of
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 
 FACE_TOLERANCE = 1e-3
@@ -85,9 +79,9 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
         with notes.faults.gathered():
             gears[number] = toothing_of(model, model.components[number], partners, notes)
     notes.faults.tell()
-    stages = _ordered(model, places, met.values(), gears, notes)
+    stages = _ordered(places, met.values(), gears, notes)
     notes.faults.tell()
-    _check_equal_planets(model, bodies, first, gears, notes)
+    _check_equal_planets(model, first, gears, notes)
     gears = with_equal_racks(gears, stages, notes)
     gears = with_shifts(gears, stages, notes)
     for number, gear in gears.items():
@@ -133,7 +127,7 @@ def _stage(model: Model, roles: Mapping[str, int]) -> tuple[Component, list[Comp
 def _check_direction(places: Places, stage: Component, gears: Sequence[Component], notes: Notes) -> None:
     """Compare the direction of the line of centres with the positions."""
     one, other = (places.position(gear) for gear in gears)
-    stated = stage.quantity("rotating_angle_around_neg_u_axis", "deg")
+    stated = stage.quantity("rotating_angle_around_neg_u_axis")
     # Angle of the second gear's centre as seen from the first, zero along w and positive towards v.
     angle = math.degrees(math.atan2(other[0] - one[0], other[1] - one[1]))
     if stated is not None and abs(math.remainder(stated - angle, 360.0)) > ANGLE_TOLERANCE:
@@ -143,11 +137,7 @@ def _check_direction(places: Places, stage: Component, gears: Sequence[Component
 
 
 def _ordered(
-    model: Model,
-    places: Places,
-    met: Iterable[tuple[Component, list[Component]]],
-    gears: Mapping[int, Toothing],
-    notes: Notes,
+    places: Places, met: Iterable[tuple[Component, list[Component]]], gears: Mapping[int, Toothing], notes: Notes
 ) -> list[Stage]:
     stages = []
     for part, (one, other) in met:
@@ -176,7 +166,7 @@ def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Tooth
         z = places.position(one.part)[2]
         low = max(low, z - 0.5 * one.face_width.value)
         high = min(high, z + 0.5 * one.face_width.value)
-    stated = stage.quantity("common_face_width", "mm")
+    stated = stage.quantity("common_face_width")
     overlap = tidy(round(high - low, 6))
     if stated is not None and stated < min(least, overlap) - FACE_TOLERANCE:
         return read(tidy(stated), "common_face_width")
@@ -185,9 +175,7 @@ def _common_face(places: Places, stage: Component, pinion: Toothing, gear: Tooth
     return None
 
 
-def _check_equal_planets(
-    model: Model, bodies: Bodies, first: Mapping[int, int], gears: Mapping[int, Toothing], notes: Notes
-) -> None:
+def _check_equal_planets(model: Model, first: Mapping[int, int], gears: Mapping[int, Toothing], notes: Notes) -> None:
     for number, own in first.items():
         if own not in gears:
             continue
@@ -195,7 +183,7 @@ def _check_equal_planets(
         mate = gears[own]
         for key in ("module", "face_width", "helix_angle", "pressure_angle"):
             if abs(getattr(other, key).value - getattr(mate, key).value) > 1e-9:
-                notes.faults.add(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
+                notes.faults.append(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
     notes.faults.tell()
 
 
@@ -218,7 +206,8 @@ def axes_to_move(
     settled = set(_coaxial(bodies, teeth.bodies[first.pinion]))
     open_stages = list(teeth.stages.values())
     while open_stages:
-        stage = next((s for s in open_stages if settled & _names_of(teeth, s)), open_stages[0])
+        touching = (s for s in open_stages if settled & {teeth.bodies[number].name for number in s.both})
+        stage = next(touching, open_stages[0])
         open_stages.remove(stage)
         one = teeth.bodies[stage.pinion]
         other = teeth.bodies[stage.gear]
@@ -238,10 +227,6 @@ def axes_to_move(
             axes[name] = axes[name][0] + by[0], axes[name][1] + by[1]
             settled.add(name)
     return [move for body in bodies.members for move in _moves(places, bodies, body, axes)]
-
-
-def _names_of(teeth: Teeth, stage: Stage) -> set[str]:
-    return {teeth.bodies[stage.pinion].name, teeth.bodies[stage.gear].name}
 
 
 def _coaxial(bodies: Bodies, body: Body) -> list[str]:
@@ -278,11 +263,11 @@ def _gear_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: 
     central = {
         number
         for stage in stages
-        for number, mate in ((stage.pinion, stage.gear), (stage.gear, stage.pinion))
+        for number, mate in (stage.both, stage.both[::-1])
         if owners[mate].carrier and not owners[number].carrier
     }
     roles: dict[str, list[int]] = {}
-    for number in dict.fromkeys(number for stage in stages for number in (stage.pinion, stage.gear)):
+    for number in dict.fromkeys(number for stage in stages for number in stage.both):
         if gears[number].internal:
             role = "ring"
         elif owners[number].carrier:
@@ -300,7 +285,7 @@ def _gear_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: 
 def _pair_names(gears: Mapping[int, Toothing], stages: Sequence[Stage], owners: Mapping[int, Body]) -> list[str]:
     names: list[str] = []
     for number, stage in enumerate(stages, 1):
-        planet = next((owners[one].name for one in (stage.pinion, stage.gear) if owners[one].carrier), "")
+        planet = next((owners[one].name for one in stage.both if owners[one].carrier), "")
         both = owners[stage.pinion].carrier and owners[stage.gear].carrier
         mate = "ring" if gears[stage.gear].internal else "sun"
         name = f"{mate}_{planet}" if planet and not both else ""
@@ -312,59 +297,46 @@ def gear_blocks(
     model: Model, teeth: Teeth, sections: Mapping[str, Sequence[Cylinder]], notes: Notes
 ) -> dict[str, Block]:
     """Tables of the gears; `sections` are the shaft sections of each body."""
-    return {
-        teeth.names[number]: Block(
-            str(gear.part),
-            _entries(model, gear, teeth.z[number], sections[teeth.bodies[number].name], notes),
-            _modification(model, gear, notes),
-        )
-        for number, gear in teeth.gears.items()
-    }
-
-
-def _modification(model: Model, gear: Toothing, notes: Notes) -> dict[str, Block]:
-    with notes.faults.gathered():
-        entries = modification_of(model, gear, notes)
-        if entries:
-            return {"modification": Block("", entries)}
-        return {}
-    return {}
+    blocks = {}
+    for number, gear in teeth.gears.items():
+        entries = _entries(model, gear, teeth.z[number], sections[teeth.bodies[number].name], notes)
+        block = blocks[teeth.names[number]] = Block(str(gear.part), entries)
+        with notes.faults.gathered():
+            modification = modification_of(model, gear, notes)
+            if modification:
+                block.blocks["modification"] = Block("", modification)
+    return blocks
 
 
 def _entries(model: Model, gear: Toothing, z: float, sections: Sequence[Cylinder], notes: Notes) -> dict[str, Entry]:
-    entries = {"teeth": read(gear.teeth, "number_of_teeth")}
-    if gear.internal:
-        entries["internal"] = read(True, "ring_gear")
-    entries |= {
+    rack = {"addendum": 1.0, "dedendum": gear.dedendum.value, "tip_radius": gear.tip_radius.value}
+    tip = "addendum: tip_diameter_mm is used" if gear.tip is not None else "addendum: A"
+    parts = (tip, f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
+    material = material_of(model, gear.part)
+    table = material_table(material)
+    if table is None and is_rigid(material):
+        notes.changed.append(f"{gear.part}: its material means 'rigid'; steel is used")
+    chamfer = read(gear.chamfer, "tooth_tip_chamfer, or tip_form_diameter")
+    entries = {
+        "teeth": read(gear.teeth, "number_of_teeth"),
+        "internal": read(True, "ring_gear") if gear.internal else None,
         "normal_module_mm": gear.module,
         "normal_pressure_angle_deg": gear.pressure_angle,
         "helix_angle_deg": gear.helix_angle,
         "profile_shift": gear.shift or assumed(0.0, ""),
         "face_width_mm": gear.face_width,
         "held_diameter_mm": _held(gear, z, sections),
-        **({"tooth_thickness": gear.allowances} if gear.allowances else {"tooth_thinning_mm": gear.thinning}),
+        "tooth_thickness": gear.allowances,
+        "tooth_thinning_mm": None if gear.allowances else gear.thinning,
+        "tip_diameter_mm": gear.tip,
+        "root_diameter_mm": gear.root,
+        "tip_chamfer_mm": chamfer if gear.chamfer else None,
+        "root_form_diameter_mm": gear.root_form,
+        "rack": Entry(rack, "; ".join(" ".join(part.split()) for part in parts)),
+        "cutter": gear.cutter,
+        "material": table,
     }
-    if gear.tip is not None:
-        entries["tip_diameter_mm"] = gear.tip
-    if gear.root is not None:
-        entries["root_diameter_mm"] = gear.root
-    if gear.chamfer:
-        entries["tip_chamfer_mm"] = read(gear.chamfer, "tooth_tip_chamfer, or tip_form_diameter")
-    if gear.root_form is not None:
-        entries["root_form_diameter_mm"] = gear.root_form
-    rack = {"addendum": 1.0, "dedendum": gear.dedendum.value, "tip_radius": gear.tip_radius.value}
-    tip = "addendum: tip_diameter_mm is used" if gear.tip is not None else "addendum: A"
-    parts = (tip, f"dedendum: {gear.dedendum.comment}", f"tip radius: {gear.tip_radius.comment}")
-    entries["rack"] = Entry(rack, "; ".join(" ".join(part.split()) for part in parts))
-    if gear.cutter is not None:
-        entries["cutter"] = gear.cutter
-    material = material_of(model, gear.part)
-    table = material_table(material)
-    if table is not None:
-        entries["material"] = table
-    elif is_rigid(material):
-        notes.changed.append(f"{gear.part}: its material means 'rigid'; steel is used")
-    return entries
+    return {key: entry for key, entry in entries.items() if entry is not None}
 
 
 def _held(gear: Toothing, z: float, sections: Sequence[Cylinder]) -> Entry:
@@ -385,30 +357,25 @@ def _held(gear: Toothing, z: float, sections: Sequence[Cylinder]) -> Entry:
 
 def pair_blocks(teeth: Teeth) -> dict[str, Block]:
     """Tables of the gear pairs."""
-    return {
-        name: Block(
-            str(stage.part),
-            {
-                "pinion": Entry(teeth.names[stage.pinion]),
-                "gear": Entry(teeth.names[stage.gear]),
-                "centre_distance_mm": stage.distance,
-            }
-            | ({"common_face_width_mm": stage.common_face} if stage.common_face else {}),
-        )
-        for name, stage in teeth.stages.items()
-    }
+    blocks = {}
+    for name, stage in teeth.stages.items():
+        block = blocks[name] = Block(str(stage.part))
+        block.entries["pinion"] = Entry(teeth.names[stage.pinion])
+        block.entries["gear"] = Entry(teeth.names[stage.gear])
+        block.entries["centre_distance_mm"] = stage.distance
+        if stage.common_face:
+            block.entries["common_face_width_mm"] = stage.common_face
+    return blocks
 
 
 def mesh_blocks(teeth: Teeth) -> dict[str, Block]:
     """Tables of the meshes: one for each pair, also for all planets of a set."""
-    return {
-        name: Block(
-            "",
-            {
-                "pair": Entry(name),
-                "pinion_body": Entry(teeth.bodies[stage.pinion].name),
-                "gear_body": Entry(teeth.bodies[stage.gear].name),
-            },
-        )
-        for name, stage in teeth.stages.items()
-    }
+    blocks = {}
+    for name, stage in teeth.stages.items():
+        names = {
+            "pair": name,
+            "pinion_body": teeth.bodies[stage.pinion].name,
+            "gear_body": teeth.bodies[stage.gear].name,
+        }
+        blocks[name] = Block("", {key: Entry(value) for key, value in names.items()})
+    return blocks

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from exugear.exchange.rexs.mapping import READ
 from exugear.exchange.rexs.to_case.bodies import Bodies, Body
-from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, entries_of, read, tidy
 from exugear.exchange.rexs.to_case.toothing import material_of
-from exugear.exchange.rexs.tree import Attribute, Component, LoadCase, Model, RexsError
+from exugear.exchange.rexs.tree import Component, LoadCase, Model, RexsError
+from exugear.gearbox.units import RPM
 
 FORCES = ("force_u_direction", "force_v_direction", "force_w_direction")
 MOMENTS = ("torque_around_v_axis", "torque_around_w_axis")
@@ -29,29 +31,6 @@ USUAL_YEARS, USUAL_VISCOSITY, USUAL_DYNAMIC_FACTOR, USUAL_ROUGHNESS, USUAL_ROOT_
     0.7,
 )
 """Assumptions for a life: years, viscosity at 40 degrees (mm2/s), K_v, Rz (um), Y_drelT Y_RrelT Y_X, Y_M."""
-ROUGHNESSES = (
-    (
-        "roughness_Rz_um",
-        ("averaged_peak_to_valley_height_flank", "mean_peak_to_valley_roughness_flank_iso_4287_1997"),
-        1.0,
-    ),
-    (
-        "roughness_Ra_um",
-        ("arithmetic_average_roughness_flank", "arithmetic_mean_roughness_flank_iso_4287_1997"),
-        1.0,
-    ),
-    (
-        "root_roughness_Rz_um",
-        ("averaged_peak_to_valley_height_root", "mean_peak_to_valley_roughness_root_iso_4287_1997"),
-        1.0,
-    ),
-    (
-        "root_roughness_Rz_um",
-        ("arithmetic_average_roughness_root", "arithmetic_mean_roughness_root_iso_4287_1997"),
-        6.0,
-    ),
-)
-"""Keys of the gearbox file, attributes with their values, and factors; Rz is taken as six times Ra (ISO 6336-2)."""
 ROUGHNESS_RANGE = (0.1, 100.0)
 """Range of accepted roughness of a gear, um."""
 DENSITIES = (500.0, 2000.0)
@@ -118,47 +97,53 @@ def loads_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> list
 
 
 def _loads(model: Model, places: Places, bodies: Bodies, case: LoadCase | None, notes: Notes) -> Loads:
-    changes = case.changes if case else {}
     speeds: dict[str, float] = {}
-    for shaft in _changed(model.components_of_type("shaft"), changes):
+    for shaft in model.components_in(case, "shaft"):
         body = bodies.body_of(shaft)
-        speed = shaft.quantity("rotational_speed", "1 / min")
+        speed = shaft.quantity("rotational_speed")
         if body is not None and speed is not None and not body.fixed:
             speeds.setdefault(body.name, tidy(places.sense(shaft) * speed))
     torques: dict[str, float] = {}
     forces: dict[int, PointForce] = {}
-    for load in _changed(model.components_of_type("external_load"), changes):
-        force = _point_force(model, places, bodies, load, notes)
+    for load in model.components_in(case, "external_load"):
+        owner = _shaft(model, load)
+        body = _free_body(bodies, owner)
+        force = _point_force(places, load, owner, body, notes)
         if force is not None:
             forces[load.number] = force
-        body = _owner(model, bodies, load)
-        torque = _torque(model, places, load, speeds, bodies)
-        if body is not None and torque and load.flag("transmits_torque") is not False:
+        if owner is None or body is None:
+            continue
+        torque = load.quantity("torque_around_u_axis")
+        if torque is not None:
+            torque = tidy(places.sense(owner) * torque)
+        elif (power := load.quantity("power")) and (speed := speeds.get(body.name)):
+            torque = tidy(1e3 * power / (speed * RPM))
+        if torque and load.flag("transmits_torque") is not False:
             torques[body.name] = torques.get(body.name, 0.0) + torque
     share = None
-    for unit in _changed(model.components_of_type("gear_unit"), changes):
-        share = unit.quantity("operating_time_fraction", "%")
+    for unit in model.components_in(case, "gear_unit"):
+        share = unit.quantity("operating_time_fraction")
     name = f"load_case_{case.number}" if case else "nominal"
     return Loads(name, "" if share is None else f"{share:g} % of the operating time", torques, speeds, forces, share)
 
 
-def _point_force(model: Model, places: Places, bodies: Bodies, load: Component, notes: Notes) -> PointForce | None:
+def _point_force(
+    places: Places, load: Component, shaft: Component | None, body: Body | None, notes: Notes
+) -> PointForce | None:
     """Radial and axial force and moment of a load, in the axes of the gearbox file; None if there is none.
 
     A load on a planet rotates with its carrier and is omitted; the casing can carry any load.
     """
-    force = np.array([load.quantity(key, "N") or 0.0 for key in FORCES])
-    moment = np.array([0.0, *(load.quantity(key, "N m") or 0.0 for key in MOMENTS)])
+    force = np.array([load.quantity(key) or 0.0 for key in FORCES])
+    moment = np.array([0.0, *(load.quantity(key) or 0.0 for key in MOMENTS)])
     if not force.any() and not moment.any():
         return None
-    shaft = _shaft(model, load)
-    body = _owner(model, bodies, load)
     size = " and ".join(f"{np.linalg.norm(one):g} {unit}" for one, unit in ((force, "N"), (moment, "N m")) if one.any())
     if shaft is None or body is None:
         notes.lost.append(f"{load}: {size}; the body it acts on is fixed, is a planet, or is not imported")
         return None
     axes = places.axes(shaft)
-    z = places.position(shaft)[2] + places.sense(shaft) * (load.quantity("u_coordinate_on_shaft", "mm") or 0.0)
+    z = places.position(shaft)[2] + places.sense(shaft) * (load.quantity("u_coordinate_on_shaft") or 0.0)
     return PointForce(
         load,
         body.name,
@@ -168,39 +153,17 @@ def _point_force(model: Model, places: Places, bodies: Bodies, load: Component, 
     )
 
 
-def _changed(parts: Sequence[Component], changes: Mapping[int, Mapping[str, Attribute]]) -> list[Component]:
-    return [part.with_attributes(changes[part.number]) if part.number in changes else part for part in parts]
-
-
 def _shaft(model: Model, load: Component) -> Component | None:
-    owners = [
-        one for kind in ("assembly", "ordered_assembly") for one in model.related(kind, "part", load.number, "assembly")
-    ]
+    owners = model.related("assembly", "part", load.number, "assembly")
     return next((owner for owner in owners if owner.type in ("shaft", "side_plate", "planet_carrier")), None)
 
 
-def _owner(model: Model, bodies: Bodies, load: Component) -> Body | None:
-    shaft = _shaft(model, load)
+def _free_body(bodies: Bodies, shaft: Component | None) -> Body | None:
+    """Body of a shaft unless it is fixed or a planet."""
     body = bodies.body_of(shaft) if shaft else None
     if body is None or body.fixed or body.carrier:
         return None
     return body
-
-
-def _torque(model: Model, places: Places, load: Component, speeds: Mapping[str, float], bodies: Bodies) -> float | None:
-    """Torque of a load about +z, N m; computed from its power and the speed of its body if the file has no torque."""
-    shaft = _shaft(model, load)
-    body = _owner(model, bodies, load)
-    if shaft is None or body is None:
-        return None
-    torque = load.quantity("torque_around_u_axis", "N m")
-    if torque is not None:
-        return tidy(places.sense(shaft) * torque)
-    power = load.quantity("power", "kW")
-    speed = speeds.get(body.name)
-    if power and speed:
-        return tidy(1e3 * power / (speed * math.pi / 30.0))
-    return None
 
 
 def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping[str, int]) -> Ends:
@@ -226,7 +189,7 @@ def ends_of(model: Model, bodies: Bodies, loads: Sequence[Loads], links: Mapping
     loaded = [
         body.name
         for part in model.components_of_type("external_load")
-        if part.flag("transmits_torque") is not False and (body := _owner(model, bodies, part)) is not None
+        if part.flag("transmits_torque") is not False and (body := _free_body(bodies, _shaft(model, part))) is not None
     ]
     given = [name for load in loads for name in load.torques]
     candidates = [name for name in given if name in defined] or given or [n for n in loaded if n in defined] or loaded
@@ -383,9 +346,7 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
     speeds = [_input_speed(load, ends, ratio) * (ratio if body == ends.output else 1.0) for load in loads]
     if body is None or not sum(shares) or not all(speeds):
         return None
-    hours = next(
-        (h for unit in model.components_of_type("gear_unit") if (h := unit.quantity("operating_time", "h"))), None
-    )
+    hours = next((h for unit in model.components_of_type("gear_unit") if (h := unit.quantity("operating_time"))), None)
     life = assumed(USUAL_YEARS, "no operating_time in the file")
     if hours:
         life = derived(_rounded(hours / HOURS_PER_YEAR), f"operating_time of {hours:g} h")
@@ -399,24 +360,17 @@ def _spectrum(model: Model, loads: Sequence[Loads], ends: Ends, ratio: float) ->
 
 def _lubricant(model: Model) -> Block | None:
     """Section on the oil if the file specifies its viscosity at both temperatures; for several oils, the thinnest."""
-    oils = {}
-    for oil in model.components_of_type("lubricant"):
-        cold, hot = (oil.quantity(f"viscosity_at_{t}_degree_celsius", "mm^2 / s") for t in (40, 100))
-        if cold and hot and hot < cold:
-            oils[cold] = hot, oil.quantity("density_at_15_degree_celsius", "kg / m^3")
+    cold = "viscosity_40_mm2_per_s"
+    hot = "viscosity_100_mm2_per_s"
+    oils = [(entries_of(READ["viscosity"], oil), oil) for oil in model.components_of_type("lubricant")]
+    oils = [(stated, oil) for stated, oil in oils if len(stated) == 2 and stated[hot].value < stated[cold].value]
     if not oils:
         return None
-    cold = min(oils)
-    hot, density = oils[cold]
-    entries = {
-        "viscosity_40_mm2_per_s": read(tidy(cold), "viscosity_at_40_degree_celsius of the lubricant"),
-        "viscosity_100_mm2_per_s": read(tidy(hot), "viscosity_at_100_degree_celsius"),
-    }
-    if density and DENSITIES[0] <= density <= DENSITIES[1]:
-        entries["density_15_kg_per_m3"] = read(tidy(density), "density_at_15_degree_celsius")
-    casings = model.components_of_type("gear_casing")
-    stated = [_changed(casings, changes) for changes in ({}, *(case.changes for case in model.load_cases))]
-    temperatures = [casing.quantity("temperature_lubricant", "C") for parts in stated for casing in parts]
+    entries, oil = min(oils, key=lambda one: one[0][cold].value)
+    entries[cold] = replace(entries[cold], source=f"{entries[cold].source} of the lubricant")
+    entries |= entries_of(READ["oil density"], oil, limits=DENSITIES)
+    casings = [one for case in (None, *model.load_cases) for one in model.components_in(case, "gear_casing")]
+    temperatures = [one.quantity("temperature_lubricant") for one in casings]
     hottest = max((t for t in temperatures if t is not None), default=math.nan)
     if TEMPERATURES[0] <= hottest <= TEMPERATURES[1]:
         entries["temperature_C"] = read(tidy(hottest), "temperature_lubricant of the casing (hottest load case)")
@@ -425,26 +379,21 @@ def _lubricant(model: Model) -> Block | None:
 
 def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
     """Section on the rating: strength of gears by their materials, unless a limit is missing, and viscosity."""
-    viscosities = [
-        one
-        for oil in model.components_of_type("lubricant")
-        if (one := oil.quantity("viscosity_at_40_degree_celsius", "mm^2 / s"))
-    ]
-    viscosity = (
-        read(tidy(min(viscosities)), "viscosity_at_40_degree_celsius of the lubricant")
-        if viscosities
-        else assumed(USUAL_VISCOSITY, "no lubricant in the file")
-    )
-    keys = ("dynamic_factor_iso_6336_2006", "dynamic_factor_din_3990_1987")
-    factors = [
-        one for stage in model.components_of_type("cylindrical_stage") for key in keys if (one := stage.quantity(key))
-    ]
-    dynamic = (
-        read(tidy(max(1.0, *factors)), "the largest dynamic_factor of the stages")
-        if factors
-        else assumed(USUAL_DYNAMIC_FACTOR, "not in the file; computed by a run or `steady`, see dynamic_factor_run")
-    )
-    block = Block("", {"dynamic_factor": dynamic, "viscosity_40_mm2_per_s": viscosity})
+    entries = {
+        "dynamic_factor": assumed(
+            USUAL_DYNAMIC_FACTOR, "not in the file; computed by a run or `steady`, see dynamic_factor_run"
+        ),
+        "viscosity_40_mm2_per_s": assumed(USUAL_VISCOSITY, "no lubricant in the file"),
+    }
+    stages = model.components_of_type("cylindrical_stage")
+    factors = [one for stage in stages for row in READ["dynamic factors"] if (one := stage.quantity(row.attribute))]
+    if factors:
+        entries["dynamic_factor"] = read(tidy(max(1.0, *factors)), "the largest dynamic_factor of the stages")
+    key = "viscosity_at_40_degree_celsius"
+    viscosities = [one for oil in model.components_of_type("lubricant") if (one := oil.quantity(key))]
+    if viscosities:
+        entries["viscosity_40_mm2_per_s"] = read(tidy(min(viscosities)), f"{key} of the lubricant")
+    block = Block("", entries)
     for name, (gear, both_ways) in gears.items():
         flanks = model.related("flank", "gear", gear.number, "left")
         strength = _strength(material_of(model, gear), (gear, *flanks), both_ways)
@@ -455,41 +404,28 @@ def _rating(model: Model, gears: Mapping[str, tuple[Component, bool]]) -> Block:
 
 def _strength(material: Component | None, parts: Sequence[Component], both_ways: bool) -> Block | None:
     """Strength of a gear; None without both of its endurance limits. `parts` are the gear and its flank."""
-    limits = {
-        ours: material.quantity(key, "MPa") if material else None
-        for ours, key in (("sigma_H_lim_MPa", "endurance_limit_flank"), ("sigma_F_lim_MPa", "endurance_limit_root"))
-    }
-    if material is None or not all(limits.values()):
-        return None
     entries = {
-        ours: read(tidy(value or 0.0), f"endurance_limit_{'flank' if 'H' in ours else 'root'} of {material}")
-        for ours, value in limits.items()
+        key: replace(entry, source=f"{entry.source} of {material}")
+        for key, entry in entries_of(READ["strength"], material).items()
     }
-    entries |= _curves(material.text("heat_treated_material_type_iso_6336_2006"), limits["sigma_H_lim_MPa"] or 0.0)
-    entries |= _roughnesses(parts)
-    for key in ("tolerance_class_according_to_iso_1328_2013", "global_tolerance_class_iso_1328_2013"):
+    if material is None or len(entries) < len(READ["strength"]):
+        return None
+    entries |= _curves(material.text("heat_treated_material_type_iso_6336_2006"), entries["sigma_H_lim_MPa"].value)
+    roughness = entries_of(READ["roughness"], *parts, limits=ROUGHNESS_RANGE)
+    if "roughness_Ra_um" in roughness:  # unchanged priority; a file that specifies both means the same surface
+        roughness.pop("roughness_Rz_um", None)
+    elif "roughness_Rz_um" not in roughness:
+        roughness["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "not in the file")
+    if "root_roughness_Rz_um" not in roughness:
+        roughness["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 to ISO 6336-3")
+    entries |= roughness
+    for key in (row.attribute for row in READ["tolerance class"]):
         stated = next((one for part in parts if (one := part.whole(key)) is not None), None)
         if stated is not None and TOLERANCE_CLASSES[0] <= stated <= TOLERANCE_CLASSES[1]:
             entries.setdefault("tolerance_class", read(stated, key))
     if both_ways:
         entries["mean_stress_factor"] = assumed(BOTH_WAYS, "Y_M of ISO 6336-3, annex B, for alternating bending")
     return Block(str(material), entries)
-
-
-def _roughnesses(parts: Sequence[Component]) -> dict[str, Entry]:
-    """Roughness of flanks and roots: Rz if specified, else from Ra, for roots as six times Ra."""
-    entries: dict[str, Entry] = {}
-    for ours, keys, factor in ROUGHNESSES:
-        stated = next(((key, one) for key in keys for part in parts if (one := part.quantity(key, "mum"))), None)
-        if stated is not None and ROUGHNESS_RANGE[0] <= factor * stated[1] <= ROUGHNESS_RANGE[1]:
-            entries.setdefault(ours, read(tidy(factor * stated[1]), stated[0]))
-    if "roughness_Ra_um" in entries:  # unchanged priority; a file that specifies both means the same surface
-        entries.pop("roughness_Rz_um", None)
-    elif "roughness_Rz_um" not in entries:
-        entries["roughness_Rz_um"] = assumed(USUAL_ROUGHNESS, "not in the file")
-    if "root_roughness_Rz_um" not in entries:
-        entries["root_factor"] = assumed(USUAL_ROOT_FACTOR, "Y_drelT Y_RrelT Y_X, near 1 to ISO 6336-3")
-    return entries
 
 
 def _curves(kind: str, flank_limit: float) -> dict[str, Entry]:

@@ -11,14 +11,17 @@ from typing import Any, Literal
 
 import numpy as np
 
+from exugear.exchange.rexs.mapping import IMPORTED_MODIFICATIONS, MODIFICATIONS, READ, SHAPES
 from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, derived, read, tidy
 from exugear.exchange.rexs.to_case.toothing import EQUAL, Tool, Toothing
 from exugear.exchange.rexs.tree import Component, Model, RexsError
+from exugear.gearbox.gear_parts import pinion_cutter
+from exugear.gearbox.sections.gears import CutterSection
 from exugear.gearbox.units import MM
 from fe_ste.geometry import pair_relations
 from fe_ste.geometry.checks import GeometryError, check_gear
 from fe_ste.geometry.gear_relations import BasicRack, GearInputs
-from fe_ste.geometry.involute import PinionCutter, involute
+from fe_ste.geometry.involute import involute
 from fe_ste.geometry.pair_relations import UncheckedPair
 
 SHIFT_TOLERANCE = 1e-3
@@ -55,6 +58,11 @@ class Stage:
     common_face: Entry | None = None
     """Common face width of the gears if less than the narrower face width, mm."""
 
+    @property
+    def both(self) -> tuple[int, int]:
+        """Numbers of pinion and gear."""
+        return self.pinion, self.gear
+
 
 def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothing], notes: Notes) -> Entry:
     """Centre distance of a stage with a given distance of the axes (mm), according to the rules of the import.
@@ -64,7 +72,7 @@ def centre_distance(stage: Component, apart: float, pair: tuple[Toothing, Toothi
     RexsError
         The file has two different distances, and neither profile shifts nor rules decide between them.
     """
-    stated = stage.quantity("center_distance", "mm")
+    stated = stage.quantity("center_distance")
     if apart <= PLACE_TOLERANCE:
         raise RexsError(f"{stage}: both gears are on one axis; correct support_vector of one of them")
     if stated is None:
@@ -96,9 +104,9 @@ def _confirmed(
 ) -> Literal["agreeing", "positions", "file"]:
     """Return which of two distances agrees with the profile shifts of both gears; "agreeing" for both or neither."""
     pinion, gear = pair
-    if pinion.shift is None or gear.shift is None:
+    if pinion.signed_shift is None or gear.signed_shift is None:
         return "agreeing"
-    total = pinion.shift.value + (-gear.shift.value if gear.internal else gear.shift.value)
+    total = pinion.signed_shift + gear.signed_shift
     asked = [pair_relations.shift_sum(unchecked("", pinion), unchecked("", gear), MM * one) for one in (apart, stated)]
     fits = [one is not None and abs(one - total) <= SHIFT_TOLERANCE for one in asked]
     if fits[0] == fits[1]:
@@ -125,20 +133,19 @@ def shift_sum(pinion: Toothing, gear: Toothing, distance: float) -> float:
 
 
 def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: Notes) -> dict[int, Toothing]:
-    """Complete the profile shifts that a file omits for one or both gears of a pair, from the centre distance.
-
-    Raises
-    ------
-    RexsError
-        Shifts and centre distance contradict each other.
-    """
+    """Complete the profile shifts that a file omits for one or both gears of a pair, from the centre distance."""
     solved = _solved(gears, stages)
     wrong = [stage for stage in stages if _contradicts_distance(solved, stage)]
     for replaced in (_zeros_with_followers(gears, stages, wrong, notes), _replaceable(gears, stages, wrong, notes)):
         again = _reopened(gears, stages, replaced)
         if replaced and not any(_contradicts_distance(again, stage) for stage in stages):
             solved = again
-            notes.changed += [_replacement(gears[number], again[number]) for number in replaced]
+            for before, after in ((gears[number], again[number]) for number in replaced):
+                assert before.shift is not None and after.shift is not None
+                notes.changed.append(
+                    f"{before.part}: addendum_modification_coefficient = {before.shift.value:g} contradicts the centre "
+                    f"distances and is treated as missing: {after.shift.value:.6f} for zero backlash"
+                )
             break
     for stage in stages:
         with notes.faults.gathered():
@@ -165,14 +172,13 @@ def _zeros_with_followers(
         return []
     found: list[int] = []
     for stage in wrong:
-        both = (stage.pinion, stage.gear)
-        zeros = [number for number in both if (shift := gears[number].shift) is not None and shift.value == 0.0]
+        zeros = [number for number in stage.both if gears[number].signed_shift == 0.0]
         if len(zeros) == 1:
             found += zeros
     again = _reopened(gears, stages, found)
     for stage in stages:
         if found and stage not in wrong and _contradicts_distance(again, stage):
-            found += [number for number in (stage.pinion, stage.gear) if number not in found]
+            found += [number for number in stage.both if number not in found]
     return list(dict.fromkeys(found))
 
 
@@ -181,8 +187,8 @@ def _solved(gears: Mapping[int, Toothing], stages: Sequence[Stage]) -> dict[int,
     solved = dict(gears)
     open_stages = list(stages)
     while open_stages:
-        ready = [open_stage for open_stage in open_stages if _given(solved, open_stage)] or open_stages[:1]
-        for stage in ready:
+        ready = [one for one in open_stages if any(solved[number].shift for number in one.both)]
+        for stage in ready or open_stages[:1]:
             open_stages.remove(stage)
             _complete(solved, stage)
     return solved
@@ -198,9 +204,8 @@ def _shift_sums(gears: Mapping[int, Toothing], stage: Stage) -> tuple[float, flo
     """Sum of the existing shifts, and the sum that the centre distance requires."""
     pinion = gears[stage.pinion]
     gear = gears[stage.gear]
-    assert pinion.shift is not None and gear.shift is not None
-    stated = pinion.shift.value + (-gear.shift.value if gear.internal else gear.shift.value)
-    return stated, shift_sum(pinion, gear, stage.distance.value)
+    assert pinion.signed_shift is not None and gear.signed_shift is not None
+    return pinion.signed_shift + gear.signed_shift, shift_sum(pinion, gear, stage.distance.value)
 
 
 def _replaceable(
@@ -213,9 +218,8 @@ def _replaceable(
     """
     found: list[int] = []
     for stage in wrong:
-        both = (stage.pinion, stage.gear)
-        free = [number for number in both if all(one in wrong for one in stages if number in (one.pinion, one.gear))]
-        zeros = [number for number in free if (shift := gears[number].shift) is not None and shift.value == 0.0]
+        free = [number for number in stage.both if all(one in wrong for one in stages if number in one.both)]
+        zeros = [number for number in free if gears[number].signed_shift == 0.0]
         if len(zeros) == 1:
             found += zeros
         elif notes.rules.shifts == "centre-distance":
@@ -223,34 +227,19 @@ def _replaceable(
     return list(dict.fromkeys(found))
 
 
-def _replacement(before: Toothing, after: Toothing) -> str:
-    assert before.shift is not None and after.shift is not None
-    return (
-        f"{before.part}: addendum_modification_coefficient = {before.shift.value:g} contradicts the centre distances "
-        f"and is treated as missing: {after.shift.value:.6f} for zero backlash"
-    )
-
-
-def _given(gears: Mapping[int, Toothing], stage: Stage) -> bool:
-    return gears[stage.pinion].shift is not None or gears[stage.gear].shift is not None
-
-
 def _complete(gears: dict[int, Toothing], stage: Stage) -> None:
     """Give both gears of a stage a shift; if neither has one, the gear gets zero and the pinion the whole sum."""
-    pinion = gears[stage.pinion]
-    gear = gears[stage.gear]
-    sign = -1.0 if gear.internal else 1.0
-    total = shift_sum(pinion, gear, stage.distance.value)
-    if pinion.shift is None and gear.shift is None:
-        gear = dataclasses.replace(gear, shift=assumed(0.0, "not in the file for either gear of the stage"))
-        gears[stage.gear] = gear
-    if pinion.shift is None and gear.shift is not None:
-        shift = derived(tidy(round(total - sign * gear.shift.value, 9)), "from the centre distance, without backlash")
-        gears[stage.pinion] = dataclasses.replace(pinion, shift=shift)
-    elif gear.shift is None and pinion.shift is not None:
-        missing = tidy(round(sign * (total - pinion.shift.value), 9))
-        shift = derived(missing, "from the centre distance, without backlash")
-        gears[stage.gear] = dataclasses.replace(gear, shift=shift)
+    total = shift_sum(gears[stage.pinion], gears[stage.gear], stage.distance.value)
+    if all(gears[number].shift is None for number in stage.both):
+        zero = assumed(0.0, "not in the file for either gear of the stage")
+        gears[stage.gear] = dataclasses.replace(gears[stage.gear], shift=zero)
+    for number, mate in (stage.both, stage.both[::-1]):
+        gear = gears[number]
+        counted = gears[mate].signed_shift
+        if gear.shift is None and counted is not None:
+            rest = counted - total if gear.internal else total - counted
+            shift = derived(tidy(round(rest, 9)), "from the centre distance, without backlash")
+            gears[number] = dataclasses.replace(gear, shift=shift)
 
 
 def _check_shifts(gears: Mapping[int, Toothing], stage: Stage, notes: Notes) -> None:
@@ -277,11 +266,9 @@ def with_equal_racks(gears: Mapping[int, Toothing], stages: Sequence[Stage], not
     open_stages = list(stages)
     settled: set[int] = set()
     while open_stages:
-        stage = next(
-            (open_stage for open_stage in open_stages if {open_stage.pinion, open_stage.gear} & settled), open_stages[0]
-        )
+        stage = next((one for one in open_stages if settled & {*one.both}), open_stages[0])
         open_stages.remove(stage)
-        keep, other = (stage.gear, stage.pinion) if stage.gear in settled else (stage.pinion, stage.gear)
+        keep, other = stage.both[::-1] if stage.gear in settled else stage.both
         settled |= {keep, other}
         if _have_one_rack(same[keep], same[other]) or not _have_one_base_pitch(same[keep], same[other]):
             continue
@@ -301,13 +288,14 @@ def _have_one_rack(toothing: Toothing, other: Toothing) -> bool:
 
 
 def _have_one_base_pitch(toothing: Toothing, other: Toothing) -> bool:
-    cosines = [math.cos(math.radians(gear.pressure_angle.value)) for gear in (toothing, other)]
-    pitches = [gear.module.value * cosine for gear, cosine in zip((toothing, other), cosines, strict=True)]
-    sines = [
-        abs(math.sin(math.radians(gear.helix_angle.value))) * cosine
-        for gear, cosine in zip((toothing, other), cosines, strict=True)
-    ]
-    return abs(pitches[0] - pitches[1]) <= PITCH_TOLERANCE * pitches[1] and abs(sines[0] - sines[1]) <= PITCH_TOLERANCE
+    (pitch, sine), (other_pitch, other_sine) = (_base_pitch(gear) for gear in (toothing, other))
+    return abs(pitch - other_pitch) <= PITCH_TOLERANCE * other_pitch and abs(sine - other_sine) <= PITCH_TOLERANCE
+
+
+def _base_pitch(gear: Toothing) -> tuple[float, float]:
+    """Return the normal base pitch divided by pi (mm), and the sine of the base helix angle."""
+    cosine = math.cos(math.radians(gear.pressure_angle.value))
+    return gear.module.value * cosine, abs(math.sin(math.radians(gear.helix_angle.value))) * cosine
 
 
 def _relative_to_mating_rack(mate: Toothing, gear: Toothing) -> Toothing:
@@ -350,6 +338,7 @@ def _relative_to_mating_rack(mate: Toothing, gear: Toothing) -> Toothing:
 
 def unchecked(name: str, gear: Toothing) -> GearInputs:
     """Build the gear with its geometric relations."""
+    cutter = CutterSection.model_construct(**gear.cutter.value) if gear.cutter else None
     plain = GearInputs(
         name=name,
         teeth=gear.teeth,
@@ -365,23 +354,11 @@ def unchecked(name: str, gear: Toothing) -> GearInputs:
         root_diameter=MM * gear.root.value if gear.root else None,
         tooth_thinning=MM * gear.thinning.value,
         root_form_diameter=MM * gear.root_form.value if gear.root_form else None,
-        cutter=_cutter(gear),
+        cutter=pinion_cutter(cutter, gear.module.value, gear.helix_angle.value),
     )
     if not gear.chamfer:
         return plain
     return dataclasses.replace(plain, tip_form_diameter=2.0 * (plain.tip_radius - MM * plain.outward * gear.chamfer))
-
-
-def _cutter(gear: Toothing) -> PinionCutter | None:
-    """Build the cutter of a ring gear."""
-    if gear.cutter is None:
-        return None
-    given = gear.cutter.value
-    tip = gear.cutter.value.get("tip_diameter_mm")
-    if "addendum" in given:
-        reference = given["teeth"] / math.cos(math.radians(gear.helix_angle.value))
-        tip = gear.module.value * (reference + 2.0 * (given["profile_shift"] + given["addendum"]))
-    return PinionCutter(given["teeth"], given["tip_radius"], given["profile_shift"], None if tip is None else MM * tip)
 
 
 @contextmanager
@@ -517,7 +494,7 @@ def with_clear_tips(gears: dict[int, Toothing], stages: Sequence[Stage], notes: 
     """
     cleared = dict(gears)
     for stage in stages:
-        for tip, mate in ((stage.gear, stage.pinion), (stage.pinion, stage.gear)):
+        for tip, mate in (stage.both[::-1], stage.both):
             with reports_impossible(cleared[tip], cleared[mate]):
                 bound = _tip_bound(cleared, stage, tip)
             if bound is None:
@@ -554,28 +531,6 @@ def _tip_bound(gears: Mapping[int, Toothing], stage: Stage, which: int) -> float
 
 # Flank modifications of a REXS file: reliefs and crownings that are equal on both flanks
 
-READ = ("tip_relief", "root_relief", "profile_crowning", "helix_crowning")
-"""Modifications that are imported."""
-MODIFICATIONS = (
-    *READ,
-    "triangular_tip_relief",
-    "triangular_root_relief",
-    "profile_slope",
-    "profile_twist",
-    "helix_slope",
-    "end_relief_datum_face",
-    "end_relief_non_datum_face",
-    "topographical_modification",
-)
-UNSIGNED = {"helix_slope": "helix_slope_um", "profile_slope": "profile_slope_um", "profile_twist": "twist_um"}
-"""Modifications with undefined sign, by the attribute of their amount, and the corresponding key.
-
-Database and schema of REXS (1.2 to 2.0.0) permit both signs and call it an amount. No public text defines at which end
-of the flank a positive value removes material. A wrong sign would be worse than no value.
-"""
-SHAPES = {"linear": "linear", "parabolic": "parabolic", "circular": "parabolic"}
-"""Shapes of a relief, REXS to exugear; a circle and its parabola differ by the square of depth over length."""
-
 
 def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Entry]:
     """Entries of a gear's table of modifications; empty for none.
@@ -587,10 +542,10 @@ def modification_of(model: Model, gear: Toothing, notes: Notes) -> dict[str, Ent
     """
     left, right = (_modification_by_type(model, gear.part, side) for side in ("left", "right"))
     for kind, part in {**right, **left}.items():
-        if kind not in READ and kind not in UNSIGNED:
+        if kind not in (*IMPORTED_MODIFICATIONS, *(row.attribute for row in READ["unsigned"])):
             notes.changed.append(f"{part} of {gear.part}: not imported; set it in [gears.NAME.modification]")
     entries: dict[str, Entry] = {}
-    for kind in READ:
+    for kind in IMPORTED_MODIFICATIONS:
         one = left.get(kind)
         other = right.get(kind)
         if one is None and other is None:
@@ -608,9 +563,9 @@ def _blanks(
     gear: Toothing, left: dict[str, Component], right: dict[str, Component], notes: Notes
 ) -> Iterator[tuple[str, Entry]]:
     """Yield slopes of the file as zeros to be completed, since their signs are not defined; skip zero slopes."""
-    for kind, key in UNSIGNED.items():
+    for kind, key in ((row.attribute, row.key) for row in READ["unsigned"]):
         part = left.get(kind) or right.get(kind)
-        amounts = [one[kind].quantity(kind, "mm") for one in (left, right) if kind in one]
+        amounts = [one[kind].quantity(kind) for one in (left, right) if kind in one]
         if part is None or not any(amounts):
             continue
         said = ", ".join(dict.fromkeys(f"{_um(amount):g} um" for amount in amounts if amount))
@@ -637,7 +592,7 @@ def _entries(gear: Toothing, part: Component, notes: Notes) -> Iterator[tuple[st
     if part.type.endswith("_relief"):
         yield from _relief(gear, part)
     elif part.type == "profile_crowning":
-        ends = [part.quantity(f"profile_crowning_at_{end}", "mm") for end in ("tip", "root")]
+        ends = [part.quantity(f"profile_crowning_at_{end}") for end in ("tip", "root")]
         if ends[0] is not None and ends[1] is not None and abs(ends[0] - ends[1]) < EQUAL:
             yield "profile_crowning_um", read(_um(ends[0]), f"profile_crowning_at_tip and _root of {part}")
     else:
@@ -647,8 +602,8 @@ def _entries(gear: Toothing, part: Component, notes: Notes) -> Iterator[tuple[st
 def _lead_crowning(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry]]:
     """Lead crowning scaled to the ends of the face, with the square of the distance from the middle."""
     sides = ("datum_face", "non_datum_face")
-    amounts = [part.quantity(f"helix_crowning_amount_{side}", "mm") for side in sides]
-    quantities = [part.quantity(f"coordinate_where_helix_crowning_is_specified_{side}", "mm") for side in sides]
+    amounts = [part.quantity(f"helix_crowning_amount_{side}") for side in sides]
+    quantities = [part.quantity(f"coordinate_where_helix_crowning_is_specified_{side}") for side in sides]
     if None in amounts or None in quantities:
         return
     (one, other), (low, high) = [[value or 0.0 for value in pair] for pair in (amounts, quantities)]
@@ -661,14 +616,14 @@ def _lead_crowning(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry
 def _relief(gear: Toothing, part: Component) -> Iterator[tuple[str, Entry]]:
     """Relief from its datum diameter, scaled to the end of the flank if its depth is specified elsewhere."""
     kind = part.type.removesuffix("_relief")
-    depth, datum = (part.quantity(f"{part.type}_{key}", "mm") for key in ("depth", "datum_diameter"))
+    depth, datum = (part.quantity(f"{part.type}_{key}") for key in ("depth", "datum_diameter"))
     shape = SHAPES.get(part.text("shape_of_relief"))
     geometry = unchecked("", gear)
     base = 2e3 * geometry.base_radius
     if not depth or datum is None or abs(datum) <= base or shape is None:
         return
     end = 2e3 * (geometry.tip_radius if kind == "tip" else geometry.form_radius)
-    stated = abs(part.quantity(f"{part.type}_evaluation_reference", "mm") or end)
+    stated = abs(part.quantity(f"{part.type}_evaluation_reference") or end)
     start, stated_at, ends_at = (math.sqrt(max((d / base) ** 2 - 1.0, 0.0)) for d in (abs(datum), stated, end))
     if abs(stated_at - start) < EQUAL:
         return

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
+from exugear.exchange.rexs.mapping import Row
 from exugear.exchange.rexs.tree import Component, Faults, Model, RexsError
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
@@ -53,6 +55,30 @@ def assumed(value: Any, source: str) -> Entry:
     return Entry(value, source, ASSUMED)
 
 
+def entries_of(
+    rows: Sequence[Row],
+    *parts: Component | None,
+    zeros: bool = False,
+    limits: tuple[float, float] = (-math.inf, math.inf),
+) -> dict[str, Entry]:
+    """Entries of those attributes that components have, by key; the first row and the first component have priority.
+
+    Parameters
+    ----------
+    zeros : whether zero is a value, too; it otherwise counts as missing
+    limits : range outside of which a value is ignored
+    """
+    entries: dict[str, Entry] = {}
+    for row in rows:
+        if row.key in entries:
+            continue
+        found = (part.quantity(row.attribute) for part in parts if part is not None)
+        value = next((row.factor * one for one in found if one or (zeros and one is not None)), None)
+        if value is not None and limits[0] <= value <= limits[1]:
+            entries[row.key] = read(tidy(value), row.attribute)
+    return entries
+
+
 @dataclass(frozen=True)
 class Rules:
     """Rules that decide between contradictory values of a file."""
@@ -91,32 +117,6 @@ def tidy(value: float) -> float:
     (16.8, 0.0)
     """
     return float(f"{value:.12g}") + 0.0
-
-
-def needed(value: float | None, part: object, key: str) -> float:
-    """Return a value, or raise an error if it is missing.
-
-    Raises
-    ------
-    RexsError
-        The value is None.
-    """
-    if value is None:
-        raise RexsError(f"{part}: {key} is missing")
-    return value
-
-
-def within(value: float, part: object, key: str, low: float, high: float) -> float:
-    """Return a value, or raise an error if it is impossible for a gear.
-
-    Raises
-    ------
-    RexsError
-        The value is below `low` or above `high`.
-    """
-    if not low <= value <= high:
-        raise RexsError(f"{part}: {key} = {value:g} is impossible; expected {low:g} to {high:g}")
-    return value
 
 
 @dataclass
@@ -178,17 +178,11 @@ def toml_value(value: Any) -> str:
     >>> toml_value({"sun": 1.0, "names": ["a", True]})
     '{ sun = 1.0, names = ["a", true] }'
     """
-    if isinstance(value, bool):
-        if value:
-            return "true"
-        return "false"
-    if isinstance(value, int | float):
-        return repr(value)
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{key} = {toml_value(entry)}" for key, entry in value.items()) + " }"
-    return "[" + ", ".join(toml_value(entry) for entry in value) + "]"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
 
 
 # Positions and directions of components in the axes of the gearbox file, z along the shafts

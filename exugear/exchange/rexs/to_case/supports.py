@@ -3,48 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
+from exugear.exchange.rexs.mapping import BEARINGS, JOINING, PLAIN_BEARINGS, READ, ROLLING_TYPES
 from exugear.exchange.rexs.to_case.bodies import (
-    JOINING,
     RIGID_ABOVE,
-    STIFFNESSES,
     Bodies,
     Body,
+    connections,
     ends,
-    is_engaged,
     is_one_piece,
     is_rigid_in_torsion,
     torsional_stiffness,
 )
-from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, read, tidy
+from exugear.exchange.rexs.to_case.notes import Block, Entry, Notes, Places, assumed, derived, entries_of, read, tidy
 from exugear.exchange.rexs.tree import Component, Model, RexsError, plain
 from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG, TYPES_OF_KEYS
 from exugear.gearbox.units import MM
 from exugear.system.bearings.rolling.dimensions import boundary_of
 
-BEARINGS = ("concept_bearing", "rolling_bearing_with_catalog_geometry", "rolling_bearing_with_detailed_geometry")
-PLAIN_BEARINGS = ("hydrodynamic_radial_plain_bearing", "slide_bearing")
-ROLLING_TYPES = {
-    "angular_contact_ball_bearing": "angular_contact_ball",
-    "axial_self_aligning_roller_bearing": "thrust_spherical_roller",
-    "four_point_contact_ball_bearing": "four_point_ball",
-    "radial_grooved_ball_bearing": "deep_groove_ball",
-    "radial_needle_roller_bearing": "needle_roller",
-    "radial_roller_bearing": "cylindrical_roller",
-    "radial_self-aligning_ball_bearing": "self_aligning_ball",
-    "radial_self_aligning_ball_bearing": "self_aligning_ball",
-    "radial_self_aligning_roller_bearing": "spherical_roller",
-    "radial_spherical_roller_bearing": "spherical_roller",
-    "radial_tapered_roller_bearing": "tapered_roller",
-}
-"""Types of rolling bearings, REXS to exugear."""
 CYLINDERS = TYPES_OF_KEYS["ribs"][0]
 """Types of roller bearings that locate a shaft axially only by ribs."""
 ARRANGED = TYPES_OF_KEYS["axial_preload_um"][0]
 """Types whose two rows are arranged in X, O or tandem."""
-GROOVE_RATIOS, OSCULATIONS = (0.501, 0.6), (0.5, 0.9999)
-"""Possible ratios of groove radii and osculations of rolling bearings."""
+RATIOS = (
+    ("inner_groove_ratio", "raceway_radius_of_inner_ring", "diameter_of_rolling_element", (0.501, 0.6)),
+    ("outer_groove_ratio", "raceway_radius_of_outer_ring", "diameter_of_rolling_element", (0.501, 0.6)),
+    ("osculation", "roller_crowning_radius", "raceway_radius_of_outer_ring", (0.5, 0.9999)),
+)
+"""Keys for ratios of two attributes, and the possible range; the profile radius is that of barrel rollers."""
 LEAST_RADIUS = 0.03
 """Radius (m) used in place of a gear radius if two coupled bodies have no gears."""
 PLACE_TOLERANCE = 0.02
@@ -94,7 +81,7 @@ def coupling_blocks(model: Model, bodies: Bodies, bearings: Mapping[str, Block])
 def _stiff_torsion(*bodies: Body) -> float:
     """Torsional stiffness used for rigid, N m/rad: the rigid radial stiffness at the largest reference circle."""
     diameters = [
-        (gear.whole("number_of_teeth") or 0) * (gear.quantity("normal_module", "mm") or 0.0)
+        (gear.whole("number_of_teeth") or 0) * (gear.quantity("normal_module") or 0.0)
         for body in bodies
         for gear in body.gears
     ]
@@ -122,13 +109,9 @@ def joint_blocks(bodies: Bodies, bearings: dict[str, Block], gear_places: dict[s
 
 def _flexible_connections(model: Model, bodies: Bodies) -> Iterator[tuple[Component, Body, Body]]:
     """Yield couplings and fits between two separate bodies, once for equal planets."""
-    for part in model.components_of_type(*JOINING):
-        both = ends(model, part)
-        if both is None or is_one_piece(part) or not is_engaged(model, part):
-            continue
-        inner = bodies.of(both[0])
-        outer = bodies.of(both[1])
-        if inner is not None and outer is not None and inner is not outer:
+    for part, *both in connections(model):
+        inner, outer = (bodies.of(end) for end in both)
+        if not is_one_piece(part) and inner is not None and outer is not None and inner is not outer:
             yield part, inner, outer
 
 
@@ -161,7 +144,7 @@ def _bearing(model: Model, places: Places, bodies: Bodies, part: Component, note
 def _check_place(places: Places, part: Component, both: tuple[Component, Component], notes: Notes) -> None:
     """Compare the position of a bearing with its coordinate on the connected shafts."""
     for side, shaft in zip(("inner", "outer"), both, strict=True):
-        along = part.quantity(f"u_coordinate_on_shaft_{side}_side", "mm")
+        along = part.quantity(f"u_coordinate_on_shaft_{side}_side")
         if along is None or shaft.type != "shaft" or not shaft.given("support_vector"):
             continue
         expected = places.position(shaft)[2] + places.sense(shaft) * along
@@ -189,13 +172,13 @@ def _support(model: Model, part: Component, sense: int, notes: Notes) -> dict[st
         return {"stiffness": Block("", entries)}
     kind = ROLLING_TYPES.get(part.text("bearing_type"))
     sizes = _sizes(part, kind, notes)
-    rows = part.whole("number_of_bearing_rows") or len(_parts_of(model, part, "rolling_bearing_row")) or 1
+    rows = part.whole("number_of_bearing_rows") or len(model.parts_of(part, "rolling_bearing_row")) or 1
     paired = rows > 1 and kind in CONTACT_ANGLES_DEG and kind not in ("spherical_roller", "self_aligning_ball")
     arrangement = _arrangement(model, part, sense) if paired and rows == 2 and kind in ARRANGED else {}
     if kind and sizes and (arrangement or not paired):
         catalogue = _catalogue(model, part, kind, rows, sense, sizes, notes, arrangement)
         return {"catalogue": Block("", catalogue), **_rib_stiffness(part, catalogue)}
-    if not sizes and part.quantity("radial_stiffness", "N / m"):
+    if not sizes and part.quantity("radial_stiffness"):
         return {"stiffness": Block("", _stiffness(part, notes))}
     if not kind:
         why = f"a {part.text('bearing_type') or part.type} has no bearing model; set its stiffness"
@@ -217,30 +200,24 @@ def _arrangement(model: Model, part: Component, sense: int) -> dict[str, Entry]:
     second one a ring pushed along u, the arrangement is X: the pressure lines converge towards the middle. For a shaft
     of opposite direction the order and both directions are reversed, so that X remains X.
     """
-    rows = _parts_of(model, part, "rolling_bearing_row")
+    rows = model.parts_of(part, "rolling_bearing_row")
     held = [row.text("axial_force_absorption_of_row") for row in rows]
     source = "axial_force_absorption_of_row, in the order of the rows"
     if held in (["negative", "positive"], ["positive", "negative"]):
         found = {"arrangement": read("X" if held[0] == "negative" else "O", source)}
     elif held in (["positive", "positive"], ["negative", "negative"]):
-        towards = "+z" if (held[0] == "positive") == (sense > 0) else "-z"
-        found = {"arrangement": read("tandem", source), "locates_towards": read(towards, source)}
+        found = {"arrangement": read("tandem", source), "locates_towards": read(_direction(held[0], sense), source)}
     else:
         return {}
-    distance = part.quantity("distance_between_bearing_rows", "mm")
-    if distance:
-        found["row_distance_mm"] = read(tidy(distance), "distance_between_bearing_rows")
-    preload = part.quantity("preload_distance", "mm")
-    play = part.quantity("operating_axial_bearing_clearance", "mm")
-    if found["arrangement"].value != "tandem" and (preload or play):
-        key = "preload_distance" if preload else "operating_axial_bearing_clearance"
-        found["axial_preload_um"] = read(tidy(1e3 * (preload or -(play or 0.0))), key)
+    found |= entries_of(READ["row distance"], part)
+    if found["arrangement"].value != "tandem":
+        found |= entries_of(READ["preload"], part)
     return found
 
 
 def _rib_stiffness(part: Component, catalogue: Mapping[str, Entry]) -> dict[str, Block]:
     """Axial stiffness of the ribs of cylindrical rollers from the file, which catalogue data do not cover."""
-    value = part.quantity("axial_stiffness", "N / m")
+    value = part.quantity("axial_stiffness")
     if not value or catalogue["type"].value not in CYLINDERS or "ribs" in catalogue:
         return {}
     stiffness = read(tidy(value), "axial_stiffness")
@@ -251,10 +228,9 @@ def _rib_stiffness(part: Component, catalogue: Mapping[str, Entry]) -> dict[str,
 
 def _sizes(part: Component, kind: str | None, notes: Notes) -> dict[str, Entry]:
     """Boundary dimensions from the file, or else from the designation; empty if neither defines them."""
-    keys = {"inner_diameter": "bore_mm", "outer_diameter": "outer_diameter_mm", "width": "width_mm"}
-    given = {ours: part.quantity(key, "mm") for key, ours in keys.items()}
-    if all(given.values()):
-        return {ours: read(given[ours], key) for key, ours in keys.items()}
+    given = entries_of(READ["bearing size"], part)
+    if len(given) == len(READ["bearing size"]):
+        return given
     boundary = boundary_of(_designation(part))
     if boundary is None or boundary.type != kind:
         return {}
@@ -285,28 +261,17 @@ def _catalogue(
         "designation": Entry(_designation(part)),
         **sizes,
     }
-    row = next(iter(_parts_of(model, part, "rolling_bearing_row")), None)
-    angle = abs((row or part).quantity("pressure_angle", "deg") or 0.0)
+    row = next(iter(model.parts_of(part, "rolling_bearing_row")), None)
+    angle = abs((row or part).quantity("pressure_angle") or 0.0)
     if kind in CONTACT_ANGLES_DEG and CONTACT_ANGLES_DEG[kind][0] <= angle <= CONTACT_ANGLES_DEG[kind][1]:
         entries["contact_angle_deg"] = read(tidy(angle), "pressure_angle of its row")
     if not arrangement and (rows > 1 or part.text("bearing_type") == "radial_spherical_roller_bearing"):
         entries["row_count"] = read(rows, "number_of_bearing_rows")
     if row is not None:
         entries |= _elements(model, row, kind, notes)
-        entries |= _grooves(model, row, kind, notes)
     entries |= arrangement
-    clearance = part.quantity("operating_radial_bearing_clearance", "mm")
-    if clearance:
-        entries["radial_clearance_mm"] = read(tidy(clearance), "operating_radial_bearing_clearance")
-    sense_of_rating = "axial" if kind == "thrust_spherical_roller" else "radial"
-    for key, ours in (
-        (f"{sense_of_rating}_dynamic_load_rating", "dynamic_rating_kN"),
-        (f"{sense_of_rating}_static_load_rating", "static_rating_kN"),
-        ("fatigue_limit_load", "fatigue_load_limit_kN"),
-    ):
-        rating = part.quantity(key, "kN")
-        if rating:
-            entries[ours] = read(tidy(rating), key)
+    entries |= entries_of(READ["clearance"], part)
+    entries |= entries_of(READ["axial rating"] if kind == "thrust_spherical_roller" else READ["radial rating"], part)
     limit, static = (entries.get(key) for key in ("fatigue_load_limit_kN", "static_rating_kN"))
     if limit is not None and static is not None and limit.value >= static.value:
         notes.changed.append(
@@ -321,36 +286,37 @@ def _catalogue(
 def _note_axial(part: Component, kind: str, sense: int, entries: dict[str, Entry], notes: Notes) -> None:
     """Add the axial locating direction of a bearing, or a note if the model of its type locates in both directions."""
     absorbed = part.text("axial_force_absorption")
-    if kind in TYPES_OF_KEYS["locates_towards"][0] and absorbed in ("positive", "negative"):
-        towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
-        entries["locates_towards"] = read(towards, f"axial_force_absorption {absorbed}")
+    one_way = absorbed in ("positive", "negative")
+    towards = read(_direction(absorbed, sense), f"axial_force_absorption {absorbed}")
+    if kind in TYPES_OF_KEYS["locates_towards"][0] and one_way:
+        entries["locates_towards"] = towards
     elif kind in CYLINDERS:
-        if absorbed == "both_directions" and not part.quantity("axial_stiffness", "N / m"):
+        if absorbed == "both_directions" and not part.quantity("axial_stiffness"):
             entries["ribs"] = read("both", "axial_force_absorption both_directions")
-        elif absorbed in ("positive", "negative"):
-            towards = "+z" if (absorbed == "positive") == (sense > 0) else "-z"
-            entries["ribs"] = read(towards, f"axial_force_absorption {absorbed}")
-    elif absorbed in ("positive", "negative", "no_direction"):
+        elif one_way:
+            entries["ribs"] = towards
+    elif one_way or absorbed == "no_direction":
         notes.changed.append(
             f"{part}: axial_force_absorption {absorbed}, but the model of a {kind} locates in both directions"
         )
 
 
+def _direction(absorbed: str, sense: int) -> str:
+    """Return the direction along z for one along the u axis, which has a sense."""
+    return "+z" if (absorbed == "positive") == (sense > 0) else "-z"
+
+
 def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
-    """Return number and dimensions of the rolling elements, as far as specified; at most as many as fit."""
+    """Return number, dimensions and curvatures of the rolling elements, as far as specified; at most as many as fit."""
     entries = {}
     count = row.whole("number_of_rolling_elements")
     if count:
         entries["element_count"] = read(count, "number_of_rolling_elements")
-    element = next(iter(_parts_of(model, row, "rolling_element")), None)
-    wanted = [(element, "diameter_of_rolling_element", "element_diameter_mm")]
-    if kind in TYPES_OF_KEYS["element_length_mm"][0]:
-        wanted.append((element, "length_of_rolling_element", "element_length_mm"))
-    wanted.append((row, "reference_diameter_rolling_bearing", "pitch_diameter_mm"))
-    for part, key, ours in wanted:
-        value = part.quantity(key, "mm") if part else None
-        if value:
-            entries[ours] = read(tidy(value), key)
+    element = next(iter(model.parts_of(row, "rolling_element")), None)
+    entries |= entries_of(READ["rolling element"], element)
+    if kind not in TYPES_OF_KEYS["element_length_mm"][0]:
+        entries.pop("element_length_mm", None)
+    entries |= entries_of(READ["bearing row"], row)
     diameter, pitch = (entries.get(key) for key in ("element_diameter_mm", "pitch_diameter_mm"))
     if count and diameter is not None and pitch is not None and 0.0 < diameter.value < pitch.value:
         most = int(math.pi / math.asin(diameter.value / pitch.value))
@@ -358,80 +324,50 @@ def _elements(model: Model, row: Component, kind: str, notes: Notes) -> dict[str
             fitting = f"{count} of {diameter.value:g} mm do not fit on {pitch.value:g} mm"
             notes.changed.append(f"{row}: {fitting}, {most} rolling elements used; ratings of the file are kept")
             entries["element_count"] = assumed(most, fitting)
+    for key, dividend, divisor, limits in RATIOS:
+        over, under = (
+            next((value for part in (row, element) if part is not None and (value := part.quantity(name))), None)
+            for name in (dividend, divisor)
+        )
+        if not over or not under or kind not in TYPES_OF_KEYS[key][0]:
+            continue
+        if limits[0] <= over / under <= limits[1]:
+            entries[key] = derived(tidy(round(over / under, 6)), f"{dividend} over {divisor}")
+        else:
+            notes.changed.append(
+                f"{row}: {dividend} over {divisor} is {over / under:.4g}, which is impossible; the usual {key} is used"
+            )
     return entries
-
-
-def _grooves(model: Model, row: Component, kind: str, notes: Notes) -> dict[str, Entry]:
-    """Groove radii divided by the ball diameter, or the profile radius of barrel rollers divided by the raceway's."""
-    element = next(iter(_parts_of(model, row, "rolling_element")), None)
-    radii = {ring: row.quantity(f"raceway_radius_of_{ring}_ring", "mm") for ring in ("inner", "outer")}
-    entries: dict[str, Entry] = {}
-    if element is None:
-        return entries
-    diameter = element.quantity("diameter_of_rolling_element", "mm")
-    for ring, radius in radii.items():
-        key = f"{ring}_groove_ratio"
-        if kind in TYPES_OF_KEYS[key][0] and diameter and radius:
-            source = f"raceway_radius_of_{ring}_ring over diameter_of_rolling_element"
-            _put_within(entries, key, radius / diameter, GROOVE_RATIOS, source, row, notes)
-    outline = element.quantity("roller_crowning_radius", "mm")
-    if kind in TYPES_OF_KEYS["osculation"][0] and outline and radii["outer"]:
-        source = "roller_crowning_radius over raceway_radius_of_outer_ring"
-        _put_within(entries, "osculation", outline / radii["outer"], OSCULATIONS, source, row, notes)
-    return entries
-
-
-def _put_within(
-    entries: dict[str, Entry],
-    key: str,
-    ratio: float,
-    limits: tuple[float, float],
-    source: str,
-    row: Component,
-    notes: Notes,
-) -> None:
-    if limits[0] <= ratio <= limits[1]:
-        entries[key] = derived(tidy(round(ratio, 6)), source)
-    else:
-        notes.changed.append(f"{row}: {source} is {ratio:.4g}, which is impossible; the usual {key} is used")
-
-
-def _parts_of(model: Model, owner: Component, kind: str) -> Sequence[Component]:
-    found = [
-        one
-        for relation in ("assembly", "ordered_assembly")
-        for one in model.related(relation, "assembly", owner.number, "part")
-    ]
-    return [one for one in found if one.type == kind]
-
-
-def _was_rigid(part: Component) -> bool:
-    """Return whether a connection is torsionally rigid; directions without a value then count as rigid, too."""
-    return part.type in JOINING and is_rigid_in_torsion(part)
 
 
 def _stiffness(part: Component, notes: Notes) -> dict[str, Entry]:
-    """Isotropic stiffness of a concept bearing or coupling; values that mean rigid are limited."""
+    """Isotropic stiffness of a concept bearing or coupling; values that mean rigid are limited.
+
+    Directions without a value count as rigid in a connection that is rigid in torsion.
+    """
     entries = {}
-    for key, (ours, unit, factor) in STIFFNESSES.items():
-        value = part.quantity(key, unit)
-        value = None if value is None else factor * value
+    was_rigid = part.type in JOINING and is_rigid_in_torsion(part)
+    absorbed = part.text("axial_force_absorption")
+    for row in READ["stiffness"]:
+        key = row.attribute
+        value = part.quantity(key)
+        value = None if value is None else row.factor * value
         if key == "radial_stiffness" and part.flag("radial_force_absorption") is False:
             continue
-        absorbed = part.text("axial_force_absorption")
-        if key == "axial_stiffness" and absorbed == "no_direction":
+        if value is None and (key == "bending_stiffness" or part.type in JOINING) and not was_rigid:
             continue
-        if value is None and (key == "bending_stiffness" or part.type in JOINING) and not _was_rigid(part):
-            continue
-        one_way = absorbed in ("positive", "negative")
-        holds = one_way or absorbed == "both_directions" or _was_rigid(part)
-        if value is None and key == "axial_stiffness" and not holds:
-            continue
-        if key == "axial_stiffness" and one_way:
-            notes.changed.append(f"{part}: locates the axis {absorbed} along u only, here in both directions")
-        if value is None or value >= RIGID_ABOVE[key]:
-            said = "not in the file" if value is None else f"{key} of {value:g} means rigid"
-            entries[ours] = assumed(RIGID[key], said)
+        if key == "axial_stiffness":
+            one_way = absorbed in ("positive", "negative")
+            if absorbed == "no_direction" or (
+                value is None and not (one_way or absorbed == "both_directions" or was_rigid)
+            ):
+                continue
+            if one_way:
+                notes.changed.append(f"{part}: locates the axis {absorbed} along u only, here in both directions")
+        if value is None:
+            entries[row.key] = assumed(RIGID[key], "not in the file")
+        elif value >= RIGID_ABOVE[key]:
+            entries[row.key] = assumed(RIGID[key], f"{key} of {value:g} means rigid")
         elif value > 0.0:
-            entries[ours] = read(tidy(value), key)
+            entries[row.key] = read(tidy(value), key)
     return entries

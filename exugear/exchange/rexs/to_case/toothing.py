@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, needed, read, tidy, within
+from exugear.exchange.rexs.mapping import READ
+from exugear.exchange.rexs.to_case.notes import Entry, Notes, assumed, entries_of, read, tidy
 from exugear.exchange.rexs.tree import Component, Model, RexsError
 
 PLAUSIBLE_TIP = (0.5, 2.0)
@@ -71,6 +72,13 @@ class Toothing:
     """Racks that generate an external gear, in the order of manufacture."""
     internal: bool
 
+    @property
+    def signed_shift(self) -> float | None:
+        """Profile shift as it counts in the sum of a pair, negative for a larger ring gear; None if unspecified."""
+        if self.shift is None:
+            return None
+        return float(-self.shift.value if self.internal else self.shift.value)
+
 
 def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes: Notes) -> Toothing:
     """Collect the data of a gear; `mates` are its mating gears.
@@ -81,11 +89,10 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
         A value is missing, or left and right flanks differ.
     """
     internal = gear.type == "ring_gear"
-    module = _length(gear, "normal_module")
+    module = _required(gear, "normal_module", LENGTHS)
     flank = _flank(model, gear)
     steps = _steps(model, gear)
     tool = _root_tool(steps, internal)
-    chamfer = (flank.quantity("tooth_tip_chamfer", "mm") if flank else None) or 0.0
     angle = _pressure_angle(gear, flank)
     helix = _helix_angle(gear, mates)
     allowances = _allowances(gear, math.radians(angle.value), math.radians(helix.value), internal)
@@ -95,34 +102,38 @@ def toothing_of(model: Model, gear: Component, mates: Sequence[Component], notes
     return Toothing(
         part=gear,
         teeth=teeth,
-        module=read(tidy(module), "normal_module"),
+        module=module,
         pressure_angle=angle,
         helix_angle=helix,
-        face_width=read(_length(gear, "face_width"), "face_width"),
+        face_width=_required(gear, "face_width", LENGTHS),
         shift=_shift(flank, internal),
-        tip=_tip(gear, teeth * module, notes),
+        tip=_tip(gear, teeth * module.value, notes),
         root=_diameter(gear, "root_diameter"),
         dedendum=_tool_factor(tool, internal, "addendum_coefficient_reference_profile", 1.25),
         tip_radius=_rounded(_tool_factor(tool, internal, "tip_corner_radius_factor_reference_profile", 0.38)),
-        thinning=_thinning(gear, module, allowances, math.radians(helix.value)),
+        thinning=_thinning(gear, module.value, allowances, math.radians(helix.value)),
         allowances=allowances,
-        cutter=_cutter(gear, tool, module) if internal else None,
-        chamfer=_chamfer(gear, chamfer),
+        cutter=_cutter(gear, tool, module.value) if internal else None,
+        chamfer=_chamfer(gear, flank),
         root_form=_diameter(gear, "root_form_diameter"),
-        tools=() if internal else tuple(_racks(steps, module)),
+        tools=() if internal else tuple(_racks(steps, module.value)),
         internal=internal,
     )
 
 
-def _length(gear: Component, key: str) -> float:
-    """Return a required length of a gear, mm."""
-    return within(needed(gear.quantity(key, "mm"), gear, key), gear, key, *LENGTHS)
+def _required(part: Component, key: str, limits: tuple[float, float]) -> Entry:
+    """Return a required value, which must be possible for a gear."""
+    value = part.required(key)
+    if not limits[0] <= value <= limits[1]:
+        raise RexsError(f"{part}: {key} = {value:g} is impossible; expected {limits[0]:g} to {limits[1]:g}")
+    return read(tidy(value), key)
 
 
-def _chamfer(gear: Component, stated: float) -> float:
+def _chamfer(gear: Component, flank: Component | None) -> float:
     """Height of the tip chamfer, mm: specified, or from the tip form diameter."""
-    tip = gear.quantity("tip_diameter", "mm")
-    form = gear.quantity("tip_form_diameter", "mm")
+    stated = (flank.quantity("tooth_tip_chamfer") if flank else None) or 0.0
+    tip = gear.quantity("tip_diameter")
+    form = gear.quantity("tip_form_diameter")
     if stated or not tip or not form:
         return tidy(stated)
     return tidy(max(0.0, round(0.5 * (abs(tip) - abs(form)) * (-1.0 if gear.type == "ring_gear" else 1.0), 9)))
@@ -133,13 +144,9 @@ def _flank(model: Model, gear: Component) -> Component | None:
     left, right = (model.related("flank", "gear", gear.number, side) for side in ("left", "right"))
     if not left or not right:
         return (left or right or (None,))[0]
-    for key, unit in (
-        ("addendum_modification_coefficient", "none"),
-        ("normal_pressure_angle", "deg"),
-        ("tooth_tip_chamfer", "mm"),
-    ):
-        quantity = left[0].quantity(key, unit)
-        other = right[0].quantity(key, unit)
+    for key in (row.attribute for row in READ["flank"]):
+        quantity = left[0].quantity(key)
+        other = right[0].quantity(key)
         if quantity != other and (quantity is None or other is None or abs(quantity - other) > EQUAL):
             raise RexsError(
                 f"{gear}: left and right flank differ in {key} ({quantity} and {other}); "
@@ -184,30 +191,23 @@ def _racks(steps: Sequence[tuple[Component, Component | None]], module: float) -
         depth = tool.quantity("addendum_coefficient_reference_profile")
         if tool.type != "rack_shaped_tool" or not depth or depth < 0.0:
             continue
-        amount = (tool.quantity("protuberance_amount", "mm") or 0.0) / module
+        amount = (tool.quantity("protuberance_amount") or 0.0) / module
+        allowance = settings.quantity("machining_allowance") if settings else None
         yield Tool(
             part=tool,
             depth=depth,
             tip_radius=max(tool.quantity("tip_corner_radius_factor_reference_profile") or 0.0, 0.0),
             protuberance=amount or tool.quantity("protuberance_amount_factor") or 0.0,
-            protuberance_angle=math.radians(tool.quantity("protuberance_angle", "deg") or USUAL_PROTUBERANCE_ANGLE),
-            allowance=_allowance(settings) / module,
+            protuberance_angle=math.radians(tool.quantity("protuberance_angle") or USUAL_PROTUBERANCE_ANGLE),
+            allowance=(allowance or 0.0) / module,
         )
-
-
-def _allowance(settings: Component | None) -> float:
-    """Machining allowance of a tool on each flank, mm."""
-    if settings is None:
-        return 0.0
-    return settings.quantity("machining_allowance", "mm") or 0.0
 
 
 def _pressure_angle(gear: Component, flank: Component | None) -> Entry:
     key = "normal_pressure_angle"
     for part in (flank, gear):
-        value = part.quantity(key, "deg") if part else None
-        if part is not None and value is not None:
-            return read(tidy(within(value, part, key, *PRESSURE_ANGLES)), f"{key} of the flank")
+        if part is not None and part.quantity(key) is not None:
+            return replace(_required(part, key, PRESSURE_ANGLES), source=f"{key} of the flank")
     return assumed(20.0, "not in the file")
 
 
@@ -215,13 +215,9 @@ def _helix_angle(gear: Component, mates: Sequence[Component]) -> Entry:
     """Helix angle, right hand positive; for a ring gear from its mating gears, since programs differ in its sign."""
     key = "helix_angle_reference_diameter"
     if gear.type == "ring_gear" and mates:
-        angle = _helix(mates[0], key)
-        return read(tidy(angle), f"{key}, with the hand of {mates[0]}, as internal pairs have")
-    return read(tidy(_helix(gear, key)), key)
-
-
-def _helix(gear: Component, key: str) -> float:
-    return within(needed(gear.quantity(key, "deg"), gear, key), gear, key, *HELIX_ANGLES)
+        angle = _required(mates[0], key, HELIX_ANGLES)
+        return replace(angle, source=f"{key}, with the hand of {mates[0]}, as internal pairs have")
+    return _required(gear, key, HELIX_ANGLES)
 
 
 def _shift(flank: Component | None, internal: bool) -> Entry | None:
@@ -233,7 +229,7 @@ def _shift(flank: Component | None, internal: bool) -> Entry | None:
 
 
 def _diameter(gear: Component, key: str) -> Entry | None:
-    value = gear.quantity(key, "mm")
+    value = gear.quantity(key)
     if value:
         return read(tidy(abs(value)), key)
     return None
@@ -253,14 +249,14 @@ def _cutter(gear: Component, tool: Component | None, module: float) -> Entry | N
     teeth = tool.whole("number_of_teeth") if tool else None
     if tool is None or tool.type != "cutter_wheel_tool" or not teeth:
         return None
-    radius = tool.quantity("tip_corner_radius_cutter", "mm")
+    radius = tool.quantity("tip_corner_radius_cutter")
     factor = tool.quantity("tip_corner_radius_factor_reference_profile") if radius is None else radius / module
     rounded = _rounded(assumed(LEAST_RADIUS, "none given") if factor is None else read(tidy(factor), ""))
     shift = tool.quantity("addendum_modification_coefficient")
     cutter = {"teeth": abs(teeth), "tip_radius": rounded.value, "profile_shift": tidy(shift or 0.0)}
-    tip = tool.quantity("tip_diameter", "mm")
+    tip = tool.quantity("tip_diameter")
     addendum = tool.quantity("addendum_coefficient_reference_profile")
-    if not gear.quantity("root_diameter", "mm"):
+    if not gear.quantity("root_diameter"):
         if tip:
             cutter["tip_diameter_mm"] = tidy(abs(tip))
         elif addendum:
@@ -299,7 +295,7 @@ def _allowances(gear: Component, angle: float, helix: float, internal: bool) -> 
         "{}_backlash_allowance_referenced_to_span": 1.0 / math.cos(angle),
     }
     for key, factor in list(sources.items())[: 2 if internal else 3]:
-        upper, lower = (gear.quantity(key.format(end), "mm") for end in ("upper", "lower"))
+        upper, lower = (gear.quantity(key.format(end)) for end in ("upper", "lower"))
         if upper is not None and lower is not None and lower <= upper <= 0.0:
             ends = {"upper": upper, "lower": lower}
             table = {f"{end}_allowance_um": tidy(round(1e3 * factor * one, 6)) for end, one in ends.items()}
@@ -325,7 +321,7 @@ def material_of(model: Model, part: Component) -> Component | None:
 
 def is_rigid(material: Component | None) -> bool:
     """Return whether a material represents a rigid body."""
-    modulus = material.quantity("elastic_modulus", "MPa") if material else None
+    modulus = material.quantity("elastic_modulus") if material else None
     return modulus is not None and modulus > RIGID_MODULUS
 
 
@@ -333,12 +329,7 @@ def material_table(material: Component | None) -> Entry | None:
     """Inline table of a material with its specified values; None if it represents a rigid body."""
     if material is None or is_rigid(material):
         return None
-    values = {
-        "youngs_modulus_GPa": (material.quantity("elastic_modulus", "MPa"), 1e-3),
-        "poissons_ratio": (material.quantity("poisson_ratio"), 1.0),
-        "density_kg_per_m3": (material.quantity("density", "kg / m^3"), 1.0),
-    }
-    given = {key: tidy(value * factor) for key, (value, factor) in values.items() if value is not None}
-    if given:
-        return read(given, str(material))
+    values = {key: entry.value for key, entry in entries_of(READ["material"], material, zeros=True).items()}
+    if values:
+        return read(values, str(material))
     return None

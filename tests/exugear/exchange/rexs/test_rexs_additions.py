@@ -1,4 +1,4 @@
-"""Attributes are put into a REXS file of any kind, and every other byte stays as it is."""
+"""Attributes are put into a REXS file of any kind, and everything else that it says stays."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from exugear.exchange.rexs.additions import Addition
 from exugear.exchange.rexs.containers import parsed, read_rexs, with_additions
 from exugear.exchange.rexs.parsing import parse_model
-from exugear.exchange.rexs.tree import RexsError
+from exugear.exchange.rexs.tree import Addition, RexsError
 
 from .own_files import spur_pair
 
@@ -58,25 +57,68 @@ def test_all_that_was_there_is_read_again_with_what_was_added(name):
                 assert again.changes[number][key] == attribute
 
 
-@pytest.mark.parametrize("name", [name for name in FILES if name.endswith((".rexs", ".rexsj"))])
-def test_without_additions_the_file_is_the_same_to_the_byte(name):
-    assert with_additions(DATA / name, []) == (DATA / name).read_bytes()
-
-
-@pytest.mark.parametrize("name", [name for name in FILES if name.endswith((".rexs", ".rexsj"))])
-def test_new_attributes_change_no_line_that_was_there(name):
-    """In JSON the comma after the last of a list comes with them."""
+@pytest.mark.parametrize("name", [name for name in FILES if name.endswith(".rexs")])
+def test_new_attributes_change_no_line_of_xml(name):
     model = read_rexs(DATA / name)
     filled = [number for number, part in model.components.items() if part.attributes]
     new = with_additions(DATA / name, [Addition(number, "custom_exugear_x", "mm", 1.0) for number in filled])
-    added = (
-        rb'\s*<attribute id="custom_exugear_x".*?</attribute>'
-        if name.endswith(".rexs")
-        else (rb',\s*\{"id": "custom_exugear_x"[^}]*\}')
-    )
-    without, count = re.subn(added, b"", new)
+    without, count = re.subn(rb'\s*<attribute id="custom_exugear_x".*?</attribute>', b"", new)
     assert count == len(filled) > 0
     assert without == (DATA / name).read_bytes()
+
+
+@pytest.mark.parametrize("name", [name for name in FILES if name.endswith(".rexsj")])
+def test_new_attributes_change_no_value_of_json(name):
+    number = next(iter(read_rexs(DATA / name).components))
+    new = json.loads(with_additions(DATA / name, [Addition(number, "custom_exugear_x", "mm", 1.0)]))
+    part = next(one for one in new["model"]["components"] if one["id"] == number)
+    assert part["attributes"].pop() == {"id": "custom_exugear_x", "unit": "mm", "floating_point": 1.0}
+    assert new == json.loads((DATA / name).read_text(encoding="utf-8-sig"))
+
+
+def test_comments_around_and_in_xml_stay(tmp_path):
+    path = tmp_path / "gearbox.rexs"
+    text = (
+        '<?xml version="1.0"?>\n<!-- <model> ä --><?a b?>\n<model version="1.4"><components><!--c-->'
+        '<component id="1" type="shaft"><attribute id="length" unit="mm">1<!--d-->2</attribute></component>'
+        "</components></model>\n<!--e-->\n"
+    )
+    path.write_text(text, encoding="utf-8")
+    assert with_additions(path, []).decode() == text
+    new = with_additions(path, [Addition(1, "custom_exugear_x", "", "A & <B>")])
+    assert parse_model(new).components[1].quantity("length", "mm") == 12.0
+    assert re.sub(b'<attribute id="custom_exugear_x".*?</attribute>', b"", new, flags=re.DOTALL).split() == (
+        path.read_bytes().split()
+    )
+
+
+def json_with(tmp_path, text):
+    path = tmp_path / "gearbox.rexsj"
+    path.write_text(f'{{\n "model": {{"version": "1.4", "components": [{{"id": 1, "type": "shaft"}}], "a": {text}}}}}')
+    return path
+
+
+def test_a_number_of_json_that_cannot_be_written_is_refused(tmp_path):
+    with pytest.raises(RexsError, match="the file has a number beyond 1e308, which cannot be written; correct it"):
+        with_additions(json_with(tmp_path, "1e999"), [Addition(1, "a", "mm", 1.0)])
+
+
+def test_json_of_any_depth_is_written_or_refused(tmp_path):
+    refused = 0
+    for depth in (100, *range(800, 1000, 10), 2000):
+        path = json_with(tmp_path, "[" * depth + "]" * depth)
+        try:
+            with_additions(path, [Addition(1, "a", "mm", 1.0)])
+        except RexsError as error:
+            assert "the file is nested far deeper than any REXS file" in str(error)
+            refused += 1
+    assert 0 < refused < 22
+
+
+def test_half_a_character_of_json_stays_as_it_is(tmp_path):
+    path = json_with(tmp_path, r'"\ud800 \u00e4"')
+    new = with_additions(path, [Addition(1, "a", "mm", 1.0)])
+    assert json.loads(new)["model"]["a"] == "\ud800 ä"
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "iso-8859-1"])
@@ -106,7 +148,7 @@ def test_an_archive_keeps_its_other_members():
 
 def test_json_without_attributes_or_spaces_takes_them(tmp_path):
     content = {"model": {"version": "1.4", "relations": [], "components": [{"id": 1, "type": "shaft"}, {"id": 2}]}}
-    content["model"]["components"][1]["attributes"] = []
+    content["model"]["components"][1]["attributes"] = [{"id": [1], "string": "odd"}]
     path = tmp_path / "gearbox.rexsj"
     path.write_text(json.dumps(content, separators=(",", ":")))
     new = with_additions(path, [Addition(1, "a", "mm", 1.0), Addition(2, "b", "mm", (1.0,)), Addition(2, "c", "", "x")])

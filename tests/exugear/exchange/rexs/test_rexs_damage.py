@@ -13,11 +13,10 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.exchange.rexs.additions import Addition
 from exugear.exchange.rexs.containers import parsed, read_rexs, with_additions
 from exugear.exchange.rexs.parsing import parse_model
 from exugear.exchange.rexs.to_case.conversion import to_case
-from exugear.exchange.rexs.tree import RexsError
+from exugear.exchange.rexs.tree import Addition, RexsError
 
 from .own_files import spur_pair
 from .test_rexs_industry import FLOATING, cylindrical, helical, planetary, two_row_tapered

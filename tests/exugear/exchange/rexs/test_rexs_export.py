@@ -14,7 +14,8 @@ from typer.testing import CliRunner
 from exugear.cli.app import app
 from exugear.exchange.rexs.containers import parsed, read_rexs
 from exugear.exchange.rexs.export.export import rotated_stiffness, with_results
-from exugear.exchange.rexs.export.names import NAMES, name_in, origins_of, stiffness_names
+from exugear.exchange.rexs.export.names import name_in, origins_of, stiffness_names
+from exugear.exchange.rexs.mapping import RESULTS
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.tree import Model, RexsError
 from exugear.gearbox.choice import Choice
@@ -68,7 +69,7 @@ def test_every_attribute_that_is_not_our_own_is_one_of_the_version(name, exporte
     """Names and versions as the lists of attributes of REXS have them; ours begin with custom_exugear_."""
     _, model = exported(name)
     version = tuple(map(int, model.version.split(".")[:2]))
-    known = {key for names in NAMES.values() for since, key in names if since <= version}
+    known = {key for result in RESULTS.values() for since, key in result.names.items() if since <= version}
     before = read_rexs(DATA / name)
     for number, part in model.components.items():
         new = part.attributes.keys() - before.components[number].attributes.keys()
@@ -76,7 +77,7 @@ def test_every_attribute_that_is_not_our_own_is_one_of_the_version(name, exporte
 
 
 def _present(names):
-    from exugear.exchange.rexs.tree import ATTRIBUTES
+    from exugear.exchange.rexs.mapping import ATTRIBUTES
 
     return {ATTRIBUTES.get(name, name) for name in names}
 
