@@ -18,7 +18,6 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.reading import GearboxFileError
 from exugear.report.findings.design_changes import (
     ChangeResult,
@@ -33,7 +32,7 @@ from exugear.report.findings.design_changes import (
 from exugear.report.findings.loudness import Resonance, ranking_of
 from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
+from exugear.steady.settings import SteadySettings, operating_speeds
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.readiness import check_parts, lacking
 from exugear.system.statics import BalanceError
@@ -50,8 +49,6 @@ if TYPE_CHECKING:
 
 FOLDER = "design-changes"
 """Subfolder of the results with one folder for each changed gearbox."""
-SPEEDS = 180
-"""Even speeds over the operating range; speeds at resonances are added."""
 BEARINGS = 2
 """Number of bearings with the largest strain energy that changes are proposed for."""
 _REFUSALS = (GearboxFileError, GeometryError, BearingError, BalanceError, MeshError, SteadyError)
@@ -117,8 +114,9 @@ def study_design_changes(
     -------
     None if the response has no resonances in the range
     """
-    settings = SteadySettings(_speeds(project.gearbox))
-    data = project.steady(settings)
+    settings = SteadySettings(operating_speeds(project.gearbox))
+    # The response of the unchanged gearbox has a folder, too: that of the project may be over other speeds.
+    data = _project_with(project, project.gearbox, "unchanged").steady(settings)
     ranking = ranking_of(data)
     if not ranking.resonances:
         return None
@@ -153,16 +151,6 @@ def study_design_changes(
     return study
 
 
-def _speeds(gearbox: Gearbox) -> SpeedRange:
-    """Speeds of the operating range; those of the first load case without one."""
-    usual = usual_speeds(gearbox)
-    stated = operating_range(gearbox)
-    if stated is None:
-        return usual
-    low, high = (math.copysign(speed, usual.last) for speed in stated)
-    return SpeedRange(low, high, SPEEDS)
-
-
 def _proposed(project: ComputedProject, data: xr.Dataset, resonance: Resonance) -> list[DesignChange]:
     deflections = {
         name: float(np.nanmean(np.abs(table.static_state["ste"].to_numpy())))
@@ -178,15 +166,17 @@ def _proposed(project: ComputedProject, data: xr.Dataset, resonance: Resonance) 
 
 
 def _changed_project(project: ComputedProject, change: DesignChange) -> ComputedProject:
-    """Check the changed gearbox as a file would be, and give it a folder with the tables there are.
-
-    Tables of pairs that the change does not touch fit there, too.
-    """
+    """Check the changed gearbox as a file would be."""
     gearbox = project.gearbox.varied(change.keys)
     check_parts(gearbox)
     if reason := lacking(gearbox, project.choice.variant):
         raise gearbox.fault(reason)
-    folder = project.folder / FOLDER / change.name
+    return _project_with(project, gearbox, change.name)
+
+
+def _project_with(project: ComputedProject, gearbox: Gearbox, name: str) -> ComputedProject:
+    """Give a gearbox a folder with the tables that exist: those of unchanged pairs are valid there, too."""
+    folder = project.folder / FOLDER / name
     changed = project.replaced(gearbox, folder)
     changed.keep_case()
     for path in (project.folder / "tables").glob("*.nc"):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,8 +14,10 @@ import typer
 from exugear.cli.case import FilesBelowOption, JsonOption, check_allow_dir
 from exugear.cli.console import (
     BadInputError,
+    FailedError,
     exit_codes,
     interruption,
+    model_errors,
     note,
     print_json,
     progress_bar,
@@ -35,6 +37,10 @@ def report(
         float | None,
         typer.Option(min=1.0, metavar="HZ", help="Target frequency to compare with modes. (default: gearbox file)"),
     ] = None,
+    stored: Annotated[
+        bool,
+        typer.Option("--stored", help="Use stored results only: do not compute missing modes and responses."),
+    ] = False,
     levers: Annotated[
         bool,
         typer.Option(
@@ -47,7 +53,8 @@ def report(
     """Write a report of a results folder as one web page.
 
     The page lists the resonances, their amplitudes and causes, and needs no other file. It compares all variants with
-    runs and modes. gmsh scripts are not run; their meshes must exist.
+    runs and modes. Missing modes of these models are computed first, and a steady-state response over the operating
+    range if there is none. gmsh scripts are not run; their meshes must exist.
     """
     with exit_codes():
         from exugear.report.writer import ReportError, write_report
@@ -57,6 +64,8 @@ def report(
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
         folder = _results_of(folder)
+        if not stored:
+            _compute_missing(folder, allow_dir)
         study = None
         if levers:
             study = _design_changes(folder, allow_dir)
@@ -72,6 +81,41 @@ def report(
         except ReportError as error:
             raise BadInputError(error) from error
         _print_report(folder, written, study, as_json)
+
+
+def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
+    """Compute missing modes of all models with runs, and a response of the one with most degrees of freedom.
+
+    Existing files stay as they are, even if they are damaged or belong to other input. What takes long (tables, contact
+    loss) or fails is left to the report, which lists it with its command.
+    """
+    from exugear.cli.watched import WatchedProject
+    from exugear.gearbox.named_files import Permissions
+    from exugear.gearbox.variant import Variant
+    from exugear.report.findings.context import choice_of
+    from exugear.results.folder import read_stored_gearbox
+    from exugear.results.run_file import load_run
+    from exugear.steady.settings import SteadySettings, operating_speeds
+    from exugear.system.tooth_mesh.laws.registry import LAWS
+    from fe_ste.tools.files import FileError
+
+    models = []
+    for path in sorted(folder.glob("*/*/run.nc")):
+        with suppress(FileError, ValueError, KeyError):
+            models.append(choice_of(load_run(path, ()).attrs))
+    if not models:
+        return
+    with suppress(BadInputError, FailedError), model_errors():
+        project = WatchedProject(read_stored_gearbox(folder, Permissions(below=allow_dir)), folder)
+        chosen = [replace(project, choice=model) for model in dict.fromkeys(models)]
+        ready = [own for own in chosen if LAWS[own.choice.mesh_model].has_force and not own.missing_tables()]
+        for own in ready:
+            if not own.modes_path.exists():
+                own.modes()
+        linear = [own for own in ready if not LAWS[own.choice.mesh_model].loses_contact]
+        if linear and not any(folder.glob("*/*/steady-*.nc")):
+            richest = max(linear, key=lambda own: list(Variant).index(own.choice.variant))
+            richest.steady(SteadySettings(operating_speeds(project.gearbox)))
 
 
 def _design_changes(folder: Path, allow_dir: Path | None) -> DesignStudy:
