@@ -34,7 +34,7 @@ from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.settings import SteadySettings, operating_speeds
 from exugear.system.bearings.rolling.rows import BearingError
-from exugear.system.readiness import check_parts, lacking
+from exugear.system.gearbox_checks import check_parts, lacking
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError
 from fe_ste.geometry.checks import GeometryError
@@ -170,7 +170,7 @@ def _changed_project(project: ComputedProject, change: DesignChange) -> Computed
     gearbox = project.gearbox.varied(change.keys)
     check_parts(gearbox)
     if reason := lacking(gearbox, project.choice.variant):
-        raise gearbox.fault(reason)
+        raise gearbox.error(reason)
     return _project_with(project, gearbox, change.name)
 
 

@@ -19,7 +19,7 @@ from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_
 from exugear.report.web import html as pieces
 from exugear.report.web.document import libraries, licences
 from exugear.results.folder import times_spent
-from exugear.results.run_file import verdict_of
+from exugear.results.run_file import invalidity_of
 from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.system.modal_damping import damping_in_words
@@ -189,7 +189,7 @@ def _run_row(material: ReportData, run: VariantRun) -> dict[str, object]:
     return {
         "run": str(material.context.name_of(run.path)),
         "load": str(run.attributes.get("load", "")),
-        "valid": "NO, see top of page" if verdict_of(run.attributes) else "yes",
+        "valid": "NO, see top of page" if invalidity_of(run.attributes) else "yes",
         "solver": run.attributes["solver"],
         "step / µs": f"{1e6 * float(run.attributes['step']):g}",
         "simulated / s": f"{figures.end:.2f}" + ("" if int(run.attributes["complete"]) else " (stopped)"),

@@ -516,7 +516,7 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
     return data[wanted]
 
 
-def verdict_of(attributes: Mapping[str, Any]) -> str:
+def invalidity_of(attributes: Mapping[str, Any]) -> str:
     """Reason why a run is invalid, from the attributes of its file; empty for a valid run.
 
     Examples

@@ -125,7 +125,7 @@ def _design_changes(folder: Path, allow_dir: Path | None) -> DesignStudy:
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.variant import Variant
     from exugear.results.folder import read_stored_gearbox
-    from exugear.system.readiness import lacking
+    from exugear.system.gearbox_checks import lacking
 
     gearbox = read_stored_gearbox(folder, Permissions(below=allow_dir))
     variant = Variant.bushing

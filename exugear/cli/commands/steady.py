@@ -220,7 +220,7 @@ def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, 
             ],
         }
         print_json({**summary, **remarks})
-        _fail_if_doubtful(data, growth)
+        _fail_if_invalid(data, growth)
         return
     title = f"Resonance ranking, {_speeds_of(ranking)}, variant {project.choice.variant}, {settings.method}"
     title += f", at {static_load_in_words(project.gearbox)}".replace(" N m", f"{HARD_SPACE}N{HARD_SPACE}m")
@@ -235,7 +235,7 @@ def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, 
         damping += f"; friction of teeth included, coefficient {friction:g}"
     print_text(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}; damping {damping}.")
     say(f"Results: {project.steady_path(settings)}")
-    _fail_if_doubtful(data, growth)
+    _fail_if_invalid(data, growth)
 
 
 def _print_bands(gearbox: Gearbox, ranking: Ranking) -> None:
@@ -345,7 +345,7 @@ def _print_speed_range(ranking: Ranking) -> None:
         note(f"No resonance at {_speeds_of(ranking)}")
 
 
-def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
+def _fail_if_invalid(data: xr.Dataset, growth: float) -> None:
     """End with code 1 if the response is unstable; stability known for each speed is left to the result file.
 
     The command also fails if meshes use table states next to non-converged ones, or if the continuation is incomplete.

@@ -15,7 +15,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import Variant, VariantError
 from exugear.results.folder import bodies_folder
-from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run, verdict_of
+from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, invalidity_of, load_run
 from exugear.results.spectra.run_spectra import RunSignals, VariantRun, analysed, run_signals
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.steady_file import load_response, settings_of
@@ -206,7 +206,7 @@ def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] |
         attributes = load_run(path, ()).attrs
         if not _fits(context, path, attributes):
             return None
-        if verdict := verdict_of(attributes):
+        if verdict := invalidity_of(attributes):
             name = context.name_of(path)
             context.notes.invalid_runs.append(f"{name}: {verdict}")
             context.notes.statements.append(f"Invalid: {name}: {verdict}")

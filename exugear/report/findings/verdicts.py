@@ -25,7 +25,7 @@ from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
 from exugear.results.folder import read_stored_gearbox
-from exugear.results.run_file import read_run, verdict_of
+from exugear.results.run_file import invalidity_of, read_run
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.steady.peaks import bearing_swings, pulls
 from exugear.system.bearings.rolling.rows import BearingError
@@ -115,7 +115,7 @@ def _check_run(run: VariantRun, figures: RunFigures) -> list[CheckResult]:
         if math.isnan(residual)
         else [CheckResult(residual < ENERGY, f"energy balance closed to {100.0 * residual:.1g} %")]
     )
-    doubtful = verdict_of(run.attributes)
+    doubtful = invalidity_of(run.attributes)
     if doubtful:
         verdicts.append(CheckResult(False, f"the run is invalid: {doubtful}"))
     for doubt in ("table_doubt", "band_doubt", "bearing_doubt"):

@@ -62,7 +62,7 @@ def data(path: Path) -> dict[str, Any]:
 def shown(browser: Any, path: Path, request: pytest.FixtureRequest) -> Iterator[View]:
     view = opened(browser, request.param)
     yield view
-    assert view.faults == []
+    assert view.errors == []
     view.page.context.close()
 
 
@@ -301,4 +301,4 @@ def test_without_scripts_cards_and_tables_are_there(browser: Any, path: Path, da
     assert view.page.locator(".scripts-only:visible").count() == 0
     assert "Passed: " in view.page.locator(".verdicts").first.text_content()
     view.page.context.close()
-    assert view.faults == []
+    assert view.errors == []

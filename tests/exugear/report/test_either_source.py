@@ -164,4 +164,4 @@ class TestInABrowser:
         view.page.locator("#view button", has_text="Difference").click()
         assert view.soon(lambda: "on bearings against on ideal joints" in title.inner_text())
         view.page.context.close()
-        assert view.faults == []
+        assert view.errors == []
