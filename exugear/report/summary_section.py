@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.facts import SummaryCard, facts_of, facts_of_response
+from exugear.report.findings.facts import facts_of, facts_of_response
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.loudness import Resonance
-from exugear.report.findings.verdicts import CheckResult, validity_checks
+from exugear.report.findings.verdicts import validity_checks
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Part, ReportData, group_words, only_for, summary_groups
-from exugear.report.web import html as pieces
-from exugear.report.web.html import Cell
-from exugear.report.web.stage import stage_figure
+from exugear.report.material import Part, ReportData, group_words, summary_groups
+from exugear.report.web.html import Cell, Figure, Table, render
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun
 
 
@@ -36,23 +35,22 @@ def summary_section(material: ReportData) -> Part:
             context.notes.statements.append(f"{several}Load: {_load_of(material, group)}.")
             context.notes.statements.extend(f"{several}{fact.line}" for fact in facts)
             context.notes.statements.extend(f"{several}{verdict.line}." for verdict in verdicts)
-        content.append(only_for(_group(material, group, facts, verdicts), group.name))
-    if not content:
-        content = [_without_groups(material)]
-    elif not any(not group.responses for group in material.groups):
-        content.append(pieces.paragraph("No run-up; run `exugear run`.", "note"))
-    return Part(pieces.section("Summary", *content, name="short"), {}, "Summary", "short")
+        content.append({"name": group.name, "scope": _scope(material, group), "facts": facts, "verdicts": verdicts})
+    alone = (
+        ()
+        if content
+        else [fact for data in material.results.steady for fact in facts_of_response(material.words, data)]
+    )
+    context.notes.statements.extend(fact.line for fact in alone)
+    run_ups = any(not group.responses for group in material.groups)
+    html = render("summary", groups=content, alone=alone, run_ups=run_ups)
+    return Part(html, title="Summary", name="short")
 
 
-def _group(material: ReportData, group: RunGroup, facts: Sequence[SummaryCard], verdicts: Sequence[CheckResult]) -> str:
-    scope = (
+def _scope(material: ReportData, group: RunGroup) -> str:
+    return (
         f"{group.title[0].upper()}{group.title[1:]}. Load: {_load_of(material, group)}. Speeds: of the "
         f"{material.input_words}. Levels: overall transmission error (TE), 0 dB = 1 µm."
-    )
-    return (
-        pieces.paragraph(scope, "note")
-        + pieces.element("div", "".join(map(_card, facts)), class_="cards")
-        + check_list(verdicts)
     )
 
 
@@ -65,72 +63,22 @@ def _load_of(material: ReportData, group: RunGroup) -> str:
     return f"{'; '.join(sorted(filter(None, loads)))} (tables and steady-state responses: static load, {static})"
 
 
-def _without_groups(material: ReportData) -> str:
-    """Show findings of continuation results and responses at few speeds, and advise a run-up."""
-    facts = [fact for data in material.results.steady for fact in facts_of_response(material.words, data)]
-    material.context.notes.statements.extend(fact.line for fact in facts)
-    cards = pieces.element("div", "".join(map(_card, facts)), class_="cards") if facts else ""
-    return cards + pieces.paragraph("No run-up; run `exugear run` for a complete report.", "note" if facts else "")
-
-
-def _card(fact: SummaryCard) -> str:
-    large = pieces.element(
-        "p", pieces.text(fact.figure) + pieces.element("small", pieces.text(f" {fact.beside}")), class_="large"
-    )
-    more = pieces.element("a", "See more", href=f"#{fact.link}", aria_label=f"See more: {fact.kind}")
-    return pieces.element(
-        "article", f"<h3>{pieces.text(fact.kind)}</h3>{large}{pieces.paragraph(fact.sentence)}{more}", class_="card"
-    )
-
-
-def check_list(verdicts: Sequence[CheckResult]) -> str:
-    """List passed checks and warnings; hidden text distinguishes them in addition to colour."""
-    entries = []
-    for verdict in verdicts:
-        sign = pieces.element("b", "✓" if verdict.passed else "!", aria_hidden="true")
-        element = pieces.element("span", "Passed: " if verdict.passed else "Warning: ", class_="unseen")
-        entries.append(
-            pieces.element(
-                "li", sign + element + pieces.text(verdict.words), class_="good" if verdict.passed else "mind"
-            )
-        )
-    return pieces.element("ul", "".join(entries), class_="verdicts", aria_label="Validity checks")
-
-
 # Section "Waterfall and order cuts", with the selected resonance as text and its animated mode shape
-
-NO_MODES = "No modes computed; run `exugear modes` to show mode shapes."
 
 
 def waterfall_section(material: ReportData) -> Part:
     """Draw the waterfalls of all run-ups and steady-state responses; the ranking has the same text."""
     if not material.groups:
-        return Part("")
-    return Part(_html(material), material.run_data, "Waterfall and order cuts", "rings")
-
-
-def _html(material: ReportData) -> str:
+        return Part()
     words = _groups_text(material.groups)
-    channel = pieces.element("label", "Signal " + pieces.element("select", "", id="channel"))
-    views = pieces.element("div", "", class_="choices", id="view", role="group", aria_label="Model shown")
-    waterfall = pieces.figure("waterfall", "Waterfall", f"Source: {material.groups[0].source}.", words)
-    scale = pieces.element("div", "", class_="scale", id="waterfall-scale") + pieces.element(
-        "p", "", class_="readout", id="readout"
+    html = render(
+        "waterfall",
+        words=words,
+        waterfall=Figure("waterfall", "Waterfall", f"Source: {material.groups[0].source}.", words),
+        cuts=Figure("cuts", "Order cuts", "Same speeds as above. Select orders below.", words),
+        modes=bool(material.results.modes),
     )
-    cuts = pieces.figure("cuts", "Order cuts", "Same speeds as above. Select orders below.", words)
-    orders = pieces.element("div", "", class_="chips", id="orders", role="group", aria_label="Orders shown")
-    detail = pieces.element("article", "", class_="panel", id="detail", aria_live="polite")
-    left = pieces.element(
-        "div", waterfall.replace("</figure>", f"{scale}</figure>") + cuts.replace("</figure>", f"{orders}</figure>")
-    )
-    # The 3-D view needs mode shapes.
-    stage = stage_figure() if material.results.modes else pieces.paragraph(NO_MODES, "note")
-    right = pieces.element("div", detail + stage)
-    controls = pieces.element("div", channel + views, class_="controls scripts-only")
-    split = pieces.element("div", left + right, class_="split scripts-only")
-    text = f"Diagrams require JavaScript, which is disabled; nothing is loaded from a network. {words}"
-    warning = f"<noscript>{pieces.paragraph(text, 'warning')}</noscript>"
-    return pieces.section("Waterfall and order cuts", controls, split, warning, name="rings")
+    return Part(html, material.run_data, "Waterfall and order cuts", "rings")
 
 
 def _groups_text(groups: Sequence[RunGroup]) -> str:
@@ -162,48 +110,43 @@ AT_CONSTANT = "Constant speed / dB, Hz"
 
 def ranking_section(material: ReportData) -> Part:
     """Rank the resonances of each run-up and each steady-state response in a table."""
-    in_operation = [only_for(_operating_resonances(material, group), group.name) for group in material.groups]
     tables = [
-        only_for(_table(material, group, variant), group.name, variant)
+        {"group": group.name, "variant": variant, **_table(material, group, variant)}
         for group in material.groups
         for variant in reversed(list(group.runs))
     ]
     for group in summary_groups(material.groups):
         _note_comparisons(material, group)
     if not tables:
-        return Part("")
-    choice = pieces.element("div", "", class_="choices", id="variant", role="group", aria_label="Resonances of")
-    controls = pieces.element("div", choice + _filters(), class_="controls scripts-only")
-    html = pieces.section(
-        "Resonance ranking",
-        *in_operation,
-        controls,
-        *tables,
-        pieces.paragraph(_rules(), "note"),
-        name="ranking",
+        return Part()
+    html = render(
+        "ranking",
+        in_operation=list(filter(None, (_operating_resonances(material, group) for group in material.groups))),
+        tables=tables,
+        factors=", ".join(f"{factor:g}" for factor in WINDOW_FACTORS),
+        absent=AbsenceRule().description,
+        built_up=BUILT_UP,
     )
-    return Part(html, {}, "Resonance ranking", "ranking")
+    return Part(html, title="Resonance ranking", name="ranking")
 
 
-def _operating_resonances(material: ReportData, group: RunGroup) -> str:
+def _operating_resonances(material: ReportData, group: RunGroup) -> dict[str, Any] | None:
     """Tabulate the main variant's resonances at constant speed in the operating range, by three quantities."""
     ranking = group.in_operation
     if ranking is None or not ranking.resonances:
-        return ""
+        return None
     low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
     which = "all speeds" if ranking.whole else "operating speed range"
     rows = [_operating_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
     label = Variant.of(group.main).label
     title = f"Highest {len(rows)} resonances at constant speed, {label}, {which} ({low} to {high} rpm)"
-    table = pieces.table(
-        rows, ("Excited by", "Bearing"), caption=title, name=f"in-operation-{group.name}", sortable=True
-    )
-    note = (
-        "Zero-to-peak amplitudes, with the (rank) in each quantity; sorted by the best rank. Force: the bearing with "
-        f"the largest amplitude. Accelerations: of the {ranking.accelerates} at bearings. Planets: root mean square "
-        "over the planets."
-    )
-    return pieces.element("h3", pieces.text(title)) + table + pieces.paragraph(note, "note")
+    name = f"in-operation-{group.name}"
+    return {
+        "group": group.name,
+        "title": title,
+        "table": Table(rows, ("Excited by", "Bearing"), caption=title, name=name, sortable=True),
+        "accelerates": ranking.accelerates,
+    }
 
 
 def _operating_row(material: ReportData, resonance: Resonance) -> dict[str, object]:
@@ -215,59 +158,26 @@ def _operating_row(material: ReportData, resonance: Resonance) -> dict[str, obje
     for name, peak in resonance.amplitudes.items():
         title, factor = QUANTITIES[name]
         place = "" if peak.place is None else f" ({peak.place})"
-        row[title] = Cell(f"{figure_text(factor * peak.amplitude)}{place}", peak.amplitude)
+        row[title] = Cell(f"{figure_text(factor * peak.amplitude)}{place}", factor * peak.amplitude)
         if name == "force":
             row["Bearing"] = material.words.of(peak.at)
     return row
 
 
-def _filters() -> str:
-    only = pieces.element(
-        "label", pieces.element("input", type="checkbox", id="only-lacking") + " only those absent in another model"
-    )
-    text = pieces.element(
-        "input", type="search", id="filter", placeholder="Filter: shaft, bearing, Hz", aria_label="Filter the table"
-    )
-    limit = pieces.element(
-        "label",
-        "Speeds up to "
-        + pieces.element("input", type="range", id="limit")
-        + pieces.element("output", "", id="limit-shown"),
-    )
-    rated = pieces.element("button", "Near rated speed", type="button", id="rated", hidden=True)
-    return only + text + limit + rated
-
-
-def _rules() -> str:
-    factors = ", ".join(f"{factor:g}" for factor in WINDOW_FACTORS)
-    return (
-        "A resonance is a peak with a prominence of at least 6 dB along an order; peaks of several orders at one "
-        f"frequency are one resonance. Absent in a model: {AbsenceRule().description}, with every window length. "
-        f"Window-dependent (run-ups): not found with all window lengths, {factors} times the window of the diagram. "
-        "With a steady-state response, levels at constant speed are ranked: a run-up that is too fast underestimates a "
-        f"resonance and is marked if {BUILT_UP:g} dB or more are missing. At constant speed ± is half the width of a "
-        "peak 3 dB below its maximum."
-    )
-
-
-def _table(material: ReportData, group: RunGroup, variant: str) -> str:
+def _table(material: ReportData, group: RunGroup, variant: str) -> dict[str, Any]:
     run = group.runs[variant]
     ranked = group.ranked[variant]
     title = f"{Variant.of(variant).label.capitalize()}, inertia set {group.inertias}, {group.source}"
-    heading = pieces.element("h3", pieces.text(f"{title}: {len(ranked)}"))
-    rows = [_row(material, group, run, number, own) for number, own in enumerate(ranked, start=1)]
-    if not rows:
-        return heading + pieces.paragraph("No resonance found.")
-    table = pieces.table(
-        rows,
+    table = Table(
+        [_row(material, group, run, number, own) for number, own in enumerate(ranked, start=1)],
         ("Excited by", "Mode shape; strain energy", *_others(group, variant)),
         caption=f"Resonances {title}",
         name=f"ranking-{group.name}-{variant}",
         hidden=("± µm", "Prominence / dB", "Mode / Hz"),
         sortable=True,
-        choices=[f"resonance:{group.name}:{variant}:{number}" for number in range(len(rows))],
+        choices=[f"resonance:{group.name}:{variant}:{number}" for number in range(len(ranked))],
     )
-    return heading + table
+    return {"title": f"{title}: {len(ranked)}", "table": table}
 
 
 def _others(group: RunGroup, variant: str) -> list[str]:
@@ -292,17 +202,16 @@ def _row(
     }
     if run.variant in group.constant:
         row[AT_CONSTANT] = _constant_speed_cell(resonance, loudest)
-    row["± µm"] = Cell(figure_text(10.0 ** (resonance.ranking_level / 20.0), 2), resonance.ranking_level)
+    amplitude = 10.0 ** (resonance.ranking_level / 20.0)
+    row["± µm"] = Cell(figure_text(amplitude, 2), amplitude)
     row["Prominence / dB"] = Cell(figure_text(peak.prominence, 2), peak.prominence)
     for name, key in zip((n for n in group.runs if n != run.variant), _others(group, run.variant), strict=True):
         level = resonance.elsewhere[name]
         if name in resonance.lacking:
-            row[key] = Cell("absent", -1e3, tag="plain")
+            row[key] = Cell("absent", math.nan, tag="plain")
         else:
-            row[key] = Cell(f"{level:.1f}" if math.isfinite(level) else "–", level if math.isfinite(level) else -1e4)
-    row["Mode / Hz"] = Cell(
-        f"{finding.mode_frequency:.1f}" if matched else "–", finding.mode_frequency if matched else -1.0
-    )
+            row[key] = Cell(f"{level:.1f}" if math.isfinite(level) else "–", level)
+    row["Mode / Hz"] = Cell(f"{finding.mode_frequency:.1f}" if matched else "–", finding.mode_frequency)
     row["Mode shape; strain energy"] = _mode_text(material, group, run, resonance)
     if group.responses:
         return row
@@ -328,7 +237,7 @@ def _constant_speed_cell(resonance: RankedResonance, loudest: float) -> Cell:
     """Return the level at constant speed and the frequency of its maximum."""
     at = resonance.constant
     if at is None:
-        return Cell("–", -1e4)
+        return Cell("–", math.nan)
     return Cell(f"{at.level:.1f}, {at.frequency:.0f} Hz", at.level, bar=1.0 - (loudest - at.level) / SHOWN_SPAN)
 
 

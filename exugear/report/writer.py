@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -35,35 +35,11 @@ from exugear.report.run_data import run_data
 from exugear.report.steady_section import steady_section
 from exugear.report.summary_section import ranking_section, summary_section, waterfall_section
 from exugear.report.trust_section import trust_section
-from exugear.report.web import html
 from exugear.report.web.document import ArrayStore, whole_page
+from exugear.report.web.html import render
 from exugear.results.folder import REPORT_FILE, read_stored_gearbox
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.files import write_file
-
-# Page elements outside the sections: head, table of contents, controls of the whole page, footer
-
-
-def page_body(material: ReportData, parts: Sequence[Part]) -> str:
-    """Combine the sections: invalid runs first, then the findings, then skipped results."""
-    notes = material.context.notes
-    warning = "Invalid runs; they are included in the results below"
-    links = "".join(
-        html.element("a", html.text(part.title), href=f"#{part.name}") for part in parts if part.title and part.html
-    )
-    contents = html.element("nav", links, aria_label="Sections")
-    head = html.element("header", _headline(material) + _tools() + contents, class_="top")
-    above = html.alert(warning, notes.invalid_runs) if notes.invalid_runs else ""
-    left_out = html.section("Skipped", html.bullets(notes.left_out), name="left-out") if notes.left_out else ""
-    if commands := commands_for_missing(material.context, material.results):
-        left_out += html.section("Not computed", html.bullets(commands), name="not-computed")
-    main = html.element("main", above + _sets(material) + "".join(part.html for part in parts) + left_out, id="content")
-    text = f"Created by exugear from {material.file_words}. This page makes no network requests."
-    foot = html.element("footer", html.paragraph(text))
-    skip = html.element("a", "Skip to the content", class_="skip", href="#content")
-    live = html.element("p", "", id="said", class_="toast", role="status", aria_live="polite")
-    tip = html.element("p", "", id="tip", class_="tip", hidden=True)
-    return skip + head + main + foot + live + tip
 
 
 def commands_for_missing(context: Context, results: StoredResults) -> list[str]:
@@ -105,35 +81,13 @@ def _shown(path: str | Path) -> str:
     return absolute.name
 
 
-def _headline(material: ReportData) -> str:
-    gearbox = material.context.gearbox
+def _scope(material: ReportData) -> str:
+    """Describe the gearbox and the results below the name of the page."""
     shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
-    line = f"Resonance report. Speed ratio output/input {gearbox.train.ratio:.6f}"
     steady = ", ".join(dict.fromkeys(str(data.attrs["variant"]) for data in material.results.steady))
-    line += f"; run-ups: {shown}" if shown else ""
-    line += f"; constant speed: {steady}." if steady else "."
-    return html.element("div", f"<h1>{html.text(gearbox.name)}</h1>{html.paragraph(line)}", class_="brand")
-
-
-def _tools() -> str:
-    def button(name: str, shown: str, label: str) -> str:
-        return html.element("button", shown, type="button", id=name, aria_label=label)
-
-    buttons = [
-        button("share", "Copy view", "Copy a link to exactly this view"),
-        button("save-data", "Data (JSON)", "Save the data of this page as JSON"),
-        button("print", "Print", "Print this page"),
-        button("theme", "◐", "Dark or light colours"),
-    ]
-    return html.element("div", "".join(buttons), class_="page-tools scripts-only")
-
-
-def _sets(material: ReportData) -> str:
-    """Return the selector of the result group, if there are several."""
-    if len(material.groups) < 2:
-        return ""
-    choices = html.element("div", "", class_="choices", id="group", role="group", aria_label="Results shown")
-    return html.element("div", f"Results of: {choices}", class_="controls scripts-only")
+    line = f"Resonance report. Speed ratio output/input {material.context.gearbox.train.ratio:.6f}"
+    line += f"; run-ups: {shown}" * bool(shown) + f"; constant speed: {steady}" * bool(steady)
+    return f"{line}."
 
 
 # The report of a results folder as a self-contained web page
@@ -209,16 +163,27 @@ def write_report(
     context = Context(folder, gearbox, reference, tell or (lambda what: None))
     material = _material(context, executor)
     parts = [section(material) for section in SECTIONS]
+    missing = tuple(commands_for_missing(context, material.results))
     # The body is made last, because sections add notes that its head shows.
-    body = page_body(material, parts)
+    body = render(
+        "report",
+        name=gearbox.name,
+        scope=_scope(material),
+        parts=[part for part in parts if part.html],
+        notes=context.notes,
+        missing=missing,
+        several=len(material.groups) > 1,
+        source=material.file_words,
+    )
     rated = gearbox.case.operation.rated_speed_rpm
     head: dict[str, Any] = {"name": gearbox.name, "input": material.input_words, "rated": rated}
-    data = {**head, "lines": [], "groups": [], "models": {}, **_merged(parts)}
+    data = {**head, "lines": [], "groups": [], "models": {}, "charts": material.charts}
+    for part in parts:
+        data |= part.data
     title = f"{gearbox.name}: resonance report"
     path = folder / REPORT_FILE
     page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
     write_file(path, page.encode("utf-8", "replace"))
-    missing = tuple(commands_for_missing(context, material.results))
     return Report(path, tuple(context.notes.statements), missing, tuple(context.notes.left_out))
 
 
@@ -237,15 +202,3 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
     # Variations come last; another process may compute them in the meantime.
     drawn = run_data(material)
     return replace(material, run_data=drawn, variations=model_variations(context, results.modes, begun))
-
-
-def _merged(parts: list[Part]) -> Mapping[str, Any]:
-    """Merge the data of all sections; their charts are collected under ``charts``."""
-    merged: dict[str, Any] = {"charts": {}}
-    for part in parts:
-        for key, value in part.data.items():
-            if key == "charts":
-                merged["charts"].update(value)
-            else:
-                merged[key] = value
-    return merged

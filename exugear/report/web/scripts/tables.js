@@ -49,7 +49,9 @@ function sort(table, column, head) {
   const rows = rowsOf(table);
   const key = (/** @type {HTMLTableRowElement} */ row) => {
     const cell = row.cells[column];
-    return cell.dataset.order === undefined ? (cell.textContent ?? "") : Number(cell.dataset.order);
+    const order = cell.dataset.order;
+    if (order === undefined) return cell.textContent ?? "";
+    return order === "" ? -Infinity : Number(order.replace("inf", "Infinity"));
   };
   rows.sort((a, b) => {
     const [one, two] = [key(a), key(b)];
