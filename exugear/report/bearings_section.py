@@ -11,10 +11,10 @@ import xarray as xr
 
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import choice_of, model_label
+from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Part, ReportData
+from exugear.report.material import Part, ReportData, model_name
 from exugear.report.web.html import Cell, Table, render
 from exugear.steady.peaks import line_name
 from exugear.system.bearings.duty import BearingLoadState
@@ -158,10 +158,10 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | N
             }
         )
     title = (
-        f"Accelerations at bearings: steady-state response of {model_label(choice_of(data.attrs))}, method "
-        f"{data.attrs['method']}"
+        f"Accelerations at bearings: steady-state response of {model_label(choice_of(data.attrs))}, "
+        f"{METHOD_LABELS[str(data.attrs['method'])]}"
     )
-    name = f"seats-{'-'.join(title.split()[7:])}"
+    name = f"seats-{model_name(choice_of(data.attrs))}-{data.attrs['method']}"
     return {"title": title, "table": Table(rows, ("order",), caption=title, name=name, sortable=True)}
 
 
@@ -169,7 +169,7 @@ def _duties(material: ReportData, assembly: Assembly) -> dict[str, Any] | None:
     if not assembly.variant.has_bearings or not any(support.catalogue for support in assembly.supports):
         return None
     name = model_label(assembly.choice)
-    label = "-".join(name.split())
+    label = model_name(assembly.choice)
     try:
         duties = bearing_duties(assembly)
     except (BalanceError, BearingError) as error:

@@ -12,8 +12,9 @@ from markupsafe import Markup
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.choice import Choice
-from exugear.report.findings.context import Context, StoredResults
+from exugear.report.findings.context import MESH_MODEL_LABELS, Context, StoredResults
 from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.headline import Headline
 from exugear.report.findings.verdicts import ModelVariations
 from exugear.report.findings.words import Labels
 from exugear.report.web.document import ArrayStore
@@ -58,6 +59,8 @@ class ReportData:
     variations: Sequence[ModelVariations]
     lines: Sequence[OrderLine]
     """Orders drawn on the page."""
+    headline: Headline | None
+    """Ranking that the report leads with; None if nothing is ranked."""
     arrays: ArrayStore
     """Store for the arrays of the page."""
     run_data: Mapping[str, Any] = field(default_factory=dict)
@@ -134,16 +137,11 @@ def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
     """Return a short label that identifies a group: source, and mesh model and inertia set where these differ."""
     parts = [own.source]
     if len({group.mesh_model for group in groups}) > 1:
-        parts.append(f"mesh model {own.mesh_model}")
+        parts.append(MESH_MODEL_LABELS[own.mesh_model])
     if len({group.inertias for group in groups}) > 1:
         parts.append(f"inertia set {own.inertias}")
     words = ", ".join(parts)
     return words[0].upper() + words[1:]
-
-
-def summary_groups(groups: Sequence[RunGroup]) -> list[RunGroup]:
-    """List the groups that the command line reports: run-ups, or steady-state responses if there are none."""
-    return [group for group in groups if not group.responses] or list(groups)
 
 
 def model_name(choice: Choice) -> str:

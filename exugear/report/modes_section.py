@@ -10,18 +10,18 @@ import numpy as np
 import xarray as xr
 
 from exugear.gearbox.choice import Choice
-from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, model_label
 from exugear.report.findings.facts import best_words, sensitivities_of, shift_text
 from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.headline import headline_of_group
 from exugear.report.findings.verdicts import best_change, track_mode
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.material import Axis, Curve, Part, ReportData, model_name
 from exugear.report.web.document import rounded
 from exugear.report.web.html import Cell, Figure, Table, render
 from exugear.report.web.stage import stage_data
-from exugear.results.spectra.run_spectra import LEAST_SHARE, NEAR, ModeReport, nearest_mode, report_mode
+from exugear.results.spectra.run_spectra import NEAR, ModeReport, nearest_mode, report_mode
 from exugear.system.modes import modes_of
 from exugear.system.sensitivity import FrequencyMatch, ParameterVariation, assumed_parameters, frequency_matches
 
@@ -40,17 +40,10 @@ def modes_section(material: ReportData) -> Part:
             unstable = f"{model_label(model)}: unstable, disturbances grow at up to {growth:.3g} 1/s."
             material.context.notes.statements.append(unstable)
     models = {model_name(model): _model(material, model, data) for model, data in modes.items()}
-    campbell = Figure(
-        "campbell",
-        "Campbell diagram",
-        "Horizontal lines: modes with TE participation. Dots: an order crosses a mode; size: TE amplification. Click "
-        "a dot to show the mode shape.",
-        "The list below gives frequency, damping and TE amplification of each mode.",
-    )
     lists = [_all_modes(material, model, data) for model, data in modes.items()]
     # Without run-ups, no other section has the animated mode shapes.
-    html = render("modes", campbell=campbell, alone=not material.groups, lists=lists)
-    return Part(html, {"models": models}, "Modes and orders", "modes")
+    html = render("modes", alone=not material.groups, lists=lists)
+    return Part(html, {"models": models}, "Modes", "modes")
 
 
 def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, Any]:
@@ -69,28 +62,10 @@ def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, A
                 "frequency": rounded(report.frequency, 6),
                 "damping": rounded(report.damping_ratio, 4),
                 "words": material.words.moves(data, report.index),
-                "seen": report.share >= LEAST_SHARE,
-                "amplification": rounded(report.amplification, 4),
-                "mesh": material.words.of(report.mesh),
             }
             for report in reports
         ],
-        "fastest": rounded(_fastest(material, model), 5),
     }
-
-
-def _fastest(material: ReportData, model: Choice) -> float:
-    """Return the highest speed (rpm) of the run-ups of a model, or of the load cases."""
-    speeds = [
-        float(group.runs[model.variant].spectra.speed.max())
-        for group in material.groups
-        if model.variant in group.runs and group.choice(model.variant) == model
-    ]
-    if speeds:
-        return max(speeds) / RPM
-    cases = material.context.gearbox.load_cases.values()
-    ends = [abs(speed) for case in cases for speed in (case.start_speed, case.end_speed or 0.0)]
-    return max([*ends, RPM]) / RPM
 
 
 def _deformed(material: ReportData, model: Choice, data: xr.Dataset) -> set[int]:
@@ -271,7 +246,7 @@ SHOWN_SENSITIVITIES = 8
 
 
 def change_section(material: ReportData) -> Part:
-    """Show the sensitivity of the mode with the highest resonance of each group."""
+    """Show the sensitivity of the mode of the first resonance in the ranking of each group."""
     content = list(filter(None, (_group(material, group) for group in material.groups)))
     if not content:
         return Part()
@@ -279,24 +254,25 @@ def change_section(material: ReportData) -> Part:
 
 
 def _group(material: ReportData, group: RunGroup) -> dict[str, Any] | None:
-    top = group.loudest
-    modes = group.runs[group.main].modes
-    if top is None or modes is None or top.finding.mode is None:
+    own = headline_of_group(group)
+    found = own.mode_of(own.top) if own.top else None
+    modes = own.modes
+    if found is None or modes is None:
         return None
-    mode = top.finding.mode
+    mode = found.index
     frequency = float(modes["frequency"][mode])
     scope = (
         f"For the mode at {frequency:.1f} Hz {Variant.of(group.main).label}, inertia set {group.inertias}: "
         f"{material.words.moves(modes, mode)}."
     )
-    own = next((variation for variation in material.variations if variation.choice == group.choice(group.main)), None)
+    varied = next((one.variations for one in material.variations if one.choice == own.choice), ())
     return {
         "name": group.name,
         "scope": scope,
         "table": _sensitivity_table(material, group, modes, mode),
         "variations": [
             _variation(material, f"variation-{group.name}-{number}", variation, frequency)
-            for number, variation in enumerate(own.variations if own else ())
+            for number, variation in enumerate(varied)
         ],
     }
 
@@ -320,7 +296,7 @@ def _sensitivity_table(material: ReportData, group: RunGroup, modes: xr.Dataset,
         for own in kinds
         for sensitivity in own
     ]
-    caption = "First-order frequency shifts of the mode with the highest peak"
+    caption = "First-order frequency shifts of the mode of the first resonance"
     return Table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True)
 
 

@@ -13,7 +13,7 @@ from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import Context, choice_of, model_label
+from exugear.report.findings.context import METHOD_LABELS, Context, choice_of, model_label
 from exugear.report.findings.words import figure_text
 from exugear.report.material import Axis, Curve, Part, ReportData, model_name
 from exugear.report.web.html import Figure, Table, render
@@ -58,7 +58,7 @@ def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     choice = choice_of(data.attrs)
     level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
-    label = f"{model_label(choice)}, method {level}"
+    label = f"{model_label(choice)}, {METHOD_LABELS[level]}"
     context.tell(f"steady-state response, {label}")
     found = peaks(data)[:SHOWN]
     rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}

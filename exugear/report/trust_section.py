@@ -13,7 +13,7 @@ import xarray as xr
 
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import choice_of, model_label
+from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
 from exugear.report.findings.verdicts import run_figures
 from exugear.report.material import Axis, Curve, Part, ReportData, model_name
 from exugear.report.web.document import libraries, licences
@@ -175,7 +175,7 @@ def _exudyn_comparison(material: ReportData, run: VariantRun) -> Figure | None:
 def _response_row(data: xr.Dataset) -> dict[str, object]:
     speed = np.abs(data["speed"].to_numpy()) / RPM
     return {
-        "steady-state response": f"{model_label(choice_of(data.attrs))}, method {data.attrs['method']}",
+        "steady-state response": f"{model_label(choice_of(data.attrs))}, {METHOD_LABELS[str(data.attrs['method'])]}",
         "speeds": data.sizes["point"],
         "lowest speed / rpm": f"{speed.min():.1f}",
         "highest speed / rpm": f"{speed.max():.1f}",
@@ -223,10 +223,9 @@ def _hashes(material: ReportData) -> list[dict[str, str]]:
     context = material.context
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
-    hashes |= {
-        f"steady-state response {model_label(choice_of(data.attrs))}, {data.attrs['method']}": data.attrs["input_hash"]
-        for data in results.steady
-    }
+    for data in results.steady:
+        method = METHOD_LABELS[str(data.attrs["method"])]
+        hashes[f"steady-state response {model_label(choice_of(data.attrs))}, {method}"] = data.attrs["input_hash"]
     hashes |= {f"modes {model_label(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
     return [{"result": name, "SHA-256 of its input": sha256} for name, sha256 in hashes.items()]
 

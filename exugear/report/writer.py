@@ -13,8 +13,10 @@ from pathlib import Path
 from typing import Any, Final
 
 from exugear.gearbox.choice import Choice
+from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.variant import Variant
+from exugear.report.answer_section import ranking_section, short_section
 from exugear.report.bearings_section import bearings_section
 from exugear.report.findings.context import (
     Context,
@@ -25,15 +27,16 @@ from exugear.report.findings.context import (
     with_responses,
 )
 from exugear.report.findings.groups import groups_of
+from exugear.report.findings.headline import headline_of
 from exugear.report.findings.verdicts import begin_variations, model_variations
 from exugear.report.findings.words import Labels
 from exugear.report.gears_section import gears_section
 from exugear.report.life_section import life_section, studies_section
 from exugear.report.material import Part, ReportData, lines_of
 from exugear.report.modes_section import change_section, modes_section, target_frequency_section
+from exugear.report.results_section import checks_section, resonances_section, results_section, waterfall_section
 from exugear.report.run_data import run_data
 from exugear.report.steady_section import steady_section
-from exugear.report.summary_section import ranking_section, summary_section, waterfall_section
 from exugear.report.trust_section import trust_section
 from exugear.report.web.document import ArrayStore, whole_page
 from exugear.report.web.html import render
@@ -83,20 +86,26 @@ def _shown(path: str | Path) -> str:
 
 def _scope(material: ReportData) -> str:
     """Describe the gearbox and the results below the name of the page."""
-    shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
-    steady = ", ".join(dict.fromkeys(str(data.attrs["variant"]) for data in material.results.steady))
-    line = f"Resonance report. Speed ratio output/input {material.context.gearbox.train.ratio:.6f}"
-    line += f"; run-ups: {shown}" * bool(shown) + f"; constant speed: {steady}" * bool(steady)
-    return f"{line}."
+    gearbox = material.context.gearbox
+    rated = gearbox.case.operation.rated_speed_rpm
+    parts = [] if rated is None else [f"rated {rated:g} rpm"]
+    parts += [material.words.labelled(static_load_in_words(gearbox)), f"speed ratio {gearbox.train.ratio:.4g}"]
+    if material.headline is not None:
+        parts += [Variant.of(material.headline.choice.variant).label, material.headline.source]
+    text = ", ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
 
 
 # The report of a results folder as a self-contained web page
 
 SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
-    summary_section,
-    waterfall_section,
+    short_section,
+    checks_section,
     ranking_section,
     change_section,
+    results_section,
+    waterfall_section,
+    resonances_section,
     bearings_section,
     life_section,
     steady_section,
@@ -125,6 +134,8 @@ class Report:
     """Path of the page."""
     statements: tuple[str, ...]
     """Statements of the summary."""
+    resonances: tuple[dict[str, Any], ...]
+    """Ranking that the page leads with, as `exugear steady` has it in ``--json``; the first is the headline."""
     missing: tuple[str, ...]
     """Results that are not in the folder, each with the command that computes it."""
     left_out: tuple[str, ...]
@@ -172,7 +183,7 @@ def write_report(
         parts=[part for part in parts if part.html],
         notes=context.notes,
         missing=missing,
-        several=len(material.groups) > 1,
+        steady=material.headline is not None and material.headline.response is not None,
         source=material.file_words,
     )
     rated = gearbox.case.operation.rated_speed_rpm
@@ -184,7 +195,9 @@ def write_report(
     path = folder / REPORT_FILE
     page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
     write_file(path, page.encode("utf-8", "replace"))
-    return Report(path, tuple(context.notes.statements), missing, tuple(context.notes.left_out))
+    ranked = () if material.headline is None else material.headline.ranking.resonances
+    resonances = tuple(resonance.summary() for resonance in ranked)
+    return Report(path, tuple(context.notes.statements), resonances, missing, tuple(context.notes.left_out))
 
 
 def _material(context: Context, executor: Executor | None) -> ReportData:
@@ -198,7 +211,8 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
         raise ReportError("\n".join([f"{context.folder}: no results of this gearbox file", *reasons]))
     groups = groups_of(context, results)
     words = Labels(context.gearbox)
-    material = ReportData(context, results, words, groups, (), lines_of(context), ArrayStore())
+    headline = headline_of(context, results, groups)
+    material = ReportData(context, results, words, groups, (), lines_of(context), headline, ArrayStore())
     # Variations come last; another process may compute them in the meantime.
     drawn = run_data(material)
     return replace(material, run_data=drawn, variations=model_variations(context, results.modes, begun))

@@ -93,7 +93,7 @@ def _print_report(folder: Path, written: Report, as_json: bool) -> None:
         note(f"Not computed: {line}")
     if as_json:
         times = {entry.step: entry.seconds for entry in spent}
-        lists = {name: list(getattr(written, name)) for name in ("statements", "missing", "left_out")}
+        lists = {name: list(getattr(written, name)) for name in ("statements", "resonances", "missing", "left_out")}
         print_json({"report": str(written.path), **lists, "seconds": times})
         return
     for line in written.statements:

@@ -44,9 +44,11 @@ class Cell:
     choice: str = ""
     """Selection made in the scripts of the page by clicking the cell; empty for none."""
     tag: str = ""
-    """Shown as a tag instead of plain text: ``good``, ``mind`` or ``plain``."""
+    """Shown as a tag instead of plain text: ``good``, ``mind``, ``plain`` or ``rank``."""
     bar: float | None = None
     """Length of a bar next to the text, 0 to 1."""
+    kind: str = ""
+    """CSS class of the bar: its quantity."""
 
     @property
     def order(self) -> str | None:
@@ -82,6 +84,8 @@ class Table:
     """Whether the scripts may sort it."""
     choices: Sequence[str] = ()
     """Selection made in the scripts of the page by clicking each row."""
+    stacked: bool = False
+    """Whether narrow screens show each row as a card."""
 
     @property
     def columns(self) -> dict[str, str]:
@@ -98,9 +102,9 @@ class Table:
         longest = max(len(_cell(row[key]).shown) for row in self.rows)
         return ["text"] + ["brief"] * (longest <= SHORT_TEXT) + ["told"] * (longest > LONG_TEXT)
 
-    def cells(self, row: Mapping[str, object]) -> Iterator[tuple[Cell, str]]:
-        """Yield the cells of a row, each with the CSS classes of its column."""
-        return ((_cell(row[key]), kind) for key, kind in self.columns.items())
+    def cells(self, row: Mapping[str, object]) -> Iterator[tuple[str, Cell, str]]:
+        """Yield heading, cell and CSS classes of each column of a row."""
+        return ((key, _cell(row[key]), kind) for key, kind in self.columns.items())
 
 
 def _cell(value: object) -> Cell:

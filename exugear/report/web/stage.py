@@ -289,16 +289,12 @@ def write_mode_page(
             MODEL: {
                 "words": heading,
                 "variant": assembly.variant,
-                "fastest": 1.0,
                 "stage": stage_data(assembly, shapes, labels or {}, arrays, near if assembly.elastic_bodies else ()),
                 "modes": [
                     {
                         "frequency": rounded(frequency, 6),
                         "damping": 0.0,
                         "words": words,
-                        "seen": True,
-                        "amplification": 0.0,
-                        "mesh": "",
                     }
                     for frequency, words in titles
                 ],

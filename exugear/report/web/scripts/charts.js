@@ -30,7 +30,8 @@ export async function redrawCharts(all) {
   const drawn = [];
   for (const name of Object.keys(pageData.charts)) {
     const box = find(name)?.querySelector(".plot");
-    if (box && (all || plotIn(box))) drawn.push(drawChart(name));
+    // What is hidden has no width; drawn all the same, it would be printed in giant letters.
+    if (box?.clientWidth && (all || plotIn(box))) drawn.push(drawChart(name));
   }
   await Promise.all(drawn);
 }

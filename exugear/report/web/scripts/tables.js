@@ -66,10 +66,15 @@ function addCsv(table) {
   const title = table.dataset.title || table.id;
   const button = make("button", { type: "button", "aria-label": `CSV: ${title}` }, "CSV");
   button.addEventListener("click", () => {
-    const text = (/** @type {HTMLTableCellElement} */ cell) => (cell.textContent ?? "").trim();
-    saveTable(title, [...table.rows].map((row) => [...row.cells].map(text)));
+    saveTable(title, [...table.rows].map((row) => [...row.cells].map(plain)));
   });
   table.parentElement?.before(make("div", { class: "tools of-table" }, button));
+}
+
+/** Content of a cell for data: its number in the unit of the heading, or its text. @param {HTMLTableCellElement} cell */
+function plain(cell) {
+  const text = (cell.textContent ?? "").trim();
+  return cell.dataset.order ?? (text === "–" ? "" : text);
 }
 
 /** Show the rows of the ranking that fit; the same for all of its tables. */

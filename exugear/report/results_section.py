@@ -1,4 +1,4 @@
-"""Sections "Summary", "Waterfall and order cuts" and "Resonance ranking"."""
+"""Sections on all result groups: checks, comparison of models, waterfalls, and resonances of each run-up."""
 
 from __future__ import annotations
 
@@ -9,42 +9,49 @@ from typing import Any
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.facts import facts_of, facts_of_response
+from exugear.report.findings.facts import facts_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
-from exugear.report.findings.loudness import Resonance
-from exugear.report.findings.verdicts import validity_checks
+from exugear.report.findings.verdicts import CheckResult, validity_checks
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Part, ReportData, group_words, summary_groups
+from exugear.report.material import Part, ReportData, group_words
 from exugear.report.web.html import Cell, Figure, Table, render
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun
 
 
-def summary_section(material: ReportData) -> Part:
-    """Show the findings of each result group as cards; the command line prints the same sentences.
+def checks_section(material: ReportData) -> Part:
+    """List warnings and passed checks of the results that the headline is from."""
+    if not material.groups:
+        return Part()
+    group = material.groups[0]
+    verdicts = _checks(material, group)
+    material.context.notes.statements.extend(f"{verdict.line}." for verdict in verdicts)
+    return Part(render("checks", verdicts=verdicts), title="Checks", name="checks")
 
-    It prints findings of steady-state responses only if there is no run-up; otherwise those of run-ups include them.
-    """
-    context = material.context
-    groups = summary_groups(material.groups)
+
+def _checks(material: ReportData, group: RunGroup) -> list[CheckResult]:
+    """Return the checks of a group with the labels of parts."""
+    found = validity_checks(material.context, group)
+    return [CheckResult(check.passed, material.words.labelled(check.words)) for check in found]
+
+
+def results_section(material: ReportData) -> Part:
+    """Show findings and checks of each result group as cards; the command line prints those of run-ups, too."""
+    notes = material.context.notes.statements
     content = []
     for group in material.groups:
-        facts = facts_of(context, material.words, group, material.variations)
-        verdicts = validity_checks(context, group)
-        if group in groups:
-            several = f"{group_words(groups, group)}: " if len(groups) > 1 else ""
-            context.notes.statements.append(f"{several}Load: {_load_of(material, group)}.")
-            context.notes.statements.extend(f"{several}{fact.line}" for fact in facts)
-            context.notes.statements.extend(f"{several}{verdict.line}." for verdict in verdicts)
+        facts = facts_of(material.context, material.words, group, material.variations)
+        verdicts = () if group is material.groups[0] else _checks(material, group)
+        if not group.responses:
+            several = group_words(material.groups, group)
+            notes.append(f"{several}: Load: {_load_of(material, group)}.")
+            notes.extend(f"{several}: {fact.line}" for fact in facts)
+            notes.extend(f"{several}: {verdict.line}." for verdict in verdicts)
         content.append({"name": group.name, "scope": _scope(material, group), "facts": facts, "verdicts": verdicts})
-    alone = (
-        ()
-        if content
-        else [fact for data in material.results.steady for fact in facts_of_response(material.words, data)]
-    )
-    context.notes.statements.extend(fact.line for fact in alone)
-    run_ups = any(not group.responses for group in material.groups)
-    html = render("summary", groups=content, alone=alone, run_ups=run_ups)
-    return Part(html, title="Summary", name="short")
+        _note_comparisons(material, group)
+    if not content:
+        return Part()
+    html = render("results", groups=content, run_ups=any(not group.responses for group in material.groups))
+    return Part(html, title="Models compared", name="results")
 
 
 def _scope(material: ReportData, group: RunGroup) -> str:
@@ -97,71 +104,26 @@ SHOWN_SPAN = 60.0
 BUILT_UP = 3.0
 """Deficit (dB) against the level at constant speed from which a run-up counts as too fast for a resonance."""
 NOT_NEAR = "no mode near"
-SHOWN = 10
-"""Number of resonances in the table by three quantities."""
-QUANTITIES = {
-    "error": ("Transmission error / µm", 1e6),
-    "force": ("Bearing force / kN", 1e-3),
-    "acceleration": ("Acceleration / m/s²", 1.0),
-}
-"""Column titles of the three quantities, and factors from SI units."""
 AT_CONSTANT = "Constant speed / dB, Hz"
 
 
-def ranking_section(material: ReportData) -> Part:
-    """Rank the resonances of each run-up and each steady-state response in a table."""
+def resonances_section(material: ReportData) -> Part:
+    """List the resonances of each run-up and each steady-state response in a table, by transmission error."""
     tables = [
         {"group": group.name, "variant": variant, **_table(material, group, variant)}
         for group in material.groups
         for variant in reversed(list(group.runs))
     ]
-    for group in summary_groups(material.groups):
-        _note_comparisons(material, group)
     if not tables:
         return Part()
     html = render(
-        "ranking",
-        in_operation=list(filter(None, (_operating_resonances(material, group) for group in material.groups))),
+        "resonances",
         tables=tables,
         factors=", ".join(f"{factor:g}" for factor in WINDOW_FACTORS),
         absent=AbsenceRule().description,
         built_up=BUILT_UP,
     )
-    return Part(html, title="Resonance ranking", name="ranking")
-
-
-def _operating_resonances(material: ReportData, group: RunGroup) -> dict[str, Any] | None:
-    """Tabulate the main variant's resonances at constant speed in the operating range, by three quantities."""
-    ranking = group.in_operation
-    if ranking is None or not ranking.resonances:
-        return None
-    low, high = (figure_text(speed / RPM, 4) for speed in ranking.speeds)
-    which = "all speeds" if ranking.whole else "operating speed range"
-    rows = [_operating_row(material, resonance) for resonance in ranking.resonances[:SHOWN]]
-    label = Variant.of(group.main).label
-    title = f"Highest {len(rows)} resonances at constant speed, {label}, {which} ({low} to {high} rpm)"
-    name = f"in-operation-{group.name}"
-    return {
-        "group": group.name,
-        "title": title,
-        "table": Table(rows, ("Excited by", "Bearing"), caption=title, name=name, sortable=True),
-        "accelerates": ranking.accelerates,
-    }
-
-
-def _operating_row(material: ReportData, resonance: Resonance) -> dict[str, object]:
-    row: dict[str, object] = {
-        "Excited by": material.words.labelled(resonance.line),
-        "Speed / rpm": Cell(figure_text(abs(resonance.speed) / RPM, 4), abs(resonance.speed) / RPM),
-        "Frequency / Hz": Cell(f"{resonance.frequency:.1f}", resonance.frequency),
-    }
-    for name, peak in resonance.amplitudes.items():
-        title, factor = QUANTITIES[name]
-        place = "" if peak.place is None else f" ({peak.place})"
-        row[title] = Cell(f"{figure_text(factor * peak.amplitude)}{place}", factor * peak.amplitude)
-        if name == "force":
-            row["Bearing"] = material.words.of(peak.at)
-    return row
+    return Part(html, title="Resonances by model", name="found")
 
 
 def _table(material: ReportData, group: RunGroup, variant: str) -> dict[str, Any]:
