@@ -117,7 +117,7 @@ def short_section(material: ReportData) -> Part:
         "further": list(_further(material, headline, top)),
     }
     quantities = ". ".join(
-        f"{one['title']} {one['value']} {one['unit']} (rank {one['rank']})" for one in answer["quantities"]
+        f"{one['title']} {one['value']} {one['unit']} (rank {one['rank']}{one['of']})" for one in answer["quantities"]
     )
     where = f"{answer['frequency']} at {answer['speed']}{answer['off_rated']}"
     notes.append(f"Highest resonance: {where}. {answer['sentence']} {quantities}.")
@@ -133,7 +133,7 @@ def short_section(material: ReportData) -> Part:
 
 def _scope(material: ReportData, headline: Headline) -> str:
     gearbox = material.context.gearbox
-    load = headline.load or f"static load, {material.words.labelled(static_load_in_words(gearbox))}"
+    load = material.words.labelled(headline.load or f"static load, {static_load_in_words(gearbox)}")
     return (
         f"{Variant.of(headline.choice.variant).label}, {headline.source}. Load: {load}. Inertia set: "
         f"{headline.choice.inertias}. Damping: {damping_in_words(gearbox.case.damping)}. Speeds: of the "
@@ -205,7 +205,8 @@ def _quantity(material: ReportData, headline: Headline, top: Resonance, name: st
         "value": f"±{rounded_text(label.factor * own.amplitude)}",
         "unit": label.unit,
         "band": band,
-        "rank": "–" if own.place is None else f"{own.place} of {count}",
+        "rank": own.place or "–",
+        "of": f" of {count}" * bool(own.place),
         "place": material.words.of(own.at) if own.at else "input to output",
     }
 

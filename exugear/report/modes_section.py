@@ -11,7 +11,7 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, model_label
+from exugear.report.findings.context import MESH_MODEL_LABELS, REFERENCE_VARIANT, VISIBLE_SHARE, model_label
 from exugear.report.findings.facts import best_words, sensitivities_of, shift_text
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import headline_of_group
@@ -159,7 +159,7 @@ def _row(material: ReportData, model: Choice, data: xr.Dataset, index: int, targ
     mode = report_mode(data, index)
     return {
         "variant": model.variant,
-        "inertia set": f"{model.inertias} ({model.mesh_model})",
+        "inertia set": f"{model.inertias} ({MESH_MODEL_LABELS[model.mesh_model]})",
         "frequency / Hz": f"{mode.frequency:.1f}",
         "near": "yes" if mode.is_near(target) else "no",
         "damping / %": f"{100 * mode.damping_ratio:.2f}",
@@ -213,7 +213,7 @@ def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[s
     mode = report_mode(data, match.index)
     return {
         "variant": found.model.variant,
-        "inertia set": f"{found.model.inertias} ({found.model.mesh_model})",
+        "inertia set": f"{found.model.inertias} ({MESH_MODEL_LABELS[found.model.mesh_model]})",
         "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
         "frequency / Hz": f"{mode.frequency:.0f}",
         "TE part. / %": f"{100 * mode.share:.1f}",

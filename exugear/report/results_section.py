@@ -64,10 +64,11 @@ def _scope(material: ReportData, group: RunGroup) -> str:
 def _load_of(material: ReportData, group: RunGroup) -> str:
     """Describe the load of a group: that of its load case, or the static load."""
     static = static_load_in_words(material.context.gearbox)
-    loads = {str(run.attributes.get("load", "")) for run in group.runs.values()}
-    if group.responses or not any(loads):
-        return f"static load, {static}"
-    return f"{'; '.join(sorted(filter(None, loads)))} (tables and steady-state responses: static load, {static})"
+    loads = sorted({str(run.attributes.get("load", "")) for run in group.runs.values()} - {""})
+    text = f"static load, {static}"
+    if loads and not group.responses:
+        text = f"{'; '.join(loads)} (tables and steady-state responses: {text})"
+    return material.words.labelled(text)
 
 
 # Section "Waterfall and order cuts", with the selected resonance as text and its animated mode shape

@@ -175,6 +175,9 @@ def _estimated(context: Context, modes: xr.Dataset, found: Mapping[str, PairExci
     pairs = {mesh.name: mesh.pair.name for mesh in context.gearbox.meshes}
     families = {mesh.name: mesh.family for mesh in context.gearbox.meshes}
     lines = {line.name: line for line in order_lines(context.gearbox, HARMONICS)}
+    fastest = max(
+        (abs(case.end_speed or case.start_speed) for case in context.gearbox.load_cases.values()), default=0.0
+    )
     peaks = []
     for index in range(modes.sizes["mode"]):
         mode = report_mode(modes, index)
@@ -187,9 +190,12 @@ def _estimated(context: Context, modes: xr.Dataset, found: Mapping[str, PairExci
                 speed = 2.0 * math.pi * mode.frequency / lines[name].order
                 amplitude = mode.amplification * float(pair.harmonics[harmonic - 1])
                 peaks.append((lines[name], speed, mode.frequency, amplitude))
+    stated = operating_range(context.gearbox)
+    if stated is None and fastest > 0.0:
+        peaks = [peak for peak in peaks if peak[1] <= fastest]
     if not peaks:
         return None
-    return ranking_of_errors(peaks, np.array([peak[1] for peak in peaks]), operating_range(context.gearbox))
+    return ranking_of_errors(peaks, np.array([peak[1] for peak in peaks]), stated)
 
 
 # Cause of a resonance, and first-order changes of its amplitude

@@ -254,7 +254,14 @@ def test_words_stand_out_from_their_ground(view: View, theme: str) -> None:
 
     pairs = [("ink", "panel"), ("ink", "ground"), ("soft", "panel"), ("soft", "ground"), ("accent", "panel")]
     pairs += [("ink", "good-soft"), ("ink", "mind-soft"), ("good", "good-soft"), ("mind", "mind-soft")]
-    pairs += [("accent", "accent-soft"), ("ink", "bad-soft"), ("panel", "accent")]
+    pairs += [
+        ("accent", "accent-soft"),
+        ("ink", "bad-soft"),
+        ("panel", "accent"),
+        ("bad", "panel"),
+        ("bad", "bad-soft"),
+    ]
+    pairs += [(name, "panel") for name in ("error", "force", "acceleration", "good", "mind")]
     for words, ground in pairs:
         bright, dull = sorted((luminance(colour(f"--{name}")) for name in (words, ground)), reverse=True)
         assert (bright + 0.05) / (dull + 0.05) >= 4.5, (words, ground)
