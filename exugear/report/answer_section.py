@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,7 +22,7 @@ from exugear.report.findings.headline import (
     changes_of,
     contributions_of,
 )
-from exugear.report.findings.loudness import HOUSING, SHAFTS, Resonance
+from exugear.report.findings.loudness import HOUSING, SHAFTS, Envelope, Resonance
 from exugear.report.findings.verdicts import default_place, track_mode
 from exugear.report.findings.words import figure_text, percentages, rounded_text
 from exugear.report.material import Part, ReportData, model_name
@@ -101,6 +101,7 @@ def short_section(material: ReportData) -> Part:
     assert top is not None
     mode = headline.mode_of(top)
     known = contributions_of(material.context, headline)
+    curves = headline.envelopes(material.lines)
     answer: dict[str, Any] = {
         "scope": _scope(material, headline),
         "kicker": _kicker(headline, top),
@@ -110,11 +111,11 @@ def short_section(material: ReportData) -> Part:
         "sentence": _sentence(material, headline, top, mode),
         "quantities": [_quantity(material, headline, top, name) for name in top.amplitudes],
         "note": _note(material, headline),
-        "strips": [] if headline.group is None else [_strips(material, headline, size) for size in STRIPS],
+        "strips": [_strips(material, headline, curves, size) for size in STRIPS if curves],
         "resonance": _resonance_box(material, headline, mode),
         "cause": _cause_box(material, top, known),
         "remedy": _remedy_box(material, headline, top, mode, known),
-        "further": list(_further(material, headline, top)),
+        "further": list(_further(material, headline, top, curves)),
     }
     quantities = ". ".join(
         f"{one['title']} {one['value']} {one['unit']} (rank {one['rank']}{one['of']})" for one in answer["quantities"]
@@ -221,16 +222,20 @@ def _note(material: ReportData, headline: Headline) -> str:
     damping = "half to twice the value used" if band is None else f"{band[0]:g} to {band[1]:g} % of critical"
     parts = {HOUSING: "of the housing at its bearing seats", SHAFTS: "of the shafts at bearings; the housing is rigid"}
     accelerates = parts.get(headline.ranking.accelerates, f"of {headline.ranking.accelerates} at bearings")
-    return f"Amplitude of this order at constant speed. Damping: {damping}. Accelerations: {accelerates}."
+    text = f"Amplitude of this order at constant speed. Damping: {damping}."
+    if "acceleration" in headline.ranking.resonances[0].amplitudes:
+        text += f" Accelerations: {accelerates}."
+    return text
 
 
-def _strips(material: ReportData, headline: Headline, size: tuple[float, float]) -> Strips:
+def _strips(
+    material: ReportData, headline: Headline, curves: Mapping[str, Envelope], size: tuple[float, float]
+) -> Strips:
     titles = {name: (f"{label.title}, ± {label.unit}", label.factor) for name, label in QUANTITIES.items()}
     peaks = "; ".join(
         f"{number}: {rounded_text(own.frequency)} Hz at {speed_text(own)}"
         for number, own in enumerate(headline.ranking.resonances[:SHOWN], start=1)
     )
-    curves = headline.envelopes(material.lines)
     rated = material.context.gearbox.case.operation.rated_speed_rpm
     return strips_of(headline.ranking, curves, titles, rated, size, f"Largest order over speed. {peaks}.")
 
@@ -310,11 +315,13 @@ def _remedy_box(
     return Box(text, changes=changes, link="change")
 
 
-def _further(material: ReportData, headline: Headline, top: Resonance) -> Iterator[tuple[str, str]]:
+def _further(
+    material: ReportData, headline: Headline, top: Resonance, curves: Mapping[str, Envelope]
+) -> Iterator[tuple[str, str]]:
     """Yield title and text of the row of small cards."""
     rated = material.context.gearbox.case.operation.rated_speed_rpm
-    if rated is not None and headline.group is not None:
-        yield f"At rated speed, {rounded_text(rated)} rpm", _rated_text(material, headline, rated)
+    if rated is not None and curves:
+        yield f"At rated speed, {rounded_text(rated)} rpm", _rated_text(headline, curves, rated)
     outside = headline.outside()
     if outside is not None:
         peaks = ", ".join(amplitude_text(name, own.amplitude) for name, own in outside.amplitudes.items())
@@ -323,9 +330,9 @@ def _further(material: ReportData, headline: Headline, top: Resonance) -> Iterat
         yield "What could overturn this", short(*doubts)
 
 
-def _rated_text(material: ReportData, headline: Headline, rated: float) -> str:
+def _rated_text(headline: Headline, curves: Mapping[str, Envelope], rated: float) -> str:
     parts = []
-    for name, curve in headline.envelopes(material.lines).items():
+    for name, curve in curves.items():
         if curve.speed[0] <= rated * RPM <= curve.speed[-1]:
             parts.append(amplitude_text(name, float(np.interp(rated * RPM, curve.speed, curve.amplitude))))
     if not parts:

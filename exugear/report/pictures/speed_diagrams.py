@@ -9,6 +9,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from exugear.gearbox.units import RPM
 from exugear.report.findings.loudness import Envelope, Ranking, Resonance
 from exugear.results.spectra.waterfall import OrderLine
@@ -26,6 +28,8 @@ HEADING = 28.0
 """Height that the title of a strip and the circles above the curve need."""
 RADIUS = 8.0
 """Radius of a circle with a number."""
+NARROWEST = 1e-3
+"""Minimum length of an axis of speeds, relative to its beginning or in rpm."""
 TICKS = 7
 """Approximate number of ticks of an axis."""
 HEADROOM = 1.3
@@ -96,6 +100,8 @@ def _frame(
     rated: float | None,
 ) -> Frame:
     width, height = size
+    # A run at constant speed has no range.
+    speeds = (speeds[0], max(speeds[1], speeds[0] * (1.0 + NARROWEST), NARROWEST))
     frame = Frame(width, height, sides[0], width - sides[1], height - 32.0, speeds, (), None, None)
     count = max(3, int(width / 90.0))
     ticks = tuple(Mark(frame.x(rpm), frame.bottom + 14.0, f"{rpm:g}") for rpm in round_ticks(*speeds, count))
@@ -175,18 +181,18 @@ def _strip(
     rpm = curve.speed / RPM
     shown = (rpm >= frame.speeds[0]) & (rpm <= frame.speeds[1])
     rpm = rpm[shown]
-    value = factor * curve.amplitude[shown]
+    value = np.nan_to_num(factor * curve.amplitude[shown], posinf=0.0)
     numbered = list(enumerate(ranking.resonances[:CIRCLED], start=1))
     marked = [(number, own) for number, own in numbered if _is_marked(own, name)]
     limits = {number: own.amplitudes[name].limits for number, own in marked}
     ends = [factor * limit.amplitude for pair in limits.values() for limit in pair or ()]
-    peak = float(max([*value, *ends, 1e-300]))
+    peak = max(size for size in (*map(float, value), *ends, 1e-300) if math.isfinite(size))
     lowest = max(float(value.min(initial=peak)) / 1.3, peak / 10.0**DECADES)
     highest = lowest * (peak / lowest) ** ((bottom - top) / (bottom - top - HEADING))
 
     def y(amplitude: float) -> float:
         share = math.log(max(amplitude, lowest) / lowest) / math.log(highest / lowest)
-        return bottom - share * (bottom - top)
+        return bottom - min(share, 1.0) * (bottom - top)
 
     bands = []
     circles: list[Mark] = []

@@ -141,9 +141,13 @@ class TestInABrowser:
         pages = len(re.findall(rb"/Type\s*/Page\b", view.page.pdf(prefer_css_page_size=True)))
         assert 2 <= pages <= MOST_PAGES
         view.page.emulate_media(media="print")
+        view.page.set_viewport_size({"width": 711, "height": 1039})  # A4 without its margins
+        first = view.page.locator("#short").bounding_box()
+        assert first["y"] + first["height"] <= 1039
         assert not view.page.locator("#rings, #modes, #inputs").locator("visible=true").count()
         assert view.page.locator(".paper-only").is_visible()
         view.page.emulate_media(media="screen")
+        view.page.set_viewport_size({"width": 1440, "height": 900})
         view.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
 
     def test_without_scripts_text_and_drawings_are_there(self, browser: Any, folder: Path, view: View) -> None:
