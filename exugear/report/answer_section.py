@@ -298,7 +298,8 @@ def _remedy_box(
     changes = []
     for change in changes_of(material.words, known):
         sign = "+" if change.more else "−"
-        changes.append((f"−{figure_text(change.gain, 2)} dB", f"{sign}10 % {change.what}"))
+        limit = "< " * change.bounded
+        changes.append((f"{limit}−{figure_text(change.gain, 2)} dB", f"{sign}10 % {change.what}"))
     error = top.amplitudes["error"]
     if error.limits is not None and error.place is not None and error.limits[1].amplitude > 0.0:
         gain = 20.0 * math.log10(error.amplitude / error.limits[1].amplitude)
@@ -306,7 +307,7 @@ def _remedy_box(
             changes.append((f"−{figure_text(gain, 2)} dB", "highest plausible damping"))
     if changes:
         text = "Transmission error at this peak, to first order; check the other quantities."
-        return Box(text, changes=changes, link="change")
+        return Box(text, changes=changes, link="change" * (mode is not None))
     if mode is None or headline.modes is None:
         return Box("Sensitivities need modes or a steady-state response: `exugear modes`, `exugear steady`.")
     shifts = sensitivities_of(material.words, headline.modes, mode.index)[:SHOWN_ENERGIES]

@@ -164,7 +164,7 @@ def _row(material: ReportData, model: Choice, data: xr.Dataset, index: int, targ
         "near": "yes" if mode.is_near(target) else "no",
         "damping / %": f"{100 * mode.damping_ratio:.2f}",
         "TE part. / %": f"{100 * mode.share:.1f}",
-        "amplification": f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})",
+        "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
         "mode shape": material.words.moves(data, index),
     }
 
@@ -217,7 +217,7 @@ def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[s
         "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
         "frequency / Hz": f"{mode.frequency:.0f}",
         "TE part. / %": f"{100 * mode.share:.1f}",
-        "amplification": f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})",
+        "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
         (
             f"nearest with TE participation in {REFERENCE_VARIANT} / Hz"
         ): f"{_reference_frequency(material, found, target):.0f}",

@@ -225,7 +225,9 @@ class Change:
     more: bool
     """Whether the parameter has to increase for the amplitude to decrease."""
     gain: float
-    """Decrease of the amplitude, dB."""
+    """Decrease of the amplitude, dB; where the first order no longer holds, at least this."""
+    bounded: bool
+    """Whether the first order no longer holds."""
 
 
 STEP = 0.1
@@ -234,7 +236,7 @@ SHOWN_CHANGES = 3
 LEAST_GAIN = 0.1
 """Smallest listed decrease, dB."""
 FIRST_ORDER = 0.5
-"""Largest relative change of the amplitude for which the first order is given."""
+"""Relative change of the amplitude beyond which the first order does not hold."""
 
 
 def contributions_of(context: Context, headline: Headline) -> Contributions | None:
@@ -287,4 +289,4 @@ def _changes(slopes: Sequence[tuple[str, float]]) -> Iterator[Change]:
         relative = min(STEP * abs(slope), FIRST_ORDER)
         gain = -20.0 * math.log10(1.0 - relative)
         if gain > LEAST_GAIN:
-            yield Change(label, slope < 0.0, gain)
+            yield Change(label, slope < 0.0, gain, STEP * abs(slope) > FIRST_ORDER)
