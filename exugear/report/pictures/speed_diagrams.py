@@ -284,9 +284,7 @@ def campbell_of(
     """
     shown = ranking.resonances[:NUMBERED]
     highest = HEADROOM * max(own.frequency for own in shown)
-    frame = _frame(
-        size, (50.0, 92.0 if size[0] > 500.0 else 64.0), (0.0, 1.08 * ranking.speeds[1] / RPM), ranking, rated
-    )
+    frame = _frame(size, (50.0, 88.0), (0.0, 1.08 * ranking.speeds[1] / RPM), ranking, rated)
 
     def y(frequency: float) -> float:
         return frame.bottom - frequency / highest * (frame.bottom - TOP)
@@ -322,10 +320,14 @@ def _rays(frame: Frame, lines: Iterable[tuple[OrderLine, str]], highest: float, 
         x = frame.x(reach * end)
         y = frame.bottom - float(line.frequency(reach * end * RPM)) / highest * height
         angle = -math.degrees(math.atan2(frame.bottom - y, x - frame.left))
-        along = 0.97 - 3.6 * len(label) / math.hypot(x - frame.left, frame.bottom - y)
-        at = (frame.left + along * (x - frame.left), frame.bottom + along * (y - frame.bottom))
-        mark = Mark(at[0], at[1] - 4.0, label, angle)
-        if any(math.hypot(mark.x - other.label.x, mark.y - other.label.y) < BETWEEN_LABELS for other in rays):
+        length = math.hypot(x - frame.left, frame.bottom - y)
+        along = 0.97 - 3.6 * len(label) / length
+        mark = Mark(
+            frame.left + along * (x - frame.left), frame.bottom + along * (y - frame.bottom) - 4.0, label, angle
+        )
+        # Rays part from each other with the distance from the origin.
+        apart = min((abs(math.radians(angle - other.label.angle)) for other in rays if other.label.text), default=1.0)
+        if apart * along * length < BETWEEN_LABELS:
             mark = Mark(0.0, 0.0, "")
         rays.append(OrderRay(x, y, families.setdefault(family, len(families)), int(number or 1), mark))
     return rays
