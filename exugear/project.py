@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from exugear.life.load_spectrum.counted import CountedLoads
     from exugear.life.rating.sheet import RatingSheet
     from exugear.life.static_balance import StaticBalance
-    from exugear.report.design_study import DesignStudy
+    from exugear.report.findings.design_changes import DesignStudy
     from exugear.report.writer import Report
     from exugear.results.solver_comparison import SolverComparison
     from exugear.steady.settings import SteadySettings

@@ -6,11 +6,9 @@ the results, so that a stopped study resumes, and a repeated one reads its resul
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -22,23 +20,25 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.report.findings.design_changes import (
     ChangeResult,
     DesignChange,
+    DesignStudy,
     effects_of,
     exciting_families,
     ordered,
     peaks_of,
     price_of,
     propose_changes,
+    settings_of_study,
+    write_design_study,
 )
 from exugear.report.findings.loudness import Resonance, ranking_of
 from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.settings import SteadySettings, operating_speeds
+from exugear.steady.settings import SteadySettings
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.gearbox_checks import check_parts, lacking
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError
 from fe_ste.geometry.checks import GeometryError
-from fe_ste.tools.files import write_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,18 +89,6 @@ class ComputedProject(Protocol):
         """Return the transmission error tables that the mesh model reads."""
 
 
-@dataclass(frozen=True)
-class DesignStudy:
-    """Results of all design changes."""
-
-    resonance: Resonance
-    """First resonance of the ranking in the operating range, which the changes are to reduce."""
-    results: tuple[ChangeResult, ...]
-    """Changes of the design by their effect, then assumptions, then changes that cannot be made."""
-    path: Path
-    """File with the results."""
-
-
 def study_design_changes(
     project: ComputedProject, progress: Callable[[int, int, str], None] | None = None
 ) -> DesignStudy | None:
@@ -114,7 +102,7 @@ def study_design_changes(
     -------
     None if the response has no resonances in the range
     """
-    settings = SteadySettings(operating_speeds(project.gearbox))
+    settings = settings_of_study(project.gearbox)
     # The response of the unchanged gearbox has a folder, too: that of the project may be over other speeds.
     data = _project_with(project, project.gearbox, "unchanged").steady(settings)
     ranking = ranking_of(data)
@@ -138,16 +126,16 @@ def study_design_changes(
         except _REFUSALS as error:
             reason = str(error).removeprefix(f"{project.gearbox.source}: ").split("\n")[0]
             results.append(ChangeResult(change, {}, "", reason))
-    study = DesignStudy(resonance, tuple(ordered(results)), project.folder / DESIGN_CHANGES_FILE)
-    content = {
-        "input_hash": str(data.attrs["input_hash"]),
-        "order": resonance.line,
-        "frequency_Hz": resonance.frequency,
-        "speed_rad_per_s": resonance.speed,
-        "amplitudes": {name: values[0] for name, values in before.items()},
-        "results": [asdict(result) for result in study.results],
-    }
-    write_file(study.path, json.dumps(content, indent=1).encode("utf-8"))
+    study = DesignStudy(
+        {key: str(data.attrs[key]) for key in ("variant", "mesh_model", "inertias")},
+        str(data.attrs["input_hash"]),
+        resonance.line,
+        resonance.frequency,
+        resonance.speed,
+        {name: values[0] for name, values in before.items()},
+        ordered(results),
+    )
+    write_design_study(project.folder / DESIGN_CHANGES_FILE, study)
     return study
 
 

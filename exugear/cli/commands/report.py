@@ -27,7 +27,7 @@ from exugear.cli.tables import print_table
 from exugear.gearbox.units import RPM
 
 if TYPE_CHECKING:
-    from exugear.report.design_study import DesignStudy
+    from exugear.report.findings.design_changes import DesignStudy
     from exugear.report.writer import Report
 
 
@@ -170,7 +170,7 @@ def _print_report(folder: Path, written: Report, study: DesignStudy | None, as_j
         note(f"Not computed: {line}")
     if as_json:
         times = {entry.step: entry.seconds for entry in spent}
-        lists = {name: list(getattr(written, name)) for name in ("statements", "missing", "left_out")}
+        lists = {name: list(getattr(written, name)) for name in ("statements", "resonances", "missing", "left_out")}
         changes = [asdict(result) for result in (study.results if study else ())]
         print_json({"report": str(written.path), **lists, "design_changes": changes, "seconds": times})
         return
@@ -194,9 +194,8 @@ def _print_changes(study: DesignStudy) -> None:
     """Print the effects of the design changes: on this peak, and on the highest amplitude in the operating range."""
     from exugear.report.findings.design_changes import Effect
 
-    resonance = study.resonance
-    speed = abs(resonance.speed) / RPM
-    title = f"Design changes for {resonance.frequency:.3g} Hz at {speed:.4g} rpm, {resonance.line}, dB"
+    speed = abs(study.speed) / RPM
+    title = f"Design changes for {study.frequency:.3g} Hz at {speed:.4g} rpm, {study.line}, dB"
     rows = []
     for result in study.results:
         row = {"change": result.change.words}

@@ -47,9 +47,27 @@ def choice_of(attributes: Mapping[str, Any]) -> Choice:
     return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
 
 
+MESH_MODEL_LABELS = {
+    "kinematic": "kinematic constraint",
+    "constant": "mean mesh stiffness",
+    "iso6336": "mesh stiffness to ISO 6336",
+    "tangential": "tangential mesh model",
+    "line_of_action": "mesh stiffness over the mesh cycle",
+    "table": "mesh stiffness with contact loss",
+}
+"""Names of the mesh models on the page."""
+METHOD_LABELS = {
+    "linear": "mean stiffness",
+    "parametric": "time-varying stiffness",
+    "nonlinear": "nonlinear, with contact loss",
+}
+"""Names of the methods of steady-state responses on the page."""
+
+
 def model_label(choice: Choice) -> str:
     """Return model settings as text for headings."""
-    return f"{choice.variant}, mesh model {choice.mesh_model}, inertia set {choice.inertias}"
+    label = Variant.of(choice.variant).label
+    return f"{choice.variant} ({label}), {MESH_MODEL_LABELS[choice.mesh_model]}, inertia set {choice.inertias}"
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,13 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.units import RPM
 from exugear.report.findings.context import choice_of
 from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine
@@ -34,6 +35,8 @@ MIN_RELATIVE_PEAK = 1e-9
 """Peaks below this fraction of the largest peak of their quantity are round-off."""
 MIN_EXCITED = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9}
 """Amplitudes below which nothing is excited, in the units of the quantities."""
+UNIT_KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2"}
+"""Units in the keys of ``--json``."""
 SHAFTS = "shafts"
 HOUSING = "housing"
 BOTH = "shafts and housing"
@@ -91,6 +94,27 @@ class Resonance:
         """Best rank in any quantity."""
         return min(own.place for own in self.amplitudes.values() if own.place is not None)
 
+    def summary(self) -> dict[str, Any]:
+        """Return all values for ``--json``, with units in the keys."""
+        found: dict[str, Any] = {
+            "line": self.line,
+            "order": self.order,
+            "speed_rpm": self.speed / RPM,
+            "frequency_Hz": self.frequency,
+            "best_place": self.best,
+        }
+        for quantity, peak in self.amplitudes.items():
+            unit = UNIT_KEYS[quantity]
+            found |= {f"{quantity}_{unit}": peak.amplitude, f"{quantity}_place": peak.place}
+            if peak.at:
+                found[f"{quantity}_at"] = peak.at
+            if peak.limits:
+                lowest, highest = peak.limits
+                found[f"{quantity}_lowest_damping_{unit}"] = lowest.amplitude
+                found[f"{quantity}_highest_damping_{unit}"] = highest.amplitude
+                found[f"{quantity}_places_over_damping"] = peak.places
+        return found
+
 
 @dataclass(frozen=True)
 class Ranking:
@@ -103,14 +127,17 @@ class Ranking:
     """Whether these are all speeds: the file has no operating range, or the response was not computed there."""
     accelerates: str
     """Parts whose acceleration is given: the shafts where the housing is rigid."""
+    without: tuple[float, float] | None = None
+    """Operating range (rad/s) in which there is no resonance, where all speeds are ranked instead."""
 
 
-def ranking_of(data: xr.Dataset) -> Ranking:
-    """Rank the resonances of a steady-state response within the operating range.
+def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None) -> Ranking:
+    """Rank the resonances of a steady-state response within the operating range or other speeds.
 
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
+    speeds : lowest and highest absolute input speed, rad/s; by default the operating range of the file
 
     Notes
     -----
@@ -118,7 +145,7 @@ def ranking_of(data: xr.Dataset) -> Ranking:
     share and the cosine and sine components around the carrier.
     """
     speed = np.abs(data["speed"].to_numpy().astype(np.float64))
-    low, high, whole = _range(data, speed)
+    low, high, whole = _range(json.loads(str(data.attrs["operating_range"])) if speeds is None else speeds, speed)
     inside = (speed >= low) & (speed <= high)
     amplitude: Floats = data["amplitude"].to_numpy()[:, 1:].astype(np.float64)
     quantities = quantities_of([str(name) for name in data["signal"].to_numpy()])
@@ -142,6 +169,30 @@ def ranking_of(data: xr.Dataset) -> Ranking:
     limits = _limits(data, quantities, peaks)
     found = tuple(_resonance(data, quantities, sizes, group, limits) for group in groups)
     return Ranking(found, (low, high), whole, _accelerating_parts(data))
+
+
+@dataclass(frozen=True)
+class Envelope:
+    """Largest single order of a quantity over speed."""
+
+    speed: Floats
+    """(n,) absolute input speed, rad/s, ascending."""
+    amplitude: Floats
+    """(n,) in the unit of the quantity."""
+
+
+def envelopes(data: xr.Dataset) -> dict[str, Envelope]:
+    """Return the largest amplitude of a single order at each speed, by quantity, of the bearing with the largest.
+
+    Parameters
+    ----------
+    data : as `exugear.steady.steady_file.load_response` reads it
+    """
+    speed = np.abs(data["speed"].to_numpy().astype(np.float64))
+    rising = np.argsort(speed, kind="stable")
+    amplitude: Floats = data["amplitude"].to_numpy()[rising, 1:].astype(np.float64)
+    quantities = quantities_of([str(name) for name in data["signal"].to_numpy()])
+    return {own.name: Envelope(speed[rising], own.sizes(amplitude).max(axis=(1, 2))) for own in quantities}
 
 
 Limits = Mapping[tuple[int, int, str], tuple[Limit, Limit]]
@@ -170,12 +221,31 @@ def _limits(data: xr.Dataset, quantities: tuple[Quantity, ...], peaks: Mapping[s
     return found
 
 
-def _range(data: xr.Dataset, speed: Floats) -> tuple[float, float, bool]:
+def _range(stated: Sequence[float] | None, speed: Floats) -> tuple[float, float, bool]:
     """Return the evaluated speed range, and whether it covers all speeds."""
-    stated = json.loads(str(data.attrs["operating_range"]))
     if stated is not None and ((speed >= stated[0]) & (speed <= stated[1])).any():
         return float(stated[0]), float(stated[1]), False
     return float(speed.min()), float(speed.max()), True
+
+
+def ranking_of_errors(
+    peaks: Sequence[tuple[OrderLine, float, float, float]], speed: Floats, stated: tuple[float, float] | None
+) -> Ranking:
+    """Rank resonances of which only the transmission error is known, such as those of a run-up.
+
+    Parameters
+    ----------
+    peaks : order, absolute input speed (rad/s), frequency (Hz) and amplitude (m) of each
+    speed : all evaluated absolute input speeds, rad/s
+    stated : operating range, rad/s
+    """
+    low, high, whole = _range(stated, speed)
+    inside = sorted((peak for peak in peaks if low <= peak[1] <= high), key=lambda peak: -peak[3])
+    found = tuple(
+        Resonance(line.name, line.order, at, frequency, {"error": PeakAmplitude(amplitude, "", place)})
+        for place, (line, at, frequency, amplitude) in enumerate(inside, start=1)
+    )
+    return Ranking(found, (low, high), whole, SHAFTS)
 
 
 def _peaks(quantity: Quantity, values: Floats, inside: Booleans) -> list[tuple[int, int]]:

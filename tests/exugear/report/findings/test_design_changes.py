@@ -28,6 +28,7 @@ from exugear.report.findings.design_changes import (
     propose_changes,
 )
 from exugear.report.findings.loudness import Resonance
+from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.system.tooth_mesh import tables
 
 from ...cases.spur import COARSE_INPUT, SPUR_CASE
@@ -139,7 +140,7 @@ def test_a_study_computes_each_change_once_and_names_what_cannot_be_made(tmp_pat
     assert names == ["crowned", "housing", "wide"]
     assert all(math.isfinite(effect.this_peak) for effect in study.results[0].effects.values())
     assert study.results[2].refusal and not study.results[2].effects
-    stored = json.loads(study.path.read_text(encoding="utf-8"))
+    stored = json.loads((tmp_path / DESIGN_CHANGES_FILE).read_text(encoding="utf-8"))
     assert [result["change"]["name"] for result in stored["results"]] == names
     # Repeated, everything is read: no file of a response or table is written again.
     files = sorted((tmp_path / design_study.FOLDER).rglob("*.nc"))
