@@ -81,15 +81,23 @@ def best_changes(study: DesignStudy | None, headline: Headline, count: int) -> l
         return []
     if study.line != top.line or abs(study.frequency - top.frequency) > 0.01 * top.frequency:
         return []
-    lowered = [
-        (effect.this_peak, result.change.words)
+    lowered = sorted(
+        (effect.this_peak, effect.highest or 0.0, result.change.words)
         for result in study.results
         if result.change.group != ASSUMPTION
         and (effect := result.effects.get("error")) is not None
         and effect.this_peak is not None
         and effect.this_peak < 0.0
+    )
+    return [
+        (_decibels(here).shown + " dB", f"{_beginning(words)}; highest in range {_decibels(highest).shown} dB")
+        for here, highest, words in lowered[:count]
     ]
-    return [(f"−{rounded_text(-gain)} dB", words) for gain, words in sorted(lowered)[:count]]
+
+
+def _beginning(words: str) -> str:
+    """Return the text of a change without its details, which the table has."""
+    return words.split(" (")[0].split(",")[0]
 
 
 def _table(material: ReportData, results: Sequence[ChangeResult], caption: str, name: str) -> Table:
@@ -101,12 +109,15 @@ def _table(material: ReportData, results: Sequence[ChangeResult], caption: str, 
                 effect = result.effects.get(quantity, Effect(None, None))
                 row[f"{title}, this peak / dB"] = _decibels(effect.this_peak)
                 row[f"{title}, highest in range / dB"] = _decibels(effect.highest)
-        row["price"] = material.words.labelled(result.price) or "–"
+        row["price"] = material.words.labelled(result.price).replace(" -", " −") or "–"
         rows.append(row)
-    return Table(rows, ("change", "price"), caption=caption, name=name, sortable=True, stacked=True)
+    narrow = ("change", "transmission error", "price")
+    hidden = [key for key in (rows[0] if rows else ()) if not key.startswith(narrow)]
+    return Table(rows, ("change", "price"), caption=caption, name=name, hidden=hidden, sortable=True, stacked=True)
 
 
 def _decibels(value: float | None) -> Cell:
     if value is None:
         return Cell("–", math.nan)
-    return Cell(f"{value:+.1f}".replace("-", "−"), value)
+    text = f"{value:+.1f}".replace("-", "−")
+    return Cell("0.0" if text in ("+0.0", "−0.0") else text, value)

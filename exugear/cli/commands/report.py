@@ -210,7 +210,8 @@ def _print_changes(study: DesignStudy) -> None:
 def _decibels(value: float | None) -> str:
     if value is None:
         return "–"
-    return f"{value:+.1f}"
+    text = f"{value:+.1f}"
+    return "0.0" if text in ("+0.0", "-0.0") else text
 
 
 def _megabytes(memory: float) -> str:

@@ -16,9 +16,11 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
 from exugear.report import design_study
+from exugear.report.findings.context import OTHER_INPUT
 from exugear.report.findings.design_changes import (
     ChangeResult,
     DesignChange,
+    DesignStudy,
     Effect,
     effects_of,
     helix_change,
@@ -26,10 +28,12 @@ from exugear.report.findings.design_changes import (
     peaks_of,
     price_of,
     propose_changes,
+    read_design_study,
 )
 from exugear.report.findings.loudness import Resonance
 from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.system.tooth_mesh import tables
+from fe_ste.tools.files import FileError
 
 from ...cases.spur import COARSE_INPUT, SPUR_CASE
 
@@ -148,3 +152,53 @@ def test_a_study_computes_each_change_once_and_names_what_cannot_be_made(tmp_pat
     again = project.design_changes()
     assert [result.effects for result in again.results] == [result.effects for result in study.results]
     assert [path.stat().st_mtime_ns for path in files] == before
+    # The page lists what the file has, and nothing of another gearbox.
+    path = tmp_path / DESIGN_CHANGES_FILE
+    assert read_design_study(path) == study
+    page = project.report()
+    text = page.path.read_text(encoding="utf-8")
+    assert "too far apart" in text and 'id="design-changes"' in text and not page.left_out
+    reduction = next(line for line in page.statements if line.startswith("Reduction"))
+    assert ("crowned" in reduction) == (study.results[0].effects["error"].this_peak < 0.0)
+    path.write_text(json.dumps(stored | {"input_hash": "0"}), encoding="utf-8")
+    page = project.report()
+    assert page.left_out == (f"{DESIGN_CHANGES_FILE}: {OTHER_INPUT}",)
+    assert 'id="design-changes"' not in page.path.read_text(encoding="utf-8")
+
+
+def damaged_studies() -> dict[str, str]:
+    """Contents of files that are no studies."""
+    result = {"change": {"name": "a", "words": "a", "group": "gear", "keys": {}}, "effects": {}, "price": ""}
+    study = {
+        "model": {"variant": "bushing", "mesh_model": "table", "inertias": "discs"},
+        "input_hash": "0",
+        "line": "spur",
+        "frequency": 1.0,
+        "speed": 1.0,
+        "amplitudes": {},
+        "results": [result | {"refusal": ""}],
+    }
+    first = study["results"][0]
+    changed = {
+        "not JSON": "{",
+        "a list": "[]",
+        "deep": "[" * 100_000,
+        "no results": json.dumps({key: value for key, value in study.items() if key != "results"}),
+        "a text as results": json.dumps(study | {"results": "none"}),
+        "another key": json.dumps(study | {"more": 1}),
+        "a text as frequency": json.dumps(study | {"frequency": "high"}),
+        "NaN": json.dumps(study | {"speed": math.nan}),
+        "another group": json.dumps(study | {"results": [first | {"change": first["change"] | {"group": "?"}}]}),
+        "an effect of text": json.dumps(study | {"results": [first | {"effects": {"error": {"here": "much"}}}]}),
+    }
+    assert DesignStudy(**json.loads(json.dumps(study)))
+    return changed
+
+
+@pytest.mark.parametrize("damage", damaged_studies())
+def test_a_damaged_study_is_one_message(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / DESIGN_CHANGES_FILE
+    path.write_text(damaged_studies()[damage], encoding="utf-8")
+    with pytest.raises(FileError, match="cannot be read as design changes") as caught:
+        read_design_study(path)
+    assert "--levers" in str(caught.value) and len(str(caught.value)) < 500
