@@ -23,7 +23,15 @@ from exugear.cli.console import BadInputError, exit_codes, note, print_json, say
 from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from exugear.system.modes import Modes
+    from exugear.system.system import Assembly
+
+SHOWN_ENERGIES = 3
+"""Number of listed fractions of the strain energy."""
+SHOWN_RESONANCES = 10
+"""Number of listed resonances of the ranking."""
 
 
 def view(
@@ -63,9 +71,10 @@ def view(
 
 def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list[Path]:
     """Write the page of all elastic modes, and pictures of the gearbox and one mode if this machine can render."""
-    from exugear.report.findings.words import Labels
+    from exugear.report.findings.context import model_label
+    from exugear.report.findings.words import Labels, percentages
     from exugear.report.pictures.shapes import bodies_of, motions_of
-    from exugear.report.web.stage import write_mode_page
+    from exugear.report.web.stage import ModeRow, write_mode_page
 
     assembly = found.assembly
     drawn = {body.name for body in bodies_of(assembly.gearbox)}
@@ -79,16 +88,55 @@ def _draw_modes(found: Modes, folder: Path, first: int, animation: bool) -> list
     shown = places.index(first) if first in places else 0
     words = Labels(assembly.gearbox)
     modes = found.to_dataset()
+    resonances = _resonances(assembly, modes, folder)
+    rows = [
+        ModeRow(
+            place + 1,
+            float(found.frequency[place]),
+            float(modes["damping_ratio"][place]),
+            words.moves(modes, place),
+            percentages(words.strain_energy(modes, place), SHOWN_ENERGIES, 0.1),
+            "; ".join(resonances.get(place, ())),
+        )
+        for place in places
+    ]
     page = write_mode_page(
         assembly,
         found.shapes[:, places],
-        [(float(found.frequency[place]), words.moves(modes, place)) for place in places],
+        rows,
         folder / "modes.html",
-        heading=f"{assembly.gearbox.name}, {found.label}",
+        heading=f"{assembly.gearbox.name}, {model_label(assembly.choice)}",
         first=shown,
         labels=words.labels,
     )
     return [page, *_draw_pictures(found, folder, places[shown], animation)]
+
+
+def _resonances(assembly: Assembly, modes: xr.Dataset, folder: Path) -> dict[int, list[str]]:
+    """Return the highest resonances in the operating range at each mode, from a stored steady-state response."""
+    from exugear.gearbox.units import RPM
+    from exugear.report.findings.headline import Headline
+    from exugear.report.findings.loudness import ranking_of
+    from exugear.steady.steady_file import load_response, settings_of
+    from fe_ste.tools.files import FileError
+
+    found: dict[int, list[str]] = {}
+    for path in sorted(folder.glob("steady-*.nc")):
+        try:
+            data = load_response(path)
+            fits = settings_of(data.attrs).hash_with(assembly) == data.attrs["input_hash"]
+        except (FileError, ValueError, KeyError):
+            continue
+        if not fits:
+            continue
+        headline = Headline(assembly.choice, "", "", ranking_of(data), None, data, modes)
+        for number, resonance in enumerate(headline.ranking.resonances[:SHOWN_RESONANCES], start=1):
+            mode = headline.mode_of(resonance)
+            if mode is not None:
+                speed = abs(resonance.speed) / RPM
+                found.setdefault(mode.index, []).append(f"{number}: {resonance.line}, {speed:.4g} rpm")
+        break
+    return found
 
 
 def _draw_pictures(modes: Modes, folder: Path, place: int, animation: bool) -> list[Path]:

@@ -243,10 +243,27 @@ MOST_DEFORMED = 60
 """Maximum number of modes in which flexible bodies deform: the first in the list."""
 
 
+@dataclass(frozen=True)
+class ModeRow:
+    """Mode in the list of the page."""
+
+    number: int
+    """Number of the command line."""
+    frequency: float
+    damping: float
+    """Hz, and ratio to critical damping."""
+    moves: str
+    """Mode shape as text."""
+    strain: str = ""
+    """Parts with most strain energy."""
+    resonances: str = ""
+    """Resonances in operation at this mode."""
+
+
 def write_mode_page(
     assembly: Assembly,
     shapes: Floats,
-    titles: Sequence[tuple[float, str]],
+    rows: Sequence[ModeRow],
     path: str | Path,
     *,
     heading: str = "Mode shapes",
@@ -259,7 +276,7 @@ def write_mode_page(
     ----------
     assembly : vibrating system
     shapes : (size, modes) modes for selection
-    titles : frequency (Hz) and mode shape description of each
+    rows : of the list, one for each mode
     path : output file
     heading : gearbox, variant, mesh model and inertia set
     first : mode that is shown when the page opens
@@ -269,14 +286,12 @@ def write_mode_page(
     Raises
     ------
     ValueError
-        If there is no mode, or the number of titles differs.
+        If there is no mode, or the number of rows differs.
     """
-    if not titles or shapes.shape[1] != len(titles):
-        raise ValueError(
-            f"mode page: {shapes.shape[1]} modes with {len(titles)} titles; at least one of each is needed"
-        )
+    if not rows or shapes.shape[1] != len(rows):
+        raise ValueError(f"mode page: {shapes.shape[1]} modes with {len(rows)} rows; at least one of each is needed")
     arrays = ArrayStore()
-    near = sorted(range(len(titles)), key=lambda mode: abs(mode - first))[:MOST_DEFORMED]
+    near = sorted(range(len(rows)), key=lambda mode: abs(mode - first))[:MOST_DEFORMED]
     data: dict[str, Any] = {
         "name": heading,
         "input": "",
@@ -292,25 +307,36 @@ def write_mode_page(
                 "stage": stage_data(assembly, shapes, labels or {}, arrays, near if assembly.elastic_bodies else ()),
                 "modes": [
                     {
-                        "frequency": rounded(frequency, 6),
-                        "damping": 0.0,
-                        "words": words,
+                        "number": row.number,
+                        "frequency": rounded(row.frequency, 6),
+                        "damping": rounded(row.damping, 4),
+                        "words": row.moves,
                     }
-                    for frequency, words in titles
+                    for row in rows
                 ],
             }
         },
     }
     target = Path(path)
-    rows = [
+    shown = [
         {
-            "No.": Cell(str(number + 1), number + 1),
-            "Frequency / Hz": Cell(f"{frequency:.1f}", frequency, f"mode:{MODEL}:{number}"),
-            "Mode shape": words,
+            "No.": Cell(str(row.number), row.number),
+            "frequency / Hz": Cell(f"{row.frequency:.1f}", row.frequency, f"mode:{MODEL}:{place}"),
+            "damping / %": Cell(f"{100.0 * row.damping:.1f}", 100.0 * row.damping),
+            "mode shape": row.moves,
+            "resonances": row.resonances or "–",
+            "strain energy": row.strain or "–",
         }
-        for number, (frequency, words) in enumerate(titles)
+        for place, row in enumerate(rows)
     ]
-    table = Table(rows, ("Mode shape",), caption="Modes", name="modes", sortable=True)
+    table = Table(
+        shown,
+        ("mode shape", "strain energy", "resonances"),
+        caption="Modes",
+        name="modes",
+        hidden=("damping / %", "strain energy"),
+        sortable=True,
+    )
     body = render("mode_page", heading=heading, table=table)
     page = whole_page(heading, body, "mode_page", data, arrays, ("three.min.js",))
     write_file(target, page.encode("utf-8", errors="replace"))

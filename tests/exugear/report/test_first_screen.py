@@ -58,7 +58,7 @@ def view(browser: Any, folder: Path, told: dict[str, Any]) -> Iterator[View]:
     view = opened(browser, "desk")
     view.open(folder / "report.html")
     yield view
-    assert view.faults == []
+    assert view.errors == []
     view.page.context.close()
 
 
@@ -157,5 +157,5 @@ class TestInABrowser:
         assert "Hz" in plain.page.locator("#short .headline").inner_text()
         assert plain.page.locator("#campbell svg:visible").count() == 1
         assert plain.page.locator("#resonances tbody tr:visible").count() >= 5
-        assert plain.faults == []
+        assert plain.errors == []
         plain.page.context.close()

@@ -12,8 +12,10 @@ function markMode() {
   for (const button of document.querySelectorAll("button[data-choice]")) {
     const own = button instanceof HTMLElement && button.dataset.choice === chosen;
     button.closest("tr")?.classList.toggle("chosen", own);
-    if (own) button.setAttribute("aria-current", "true");
-    else button.removeAttribute("aria-current");
+    if (own) {
+      button.setAttribute("aria-current", "true");
+      button.closest("tr")?.scrollIntoView({ block: "nearest" });
+    } else button.removeAttribute("aria-current");
   }
   const words = pageData.models[state.model]?.modes[state.mode]?.words;
   if (words) need("mode-words").textContent = words;

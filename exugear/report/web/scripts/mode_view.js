@@ -35,6 +35,15 @@ export function beginModeView() {
     stage.colour();
     stage.draw();
   });
+  need("at-rest").addEventListener("change", (event) => {
+    stage?.showRest(/** @type {HTMLInputElement} */ (event.target).checked);
+  });
+  need("views").addEventListener("click", (event) => {
+    const look = event.target instanceof HTMLElement ? event.target.dataset.look : undefined;
+    if (!look || !stage) return;
+    stage.lookFrom(look.split(" ").map(Number));
+    stage.draw();
+  });
   window.addEventListener("beforeprint", keepStill);
 }
 
@@ -60,7 +69,7 @@ export async function drawMode() {
   const title = find("mode-title");
   if (!model || !title) return;
   const mode = model.modes[state.mode];
-  title.textContent = mode ? `Mode at ${mode.frequency.toFixed(1)} Hz` : "No matching mode";
+  title.textContent = mode ? `Mode ${mode.number ?? state.mode + 1} at ${mode.frequency.toFixed(1)} Hz` : "No matching mode";
   if (!stage) return;
   stage.canvas.setAttribute("aria-label", mode ? `Mode at ${figureText(mode.frequency, 5)} Hz: ${mode.words}` : "At rest");
   const current = stage;

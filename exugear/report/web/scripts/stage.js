@@ -24,11 +24,14 @@ export class Stage {
     this.controls.addEventListener("change", () => this.draw());
     /** @type {Actor[]} */
     this.actors = [];
+    /** @type {any[]} */
+    this.ghosts = [];
     /** @type {Set<string>} */
     this.hidden = new Set();
     this.amplitude = 1;
     this.byBody = false;
     this.playing = false;
+    this.resting = false;
     this.phase = 1;
     /** @type {import("./page_data.js").StageData | null} */
     this.data = null;
@@ -74,6 +77,7 @@ export class Stage {
 
   /** @param {import("./page_data.js").StageData} data @param {Actor[]} actors */
   enter(data, actors) {
+    this.ghosts.forEach((ghost) => this.scene.remove(ghost));
     for (const actor of this.actors) {
       this.scene.remove(actor.mesh);
       actor.mesh.geometry.dispose();
@@ -83,8 +87,17 @@ export class Stage {
     this.data = data;
     this.actors = actors;
     for (const actor of actors) this.scene.add(actor.mesh);
+    this.ghosts = actors.filter((actor) => !actor.data.fixed).map(ghostOf);
+    this.showRest(this.resting);
     if (first) this.lookFrom([0.75, 0.45, -1]);
     this.resize();
+  }
+
+  /** Draw the bodies at rest, too, translucent. @param {boolean} on */
+  showRest(on) {
+    this.resting = on;
+    for (const ghost of this.ghosts) on ? this.scene.add(ghost) : this.scene.remove(ghost);
+    this.draw();
   }
 
   /** @param {number[]} direction from the middle to the eye */
@@ -249,6 +262,17 @@ async function actorOf(data) {
   const own = new THREE.Matrix4().makeRotationZ(data.turn).setPosition(new THREE.Vector3(...data.reference));
   const turned = data.elastic ? rest : turnedPoints(rest, data.turn);
   return { data, mesh, rest: turned, colours, own };
+}
+
+/** A translucent copy of a body at rest. @param {Actor} actor @returns {any} */
+function ghostOf(actor) {
+  const material = new THREE.MeshLambertMaterial({ color: 0x5b6b7c, side: THREE.DoubleSide, flatShading: true });
+  Object.assign(material, { transparent: true, opacity: 0.22, depthWrite: false });
+  const ghost = new THREE.Mesh(actor.mesh.geometry.clone(), material);
+  ghost.matrixAutoUpdate = false;
+  ghost.frustumCulled = false;
+  if (!actor.data.elastic) ghost.matrix.copy(actor.own);
+  return ghost;
 }
 
 /** Points of a body in the axes of the gearbox, from its reference. @param {Float32Array} rest @param {number} turn */
