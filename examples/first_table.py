@@ -12,7 +12,7 @@ Two gears are described, meshed with finite elements, and rotated through one me
 import math
 
 from fe_ste import Gear, GearPair, static_transmission_error
-from fe_ste.pictures.diagrams import plot_load_share, plot_ste_curves
+from fe_ste.transmission_error.diagrams import plot_load_share, plot_ste_curves
 
 helix = math.radians(12.0)
 pinion = Gear(

@@ -13,7 +13,7 @@ import numpy as np
 
 from fe_ste import FlankModification, Gear, GearPair, Relief, pair_compliance, static_transmission_error
 from fe_ste.flanks import radius_at_roll_length_from_tip
-from fe_ste.pictures.diagrams import plot_ripple, plot_ste_curves
+from fe_ste.transmission_error.diagrams import plot_ripple, plot_ste_curves
 
 gear = Gear(name="gear", teeth=40, normal_module=3e-3, face_width=25e-3, held_diameter=80e-3)
 pair = GearPair(name="spur", pinion=gear, gear=gear, centre_distance=120e-3)

@@ -17,10 +17,10 @@ from exugear.gearbox.units import RPM
 from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from exugear.system.tooth_mesh.tables import TableRequest
-from fe_ste.pictures.diagrams import plot_load_share, plot_ste_curves
 from fe_ste.pictures.teeth import contact_quads, draw_tooth_contact, meshed_teeth
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
+from fe_ste.transmission_error.diagrams import plot_load_share, plot_ste_curves
 from fe_ste.transmission_error.search import contact_state
 from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 
