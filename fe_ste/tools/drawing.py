@@ -76,7 +76,7 @@ def axes_or_new(ax: Axes | None, width: float = 5.0, height: float = 3.4) -> Ite
 
     Parameters
     ----------
-    width, height : size of a new figure, inches
+    width, height : size of a new picture, inches
     """
     if ax is None:
         with drawing_style():

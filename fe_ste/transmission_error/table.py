@@ -228,7 +228,7 @@ class MeshTable(ReprMixin):
             Over the mesh cycle the static transmission error ``ste`` (µm), the mesh ``stiffness`` (N/µm) or the
             ``load_share`` of each tooth pair (%); ``contact``: line load along the face (N/mm), mean of the mesh cycle.
             Positions that have not converged are crossed out.
-        ax : matplotlib axes; by default those of a new figure, which is their attribute ``figure``
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
 
         Raises
         ------

@@ -24,6 +24,7 @@ from exugear.results.spectra.resonances import (
     pick_resonances,
 )
 from exugear.results.spectra.waterfall import OrderLine, Waterfall, sweep_matched_window, waterfall
+from exugear.system.modes import participation
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin, TitledRows
 
@@ -34,16 +35,8 @@ NEAR = 0.05
 
 
 def mobility_shares(modes: xr.Dataset) -> Floats:
-    """Participation of each mode in the overall transmission error (TE), shape (n,); the sum is one.
-
-    The participation is the square of the overall TE of a mode with unit modal mass, divided by the sum of these
-    squares over all modes. This sum is r M^-1 r^T, independent of the stiffness, so that the participation is
-    dimensionless.
-    """
-    squares = modes["overall_dte"].to_numpy() ** 2
-    total = float(squares.sum())
-    shares: Floats = squares / total if total > 0.0 else np.zeros(squares.shape)
-    return shares
+    """Participation of each stored mode, see `exugear.system.modes.participation`."""
+    return participation(modes["overall_dte"].to_numpy())
 
 
 @dataclass(frozen=True)
