@@ -23,6 +23,7 @@ from exugear.gearbox.reading import GearboxFileError
 from exugear.report.findings.design_changes import (
     ChangeResult,
     DesignChange,
+    effects_in_decibels,
     effects_of,
     exciting_families,
     ordered,
@@ -43,6 +44,7 @@ from fe_ste.tools.files import write_file
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
     from exugear.system.bearings.duty import BearingLoadState
     from exugear.system.modes import Modes
@@ -102,6 +104,30 @@ class DesignStudy:
     """Changes of the design by their effect, then assumptions, then changes that cannot be made."""
     path: Path
     """File with the results."""
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw what each change does to the three quantities, in dB, as `exugear report --levers` lists it.
+
+        Narrow dark bars: this peak; wide pale bars: highest amplitude of any order in the operating range. Changes that
+        cannot be made are left out.
+
+        Parameters
+        ----------
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Examples
+        --------
+        >>> from exugear.report.findings.design_changes import Effect
+        >>> wider = DesignChange("wider", "face width 40 to 48 mm", "gear", {})
+        >>> results = (ChangeResult(wider, {"error": Effect(-6.0, -3.5)}, "+2 kg"),)
+        >>> ax = DesignStudy(Resonance("stage_1", 21.0, 100.0, 334.0, {}), results, Path("changes.json")).plot()
+        >>> [label.get_text() for label in ax.get_yticklabels()], [float(bar.get_width()) for bar in ax.patches]
+        (['face width 40 to 48 mm'], [-3.5, -6.0])
+        """
+        from exugear.report.pictures.diagrams import draw_effects  # for drawing only
+
+        made = [result for result in self.results if not result.refusal]
+        return draw_effects([result.change.words for result in made], effects_in_decibels(made), ax)
 
 
 def study_design_changes(

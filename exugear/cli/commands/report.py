@@ -148,24 +148,25 @@ QUANTITIES = {"error": "TE", "force": "force", "acceleration": "accel."}
 
 def _print_changes(study: DesignStudy) -> None:
     """Print the effects of the design changes: on this peak, and on the highest amplitude in the operating range."""
-    from exugear.report.findings.design_changes import Effect
+    from exugear.report.findings.design_changes import effects_in_decibels
 
     resonance = study.resonance
     speed = abs(resonance.speed) / RPM
     title = f"Design changes for {resonance.frequency:.3g} Hz at {speed:.4g} rpm, {resonance.line}, dB"
     rows = []
-    for result in study.results:
+    effects = effects_in_decibels(study.results)
+    for number, result in enumerate(study.results):
         row = {"change": result.change.words}
         for name, words in QUANTITIES.items():
-            effect = result.effects.get(name, Effect(None, None))
-            row[f"{words}\nhere"] = _decibels(effect.this_peak)
-            row[f"{words}\nrange"] = _decibels(effect.highest)
+            here, highest = effects[name][number]
+            row[f"{words}\nhere"] = _decibels(here)
+            row[f"{words}\nrange"] = _decibels(highest)
         rows.append({**row, "price": result.refusal or result.price})
     print_table(title, rows, ("change", "price"), legend="here: this peak; range: highest amplitude of any order.")
 
 
-def _decibels(value: float | None) -> str:
-    if value is None:
+def _decibels(value: float) -> str:
+    if math.isnan(value):
         return "–"
     return f"{value:+.1f}"
 

@@ -50,8 +50,6 @@ LEAST_AMPLITUDE = 1e-12
 """Amplitude of the overall transmission error below which a peak is round-off, m."""
 SHOWN_RESONANCES = 15
 SHOWN_BEARINGS = 4
-KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2"}
-"""Units in the keys of `--json`."""
 COLUMNS = {
     "error": ("overall\nTE µm", 1e6),
     "force": ("bearing\nforce kN", 1e-3),
@@ -321,7 +319,7 @@ def _whole_summary(
         "ranked_speeds_rpm": [speed / RPM for speed in ranking.speeds],
         "ranked_over_all_speeds": ranking.whole,
         "accelerations_of": ranking.accelerates,
-        "resonances": [_resonance_summary(resonance) for resonance in ranking.resonances],
+        "resonances": [resonance.to_row() for resonance in ranking.resonances],
         "peaks_of_overall_dte": [_summary(peak) for peak in found],
         "file": str(project.steady_path(settings)),
     }
@@ -481,29 +479,6 @@ def _summary(peak: Peak) -> dict[str, Any]:
         "frequency_Hz": peak.frequency,
         "amplitude_m": peak.amplitude,
     }
-
-
-def _resonance_summary(resonance: Resonance) -> dict[str, Any]:
-    from exugear.gearbox.units import RPM
-
-    found: dict[str, Any] = {
-        "line": resonance.line,
-        "order": resonance.order,
-        "speed_rpm": resonance.speed / RPM,
-        "frequency_Hz": resonance.frequency,
-        "best_place": resonance.best,
-    }
-    for quantity, peak in resonance.amplitudes.items():
-        found[f"{quantity}_{KEYS[quantity]}"] = peak.amplitude
-        found[f"{quantity}_place"] = peak.place
-        if peak.at:
-            found[f"{quantity}_at"] = peak.at
-        if peak.limits:
-            lowest, highest = peak.limits
-            found[f"{quantity}_lowest_damping_{KEYS[quantity]}"] = lowest.amplitude
-            found[f"{quantity}_highest_damping_{KEYS[quantity]}"] = highest.amplitude
-            found[f"{quantity}_places_over_damping"] = peak.places
-    return found
 
 
 def _row(resonance: Resonance) -> dict[str, str]:

@@ -21,7 +21,7 @@ from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG
 from exugear.gearbox.sections.gears import ModificationSection
 from exugear.gearbox.units import MM, UM
 from exugear.report.findings.loudness import Resonance
-from exugear.steady.mean_system.signals import quantities_of
+from exugear.steady.mean_system.signals import SIGNALS, quantities_of
 from fe_ste.geometry.gears import GearPair
 from fe_ste.geometry.involute import involute
 from fe_ste.standards.pitting import nominal_contact_stress
@@ -368,6 +368,20 @@ def _gear_mass(gearbox: Gearbox) -> float:
         for gear in gearbox.gears.values()
     ]
     return sum(masses)
+
+
+def effects_in_decibels(results: Sequence[ChangeResult]) -> dict[str, Floats]:
+    """Effects (changes, 2) on this peak and on the highest amplitude in the range, dB, by quantity; NaN without one."""
+    return {
+        quantity: np.array(
+            [
+                (math.nan, math.nan) if effect is None else (effect.this_peak, effect.highest)
+                for effect in (result.effects.get(quantity) for result in results)
+            ],
+            dtype=np.float64,
+        ).reshape(-1, 2)
+        for quantity in SIGNALS
+    }
 
 
 def ordered(results: Sequence[ChangeResult]) -> list[ChangeResult]:

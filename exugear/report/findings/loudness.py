@@ -9,12 +9,13 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.units import RPM
 from exugear.report.findings.context import choice_of
 from exugear.results.spectra.line_spectra import LineSpectra, line_spectra
 from exugear.results.spectra.waterfall import OrderLine
@@ -26,6 +27,7 @@ from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Booleans, Floats
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 SAME_SPEED_TOLERANCE = 0.01
@@ -37,6 +39,8 @@ MIN_EXCITED = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9}
 SHAFTS = "shafts"
 HOUSING = "housing"
 BOTH = "shafts and housing"
+UNITS_IN_KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2"}
+"""Units of the quantities in keys of tables."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,28 @@ class Resonance:
         """Best rank in any quantity."""
         return min(own.place for own in self.amplitudes.values() if own.place is not None)
 
+    def to_row(self) -> dict[str, Any]:
+        """Row of a table, as `resonances` and the command `steady --json` have it; units in the keys."""
+        row: dict[str, Any] = {
+            "line": self.line,
+            "order": self.order,
+            "speed_rpm": self.speed / RPM,
+            "frequency_Hz": self.frequency,
+            "best_place": self.best,
+        }
+        for quantity, peak in self.amplitudes.items():
+            unit = UNITS_IN_KEYS[quantity]
+            row[f"{quantity}_{unit}"] = peak.amplitude
+            row[f"{quantity}_place"] = peak.place
+            if peak.at:
+                row[f"{quantity}_at"] = peak.at
+            if peak.limits:
+                lowest, highest = peak.limits
+                row[f"{quantity}_lowest_damping_{unit}"] = lowest.amplitude
+                row[f"{quantity}_highest_damping_{unit}"] = highest.amplitude
+                row[f"{quantity}_places_over_damping"] = peak.places
+        return row
+
 
 @dataclass(frozen=True)
 class Ranking:
@@ -142,6 +168,55 @@ def ranking_of(data: xr.Dataset) -> Ranking:
     limits = _limits(data, quantities, peaks)
     found = tuple(_resonance(data, quantities, sizes, group, limits) for group in groups)
     return Ranking(found, (low, high), whole, _accelerating_parts(data))
+
+
+def resonances(data: xr.Dataset) -> pd.DataFrame:
+    """Rank the resonances of a steady-state response within the operating range, as `exugear steady` lists them.
+
+    Parameters
+    ----------
+    data : result of `exugear.project.Project.steady` or `exugear.steady.steady_file.steady_response`
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a resonance, sorted by the best rank in any quantity: order, input speed, frequency; amplitude, rank
+        (empty without a peak) and bearing of each quantity, and its amplitudes with the lowest and the highest
+        plausible damping. SI units, speeds in rpm.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from exugear import Choice, Gearbox, SpeedRange, SteadySettings, steady_response
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
+    >>> mean = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> stiffness = {name: value * shape for name, value in mean.items()}
+    >>> settings = SteadySettings(SpeedRange.from_text("15:25:11"))
+    >>> table = resonances(steady_response(gearbox, Choice("rigid"), stiffness, settings=settings))
+    >>> table[["line", "error_place"]].head(1)
+                  line  error_place
+    0  2 x intermediate            1
+    """
+    import pandas as pd
+
+    table = pd.DataFrame([resonance.to_row() for resonance in ranking_of(data).resonances])
+    return table.astype({name: "Int64" for name in table if str(name).endswith("_place")})
+
+
+def order_amplitudes(data: xr.Dataset, quantity: str) -> Floats:
+    """Amplitude (points, orders) of a quantity along each order but 0, at the bearing where it is largest.
+
+    Raises
+    ------
+    ValueError
+        The response has no such quantity; those of bearings are missing without bearings.
+    """
+    quantities = {own.name: own for own in quantities_of([str(name) for name in data["signal"].to_numpy()])}
+    if quantity not in quantities:
+        raise ValueError(f"quantity = {quantity!r}: must be one of {', '.join(quantities)}")
+    sizes = quantities[quantity].sizes(data["amplitude"].to_numpy()[:, 1:].astype(np.float64))
+    return np.asarray(sizes.max(axis=2))
 
 
 Limits = Mapping[tuple[int, int, str], tuple[Limit, Limit]]

@@ -1,29 +1,30 @@
-"""Diagrams of modes (Campbell), of run-ups (waterfalls with order lines) and of transmission error tables.
-
-Functions for modes and runs take arrays or spectra of `exugear.results.spectra` and return a matplotlib `Figure`;
-they need no display.
-"""
+"""Diagrams of modes (Campbell), of steady-state responses and design changes, and pictures of tables."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.units import RPM
+from exugear.report.findings.loudness import order_amplitudes, ranking_of
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.system.diagrams import draw_campbell
 from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.pictures.teeth import contact_quads, draw_tooth_contact, meshed_teeth
-from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
+from fe_ste.tools.arrays import Floats
+from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable, drawing_style, finish_figure, new_figure
 from fe_ste.transmission_error.diagrams import plot_load_share, plot_ste_curves
 from fe_ste.transmission_error.search import contact_state
 from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 
 if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -68,6 +69,106 @@ def plot_campbell(
         if orders:
             figure.legend(loc="outside upper center", ncols=4)
         return finish_figure(figure, path)
+
+
+# Steady-state responses over speed, and design changes
+
+QUANTITIES = {
+    "error": ("Overall transmission error / µm", 1e6),
+    "force": ("Bearing force / kN", 1e-3),
+    "acceleration": ("Acceleration at bearings / (m/s²)", 1.0),
+}
+"""Axis labels of the three quantities, and factors from SI units."""
+SHOWN_RESONANCES = 10
+"""Maximum number of resonances with a circle, whose orders have a curve."""
+SHOWN_RANGE = 1e-4
+"""Lowest drawn amplitude as a fraction of the highest."""
+
+
+def plot_response(
+    data: xr.Dataset, quantity: Literal["error", "force", "acceleration"] = "error", ax: Axes | None = None
+) -> Axes:
+    """Draw the amplitudes of a steady-state response over speed: the highest of all orders, and those with resonances.
+
+    Circles are the ten highest resonances that `exugear.resonances` and `exugear steady` rank, with their rank; the
+    operating range is tinted.
+
+    Parameters
+    ----------
+    data : result of `exugear.project.Project.steady` or `exugear.steady.steady_file.steady_response`
+    quantity : force and acceleration: at the bearing with the largest amplitude, for planets root mean square
+    ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+    Raises
+    ------
+    ValueError
+        The response has no such quantity; those of bearings are missing without bearings.
+
+    Examples
+    --------
+    >>> from exugear import Choice, Gearbox, SpeedRange, SteadySettings, steady_response
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
+    >>> mean = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> stiffness = {name: value * shape for name, value in mean.items()}
+    >>> settings = SteadySettings(SpeedRange.from_text("15:25:11"))
+    >>> ax = plot_response(steady_response(gearbox, Choice("rigid"), stiffness, settings=settings))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('Input speed / rpm', 'Overall transmission error / µm')
+    """
+    amplitude = order_amplitudes(data, quantity)
+    label, factor = QUANTITIES[quantity]
+    speed = np.abs(data["speed"].to_numpy()) / RPM
+    orders = data["order"].to_numpy()[1:]
+    ranking = ranking_of(data)
+    places = {own.amplitudes[quantity].place: own for own in ranking.resonances}
+    ranked = {place: places[place] for place in range(1, SHOWN_RESONANCES + 1) if place in places}
+    lines = {own.line: int(np.argmin(np.abs(orders - own.order))) for own in ranked.values()}
+    colours = dict(zip(lines, itertools.cycle(COLOURS), strict=False))
+    with axes_or_new(ax, 6.5, 4.0) as panel:
+        panel.plot(speed, factor * amplitude.max(axis=1), color="#BBBBBB", linewidth=3.0, label="highest order")
+        for name, colour in colours.items():
+            panel.plot(speed, factor * amplitude[:, lines[name]], color=colour, linewidth=1.0, label=drawable(name))
+        for place, resonance in ranked.items():
+            highest = resonance.amplitudes[quantity].amplitude
+            point = int(np.argmin(np.abs(amplitude[:, lines[resonance.line]] - highest)))
+            at = speed[point], factor * highest
+            panel.plot(*at, "o", color=colours[resonance.line], markerfacecolor="none")
+            panel.annotate(str(place), at, (0, 5), textcoords="offset points", ha="center", fontsize=7.0)
+        if not ranking.whole:
+            panel.axvspan(*(value / RPM for value in ranking.speeds), color="#EEEEEE", zorder=0)
+        highest = factor * float(amplitude.max(initial=0.0))
+        if highest > 0.0:
+            panel.set(yscale="log", ylim=(SHOWN_RANGE * highest, 2.0 * highest))
+        panel.set(xlabel="Input speed / rpm", ylabel=label)
+        panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        return panel
+
+
+def draw_effects(names: Sequence[str], effects: Mapping[str, Floats], ax: Axes | None = None) -> Axes:
+    """Draw effects (changes, 2) of design changes as bars, see `exugear.report.design_study.DesignStudy.plot`.
+
+    Parameters
+    ----------
+    names : of the changes
+    effects : on this peak and on the highest amplitude in the range, dB, by quantity
+    """
+    known = {quantity: values for quantity, values in effects.items() if not np.isnan(values).all()}
+    places = np.arange(len(names))
+    height = 0.8 / max(1, len(known))
+    with axes_or_new(ax, 8.0, 1.2 + 0.45 * len(names)) as panel:
+        for number, (quantity, values) in enumerate(known.items()):
+            at = places + (number - 0.5 * (len(known) - 1)) * height
+            label = QUANTITIES[quantity][0].partition(" / ")[0]
+            panel.barh(at, values[:, 1], 0.95 * height, color=COLOURS[number], alpha=0.35, label=f"{label}, range")
+            panel.barh(at, values[:, 0], 0.4 * height, color=COLOURS[number], label=f"{label}, this peak")
+        panel.set_yticks(places, [drawable(name) for name in names], parse_math=False)
+        panel.invert_yaxis()
+        panel.axvline(0.0, color="black", linewidth=0.8)
+        panel.set_xlabel("Change of the amplitude / dB")
+        if known:
+            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(known))
+        return panel
 
 
 # Pictures of the transmission error tables of a gearbox

@@ -20,6 +20,7 @@ from exugear.report.findings.design_changes import (
     ChangeResult,
     DesignChange,
     Effect,
+    effects_in_decibels,
     effects_of,
     helix_change,
     ordered,
@@ -108,6 +109,21 @@ def test_changes_are_sorted_with_assumptions_and_refusals_behind() -> None:
     assumed = ChangeResult(replace(change, group="assumption"), {"error": Effect(-20.0, -20.0)}, "")
     refused = ChangeResult(change, {}, "", "does not fit")
     assert ordered([refused, assumed, worse, better]) == [better, worse, assumed, refused]
+
+
+def test_the_diagram_of_changes_has_both_effects_of_those_that_can_be_made() -> None:
+    known = {"error": Effect(-6.0, -2.0), "force": Effect(1.0, None)}
+    results = tuple(
+        ChangeResult(DesignChange(name, f"{name} it", "gear", {}), effects, "", refusal)
+        for name, effects, refusal in (("widen", known, ""), ("turn", {}, "does not fit"), ("soften", {}, ""))
+    )
+    panel = design_study.DesignStudy(RESONANCE, results, Path("changes.json")).plot()
+    assert [label.get_text() for label in panel.get_yticklabels()] == ["widen it", "soften it"]
+    effects = effects_in_decibels([results[0], results[2]])
+    drawn = np.array([bar.get_width() for bar in panel.patches]).reshape(2, 2, 2)  # quantity, range or peak, change
+    np.testing.assert_array_equal(drawn, [effects[name].T[::-1] for name in ("error", "force")])
+    np.testing.assert_array_equal(effects["error"], [[-6.0, -2.0], [math.nan, math.nan]])
+    assert panel.get_xlabel() == "Change of the amplitude / dB"
 
 
 def test_the_price_names_mass_axial_force_stress_and_life(grc: Gearbox) -> None:
