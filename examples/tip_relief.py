@@ -43,7 +43,8 @@ ripples = {
     f"{amount:g} um": static_transmission_error(relieved(1e-6 * amount), torque=torques, positions=15)
     for amount in (0.0, 6.0, 12.0, 18.0)
 }
-plot_ripple(ripples)
+print("diagrams in results/tip_relief")
+plot_ripple(ripples, "results/tip_relief/ripple.png")
 
 # %%
 # Each relief has a load with a minimum of the peak-to-peak value; more relief suits a higher load. Below that load,
@@ -58,4 +59,5 @@ for name, dataset in ripples.items():
 # %%
 # The curves at 300 N m show the reason.
 
-plot_ste_curves({name: dataset.sel(torque=[300.0]) for name, dataset in ripples.items()})
+at_300 = {name: dataset.sel(torque=[300.0]) for name, dataset in ripples.items()}
+plot_ste_curves(at_300, "results/tip_relief/ste.png")

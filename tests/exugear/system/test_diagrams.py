@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from exugear.gearbox.choice import Choice
@@ -9,9 +10,11 @@ from exugear.gearbox.units import RPM
 from exugear.results.spectra.run_spectra import mobility_shares, report_mode
 from exugear.results.spectra.waterfall import order_lines
 from exugear.system.build import assemble
+from exugear.system.diagrams import draw_campbell, draw_energies, draw_misalignment
 from exugear.system.modes import VISIBLE, modes_of
 from exugear.system.operating_points import mesh_duties
 from exugear.system.statics import static_state
+from fe_ste.tools.drawing import axes_or_new
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +61,16 @@ def test_the_static_state_draws_the_misalignment_that_the_command_lists(modes):
     drawn = dict(zip(names, (bar.get_width() for bar in panel.patches), strict=True))
     assert drawn == pytest.approx({duty.name: 1e3 * duty.misalignment for duty in mesh_duties(modes.assembly)})
     assert panel.get_xlabel() == "Misalignment / mrad"
+
+
+def test_any_name_can_be_drawn_on_axes_of_the_caller():
+    figure = Figure()
+    first, second, third = figure.subplots(1, 3)
+    names = ["$\\frac", "a\x1bb"]
+    draw_misalignment(names, np.array([1e-3, -1e-3]), first)
+    draw_energies(dict.fromkeys(names, np.array([0.5, 1.0])), second)
+    with axes_or_new(third) as panel:
+        draw_campbell(panel, np.array([100.0]), {names[0]: 20.0, names[1]: 40.0}, 50.0, 200.0, np.ones(1))
+        panel.legend()
+    FigureCanvasAgg(figure).draw()
+    assert [label.get_text() for label in first.get_yticklabels()] == ["$\\frac", "a\ufffdb"]
