@@ -272,7 +272,7 @@ class Modes(ReprMixin):
         with axes_or_new(ax, 7.2, 5.0) as panel:
             draw_campbell(panel, self.frequency[seen], gearbox.mesh_orders(), fastest, top, weights)
             if panel.lines:
-                panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4)
+                panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
             return panel
 
     def to_dataset(self) -> xr.Dataset:

@@ -6,14 +6,17 @@ Line loads of different discretisations can be compared; the largest pressure of
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from fe_ste.geometry.gears import GearPair
 from fe_ste.tools.arrays import Floats
 from fe_ste.transmission_error.search import flank_radii
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def contact_line_stress(

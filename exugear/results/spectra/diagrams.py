@@ -107,6 +107,21 @@ def draw_levels(run: Waterfall, lines: Iterable[OrderLine], ax: Axes | None = No
         return panel
 
 
+def draw_highest_levels(
+    runs: Mapping[str, Waterfall], marks: Mapping[str, Sequence[Pick]], ax: Axes | None = None
+) -> Axes:
+    """Draw the highest level of runs over speed, see `exugear.results.spectra.run_spectra.Comparison.plot`."""
+    with axes_or_new(ax, 6.0, 4.0) as panel:
+        for number, (name, run) in enumerate(runs.items()):
+            colour = COLOURS[number % len(COLOURS)]
+            panel.plot(run.speed / RPM, run.level.max(axis=1), color=colour, label=drawable(name))
+            at = np.array([(pick.speed / RPM, pick.level) for pick in marks.get(name, ())]).reshape(-1, 2)
+            panel.plot(*at.T, "o", color=colour, markerfacecolor="none", label=f"only {drawable(name)}")
+        panel.set(xlabel="Input speed / rpm", ylabel=_level_label(TRANSMISSION_ERROR, next(iter(runs.values()))))
+        panel.legend()
+        return panel
+
+
 def _level_label(quantity: str, run: Waterfall) -> str:
     return f"{quantity[0].upper()}{quantity[1:]}, level / dB re {run.reference_text}"
 

@@ -14,6 +14,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.report.findings.loudness import resonances
 from exugear.report.writer import write_report
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
@@ -98,6 +99,16 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
         assert words in page, words
     assert "no modes computed; run `exugear modes` for mode shapes" not in page
     assert "window-dependent" not in page.partition('id="trust"')[0]
+
+
+def test_the_page_ranks_the_resonances_that_python_ranks(folder):
+    page = write_report(folder).path.read_text(encoding="utf-8")
+    (table,) = re.findall(r'<table id="in-operation-.*?</table>', page, re.DOTALL)
+    rows = [[float(value) for value in re.findall(r'data-order="(.*?)"', row)] for row in table.split("<tr>")[2:]]
+    expected = resonances(load_response(response_path(folder, "bushing"))).head(len(rows))
+    expected["speed_rpm"] = expected["speed_rpm"].abs()
+    columns = ["speed_rpm", "frequency_Hz", "error_m", "force_N", "acceleration_m_per_s2"]
+    np.testing.assert_allclose(rows, expected[columns].to_numpy(), rtol=1e-12)
 
 
 @pytest.mark.validation

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
 from exugear.results.folder import keep_case
+from exugear.results.solver_comparison import SolverComparison
 from exugear.results.spectra.diagrams import plot_waterfalls, pooled_levels
 from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.run_spectra import run_waterfall
@@ -133,3 +134,13 @@ def test_a_run_draws_the_levels_along_its_orders_and_its_waterfall(tmp_path, grc
     expected = pooled_levels(spectra, spectra.frequency[-1], spectra.speed.max())
     np.testing.assert_array_equal(np.ma.filled(panel.images[0].get_array(), np.nan), expected)
     assert panel.get_ylabel() == "Frequency / kHz"
+
+
+def test_both_solvers_are_drawn_as_deviations_from_the_mean_of_exudyn():
+    time = np.linspace(0.0, 1.0, 5)
+    compared = SolverComparison(
+        "Exudyn 1.8", "Newmark", 1.0, {"overall_dte": 1e-3}, time, (1e-6 * time**2, 1e-6 * time)
+    )
+    compiled, exudyn = compared.plot().lines
+    np.testing.assert_allclose(compiled.get_xydata().T, [time, time**2 - 0.5], atol=1e-15)
+    np.testing.assert_allclose(exudyn.get_xydata().T, [time, time - 0.5], atol=1e-15)
