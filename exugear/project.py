@@ -63,7 +63,7 @@ if TYPE_CHECKING:
     from exugear.life.load_spectrum.counted import CountedLoads
     from exugear.life.rating.sheet import RatingSheet
     from exugear.life.static_balance import StaticBalance
-    from exugear.report.design_study import DesignStudy
+    from exugear.report.findings.design_changes import DesignStudy
     from exugear.report.writer import Report
     from exugear.results.solver_comparison import SolverComparison
     from exugear.steady.settings import SteadySettings
@@ -158,7 +158,7 @@ class Project(ReprMixin):
         """
         known = self.gearbox.load_cases
         if name not in known:
-            raise self.gearbox.fault(f"no load case {name!r}; choose one of: {', '.join(known) or 'none in the file'}")
+            raise self.gearbox.error(f"no load case {name!r}; choose one of: {', '.join(known) or 'none in the file'}")
         return self.replaced(gearbox_at_load(self.gearbox, known[name]), self.folder / f"at-{name}")
 
     def _line(self) -> str:
@@ -484,7 +484,7 @@ class Project(ReprMixin):
         """Return values for the nominal load from stored tables."""
         from exugear.life.gear_life import pair_stresses
         from exugear.life.life import rating_of
-        from exugear.life.rating.sheet import nominal_load_values, nominal_loads, remarks_on
+        from exugear.life.rating.sheet import nominal_load_values, nominal_loads, stress_warnings
 
         rating = rating_of(self.gearbox)
         stresses = pair_stresses(self.requested_tables(), self.folder, begin, keep=False)
@@ -496,7 +496,7 @@ class Project(ReprMixin):
             if missing
             else []
         )
-        return found, (*lines, *remarks_on(stresses))
+        return found, (*lines, *stress_warnings(stresses))
 
     def stored_life(self, counted: CountedLoads) -> xr.Dataset | None:
         """Return the stored life computed from exactly this input; None without one."""

@@ -68,7 +68,11 @@ def test_a_gearbox_of_ones_own_goes_from_file_to_report(tmp_path: Path, monkeypa
         more = ["--duration", "0.05"] if words[0] == "run" else []
         outcome = CliRunner().invoke(app, [*words, *more])
         assert outcome.exit_code == 0, outcome.output
-    assert (tmp_path / "results" / "my" / "report.html").is_file()
+    results = tmp_path / "results" / "my"
+    # The three commands give all that the page shows: modes and a steady-state response are computed by the last one.
+    assert "Not computed" not in outcome.output
+    assert list(results.glob("bushing/*/modes.nc")) and list(results.glob("bushing/*/steady-parametric.nc"))
+    assert (results / "report.html").is_file()
 
 
 def test_the_python_example_runs(capsys):

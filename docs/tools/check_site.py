@@ -58,7 +58,7 @@ class Page(HTMLParser):
                 self.loads += STYLE_ADDRESS.findall(value)
 
 
-def faults(site: Path) -> Iterator[str]:
+def errors(site: Path) -> Iterator[str]:
     """Yield broken links and addresses that a page would load from the network."""
     pages = {file: Page(file.read_text(encoding="utf-8")) for file in pages_of(site)}
     for file, page in pages.items():
@@ -99,7 +99,7 @@ def target(file: Path, address: str) -> Path:
 
 def main(site: Path) -> int:
     """Print the errors; return 1 if there are any."""
-    found = list(faults(site.resolve()))
+    found = list(errors(site.resolve()))
     print("\n".join(found), file=sys.stderr)
     count = len(pages_of(site))
     print(f"{count} pages: {len(found)} errors in links and requests")

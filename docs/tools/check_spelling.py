@@ -55,13 +55,13 @@ def main() -> int:
     """Print unknown words by document; return 1 if there are any."""
     dictionary = SpellChecker(language="en")
     dictionary.word_frequency.load_words(WORDS.read_text(encoding="utf-8").split())
-    files, faults = documents(), 0
+    files, errors = documents(), 0
     for file in files:
         if found := unknown_words(file, dictionary):
-            faults += len(found)
+            errors += len(found)
             print(f"{file.relative_to(ROOT)}: {', '.join(found)}", file=sys.stderr)
-    print(f"{len(files)} documents: {faults} unknown words; words of the field go into {WORDS.relative_to(ROOT)}")
-    return 1 if faults else 0
+    print(f"{len(files)} documents: {errors} unknown words; words of the field go into {WORDS.relative_to(ROOT)}")
+    return 1 if errors else 0
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = Fals
     from exugear.gearbox.gearbox import Gearbox
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.reading import GearboxFileError, read_toml
-    from exugear.system.readiness import check_parts, faults_of_bearings, remarks
+    from exugear.system.gearbox_checks import check_parts, errors_of_bearings, gearbox_warnings
 
     check_allow_dir(allow_dir)
     try:
@@ -34,11 +34,11 @@ def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = Fals
         try:
             gearbox = Gearbox.from_dict(content, str(case), Permissions(scripts, allow_dir))
         except GearboxFileError as error:
-            raise GearboxFileError(*error.faults, *faults_of_bearings(content, str(case))) from None
+            raise GearboxFileError(*error.errors, *errors_of_bearings(content, str(case))) from None
         check_parts(gearbox)
     except GearboxFileError as error:
         raise BadInputError(error) from error
-    for line in counted([f"Warning: {line}" for line in remarks(gearbox)]) if tell else ():
+    for line in counted([f"Warning: {line}" for line in gearbox_warnings(gearbox)]) if tell else ():
         note(line, style="yellow")
     return gearbox
 
@@ -102,23 +102,23 @@ def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     """Raise an error for invalid or unavailable model settings before files are written into the results folder."""
     from exugear.results.folder import bodies_folder
     from exugear.system.bodies.of_gearbox import check_solids
-    from exugear.system.readiness import lacking
+    from exugear.system.gearbox_checks import lacking
     from exugear.system.tooth_mesh.laws.registry import LAWS
     from exugear.system.tooth_mesh.tables import without_table
 
     gearbox.bodies(choice.inertias)
     if choice.load_case is not None and choice.load_case not in gearbox.load_cases:
         known = ", ".join(gearbox.load_cases) or "none"
-        raise gearbox.fault(f"no load case {choice.load_case!r}; choose one of: {known}")
+        raise gearbox.error(f"no load case {choice.load_case!r}; choose one of: {known}")
     reason = lacking(gearbox, choice.variant)
     if reason:
-        raise gearbox.fault(f"variant {choice.variant}: {reason}")
+        raise gearbox.error(f"variant {choice.variant}: {reason}")
     if choice.variant.is_elastic:
         check_solids(gearbox, bodies_folder(folder))
     if LAWS[choice.mesh_model].needs_axes:
         without = without_table(gearbox, [mesh.pair.name for mesh in gearbox.meshes])
         if without:
-            raise BadInputError(gearbox.fault(without))
+            raise BadInputError(gearbox.error(without))
     if not LAWS[choice.mesh_model].has_force and not choice.variant.spins_only:
         raise BadInputError(
             f"--mesh-model {choice.mesh_model}: a kinematic constraint, which requires --variant rigid, not "
@@ -140,7 +140,7 @@ def check_friction(gearbox: Gearbox, mesh_model: str) -> None:
         )
     for mesh in gearbox.meshes:
         if gearbox.case.pairs[mesh.pair.name].stiffness is not None:
-            raise gearbox.fault(
+            raise gearbox.error(
                 f"damping.tooth_friction = {friction:g}: requires line loads over the mesh cycle, which are unknown "
                 f"for a stated stiffness; remove pairs.{mesh.pair.name}.stiffness, or remove tooth_friction"
             )

@@ -373,12 +373,12 @@ def files_read(row: Row) -> Callable[[int, int], None]:
 
 def table_warnings(tables: Mapping[str, MeshTable]) -> list[str]:
     """Print warnings about missing or truncated values of tables; return the reasons why tables are invalid."""
-    from exugear.system.tooth_mesh.tables import doubts_about_table, remarks_about_table
+    from exugear.system.tooth_mesh.tables import table_notes, table_warnings
 
     for name, table in tables.items():
-        for remark in remarks_about_table(name, table):
+        for remark in table_notes(name, table):
             note(f"Warning: {remark}", style="yellow")
-    return [doubt for name, table in tables.items() for doubt in doubts_about_table(name, table)]
+    return [doubt for name, table in tables.items() for doubt in table_warnings(name, table)]
 
 
 def refuse_not_converged(meshes: Sequence[str]) -> None:

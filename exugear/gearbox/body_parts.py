@@ -74,7 +74,7 @@ def _family(origin: Origin, family: str, section: BodySection, inertias: str) ->
     if not section.inertia and not section.fixed:
         inertia = _computed_inertia(origin, family, section)
     elif inertia is None and not section.fixed:
-        raise origin.fault(
+        raise origin.error(
             f"bodies.{family}.inertia: no set {inertias!r}; every moving body "
             f"needs the sets {', '.join(inertia_sets(origin))}"
         )
@@ -199,9 +199,9 @@ def _axis(origin: Origin, family: str, angle: float) -> tuple[float, float]:
     if carrier is None or radius is None:
         return _axis_of_neighbour(origin, family)
     if not origin.are_enabled(f"bodies.{family}.carrier", carrier):
-        raise origin.fault(f"bodies.{family}.carrier = {carrier!r}: that body is not enabled")
+        raise origin.error(f"bodies.{family}.carrier = {carrier!r}: that body is not enabled")
     if origin.case.bodies[carrier].axis_position_mm is None:
-        raise origin.fault(
+        raise origin.error(
             f"bodies.{family}.carrier = {carrier!r}: a carrier has its own axis position and is not a planet; set "
             f"bodies.{carrier}.axis_position_mm"
         )
@@ -233,7 +233,7 @@ def pin_offsets(origin: Origin, bodies: Mapping[str, Body]) -> dict[str, tuple[f
         body = bodies.get(section.body)
         if body is None or body.planet_of is None:
             planets = ", ".join(planet.name for planet in bodies.values() if planet.planet_of) or "none"
-            raise origin.fault(f"pins.{name}.body = {section.body!r}: not a planet; planets are {planets}")
+            raise origin.error(f"pins.{name}.body = {section.body!r}: not a planet; planets are {planets}")
         error = UM * complex(section.radial_um, section.tangential_um)
         error *= complex(math.cos(body.orbit_angle), math.sin(body.orbit_angle))
         return section.body, (error.real, error.imag)
@@ -259,9 +259,9 @@ def load_cases(origin: Origin, spinning: Sequence[str]) -> dict[str, LoadCase]:
         driven = (section.driven_body,) if section.driven_body else ()
         for body in (*section.torques_N_m, *section.start_speeds_rpm, *driven):
             if body not in spinning:
-                raise origin.fault(f"{key}: no rotating body {body!r}; bodies are {', '.join(spinning)}")
+                raise origin.error(f"{key}: no rotating body {body!r}; bodies are {', '.join(spinning)}")
         if origin.case.overall.input in section.start_speeds_rpm:
-            raise origin.fault(
+            raise origin.error(
                 f"{key}.start_speeds_rpm: {origin.case.overall.input} is the overall input, whose speed is "
                 "start_speed_rpm; remove it here"
             )
@@ -301,7 +301,7 @@ def joints(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Joint, ...]:
     def convert_section(name: str, section: JointSection) -> tuple[Joint, ...]:
         key = f"joints.{name}"
         if section.body == GROUND:
-            raise origin.fault(
+            raise origin.error(
                 f"{key}.body = {GROUND!r}: set the rotating body here, and the ground in the key of the other body"
             )
         if not origin.are_enabled(key, section.body, section.on):
@@ -337,7 +337,7 @@ def bearings(origin: Origin, bodies: Mapping[str, Body]) -> tuple[Bearing, ...]:
     def convert_section(name: str, section: BearingSection) -> tuple[Bearing, ...]:
         key = f"bearings.{name}"
         if section.body == GROUND:
-            raise origin.fault(
+            raise origin.error(
                 f"{key}.body = {GROUND!r}: set the supported body here, and the ground in the key of the other body"
             )
         if not origin.are_enabled(key, section.body, section.on) or not section.is_known:
@@ -425,10 +425,10 @@ def mounts(origin: Origin) -> tuple[Bearing, ...]:
         if _stands_aside(origin, key, section):
             return ()
         if section.body == GROUND or not origin.are_enabled(key, section.body):
-            raise origin.fault(f"{key}.body = {section.body!r}: set an enabled body that the mount supports")
+            raise origin.error(f"{key}.body = {section.body!r}: set an enabled body that the mount supports")
         body = origin.case.bodies[section.body]
         if body.carrier is not None or body.spin_only:
-            raise origin.fault(f"{key}.body = {section.body!r}: a planet or a spin-only body cannot be mounted")
+            raise origin.error(f"{key}.body = {section.body!r}: a planet or a spin-only body cannot be mounted")
         x, y, z = (MM * value for value in section.position_mm)
         mount = Bearing(
             name=name,
@@ -458,12 +458,12 @@ def point_forces(origin: Origin, bodies: Mapping[str, Body]) -> tuple[PointForce
     def convert_section(name: str, section: ForceSection) -> tuple[PointForce, ...]:
         key = f"forces.{name}"
         if section.body == GROUND:
-            raise origin.fault(f"{key}.body = {GROUND!r}: a force on the ground has no effect; set a moving body")
+            raise origin.error(f"{key}.body = {GROUND!r}: a force on the ground has no effect; set a moving body")
         if not origin.are_enabled(key, section.body):
             return ()
         body = origin.case.bodies[section.body]
         if body.carrier is not None or body.spin_only:
-            raise origin.fault(
+            raise origin.error(
                 f"{key}.body = {section.body!r}: a planet or a spin-only body cannot have a constant force; set a "
                 "body on a fixed axis"
             )
@@ -496,12 +496,12 @@ def couplings(origin: Origin, spinning: Sequence[str], bearing_names: Sequence[s
         for body in section.bodies:
             if body not in spinning:
                 known = ", ".join(spinning)
-                raise origin.fault(
+                raise origin.error(
                     f"{key}.bodies: {body!r} has no rotation of its own; a coupling connects two of {known}"
                 )
         if section.seat is not None and section.seat not in bearing_names:
             known = ", ".join(bearing_names)
-            raise origin.fault(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
+            raise origin.error(f"{key}.seat = {section.seat!r}: no such bearing; bearings are {known}")
         damping = section.damping_N_m_s_per_rad
         if damping is None:
             damping = damping_times(origin.case.damping).coupling * section.stiffness_N_m_per_rad

@@ -44,7 +44,7 @@ class Check:
 
 
 def check(checks: Iterable[Check]) -> None:
-    """Run all checks and raise their errors together; `faults_of` states which checks are skipped.
+    """Run all checks and raise their errors together; `errors_of` states which checks are skipped.
 
     Raises
     ------
@@ -55,14 +55,14 @@ def check(checks: Iterable[Check]) -> None:
     --------
     >>> check([Check("gears", lambda: None), Check("pairs", lambda: None, ("gears",))])
     """
-    faults = faults_of(checks)
-    if faults:
-        raise GearboxFileError(*faults)
+    errors = errors_of(checks)
+    if errors:
+        raise GearboxFileError(*errors)
 
 
-def faults_of(checks: Iterable[Check]) -> list[str]:
+def errors_of(checks: Iterable[Check]) -> list[str]:
     """Return the errors of all checks in order, skipping checks whose prerequisites failed or were skipped."""
-    faults: list[str] = []
+    errors: list[str] = []
     failed: set[str] = set()
     for one in checks:
         if failed & set(one.needs):
@@ -71,12 +71,12 @@ def faults_of(checks: Iterable[Check]) -> list[str]:
         try:
             one.run()
         except GearboxFileError as error:
-            faults += error.faults
+            errors += error.errors
             failed.add(one.name)
-    return faults
+    return errors
 
 
-def faults_of_bodies(case: GearboxFile) -> Iterator[str]:
+def errors_of_bodies(case: GearboxFile) -> Iterator[str]:
     """Yield errors for names that are already used, impossible carriers, and unknown gears of bodies."""
     if GROUND in case.bodies:
         yield f"bodies.{GROUND}: {GROUND} is the name of the fixed frame; choose another name"
@@ -94,10 +94,10 @@ def faults_of_bodies(case: GearboxFile) -> Iterator[str]:
             if gear not in case.gears:
                 yield f"bodies.{family}.gears_z_mm.{gear}: no such gear; gears are {', '.join(case.gears)}"
         if section.enabled and section.carrier is not None:
-            yield from _faults_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
+            yield from _errors_of_carrier(case, f"bodies.{family}.carrier = {section.carrier!r}", section.carrier)
 
 
-def faults_of_blanks(case: GearboxFile) -> Iterator[str]:
+def errors_of_blanks(case: GearboxFile) -> Iterator[str]:
     """Yield errors for blanks of stepped shafts without a seat, if the inertia follows from the shape.
 
     The computed inertia would lack these blanks. If it is specified, they affect only a flexible shaft, which refuses
@@ -113,7 +113,7 @@ def faults_of_blanks(case: GearboxFile) -> Iterator[str]:
                 yield f"bodies.{family}.shape.blanks.{blank}: no such seat on the body; seats are {known}"
 
 
-def _faults_of_carrier(case: GearboxFile, key: str, name: str) -> Iterator[str]:
+def _errors_of_carrier(case: GearboxFile, key: str, name: str) -> Iterator[str]:
     carrier = case.bodies.get(name)
     if carrier is None:
         yield f"{key}: no such body; bodies are {', '.join(case.bodies)}"
@@ -125,7 +125,7 @@ def _faults_of_carrier(case: GearboxFile, key: str, name: str) -> Iterator[str]:
         yield f"{key}: a spin-only body has no position and cannot carry planets"
 
 
-def faults_of_inertia_sets(default: str, inertia_sets: Sequence[str]) -> Iterator[str]:
+def errors_of_inertia_sets(default: str, inertia_sets: Sequence[str]) -> Iterator[str]:
     """Yield an error if no body moves, or if no body has the default inertia set."""
     if not inertia_sets:
         yield "bodies: all bodies are fixed; a gearbox needs at least one body without fixed = true"
@@ -133,7 +133,7 @@ def faults_of_inertia_sets(default: str, inertia_sets: Sequence[str]) -> Iterato
         yield f"default_inertias = {default!r}: no such set; sets are {', '.join(inertia_sets)}"
 
 
-def faults_of_size(bodies: int, elements: int) -> Iterator[str]:
+def errors_of_size(bodies: int, elements: int) -> Iterator[str]:
     """Yield an error if the matrices exceed the memory: each element has stiffness and damping over all coordinates.
 
     Parameters
@@ -149,7 +149,7 @@ def faults_of_size(bodies: int, elements: int) -> Iterator[str]:
         )
 
 
-def faults_of_overall(overall: OverallSection, spinning: Sequence[str], gears: Collection[str]) -> Iterator[str]:
+def errors_of_overall(overall: OverallSection, spinning: Sequence[str], gears: Collection[str]) -> Iterator[str]:
     """Yield errors for an overall input or output that cannot rotate, or that is the same body although gears exist."""
     for key in ("input", "output"):
         if getattr(overall, key) not in spinning:
@@ -161,7 +161,7 @@ def faults_of_overall(overall: OverallSection, spinning: Sequence[str], gears: C
         yield f"overall.output = {overall.output!r}: is also the input; set the body at the other end"
 
 
-def faults_of_output_gear(
+def errors_of_output_gear(
     overall: OverallSection, gears: Collection[str], bodies: Iterable[Body], couplings: Sequence[Coupling]
 ) -> Iterator[str]:
     """Yield an error if the output gear does not rotate with the output.
@@ -196,7 +196,7 @@ def _coupled(couplings: Sequence[Coupling], body: str) -> set[str]:
     return reached
 
 
-def faults_of_repetition(
+def errors_of_repetition(
     case: GearboxFile, deviations: Collection[tuple[str, str]], pin_offsets: Collection[str]
 ) -> Iterator[str]:
     """Yield errors for deviations of a gear or pin that are specified twice; the second would replace the first."""
@@ -206,7 +206,7 @@ def faults_of_repetition(
         yield "pins: two tables for the same planet; combine them in one"
 
 
-def faults_of_mass_properties(case: GearboxFile) -> Iterator[str]:
+def errors_of_mass_properties(case: GearboxFile) -> Iterator[str]:
     """Yield errors for missing mass properties."""
     for family, section in case.bodies.items():
         for inertias, values in section.inertia.items():
@@ -220,7 +220,7 @@ def faults_of_mass_properties(case: GearboxFile) -> Iterator[str]:
                     )
 
 
-def faults_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body]) -> Iterator[str]:
+def errors_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body]) -> Iterator[str]:
     """Yield errors for body positions that contradict the centre distance of a pair or the axis of a carrier."""
     for mesh in meshes:
         difference = mesh.centre_distance - mesh.pair.centre_distance
@@ -240,7 +240,7 @@ def faults_of_centre_distances(meshes: Iterable[Mesh], bodies: Mapping[str, Body
                     )
 
 
-def faults_of_planets(
+def errors_of_planets(
     case: GearboxFile, bodies: Iterable[Body], gears: Mapping[str, Gear], meshes: Sequence[Mesh]
 ) -> Iterator[str]:
     """Yield errors for planets of one carrier that collide, in a set or between sets, and for impossible assembly."""
@@ -257,7 +257,7 @@ def faults_of_planets(
             yield collision
     for family in case.bodies:
         others = {body.name for body in planets if body.family != family}
-        yield from _faults_of_assembly(family, [body for body in planets if body.family == family], others, meshes)
+        yield from _errors_of_assembly(family, [body for body in planets if body.family == family], others, meshes)
 
 
 def _collisions(case: GearboxFile, planet: Body, other: Body, gears: Mapping[str, Gear]) -> Iterator[str]:
@@ -274,7 +274,7 @@ def _collisions(case: GearboxFile, planet: Body, other: Body, gears: Mapping[str
             )
 
 
-def _faults_of_assembly(
+def _errors_of_assembly(
     family: str, planets: Sequence[Body], others: Collection[str], meshes: Sequence[Mesh]
 ) -> Iterator[str]:
     """Yield errors for planets that violate the assembly condition relative to the first planet of the set.
@@ -314,7 +314,7 @@ def _teeth_on_planet(mesh: Mesh, planet: str) -> tuple[int, int]:
     return gear.teeth, -pinion.teeth
 
 
-def faults_of_connection(
+def errors_of_connection(
     case: GearboxFile,
     bodies: Iterable[Body],
     meshes: Iterable[Mesh],
@@ -358,7 +358,7 @@ def bodies_apart(
     return tuple(body.name for body in bodies if not body.fixed and body.name not in reached)
 
 
-def faults_of_torsion(
+def errors_of_torsion(
     spinning: Sequence[str], couplings: Iterable[Coupling], bearings: Iterable[Bearing]
 ) -> Iterator[str]:
     """Yield errors for ambiguous torsional load paths: loops of couplings, or bearings between two rotating bodies."""
@@ -386,7 +386,7 @@ def faults_of_torsion(
             return
 
 
-def faults_of_supports(case: GearboxFile) -> Iterator[str]:
+def errors_of_supports(case: GearboxFile) -> Iterator[str]:
     """Yield errors for stiffness and damping that are not symmetric, indefinite or zero throughout."""
     for table, sections in (("bearings", case.bearings), ("mounts", case.mounts)):
         for name, section in sections.items():
@@ -395,11 +395,11 @@ def faults_of_supports(case: GearboxFile) -> Iterator[str]:
             damping = section.damping
             catalogue = isinstance(section, BearingSection) and section.catalogue is not None
             if stiffness is not None:
-                yield from _faults_of_matrix(f"{key}.stiffness", stiffness)
+                yield from _errors_of_matrix(f"{key}.stiffness", stiffness)
                 if not catalogue and not np.any(connector_matrix(stiffness)):
                     yield f"{key}.stiffness: is zero in all directions; set at least one above zero"
             if damping is not None:
-                yield from _faults_of_matrix(f"{key}.damping", damping)
+                yield from _errors_of_matrix(f"{key}.damping", damping)
     yield from _bearings_at_one_place(case.bearings)
 
 
@@ -420,7 +420,7 @@ def _bearings_at_one_place(bearings: Mapping[str, BearingSection]) -> Iterator[s
                 )
 
 
-def _faults_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSection) -> Iterator[str]:
+def _errors_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSection) -> Iterator[str]:
     """Yield an error for an unsymmetric or indefinite matrix, scaled by its diagonal since units differ by row."""
     if section.matrix is None:
         return
@@ -438,7 +438,7 @@ def _faults_of_matrix(key: str, section: StiffnessSection | ConnectorDampingSect
         yield f"{key}.matrix: is not positive semi-definite (negative eigenvalue); correct the matrix"
 
 
-def faults_of_seals(case: GearboxFile, bodies: Collection[str]) -> Iterator[str]:
+def errors_of_seals(case: GearboxFile, bodies: Collection[str]) -> Iterator[str]:
     """Yield an error for each seal between bodies that are not in the file, or between a body and itself."""
     for name, seal in case.seals.items():
         for key, body in (("body", seal.body), ("on", seal.on)):
@@ -448,7 +448,7 @@ def faults_of_seals(case: GearboxFile, bodies: Collection[str]) -> Iterator[str]
             yield f"seals.{name}.on = {seal.on!r}: is the body that the seal slides on; set another body, or remove on"
 
 
-def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | PointForce]]) -> Iterator[str]:
+def errors_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | PointForce]]) -> Iterator[str]:
     """Yield an error for a name used twice among meshes, supports and couplings: these share one list in the results.
 
     Parameters
@@ -464,7 +464,7 @@ def faults_of_names(parts: Mapping[str, Sequence[Mesh | Bearing | Coupling | Poi
             tables[part.name] = table
 
 
-def faults_of_joints(joints: Iterable[Joint], bodies: Mapping[str, Body]) -> Iterator[str]:
+def errors_of_joints(joints: Iterable[Joint], bodies: Mapping[str, Body]) -> Iterator[str]:
     """Yield an error for the first invalid joint: on a fixed body, a second joint, or a planet off its carrier."""
     joined: dict[str, str] = {}
     for joint in joints:

@@ -136,15 +136,15 @@ def _with_shift(origin: Origin, gears: Mapping[str, GearInputs], name: str, sect
     for pair_name, pair in _pairs_of(origin, gears, name):
         mate = pair.gear if pair.pinion.name == name else pair.pinion
         if origin.case.gears[mate.name].profile_shift_from_centre_distance:
-            raise origin.fault(f"{key}: {mate.name} of pairs.{pair_name} has no profile_shift either; set one of them")
+            raise origin.error(f"{key}: {mate.name} of pairs.{pair_name} has no profile_shift either; set one of them")
         shift = shift_beside(mate, gears[name], pair.centre_distance)
         if shift is None:
-            raise origin.fault(
+            raise origin.error(
                 f"{key}: at pairs.{pair_name}.centre_distance_mm = {1e3 * pair.centre_distance:g} no line of action "
                 "touches both base circles; correct it"
             )
         return replace(gears[name], profile_shift=shift)
-    raise origin.fault(f"{key}: the gear is in no pair whose centre distance defines it; set profile_shift")
+    raise origin.error(f"{key}: the gear is in no pair whose centre distance defines it; set profile_shift")
 
 
 LEAST_PLAY = 1e-12
@@ -214,7 +214,7 @@ def _with_fitted_tip(origin: Origin, gears: Mapping[str, GearInputs], name: str,
     except ValueError:
         return gear  # an impossible pair is reported when it is built
     if not tips:
-        raise origin.fault(f"gears.{name}.fitted_tip: the gear is in no pair; remove the key")
+        raise origin.error(f"gears.{name}.fitted_tip: the gear is in no pair; remove the key")
     return replace(gear, tip_diameter=max(tips) if gear.internal else min(tips))
 
 
@@ -345,7 +345,7 @@ def _check_depth(origin: Origin, key: str, amounts: Mapping[str, Any], module_mm
     deepest = 1e3 * DEEPEST_REMOVAL * module_mm
     for name, amount in amounts.items():
         if name.endswith("_um") and abs(amount) > deepest:
-            raise origin.fault(f"{key}.{name} = {amount:g}: must be at most {deepest:g}, half a normal module")
+            raise origin.error(f"{key}.{name} = {amount:g}: must be at most {deepest:g}, half a normal module")
 
 
 def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]:
@@ -360,7 +360,7 @@ def gear_pairs(origin: Origin, gears: Mapping[str, Gear]) -> dict[str, GearPair]
     def convert_section(name: str, section: PairSection) -> GearPair:
         for key in ("pinion", "gear"):
             if getattr(section, key) not in gears:
-                raise origin.fault(
+                raise origin.error(
                     f"pairs.{name}.{key} = {getattr(section, key)!r}: no such gear; gears are {', '.join(gears)}"
                 )
         first = gears[section.pinion]
@@ -428,7 +428,7 @@ def stated_stiffness(origin: Origin) -> dict[str, tuple[float, ...]]:
         assert section.stiffness is not None
         values = _stiffness_over_cycle(section.stiffness)
         if values.min() <= 0.0:
-            raise origin.fault(
+            raise origin.error(
                 f"pairs.{name}.stiffness: falls to {values.min():g} N/m in the mesh cycle; reduce its harmonics, it "
                 "must stay above zero"
             )
@@ -465,13 +465,13 @@ def meshes(origin: Origin, pairs: Mapping[str, GearPair], bodies: Mapping[str, B
         key = f"meshes.{name}"
         for end in ("pinion_body", "gear_body"):
             if getattr(section, end) == GROUND:
-                raise origin.fault(
+                raise origin.error(
                     f"{key}.{end} = {GROUND!r}: set a rotating body; a body with fixed = true does not rotate"
                 )
         if not origin.are_enabled(key, section.pinion_body, section.gear_body):
             return ()
         if section.pair not in pairs:
-            raise origin.fault(f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(pairs)}")
+            raise origin.error(f"{key}.pair = {section.pair!r}: no such pair; pairs are {', '.join(pairs)}")
         return tuple(_meshes_of_section(origin, name, section, pairs[section.pair], bodies))
 
     return parts_of_each(convert_section, origin.case.meshes)
@@ -489,13 +489,13 @@ def _meshes_of_section(
     instances = origin.instances(key, *ends)
     phases = section.phase if isinstance(section.phase, tuple) else (section.phase,) * len(instances)
     if len(phases) != len(instances):
-        raise origin.fault(f"{key}.phase = {list(phases)}: {len(instances)} meshes require {len(instances)} phases")
+        raise origin.error(f"{key}.phase = {list(phases)}: {len(instances)} meshes require {len(instances)} phases")
     for (suffix, pinion_name, gear_name), phase in zip(instances, phases, strict=True):
         pinion_body = bodies[pinion_name]
         gear_body = bodies[gear_name]
         frame = section.frame or pinion_body.carrier or gear_body.carrier or GROUND
         if frame != GROUND and frame not in bodies:
-            raise origin.fault(f"{key}.frame = {frame!r}: no such body; use a carrier's name or ground")
+            raise origin.error(f"{key}.frame = {frame!r}: no such body; use a carrier's name or ground")
         dx = gear_body.axis[0] - pinion_body.axis[0]
         dy = gear_body.axis[1] - pinion_body.axis[1]
         angle = math.atan2(dy, dx)
@@ -519,7 +519,7 @@ def _meshes_of_section(
 def _check_angle(origin: Origin, key: str, stated_deg: float | None, angle: float) -> None:
     """Raise an error if a specified angle of the line of centres differs from that of the body positions (rad)."""
     if stated_deg is not None and abs(math.remainder(angle - math.radians(stated_deg), 2 * math.pi)) > ANGLE_TOLERANCE:
-        raise origin.fault(
+        raise origin.error(
             f"{key}.position_angle_deg = {stated_deg}: the positions of the bodies result in {math.degrees(angle):.4f}"
             " deg; remove the key or correct the positions"
         )
@@ -531,14 +531,14 @@ def _middle_of_faces(origin: Origin, key: str, pair: GearPair, pinion_body: Body
     high = math.inf
     for body, gear in ((pinion_body, pair.pinion), (gear_body, pair.gear)):
         if gear.name not in body.wheels:
-            raise origin.fault(
+            raise origin.error(
                 f"{key}: body {body.family!r} carries no gear {gear.name!r}; set its position in bodies.{body.family}"
                 ".gears_z_mm"
             )
         low = max(low, body.wheels[gear.name] - gear.face_width / 2)
         high = min(high, body.wheels[gear.name] + gear.face_width / 2)
     if high <= low:
-        raise origin.fault(f"{key}: the faces of {pair.pinion.name} and {pair.gear.name} do not overlap in z")
+        raise origin.error(f"{key}: the faces of {pair.pinion.name} and {pair.gear.name} do not overlap in z")
     return (low + high) / 2
 
 
@@ -556,11 +556,11 @@ def deviations(
     def convert_section(name: str, section: DeviationSection) -> tuple[tuple[str, str], WheelDeviation]:
         key = f"deviations.{name}"
         if section.body not in bodies:
-            raise origin.fault(f"{key}.body = {section.body!r}: no such body; bodies are {', '.join(bodies)}")
+            raise origin.error(f"{key}.body = {section.body!r}: no such body; bodies are {', '.join(bodies)}")
         wheels = bodies[section.body].wheels
         gear = section.gear or next(iter(wheels), "")
         if gear not in wheels or (section.gear is None and len(wheels) > 1):
-            raise origin.fault(f"{key}.gear = {section.gear!r}: choose one of {', '.join(wheels) or 'no gears'}")
+            raise origin.error(f"{key}.gear = {section.gear!r}: choose one of {', '.join(wheels) or 'no gears'}")
         return (section.body, gear), _deviation(origin, key, gears[gear], section)
 
     return dict(part_of_each(convert_section, origin.case.deviations).values())
@@ -569,7 +569,7 @@ def deviations(
 def _deviation(origin: Origin, key: str, gear: Gear, section: DeviationSection) -> WheelDeviation:
     pitch = np.array(section.cumulative_pitch_um) * UM
     if len(pitch) not in (0, gear.teeth):
-        raise origin.fault(f"{key}.cumulative_pitch_um: {len(pitch)} values; {gear.name} has {gear.teeth} teeth")
+        raise origin.error(f"{key}.cumulative_pitch_um: {len(pitch)} values; {gear.name} has {gear.teeth} teeth")
     amounts = {"cumulative_pitch_um": max(map(abs, section.cumulative_pitch_um), default=0.0)}
     amounts["runout_um"] = section.runout_um
     _check_depth(origin, key, amounts, 1e3 * gear.normal_module)

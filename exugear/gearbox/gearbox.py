@@ -101,7 +101,7 @@ class Gearbox(ReprMixin):
         except GearboxFileError as error:
             rest = cls(readable(content), source, content, permissions)
             alone = [check for check in _checks_of_parts(rest) if check.name in ALONE]
-            raise GearboxFileError(*error.faults, *checks.faults_of(alone)) from None
+            raise GearboxFileError(*error.errors, *checks.errors_of(alone)) from None
         gearbox = cls(case, source, content, permissions)
         # Each check follows its prerequisites; building a part checks its section.
         checks.check([*_checks_of_parts(gearbox), *_checks_of_the_whole(gearbox)])
@@ -132,7 +132,7 @@ class Gearbox(ReprMixin):
             for parent in parents:
                 section = section.setdefault(parent, {})
                 if not isinstance(section, dict):
-                    raise self.fault(f"{dotted}: {parent!r} is not a section")
+                    raise self.error(f"{dotted}: {parent!r} is not a section")
             section[key] = value
         content["labels"] = labels_in_use(content)
         try:
@@ -141,13 +141,13 @@ class Gearbox(ReprMixin):
             if not made:
                 raise
             near = difflib.get_close_matches(made[0], list(_paths(self.content)), 1, 0.0)
-            raise self.fault(
+            raise self.error(
                 f"{made[0]}: the file has no entry of this name, and a new one lacks keys; did you mean {near[0]}?"
             ) from error
 
-    def fault(self, text: str) -> GearboxFileError:
+    def error(self, text: str) -> GearboxFileError:
         """Error whose message is the file name followed by `text` (key, value and remedy)."""
-        return self._origin.fault(text)
+        return self._origin.error(text)
 
     def file(self, key: str, name: str, largest: int) -> Path:
         """Path of a file that the gearbox file names under a key, with at most `largest` bytes.
@@ -182,7 +182,7 @@ class Gearbox(ReprMixin):
         given = [value for value in found if value is not None]
         if len(given) != 1:
             what = "is set twice; remove the key of [rating]" if given else "this key is missing"
-            raise self.fault(f"lubricant.viscosity_40_mm2_per_s: {what}")
+            raise self.error(f"lubricant.viscosity_40_mm2_per_s: {what}")
         return given[0]
 
     @property
@@ -249,7 +249,7 @@ class Gearbox(ReprMixin):
         """
         inertias = inertias or self.case.default_inertias
         if inertias not in self.inertia_sets:
-            raise self.fault(f"inertia set {inertias!r} is unknown; sets are {', '.join(self.inertia_sets)}")
+            raise self.error(f"inertia set {inertias!r} is unknown; sets are {', '.join(self.inertia_sets)}")
         return body_parts.bodies(self._origin, inertias)
 
     def body(self, name: str, inertias: str | None = None) -> Body:
@@ -262,7 +262,7 @@ class Gearbox(ReprMixin):
         """
         bodies = {body.name: body for body in self.bodies(inertias)}
         if name not in bodies:
-            raise self.fault(f"no body {name!r}; bodies are {', '.join(bodies)}")
+            raise self.error(f"no body {name!r}; bodies are {', '.join(bodies)}")
         return bodies[name]
 
     @cached_property
@@ -367,7 +367,7 @@ class Gearbox(ReprMixin):
             output=self.case.overall.output,
             torques=self.case.static_load.torques_N_m,
             locked=self.locked,
-            fault=self.fault,
+            error=self.error,
         )
 
     @cached_property
@@ -493,16 +493,16 @@ ALONE = ("bodies", "masses", "gears", "stiffness", "supports", "modifications", 
 def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
     case = gearbox.case
     refuse = partial(_refuse, gearbox)
-    yield checks.Check("bodies", lambda: refuse(checks.faults_of_bodies(case)))
-    yield checks.Check("masses", lambda: refuse(checks.faults_of_mass_properties(case)))
+    yield checks.Check("bodies", lambda: refuse(checks.errors_of_bodies(case)))
+    yield checks.Check("masses", lambda: refuse(checks.errors_of_mass_properties(case)))
     yield checks.Check("gears", lambda: gearbox.gears)
     yield checks.Check("stiffness", lambda: gear_parts.stated_stiffness(gearbox._origin))
-    yield checks.Check("supports", lambda: refuse(checks.faults_of_supports(case)))
+    yield checks.Check("supports", lambda: refuse(checks.errors_of_supports(case)))
     yield checks.Check("places", lambda: _check_inertia_sets(gearbox), ("bodies", "masses"))
     yield checks.Check("modifications", lambda: gearbox.modifications, ("gears",))
     yield checks.Check("pairs", lambda: gearbox.gear_pairs, ("gears",))
     yield checks.Check(
-        "ends", lambda: refuse(checks.faults_of_overall(case.overall, gearbox.spinning, case.gears)), ("places",)
+        "ends", lambda: refuse(checks.errors_of_overall(case.overall, gearbox.spinning, case.gears)), ("places",)
     )
     for name, part in (
         ("bearings", lambda: gearbox.bearings),
@@ -513,7 +513,7 @@ def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
         ("pins", lambda: gearbox.pin_offsets),
     ):
         yield checks.Check(name, part, ("places",))
-    yield checks.Check("blanks", lambda: refuse(checks.faults_of_blanks(case)), ("bearings", "mounts", "forces"))
+    yield checks.Check("blanks", lambda: refuse(checks.errors_of_blanks(case)), ("bearings", "mounts", "forces"))
     yield checks.Check("meshes", lambda: gearbox.meshes, ("places", "pairs"))
     yield checks.Check("couplings", lambda: gearbox.couplings, ("bearings",))
     yield checks.Check("deviations", lambda: gearbox.deviations, ("places", "gears"))
@@ -522,45 +522,45 @@ def _checks_of_parts(gearbox: Gearbox) -> Iterator[checks.Check]:
 def _checks_of_the_whole(gearbox: Gearbox) -> Iterator[checks.Check]:
     case = gearbox.case
     elements = ("meshes", "bearings", "mounts", "couplings", "forces")
-    for name, faults, needs in (
-        ("distances", lambda: checks.faults_of_centre_distances(gearbox.meshes, gearbox.named_bodies), ("meshes",)),
+    for name, errors, needs in (
+        ("distances", lambda: checks.errors_of_centre_distances(gearbox.meshes, gearbox.named_bodies), ("meshes",)),
         (
             "planets",
-            lambda: checks.faults_of_planets(case, gearbox.bodies(), gearbox.gears, gearbox.meshes),
+            lambda: checks.errors_of_planets(case, gearbox.bodies(), gearbox.gears, gearbox.meshes),
             ("meshes",),
         ),
         (
             "size",
-            lambda: checks.faults_of_size(len(gearbox.bodies()), sum(map(len, _elements(gearbox).values()))),
+            lambda: checks.errors_of_size(len(gearbox.bodies()), sum(map(len, _elements(gearbox).values()))),
             elements,
         ),
         (
             "connection",
-            lambda: checks.faults_of_connection(
+            lambda: checks.errors_of_connection(
                 case, gearbox.bodies(), gearbox.meshes, gearbox.couplings, gearbox.held_by_torsion
             ),
             ("ends", "meshes", "couplings", "mounts"),
         ),
         (
             "torsion",
-            lambda: checks.faults_of_torsion(gearbox.spinning, gearbox.couplings, gearbox.bearings),
+            lambda: checks.errors_of_torsion(gearbox.spinning, gearbox.couplings, gearbox.bearings),
             ("couplings", "supports"),
         ),
-        ("seals", lambda: checks.faults_of_seals(case, list(gearbox.named_bodies)), ("ends",)),
-        ("names", lambda: checks.faults_of_names(_elements(gearbox)), elements),
-        ("axes", lambda: checks.faults_of_joints(gearbox.joints, gearbox.named_bodies), ("joints",)),
+        ("seals", lambda: checks.errors_of_seals(case, list(gearbox.named_bodies)), ("ends",)),
+        ("names", lambda: checks.errors_of_names(_elements(gearbox)), elements),
+        ("axes", lambda: checks.errors_of_joints(gearbox.joints, gearbox.named_bodies), ("joints",)),
         (
             "repetition",
-            lambda: checks.faults_of_repetition(case, gearbox.deviations, gearbox.pin_offsets),
+            lambda: checks.errors_of_repetition(case, gearbox.deviations, gearbox.pin_offsets),
             ("deviations", "pins"),
         ),
         (
             "output",
-            lambda: checks.faults_of_output_gear(case.overall, gearbox.gears, gearbox.bodies(), gearbox.couplings),
+            lambda: checks.errors_of_output_gear(case.overall, gearbox.gears, gearbox.bodies(), gearbox.couplings),
             ("ends", "gears", "couplings"),
         ),
     ):
-        yield checks.Check(name, partial(_refuse_found, gearbox, faults), needs)
+        yield checks.Check(name, partial(_refuse_found, gearbox, errors), needs)
     yield checks.Check("train", lambda: _check_train(gearbox), ("connection", "size", "load cases"))
 
 
@@ -568,15 +568,15 @@ def _refuse_found(gearbox: Gearbox, find: Callable[[], Iterable[str]]) -> None:
     _refuse(gearbox, find())
 
 
-def _refuse(gearbox: Gearbox, faults: Iterable[str]) -> None:
+def _refuse(gearbox: Gearbox, errors: Iterable[str]) -> None:
     """Raise all errors together, one per line."""
-    lines = [line for text in faults for line in gearbox.fault(text).faults]
+    lines = [line for text in errors for line in gearbox.error(text).errors]
     if lines:
         raise GearboxFileError(*lines)
 
 
 def _check_inertia_sets(gearbox: Gearbox) -> None:
-    _refuse(gearbox, checks.faults_of_inertia_sets(gearbox.case.default_inertias, gearbox.inertia_sets))
+    _refuse(gearbox, checks.errors_of_inertia_sets(gearbox.case.default_inertias, gearbox.inertia_sets))
     for inertias in gearbox.inertia_sets:
         gearbox.bodies(inertias)
 
@@ -585,14 +585,14 @@ def _check_train(gearbox: Gearbox) -> None:
     """Check that the static load can be reacted and that the train has consistent kinematics from input to output."""
     gearbox.train.static_mesh_forces()
     if gearbox.gears and not gearbox.meshes:
-        raise gearbox.fault("meshes: none is enabled; a gearbox with gears needs at least one")
+        raise gearbox.error("meshes: none is enabled; a gearbox with gears needs at least one")
     _ = gearbox.train.ratio
     for case in gearbox.load_cases.values():
         try:
             gearbox.start_speeds(case)
         except GearboxFileError as error:
             key = f"load_cases.{case.name}.start_speeds_rpm"
-            raise GearboxFileError(*(f"{fault}; see {key}" for fault in error.faults)) from None
+            raise GearboxFileError(*(f"{line}; see {key}" for line in error.errors)) from None
 
 
 def _elements(gearbox: Gearbox) -> dict[str, Sequence[Mesh | Bearing | Coupling | PointForce]]:

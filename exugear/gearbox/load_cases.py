@@ -17,7 +17,7 @@ import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import LoadCase
-from exugear.gearbox.reading import GearboxFileError, fault_line, shortened
+from exugear.gearbox.reading import GearboxFileError, error_line, shortened
 from exugear.gearbox.train import UNLOADED
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
@@ -45,30 +45,30 @@ def torque_series(gearbox: Gearbox, case: LoadCase) -> dict[str, tuple[Floats, F
     if case.torque_series is None:
         return {}
 
-    def fault(text: str) -> GearboxFileError:
-        return GearboxFileError(fault_line(str(case.torque_series), text))
+    def file_error(text: str) -> GearboxFileError:
+        return GearboxFileError(error_line(str(case.torque_series), text))
 
     try:
         with case.torque_series.open(newline="", encoding="utf-8-sig") as file:
             lines = [line for line in csv.reader(file) if line]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise fault(f"cannot be read as CSV ({error})") from None
+        raise file_error(f"cannot be read as CSV ({error})") from None
     if len(lines) < 3 or lines[0][0].strip() != "time_s":
-        raise fault("expected a header time_s,BODY_N_m,... and at least two lines of numbers")
+        raise file_error("expected a header time_s,BODY_N_m,... and at least two lines of numbers")
     try:
         table = np.array([[float(cell) for cell in line] for line in lines[1:]])
     except ValueError as error:
-        raise fault(f"{error}; every line needs {len(lines[0])} numbers") from None
+        raise file_error(f"{error}; every line needs {len(lines[0])} numbers") from None
     if table.ndim != 2 or table.shape[1] != len(lines[0]) or not np.all(np.isfinite(table)):
-        raise fault(f"every line needs {len(lines[0])} finite numbers")
+        raise file_error(f"every line needs {len(lines[0])} finite numbers")
     if not np.all(np.diff(table[:, 0]) > 0.0):
-        raise fault("time_s must increase from line to line")
+        raise file_error("time_s must increase from line to line")
     series = {}
     for column, name in enumerate(lines[0][1:], start=1):
         body = name.strip().removesuffix("_N_m")
         if body not in gearbox.spinning or not name.strip().endswith("_N_m"):
             known = ", ".join(f"{known}_N_m" for known in gearbox.spinning)
-            raise fault(f"column {shortened(name.strip())} is not the torque of a body; columns are {known}")
+            raise file_error(f"column {shortened(name.strip())} is not the torque of a body; columns are {known}")
         series[body] = (table[:, 0], table[:, column])
     return series
 
@@ -216,7 +216,7 @@ def _without_round_off(total: float, parts: Floats) -> float:
     return 0.0
 
 
-def doubts_about(loads: LoadSummary) -> tuple[str, ...]:
+def load_warnings(loads: LoadSummary) -> tuple[str, ...]:
     """Return warnings that indicate a wrong sign of a torque; empty if none."""
     doubts = []
     if loads.reversed_flanks:
@@ -385,7 +385,7 @@ def gearbox_at_load(gearbox: Gearbox, case: LoadCase) -> Gearbox:
     locked = gearbox.case.static_load.locked
     torques = {body: torque for body, torque in {**case.torques, **first}.items() if torque and body not in locked}
     if not torques:
-        raise gearbox.fault(
+        raise gearbox.error(
             f"load_cases.{case.name}.torques_N_m: at the start, torques act only on bodies that hold the static load ("
             f"{', '.join(locked)}), so nothing is loaded; choose another load case"
         )

@@ -22,9 +22,9 @@ from exugear.gearbox.sections.entries import GROUND
 from fe_ste.geometry.checks import GeometryError
 from fe_ste.tools.display import ReprMixin
 
-SHOWN_FAULTS = 24
+SHOWN_ERRORS = 24
 """Maximum number of errors that a message shows; the exception holds all of them."""
-LONGEST_FAULT = 280
+LONGEST_ERROR = 280
 """Maximum number of characters of an error after the name of the file."""
 
 
@@ -33,23 +33,23 @@ class GearboxFileError(ValueError):
 
     Attributes
     ----------
-    faults : tuple of str
-        All errors; the message shows the first `SHOWN_FAULTS`.
+    errors : tuple of str
+        All errors; the message shows the first `SHOWN_ERRORS`.
     """
 
-    def __init__(self, *faults: str) -> None:
-        self.faults = tuple(dict.fromkeys(faults))
-        more = len(self.faults) - SHOWN_FAULTS
+    def __init__(self, *errors: str) -> None:
+        self.errors = tuple(dict.fromkeys(errors))
+        more = len(self.errors) - SHOWN_ERRORS
         many = "s" if more > 1 else ""
         rest = [f"and {more} more error{many}"] if more > 0 else []
-        super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
+        super().__init__("\n".join([*self.errors[:SHOWN_ERRORS], *rest]))
 
 
-def fault_line(source: str, text: str) -> str:
+def error_line(source: str, text: str) -> str:
     """Return the file name and an error as one line; long errors are shortened in the middle to keep key and remedy."""
     text = " ".join(text.split())
-    half = (LONGEST_FAULT - 1) // 2
-    return f"{' '.join(source.splitlines())}: {text if len(text) <= LONGEST_FAULT else f'{text[:half]}…{text[-half:]}'}"
+    half = (LONGEST_ERROR - 1) // 2
+    return f"{' '.join(source.splitlines())}: {text if len(text) <= LONGEST_ERROR else f'{text[:half]}…{text[-half:]}'}"
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
@@ -107,11 +107,11 @@ def parsed(parse: Callable[[], dict[str, Any]], source: str, form: str) -> dict[
         return parse()
     except RecursionError:
         raise GearboxFileError(
-            fault_line(source, f"not valid {form}: nested too deep; a gearbox needs 6 levels")
+            error_line(source, f"not valid {form}: nested too deep; a gearbox needs 6 levels")
         ) from None
     except ValueError as error:
         why = "a whole number of thousands of digits" if "set_int_max_str_digits" in str(error) else error
-        raise GearboxFileError(fault_line(source, f"not valid {form}: {why}")) from None
+        raise GearboxFileError(error_line(source, f"not valid {form}: {why}")) from None
 
 
 def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
@@ -129,8 +129,8 @@ def parse_case(content: dict[str, Any], source: str) -> GearboxFile:
     try:
         return GearboxFile.model_validate(content)
     except ValidationError as error:
-        faults = error.errors(include_url=False)
-    raise GearboxFileError(*(fault_line(source, text) for text in _described(faults, content)))
+        errors = error.errors(include_url=False)
+    raise GearboxFileError(*(error_line(source, text) for text in _described(errors, content)))
 
 
 def readable(content: Mapping[str, Any]) -> GearboxFile:
@@ -195,28 +195,28 @@ def _valid_entries(content: Mapping[str, Any], table: str) -> dict[str, Any]:
     return found
 
 
-def _described(faults: list[Any], content: dict[str, Any]) -> Iterator[str]:
+def _described(errors: list[Any], content: dict[str, Any]) -> Iterator[str]:
     """Yield key, value and remedy of each error; a key that was misspelt is not reported as missing in addition."""
     meant = set()
-    locations = {fault["loc"] for fault in faults}
-    for fault in faults:
-        if fault["type"] == "extra_forbidden":
-            renamed = new_name([str(part) for part in fault["loc"]], GEARBOX_RENAMES)
-            meant.add((*fault["loc"][:-1], renamed or _nearest(fault["loc"])))
-    for fault in faults:
-        path = _path(fault["loc"], content)
+    locations = {error["loc"] for error in errors}
+    for error in errors:
+        if error["type"] == "extra_forbidden":
+            renamed = new_name([str(part) for part in error["loc"]], GEARBOX_RENAMES)
+            meant.add((*error["loc"][:-1], renamed or _nearest(error["loc"])))
+    for error in errors:
+        path = _path(error["loc"], content)
         key = ".".join(_key(part) for part in path)
-        if fault["type"] == "too_short" and any(loc[:-1][: len(fault["loc"])] == fault["loc"] for loc in locations):
+        if error["type"] == "too_short" and any(loc[:-1][: len(error["loc"])] == error["loc"] for loc in locations):
             continue  # the array is too short only because its entries are invalid
-        if fault["type"] == "missing":
+        if error["type"] == "missing":
             if path not in meant:
                 yield f"{key}: this key is missing"
             continue
-        shown = "" if isinstance(fault["input"], Mapping) else f" = {shortened(fault['input'])}"
-        if fault["loc"][-1:] == ("[key]",):
+        shown = "" if isinstance(error["input"], Mapping) else f" = {shortened(error['input'])}"
+        if error["loc"][-1:] == ("[key]",):
             yield f"{key}: {_A_NAME}"
         else:
-            yield f"{key}{shown}: {_remedy(fault)}"
+            yield f"{key}{shown}: {_remedy(error)}"
 
 
 _NO_CONTROL = "must be text without control characters"
@@ -234,28 +234,28 @@ _TYPES = {
 """Remedies for values of a wrong type; numbers and texts of a file are not converted."""
 
 
-def _remedy(fault: Any) -> str:
+def _remedy(error: Any) -> str:
     """Return the remedy of an error."""
-    if fault["type"] == "extra_forbidden":
-        if hint := renamed_hint([str(part) for part in fault["loc"]], GEARBOX_RENAMES):
+    if error["type"] == "extra_forbidden":
+        if hint := renamed_hint([str(part) for part in error["loc"]], GEARBOX_RENAMES):
             return hint
-        near = _nearest(fault["loc"])
-        known = ", ".join(_known_keys(fault["loc"]))
+        near = _nearest(error["loc"])
+        known = ", ".join(_known_keys(error["loc"]))
         if near:
             return f"unknown key; did you mean {near!r}?"
         return f"unknown key; known keys are {known}"
-    if fault["type"] in _TYPES:
-        return _TYPES[fault["type"]]
-    if fault["type"] in ("too_long", "too_short"):
-        limit = fault["ctx"].get("max_length", fault["ctx"].get("min_length"))
-        return f"must have {'at most' if fault['type'] == 'too_long' else 'at least'} {limit} entries"
-    if fault["type"] == "string_pattern_mismatch":
-        if "x7f" in fault["ctx"]["pattern"]:
+    if error["type"] in _TYPES:
+        return _TYPES[error["type"]]
+    if error["type"] in ("too_long", "too_short"):
+        limit = error["ctx"].get("max_length", error["ctx"].get("min_length"))
+        return f"must have {'at most' if error['type'] == 'too_long' else 'at least'} {limit} entries"
+    if error["type"] == "string_pattern_mismatch":
+        if "x7f" in error["ctx"]["pattern"]:
             return _NO_CONTROL
         return _A_NAME
-    if fault["type"] in ("literal_error", "enum"):
-        return one_of(fault["ctx"]["expected"], fault["input"])
-    text = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "must", 1)
+    if error["type"] in ("literal_error", "enum"):
+        return one_of(error["ctx"]["expected"], error["input"])
+    text = str(error["msg"]).removeprefix("Value error, ").replace("Input should", "must", 1)
     return text[:1].lower() + text[1:]
 
 
@@ -365,9 +365,9 @@ class Origin(ReprMixin):
     def _line(self) -> str:
         return f" {shortened(self.source)}"
 
-    def fault(self, text: str) -> GearboxFileError:
+    def error(self, text: str) -> GearboxFileError:
         """Error whose message is the file name followed by `text` (key, value and remedy)."""
-        return GearboxFileError(fault_line(self.source, text))
+        return GearboxFileError(error_line(self.source, text))
 
     def file(self, key: str, name: str, largest: int) -> Path:
         """Path of a file that the gearbox file names under a key, with at most `largest` bytes.
@@ -380,14 +380,14 @@ class Origin(ReprMixin):
         try:
             return named_file(name, Path(self.source).parent, self.permissions, largest)
         except NamedFileError as error:
-            raise self.fault(f"{key} = {name!r}: {error}") from None
+            raise self.error(f"{key} = {name!r}: {error}") from None
 
     def guarded(self, key: str, build: Callable[..., Part], *arguments: Any, **named: Any) -> Part:
         """Build a part of gears; geometric errors are reported as errors of the key."""
         try:
             return build(*arguments, **named)
         except GeometryError as error:
-            raise self.fault(f"{key}: {error}") from None
+            raise self.error(f"{key}: {error}") from None
 
     @cached_property
     def enabled(self) -> dict[str, BodySection]:
@@ -398,7 +398,7 @@ class Origin(ReprMixin):
         """Return whether all bodies are enabled; an unknown name raises an error, a disabled body does not."""
         for name in names:
             if name != GROUND and name not in self.case.bodies:
-                raise self.fault(f"{key}: no body {name!r}; bodies are {', '.join(self.case.bodies)} and ground")
+                raise self.error(f"{key}: no body {name!r}; bodies are {', '.join(self.case.bodies)} and ground")
         return all(name == GROUND or name in self.enabled for name in names)
 
     def suffixes(self, family: str) -> list[str]:
@@ -413,7 +413,7 @@ class Origin(ReprMixin):
         single = suffixes == [""]
         other_single = other_suffixes == [""]
         if not single and not other_single and len(suffixes) != len(other_suffixes):
-            raise self.fault(f"{key}: {family!r} and {other_family!r} are planet sets of different size")
+            raise self.error(f"{key}: {family!r} and {other_family!r} are planet sets of different size")
         return [
             (suffix, family + ("" if single else suffix), other_family + ("" if other_single else suffix))
             for suffix in (other_suffixes if single else suffixes)
@@ -429,14 +429,14 @@ def part_of_each(build: Callable[[str, Entry], Part], sections: Mapping[str, Ent
         Some sections have errors; the exception holds all of them.
     """
     parts: dict[str, Part] = {}
-    faults: list[str] = []
+    errors: list[str] = []
     for name, section in sections.items():
         try:
             parts[name] = build(name, section)
         except GearboxFileError as error:
-            faults += error.faults
-    if faults:
-        raise GearboxFileError(*faults)
+            errors += error.errors
+    if errors:
+        raise GearboxFileError(*errors)
     return parts
 
 

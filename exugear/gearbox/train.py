@@ -182,7 +182,7 @@ class Train(
 ):
     """Bodies that rotate about fixed or orbiting axes and are connected by rigid meshes and couplings.
 
-    The class is independent of the gearbox file; it raises errors through `fault`, which adds the name of the file.
+    The class is independent of the gearbox file; it raises errors through `error`, which adds the name of the file.
 
     Examples
     --------
@@ -207,7 +207,7 @@ class Train(
     """Static torques by body name, N m."""
     locked: tuple[str, ...]
     """Bodies that react the static torques."""
-    fault: Callable[[str], Exception]
+    error: Callable[[str], Exception]
     """Function that returns the exception for an error text."""
 
     def _table(self) -> TitledRows:
@@ -269,7 +269,7 @@ class Train(
         Raises
         ------
         Exception
-            Made by `fault`: the speeds are undetermined or contradict each other, or a body cannot rotate.
+            Made by `error`: the speeds are undetermined or contradict each other, or a body cannot rotate.
 
         Examples
         --------
@@ -280,20 +280,20 @@ class Train(
         """
         for body in speeds:
             if body not in self.spins:
-                raise self.fault(f"body {body!r} does not rotate; bodies are {', '.join(self.spins)}")
+                raise self.error(f"body {body!r} does not rotate; bodies are {', '.join(self.spins)}")
         if not self.degrees_of_freedom:
-            raise self.fault("meshes: the gear train is locked by its meshes and couplings; check them")
+            raise self.error("meshes: the gear train is locked by its meshes and couplings; check them")
         prescribed = self._prescribed(speeds)
         rows = self._modes_of(prescribed)
         given = np.array([speeds.get(name, 0.0) for name in prescribed])
         weights, _, rank, _ = np.linalg.lstsq(rows, given, rcond=1e-9)
         if rank < self.degrees_of_freedom:
-            raise self.fault(
+            raise self.error(
                 f"the gear train has {self.degrees_of_freedom} degrees of freedom; the rotation of "
                 f"{', '.join(prescribed)} does not determine all speeds; set the locked bodies in static_load.locked"
             )
         if np.abs(rows @ weights - given).max() > 1e-9 * np.abs(given).max():
-            raise self.fault(
+            raise self.error(
                 f"the speeds of {', '.join(speeds)} contradict each other: the gear train has "
                 f"{self.degrees_of_freedom} degree{'s' if self.degrees_of_freedom > 1 else ''} of freedom"
             )
@@ -333,7 +333,7 @@ class Train(
         Raises
         ------
         Exception
-            Made by `fault`: a body cannot rotate, too many bodies are locked, or they do not balance the torques.
+            Made by `error`: a body cannot rotate, too many bodies are locked, or they do not balance the torques.
         """
         torques = self.torques if torques is None else torques
         self._check_load(torques)
@@ -341,7 +341,7 @@ class Train(
         locks = np.array([[float(name == lock) for name in self.spins] for lock in self.locked])
         forces = holding_forces(np.vstack([self.spin_rows, locks.reshape(-1, len(self.spins))]), applied)
         if forces is None:
-            raise self.fault(
+            raise self.error(
                 f"static_load: locking {', '.join(self.locked) or 'nothing'} does not balance the torques "
                 f"{dict(torques)}; check static_load.locked"
             )
@@ -371,11 +371,11 @@ class Train(
         for key, names in (("torques_N_m", tuple(torques)), ("locked", self.locked)):
             for name in names:
                 if name not in self.spins:
-                    raise self.fault(
+                    raise self.error(
                         f"static_load.{key} = {name!r}: no such rotating body; bodies are {', '.join(self.spins)}"
                     )
         if np.linalg.matrix_rank(self._modes_of(self.locked)) < len(self.locked):
-            raise self.fault(
+            raise self.error(
                 f"static_load.locked = {list(self.locked)}: more bodies than the degrees of freedom of the train ("
                 f"{self.degrees_of_freedom}), load sharing is undetermined; remove one"
             )

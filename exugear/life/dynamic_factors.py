@@ -99,9 +99,9 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
         arrays, attributes = read_run(path, ["time", "input_speed", "mesh_force"])
     except FileError as error:
         command = f"exugear run GEARBOX.toml --variant {assembly.variant} --load-case {rating.dynamic_factor_run}"
-        raise gearbox.fault(f"{key}: {error}; compute it by `{command}`") from error
+        raise gearbox.error(f"{key}: {error}; compute it by `{command}`") from error
     if attributes["input_hash"] != input_hash(assembly, rating.dynamic_factor_run):
-        raise gearbox.fault(f"{key}: {path} belongs to another input; run it again")
+        raise gearbox.error(f"{key}: {path} belongs to another input; run it again")
     ratio = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)[body])
     frequencies = gearbox.train.mesh_frequencies(1.0)
     speed = np.abs(arrays["input_speed"].astype(np.float64))
@@ -110,7 +110,7 @@ def factors_of_run(assembly: Assembly, rating: RatingSection, path: Path, body: 
         force = np.abs(arrays["mesh_force"][:, number].astype(np.float64))
         windows = window_factors(arrays["time"], frequencies[mesh.name] * speed, force)
         if windows is None:
-            raise gearbox.fault(f"{key}: {path} is shorter than a window of {CYCLES:g} mesh cycles of {mesh.name}")
+            raise gearbox.error(f"{key}: {path} is shorter than a window of {CYCLES:g} mesh cycles of {mesh.name}")
         instants, values = windows
         found.setdefault(mesh.family, []).append((ratio * np.interp(instants, arrays["time"], speed), values))
     every = np.concatenate([speeds for parts in found.values() for speeds, _ in parts]) / RPM
@@ -228,9 +228,9 @@ def factors_of_response(assembly: Assembly, rating: RatingSection, path: Path, b
         fits = settings_of(data.attrs).hash_with(assembly) == data.attrs["input_hash"]
     except (FileError, ValueError) as error:
         command = f"exugear steady GEARBOX.toml --variant {assembly.variant} --method {level}"
-        raise gearbox.fault(f"{key}: {error}; compute it by `{command}`") from error
+        raise gearbox.error(f"{key}: {error}; compute it by `{command}`") from error
     if not fits:
-        raise gearbox.fault(f"{key}: {path} belongs to another input; recompute it")
+        raise gearbox.error(f"{key}: {path} belongs to another input; recompute it")
     frequencies = gearbox.train.mesh_frequencies(2.0 * np.pi)
     sets = planet_sets(assembly)
     ratio = abs(gearbox.train.rolling_speeds(gearbox.case.overall.input, 1.0)[body])

@@ -120,26 +120,26 @@ def check_strengths(
     gearbox: Gearbox, rating: RatingSection, teeth: Sequence[ToothExposure], reversed_too: bool
 ) -> None:
     """Refuse strengths of unknown gears, and alternating bending without Y_M; all errors are raised together."""
-    faults: list[str] = []
+    errors: list[str] = []
     for name, strength in rating.gears.items():
         flanks = {one.flank for one in teeth if one.gear == name}
         if not flanks:
             known = ", ".join(sorted({one.gear for one in teeth}))
-            faults += gearbox.fault(f"rating.gears.{name}: no gear of that name in a mesh; gears are {known}").faults
+            errors += gearbox.error(f"rating.gears.{name}: no gear of that name in a mesh; gears are {known}").errors
         elif (len(flanks) > 1 or reversed_too) and strength.mean_stress_factor is None:
-            faults += gearbox.fault(
+            errors += gearbox.error(
                 f"rating.gears.{name}.mean_stress_factor: this key is missing; teeth of {name} are loaded on both "
                 "flanks (alternating bending)"
-            ).faults
+            ).errors
     if rating.f_ZCa is not None and not any(
         mesh.pair.overlap_ratio > 0.0 and is_modified(gearbox, mesh.pair) for mesh in gearbox.meshes
     ):
-        faults += gearbox.fault(
+        errors += gearbox.error(
             f"rating.f_ZCa = {rating.f_ZCa:g}: no helical gear has a modification; add [gears.NAME.modification], or "
             f"remove the key (f_ZCa = {UNMODIFIED:g})"
-        ).faults
-    if faults:
-        raise GearboxFileError(*faults)
+        ).errors
+    if errors:
+        raise GearboxFileError(*errors)
 
 
 def is_modified(gearbox: Gearbox, pair: GearPair) -> bool:

@@ -64,7 +64,7 @@ def check_reach(gearbox: Gearbox, counted: CountedLoads, tables: Mapping[str, fl
             torque = largest * counted.mesh_forces[mesh.family] * mesh.pair.pinion.base_radius
             reach, name = max((reach, name), (torque / tables[mesh.pair.name], mesh.pair.name))
     if reach > LARGEST_REACH:
-        raise gearbox.fault(
+        raise gearbox.error(
             f"loads: {1e-3 * largest:.4g} kN m on {counted.body} is {reach:.3g} times the largest torque of the table "
             f"of {name}; stresses are extrapolated up to {LARGEST_REACH:g} times. Increase static_load.torques_N_m to "
             f"these loads, or set torque_factors up to {reach:.2g} and grid = true in [ste]"
@@ -210,7 +210,7 @@ def rating_of(gearbox: Gearbox) -> RatingSection:
         There is none.
     """
     if gearbox.case.rating is None:
-        raise gearbox.fault(
+        raise gearbox.error(
             "rating: this section is missing; add [rating] with dynamic_factor, [rating.gears.NAME] with the "
             "strength of each gear, and [lubricant] with viscosity_40_mm2_per_s"
         )
@@ -243,21 +243,21 @@ def check_keys(gearbox: Gearbox) -> None:
     GearboxFileError
         Missing sections or keys, or an unknown load case.
     """
-    faults: list[str] = []
+    errors: list[str] = []
     for asked in (rating_of, section_of, lambda given: given.viscosity_40):
         try:
             asked(gearbox)
         except GearboxFileError as error:
-            faults += error.faults
+            errors += error.errors
     rating = gearbox.case.rating
     named = rating and rating.dynamic_factor_run
     if named and named not in gearbox.load_cases:
         known = ", ".join(gearbox.load_cases) or "none"
-        faults += gearbox.fault(
+        errors += gearbox.error(
             f"rating.dynamic_factor_run = {named!r}: no such load case; load cases are {known}"
-        ).faults
-    if faults:
-        raise GearboxFileError(*faults)
+        ).errors
+    if errors:
+        raise GearboxFileError(*errors)
 
 
 def life_hash(assembly: Assembly, counted: CountedLoads, tables: Mapping[str, str], run: str = "") -> str:

@@ -182,7 +182,7 @@ def losses_of(
     """
     lubricant = gearbox.case.lubricant
     if lubricant is None or lubricant.viscosity_100_mm2_per_s is None:
-        raise gearbox.fault(
+        raise gearbox.error(
             "lubricant: viscosity_40_mm2_per_s and viscosity_100_mm2_per_s are required for losses; add them to "
             "[lubricant]"
         )
@@ -191,7 +191,7 @@ def losses_of(
     ambient = lubricant.ambient_C
     conductance = lubricant.conductance_W_per_K
     if ambient is None or conductance is None:
-        raise gearbox.fault(
+        raise gearbox.error(
             "lubricant: the temperature of the oil is required for losses; set temperature_C, or ambient_C and "
             "conductance_W_per_K"
         )
@@ -200,7 +200,7 @@ def losses_of(
         return temperature - ambient - _at_temperature(gearbox, duties, tables, speed, temperature).total / conductance
 
     if excess(HOTTEST) < 0.0:
-        raise gearbox.fault(
+        raise gearbox.error(
             f"lubricant.conductance_W_per_K = {conductance:g}: the losses heat the oil above {HOTTEST:g} degrees "
             "Celsius; set a larger conductance (cooler), or temperature_C"
         )
@@ -368,4 +368,4 @@ def operating_speed(gearbox: Gearbox, stated: float | None = None) -> float:
         loads = summarise_loads(gearbox, case)
         if loads.fastest_speed > 0.0:
             return math.copysign(loads.fastest_speed, loads.end_speed)
-    raise gearbox.fault("operation.rated_speed_rpm: is required for losses; set it, or use --speed RPM")
+    raise gearbox.error("operation.rated_speed_rpm: is required for losses; set it, or use --speed RPM")

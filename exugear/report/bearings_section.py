@@ -11,12 +11,11 @@ import xarray as xr
 
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import choice_of, model_label
+from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Part, ReportData, only_for
-from exugear.report.web import html as pieces
-from exugear.report.web.html import Cell
+from exugear.report.material import Part, ReportData, model_name
+from exugear.report.web.html import Cell, Table, render
 from exugear.steady.peaks import line_name
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.rows import BearingError
@@ -31,18 +30,6 @@ NOISE = 1e-3
 """Fraction of the mean transverse force below which an axial force is shown as zero."""
 NOISE_OF_ALL = 1e-5
 """Fraction of the largest force of all bearings below which a force is shown as zero."""
-RUN_UP_NOTE = (
-    "Mean radial force over the middle third of the run-up, and largest zero-to-peak amplitude along an order (root "
-    "sum square of both radial directions). For planet sets, the bearing with the largest amplitude. Axial force: of "
-    "the shaft on the bearing or joint, positive along +z."
-)
-"""Note above the table of forces in run-ups."""
-STEADY_NOTE = (
-    "Largest zero-to-peak amplitude along an order at constant speed (root sum square of both radial "
-    "directions). Planet bearing forces are multi-blade components (mean, cosine, sine). Static loads are listed "
-    "below."
-)
-"""Note above the table of forces at constant speed."""
 SEATS = 12
 """Maximum number of seats in the table of accelerations."""
 MIN_RELATIVE_ACCELERATION = 1e-3
@@ -52,51 +39,51 @@ MIN_RELATIVE_ACCELERATION = 1e-3
 def bearings_section(material: ReportData) -> Part:
     """List bearing forces by result group, accelerations by steady-state response and static bearing loads by model."""
     forces = [
-        only_for(_forces(material, data, group, variant), group.name, variant)
+        _forces(data, group, variant)
         for data, group in zip(material.run_data["groups"], material.groups, strict=True)
         for variant in group.runs
     ]
-    accelerations = [_accelerations(material, data) for data in material.results.steady]
-    duties = [_duties(material, assembly) for assembly in material.context.assemblies.values()]
-    if not any((*forces, *accelerations, *duties)):
-        return Part("")
-    note = ""
-    if not any(accelerations):
-        note = pieces.paragraph("Accelerations at bearings require a steady-state response: `exugear steady`.", "note")
-    html = pieces.section("Bearing forces and accelerations", *forces, *accelerations, note, *duties, name="bearings")
-    return Part(html, {}, "Bearing forces and accelerations", "bearings")
+    forces = list(filter(None, forces))
+    accelerations = list(filter(None, (_accelerations(material, data) for data in material.results.steady)))
+    duties = list(filter(None, (_duties(material, assembly) for assembly in material.context.assemblies.values())))
+    if not (forces or accelerations or duties):
+        return Part()
+    html = render("bearings", forces=forces, accelerations=accelerations, seats=SEATS, duties=duties)
+    return Part(html, title="Bearing forces and accelerations", name="bearings")
 
 
-def _forces(material: ReportData, data: Mapping[str, Any], group: RunGroup, variant: str) -> str:
+def _forces(data: Mapping[str, Any], group: RunGroup, variant: str) -> dict[str, Any] | None:
     own = data["variants"][variant]
     loudest = {name: figures for name, figures in own["loudest"].items() if figures["amplitude"] is not None}
     if not loudest:
-        return ""
+        return None
     largest = max(figures["amplitude"] for figures in loudest.values())
     felt = NOISE_OF_ALL * max(max(figures["amplitude"], figures["mean"] or 0.0) for figures in loudest.values())
     loudest = {
         name: {**figures, **{kind: _above(figures[kind], felt) for kind in ("mean", "amplitude")}}
         for name, figures in loudest.items()
     }
-    rows = [_force_row(group, variant, name, figures, largest) for name, figures in loudest.items()]
     caption = f"Radial forces {Variant.of(variant).label}, {group.source}"
-    lifting = [
-        f"{figures['words']}: dynamic force amplitude {100.0 * figures['amplitude'] / figures['mean']:.0f} % of the "
-        "mean force. A linear bearing model neglects loss of contact."
-        for figures in loudest.values()
-        if figures["mean"] and figures["amplitude"] > CONTACT_LOSS_RATIO * figures["mean"]
-    ]
-    words = STEADY_NOTE if group.responses else RUN_UP_NOTE
-    table = pieces.table(
-        rows,
-        ("dominant order",),
-        caption=caption,
-        name=f"forces-{group.name}-{variant}",
-        hidden=("mean axial force / kN",),
-        sortable=True,
-    )
-    warned = pieces.element("div", pieces.bullets(lifting), class_="warning") if lifting else ""
-    return pieces.element("h3", pieces.text(caption)) + pieces.paragraph(words, "note") + table + warned
+    return {
+        "group": group.name,
+        "variant": variant,
+        "title": caption,
+        "steady": bool(group.responses),
+        "table": Table(
+            [_force_row(group, variant, name, figures, largest) for name, figures in loudest.items()],
+            ("dominant order",),
+            caption=caption,
+            name=f"forces-{group.name}-{variant}",
+            hidden=("mean axial force / kN",),
+            sortable=True,
+        ),
+        "lifting": [
+            f"{figures['words']}: dynamic force amplitude {100.0 * figures['amplitude'] / figures['mean']:.0f} % of "
+            "the mean force. A linear bearing model neglects loss of contact."
+            for figures in loudest.values()
+            if figures["mean"] and figures["amplitude"] > CONTACT_LOSS_RATIO * figures["mean"]
+        ],
+    }
 
 
 def _force_row(
@@ -105,17 +92,18 @@ def _force_row(
     amplitude = figures["amplitude"]
     mean = figures["mean"] or 0.0
     copies = f" (1 of {figures['copies']})" if figures["copies"] > 1 else ""
-    share = amplitude / mean if mean else math.inf
+    share = amplitude / mean if mean else math.nan
     named = Cell(f"{figures['words']}{copies}", choice=f"channel:{group.name}:{variant}:{name}")
-    swings = Cell(figure_text(1e-3 * amplitude), amplitude, bar=amplitude / largest)
+    swings = Cell(figure_text(1e-3 * amplitude), 1e-3 * amplitude, bar=amplitude / largest)
     measures = {"amplitude / kN": swings}
     if not group.responses:
+        axial = _without_noise(1e-3 * figures["axial"], mean)
         measures = {
-            "mean radial force / kN": Cell(figure_text(1e-3 * mean), mean),
-            "mean axial force / kN": Cell(figure_text(_without_noise(1e-3 * figures["axial"], mean)), figures["axial"]),
+            "mean radial force / kN": Cell(figure_text(1e-3 * mean), 1e-3 * mean),
+            "mean axial force / kN": Cell(figure_text(axial), axial),
             **measures,
             ("amplitude over mean / %"): Cell(
-                figure_text(100.0 * share, 2) if math.isfinite(share) else "–", min(share, 1e9)
+                figure_text(100.0 * share, 2) if math.isfinite(share) else "–", 100.0 * share
             ),
         }
     return {
@@ -141,12 +129,12 @@ def _without_noise(value: float, mean: float) -> float:
     return 0.0
 
 
-def _accelerations(material: ReportData, data: xr.Dataset) -> str:
+def _accelerations(material: ReportData, data: xr.Dataset) -> dict[str, Any] | None:
     """Tabulate the largest seat accelerations of a steady-state response over all orders and speeds."""
     signals = [str(name) for name in data["signal"].to_numpy()]
     places = [place for place, name in enumerate(signals) if name.startswith("seat_acceleration ")]
     if not places:
-        return ""
+        return None
     amplitude = data["amplitude"].to_numpy()[:, 1:, places].astype(np.float64)
     order = np.argsort(-amplitude.max(axis=(0, 1)))[:SEATS]
     bases = tuple(str(name) for name in data["base"].to_numpy())
@@ -165,64 +153,42 @@ def _accelerations(material: ReportData, data: xr.Dataset) -> str:
                     figure_text(float(amplitude[point, line, seat])), float(amplitude[point, line, seat])
                 ),
                 "order": material.words.labelled(line_name(index, bases)),
-                "speed / rpm": Cell(figure_text(speed / RPM, 4), speed),
+                "speed / rpm": Cell(figure_text(speed / RPM, 4), speed / RPM),
                 "frequency / Hz": Cell(f"{float(data['order'][line + 1]) * speed / (2.0 * np.pi):.0f}"),
             }
         )
     title = (
-        f"Accelerations at bearings: steady-state response of {model_label(choice_of(data.attrs))}, method "
-        f"{data.attrs['method']}"
+        f"Accelerations at bearings: steady-state response of {model_label(choice_of(data.attrs))}, "
+        f"{METHOD_LABELS[str(data.attrs['method'])]}"
     )
-    words = (
-        f"Largest zero-to-peak amplitude of a single order over all speeds, the {SEATS} largest; x, y and z are the "
-        "gearbox axes. For planet sets: multi-blade components (mean, cosine, sine)."
-    )
-    table = pieces.table(rows, ("order",), caption=title, name=f"seats-{'-'.join(title.split()[7:])}", sortable=True)
-    return pieces.element("h3", pieces.text(title)) + pieces.paragraph(words, "note") + table
+    name = f"seats-{model_name(choice_of(data.attrs))}-{data.attrs['method']}"
+    return {"title": title, "table": Table(rows, ("order",), caption=title, name=name, sortable=True)}
 
 
-def _duties(material: ReportData, assembly: Assembly) -> str:
+def _duties(material: ReportData, assembly: Assembly) -> dict[str, Any] | None:
     if not assembly.variant.has_bearings or not any(support.catalogue for support in assembly.supports):
-        return ""
+        return None
     name = model_label(assembly.choice)
+    label = model_name(assembly.choice)
     try:
         duties = bearing_duties(assembly)
     except (BalanceError, BearingError) as error:
         material.context.notes.left_out.append(f"bearings of {name}: {error}")
-        return ""
+        return None
     said = ((duty, remark) for duty in duties for remark in (duty.ratings.two_designs, *duty.remarks) if remark)
-    remarks = [f"{material.words.of(duty.name)}: {remark}." for duty, remark in said]
     rows = [_duty_row(material, duty) for duty in duties]
-    table = pieces.table(
-        rows, ("model",), caption=f"Bearings at the static load, {name}", name=f"duties-{'-'.join(name.split())}"
-    )
-    words = (
-        "Rolling elements to ISO/TS 16281 with rigid rings, under the static load. L10 to ISO 281 and L10r to ISO/TS "
-        "16281 in million revolutions; lubricant, cleanliness and ribs are neglected. *: conservatively estimated "
-        "rating; +: smallest rating in manufacturers' catalogues. Linear bearings have the tangent stiffness at this "
-        "load. Axial load: of the shaft on the inner ring, positive along +z."
-    )
-    content = pieces.paragraph(words, "note") + table + (pieces.bullets(remarks) if remarks else "")
-    content += _meshes(material, assembly)
-    return pieces.folded(f"Bearings at the static load: {name}", content)
-
-
-def _meshes(material: ReportData, assembly: Assembly) -> str:
-    """Tabulate mesh misalignment and face load distribution under static load; empty without solved tooth contact."""
-    if not assembly.contacts.contacts:
-        return ""
-    name = model_label(assembly.choice)
-    duties = mesh_duties(assembly)
-    rows = [_mesh_row(material, duty) for duty in duties]
-    words = (
-        "Gear misalignment and load distribution under the static load (finite element contact). Gap at +z "
-        "end: opening of the flanks there due to misalignment, over the common face width; negative: at the -z end. "
-        "K_Hbeta: maximum over mean line load along the face width."
-    )
-    table = pieces.table(
-        rows, (), caption=f"Meshes at the static load, {name}", name=f"meshes-{'-'.join(name.split())}"
-    )
-    return pieces.paragraph(words, "note") + table
+    # Without solved tooth contact there is no load distribution along the face.
+    meshes = mesh_duties(assembly) if assembly.contacts.contacts else ()
+    return {
+        "name": name,
+        "table": Table(rows, ("model",), caption=f"Bearings at the static load, {name}", name=f"duties-{label}"),
+        "remarks": [f"{material.words.of(duty.name)}: {remark}." for duty, remark in said],
+        "meshes": Table(
+            [_mesh_row(material, duty) for duty in meshes],
+            caption=f"Meshes at the static load, {name}",
+            name=f"meshes-{label}",
+        ),
+    }
 
 
 def _mesh_row(material: ReportData, duty: MeshLoadState) -> dict[str, object]:
@@ -260,13 +226,11 @@ def _duty_row(material: ReportData, duty: BearingLoadState) -> dict[str, object]
         "tilting stiffness / (MN m/rad)": f"{tilt:.3g}",
         "misalignment / mrad": f"{1e3 * duty.misalignment:.3f}",
         "contact stress / MPa": f"{1e-6 * duty.pressure:.0f}",
-        "C_r / kN": f"{1e-3 * duty.ratings.dynamic:.4g}{sign}",
+        "C_r / kN": Cell(f"{1e-3 * duty.ratings.dynamic:.4g}{sign}", 1e-3 * duty.ratings.dynamic),
         "L10 / Mrev": _life(duty.basic_life),
         "L10r / Mrev": _life(duty.reference_life),
     }
 
 
-def _life(value: float) -> str:
-    if math.isfinite(value):
-        return f"{value:.3g}"
-    return "no load"
+def _life(value: float) -> Cell:
+    return Cell(f"{value:.3g}" if math.isfinite(value) else "no load", value)

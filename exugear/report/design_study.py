@@ -6,11 +6,9 @@ the results, so that a stopped study resumes, and a repeated one reads its resul
 
 from __future__ import annotations
 
-import json
 import math
 import shutil
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -18,33 +16,32 @@ import numpy as np
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.reading import GearboxFileError
 from exugear.report.findings.design_changes import (
     ChangeResult,
     DesignChange,
-    effects_in_decibels,
+    DesignStudy,
     effects_of,
     exciting_families,
     ordered,
     peaks_of,
     price_of,
     propose_changes,
+    settings_of_study,
+    write_design_study,
 )
 from exugear.report.findings.loudness import Resonance, ranking_of
 from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.rotating_frame import SteadyError
-from exugear.steady.settings import SpeedRange, SteadySettings, usual_speeds
+from exugear.steady.settings import SteadySettings
 from exugear.system.bearings.rolling.rows import BearingError
-from exugear.system.readiness import check_parts, lacking
+from exugear.system.gearbox_checks import check_parts, lacking
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError
 from fe_ste.geometry.checks import GeometryError
-from fe_ste.tools.files import write_file
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.axes import Axes
 
     from exugear.system.bearings.duty import BearingLoadState
     from exugear.system.modes import Modes
@@ -52,8 +49,6 @@ if TYPE_CHECKING:
 
 FOLDER = "design-changes"
 """Subfolder of the results with one folder for each changed gearbox."""
-SPEEDS = 180
-"""Even speeds over the operating range; speeds at resonances are added."""
 BEARINGS = 2
 """Number of bearings with the largest strain energy that changes are proposed for."""
 _REFUSALS = (GearboxFileError, GeometryError, BearingError, BalanceError, MeshError, SteadyError)
@@ -94,42 +89,6 @@ class ComputedProject(Protocol):
         """Return the transmission error tables that the mesh model reads."""
 
 
-@dataclass(frozen=True)
-class DesignStudy:
-    """Results of all design changes."""
-
-    resonance: Resonance
-    """First resonance of the ranking in the operating range, which the changes are to reduce."""
-    results: tuple[ChangeResult, ...]
-    """Changes of the design by their effect, then assumptions, then changes that cannot be made."""
-    path: Path
-    """File with the results."""
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw what each change does to the three quantities, in dB, as `exugear report --levers` lists it.
-
-        Narrow dark bars: this peak; wide pale bars: highest amplitude of any order in the operating range. Changes that
-        cannot be made are left out.
-
-        Parameters
-        ----------
-        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
-
-        Examples
-        --------
-        >>> from exugear.report.findings.design_changes import Effect
-        >>> wider = DesignChange("wider", "face width 40 to 48 mm", "gear", {})
-        >>> results = (ChangeResult(wider, {"error": Effect(-6.0, -3.5)}, "+2 kg"),)
-        >>> ax = DesignStudy(Resonance("stage_1", 21.0, 100.0, 334.0, {}), results, Path("changes.json")).plot()
-        >>> [label.get_text() for label in ax.get_yticklabels()], [float(bar.get_width()) for bar in ax.patches]
-        (['face width 40 to 48 mm'], [-3.5, -6.0])
-        """
-        from exugear.report.pictures.diagrams import draw_effects  # for drawing only
-
-        made = [result for result in self.results if not result.refusal]
-        return draw_effects([result.change.words for result in made], effects_in_decibels(made), ax)
-
-
 def study_design_changes(
     project: ComputedProject, progress: Callable[[int, int, str], None] | None = None
 ) -> DesignStudy | None:
@@ -143,8 +102,9 @@ def study_design_changes(
     -------
     None if the response has no resonances in the range
     """
-    settings = SteadySettings(_speeds(project.gearbox))
-    data = project.steady(settings)
+    settings = settings_of_study(project.gearbox)
+    # The response of the unchanged gearbox has a folder, too: that of the project may be over other speeds.
+    data = _project_with(project, project.gearbox, "unchanged").steady(settings)
     ranking = ranking_of(data)
     if not ranking.resonances:
         return None
@@ -166,27 +126,17 @@ def study_design_changes(
         except _REFUSALS as error:
             reason = str(error).removeprefix(f"{project.gearbox.source}: ").split("\n")[0]
             results.append(ChangeResult(change, {}, "", reason))
-    study = DesignStudy(resonance, tuple(ordered(results)), project.folder / DESIGN_CHANGES_FILE)
-    content = {
-        "input_hash": str(data.attrs["input_hash"]),
-        "order": resonance.line,
-        "frequency_Hz": resonance.frequency,
-        "speed_rad_per_s": resonance.speed,
-        "amplitudes": {name: values[0] for name, values in before.items()},
-        "results": [asdict(result) for result in study.results],
-    }
-    write_file(study.path, json.dumps(content, indent=1).encode("utf-8"))
+    study = DesignStudy(
+        {key: str(data.attrs[key]) for key in ("variant", "mesh_model", "inertias")},
+        str(data.attrs["input_hash"]),
+        resonance.line,
+        resonance.frequency,
+        resonance.speed,
+        {name: values[0] for name, values in before.items()},
+        ordered(results),
+    )
+    write_design_study(project.folder / DESIGN_CHANGES_FILE, study)
     return study
-
-
-def _speeds(gearbox: Gearbox) -> SpeedRange:
-    """Speeds of the operating range; those of the first load case without one."""
-    usual = usual_speeds(gearbox)
-    stated = operating_range(gearbox)
-    if stated is None:
-        return usual
-    low, high = (math.copysign(speed, usual.last) for speed in stated)
-    return SpeedRange(low, high, SPEEDS)
 
 
 def _proposed(project: ComputedProject, data: xr.Dataset, resonance: Resonance) -> list[DesignChange]:
@@ -204,15 +154,17 @@ def _proposed(project: ComputedProject, data: xr.Dataset, resonance: Resonance) 
 
 
 def _changed_project(project: ComputedProject, change: DesignChange) -> ComputedProject:
-    """Check the changed gearbox as a file would be, and give it a folder with the tables there are.
-
-    Tables of pairs that the change does not touch fit there, too.
-    """
+    """Check the changed gearbox as a file would be."""
     gearbox = project.gearbox.varied(change.keys)
     check_parts(gearbox)
     if reason := lacking(gearbox, project.choice.variant):
-        raise gearbox.fault(reason)
-    folder = project.folder / FOLDER / change.name
+        raise gearbox.error(reason)
+    return _project_with(project, gearbox, change.name)
+
+
+def _project_with(project: ComputedProject, gearbox: Gearbox, name: str) -> ComputedProject:
+    """Give a gearbox a folder with the tables that exist: those of unchanged pairs are valid there, too."""
+    folder = project.folder / FOLDER / name
     changed = project.replaced(gearbox, folder)
     changed.keep_case()
     for path in (project.folder / "tables").glob("*.nc"):

@@ -3,48 +3,34 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from exugear.report.findings.context import HARMONICS, PairExcitation, excitations
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Axis, Curve, Part, ReportData, chart
-from exugear.report.web import html as pieces
-from exugear.report.web.html import Cell
-
-PRESSURE = (
-    "Contact stress: maximum over the mesh cycle without tip-edge contact, under this torque, aligned gears, no load "
-    "factors."
-)
-"""Note on the contact stresses of TE tables."""
+from exugear.report.material import Axis, Curve, Part, ReportData
+from exugear.report.web.html import Cell, Table, render
 
 
 def gears_section(material: ReportData) -> Part:
     """Show the static transmission error of each pair with harmonics and stiffness, and the gear geometry."""
     found = excitations(material.context, material.results)
-    charts: dict[str, Any] = {}
-    content = []
-    if found:
-        html, charts = chart(
+    curves = [Curve(material.words.of(own.pair), own.position, 1e6 * (own.error - own.error.mean())) for own in found]
+    html = render(
+        "gears",
+        figure_of_error=material.chart(
             "ste",
             "Static transmission error over one mesh cycle",
             "Deviation from the mean.",
             "; ".join(f"{material.words.of(own.pair)} {_swing(own):.2f} µm peak-to-peak" for own in found),
-            [Curve(material.words.of(own.pair), own.position, 1e6 * (own.error - own.error.mean())) for own in found],
+            curves,
             [Axis("position in the mesh cycle"), Axis("transmission error / µm")],
-            material.arrays,
-        )
-        content = [
-            html,
-            pieces.table([_row(material, own) for own in found], caption="Static transmission error", name="errors"),
-            pieces.paragraph(PRESSURE, "note"),
-            pieces.element("h3", "Harmonics of the transmission error, ± µm"),
-            pieces.table([_harmonics_row(material, own) for own in found], caption="Harmonics", name="harmonics"),
-        ]
-    content.append(pieces.folded("Gears", pieces.table(_gear_rows(material), caption="Gears", name="gears")))
-    html = pieces.section("Static transmission error and gears", *content, name="gears-section")
-    return Part(html, {"charts": charts}, "Static transmission error", "gears-section")
+        ),
+        errors=Table([_row(material, own) for own in found], caption="Static transmission error", name="errors"),
+        harmonics=Table([_harmonics_row(material, own) for own in found], caption="Harmonics", name="harmonics"),
+        gears=Table(_gear_rows(material), caption="Gears", name="gears"),
+    )
+    return Part(html, title="Static transmission error", name="gears-section")
 
 
 def _swing(excitation: PairExcitation) -> float:

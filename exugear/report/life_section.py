@@ -7,7 +7,6 @@ import io
 import json
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -19,27 +18,14 @@ from exugear.life.rating.sheet import RATED_AS, FlankKey, balanced, life_results
 from exugear.report.findings.context import choice_of, model_label
 from exugear.report.findings.words import figure_text
 from exugear.report.material import Part, ReportData
-from exugear.report.web import html as pieces
-from exugear.report.web.html import Cell
+from exugear.report.web.html import Cell, Table, render
 from exugear.results.folder import StoredStudy, stored_studies
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError
 
-WORDS = (
-    "Load spectrum of the gearbox file, static balance of the variant, and finite element tooth contact. Damage: "
-    "Miner's sum (1: failure). Bearing lives are basic rating lives (L10 to ISO 281, L10r to ISO/TS 16281); L10m "
-    "(ISO 281) includes lubricant and cleanliness.",
-    "σ_H: largest contact stress; σ_F: largest root stress; σ_H0, σ_F0: nominal stresses of ISO 6336-2 and -3. S_H, "
-    "S_F: factors on stress at which the damage is 1; static: for extreme loads. Outside the path: fraction of the "
-    "load carried by tip edges, outside the path of contact. +: flank that faces the direction of positive rotation "
-    "about z. S_0: static load safety factor of the bearing, static load rating over the largest load.",
-)
-
 LEAST_DAMAGE = 1e-6
 """Damages below this value are shown as "below" it."""
-WIDTH = 850
-"""Width of the picture, pixels."""
 
 
 def life_section(material: ReportData) -> Part:
@@ -47,13 +33,13 @@ def life_section(material: ReportData) -> Part:
     context = material.context
     found: dict[FlankKey, dict[str, float]] = {}
     if context.gearbox.case.loads is None:
-        return Part("", _rating(material, found))
+        return Part(data=_rating(material, found))
     content = []
     for stored in stored_lives(context.gearbox, context.folder, context.assembled):
         if stored.data is None:
             context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
         else:
-            content.append(_variant_section(material, stored.data))
+            content.append(_rated_variant(material, stored.data))
             found = found or life_results(stored.data)
             worst = limits(stored.data)
             if worst:
@@ -66,9 +52,8 @@ def life_section(material: ReportData) -> Part:
                 )
     data = _rating(material, found)
     if not content:
-        return Part("", data)
-    html = pieces.section("Rating and life", *(pieces.paragraph(own, "note") for own in WORDS), *content, name="life")
-    return Part(html, data, "Rating and life", "life")
+        return Part(data=data)
+    return Part(render("life", variants=content), data, "Rating and life", "life")
 
 
 def _rating(material: ReportData, beside: Mapping[FlankKey, Mapping[str, float]]) -> dict[str, Any]:
@@ -85,34 +70,35 @@ def _rating(material: ReportData, beside: Mapping[FlankKey, Mapping[str, float]]
     return {"rating": rated(context.gearbox, counted, balance, beside).summary()}
 
 
-def _variant_section(material: ReportData, data: xr.Dataset) -> str:
+def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     labelled = material.words.labelled
     data = data.assign_coords(
         {key: [labelled(str(own)) for own in data[key].to_numpy()] for key in ("flank", "bearing")}
     )
     name = model_label(choice_of(data.attrs))
     label = f"life-{data.attrs['variant']}-{data.attrs['mesh_model']}"
-    rested = [line for key in ("assumptions", "unrated") for line in json.loads(data.attrs[key])]
-    return (
-        pieces.element("h3", pieces.text(f"{name[0].upper()}{name[1:]}, gears to {data.attrs['edition']}"))
-        + "".join(pieces.paragraph(f"Fails: {labelled(line)}.") for line in json.loads(data.attrs["failures"]))
-        + "".join(
-            pieces.paragraph(f"Required life not reached: {labelled(line)}.")
-            for line in json.loads(data.attrs["shortfalls"])
-        )
-        + "".join(pieces.paragraph(f"{labelled(line)}.") for line in json.loads(data.attrs["reliefs"]))
-        + _picture(data, f"Limiting parts, {name}")
-        + pieces.table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True)
-        + pieces.table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True)
-        + pieces.folded("Assumptions, and parts without rating", pieces.bullets(map(labelled, rested)))
-    )
 
+    def listed(*keys: str) -> list[str]:
+        return [labelled(line) for key in keys for line in json.loads(data.attrs[key])]
 
-def _picture(data: xr.Dataset, words: str) -> str:
     content = io.BytesIO()
     draw_life(data).savefig(content, format="png", dpi=130)
-    source = f"data:image/png;base64,{base64.b64encode(content.getvalue()).decode()}"
-    return pieces.picture(source, words, WIDTH)
+    return {
+        "title": f"{name[0].upper()}{name[1:]}, gears to {data.attrs['edition']}",
+        "failures": listed("failures"),
+        "shortfalls": listed("shortfalls"),
+        "reliefs": listed("reliefs"),
+        "picture": _address(content.getvalue()),
+        "words": f"Limiting parts, {name}",
+        "gears": Table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True),
+        "bearings": Table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True),
+        "rested": listed("assumptions", "unrated"),
+    }
+
+
+def _address(picture: bytes) -> str:
+    """Return a PNG picture as an address that contains it."""
+    return f"data:image/png;base64,{base64.b64encode(picture).decode()}"
 
 
 def _flank_rows(data: xr.Dataset) -> list[dict[str, object]]:
@@ -161,12 +147,12 @@ def _rows(
     ]
 
 
-def _cell(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> Cell | str:
+def _cell(data: xr.Dataset, name: str, place: int, key: str, factor: float, form: str) -> Cell:
     value = factor * float(data[f"{name}_{key}"][place])
     if math.isnan(value):
-        return "–"
+        return Cell("–", value)
     if math.isinf(value):
-        return "infinite"
+        return Cell("infinite", value)
     if key.endswith("damage") and value < LEAST_DAMAGE:
         return Cell(f"below {LEAST_DAMAGE:g}", value)
     return Cell(figure_text(float(format(value, form))) if key.endswith("hours") else format(value, form), value)
@@ -176,30 +162,27 @@ def _cell(data: xr.Dataset, name: str, place: int, key: str, factor: float, form
 
 LARGEST_PICTURE = 2_000_000
 """Maximum size of a picture embedded in the page, bytes."""
-STUDY_WIDTH = 640
-"""Width of the picture, pixels."""
 
 
 def studies_section(material: ReportData) -> Part:
     """Show the pictures of the studies in the results folder."""
     found = list(stored_studies(material.context.folder, material.context.gearbox))
     if not found:
-        return Part("")
-    html = pieces.section("Studies", *map(_study, found), name="studies")
-    return Part(html, title="Studies", name="studies")
+        return Part()
+    return Part(render("studies", studies=map(_study, found)), title="Studies", name="studies")
 
 
-def _study(study: StoredStudy) -> str:
+def _study(study: StoredStudy) -> dict[str, object]:
     lost = "".join(
         f", {count} {word}" for count, word in ((study.failed, "failed"), (study.missing, "missing")) if count
     )
-    old = "" if study.fits else pieces.paragraph("The gearbox file has changed; run the study again.", "warning")
-    text = f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}"
-    shown = [_picture_of_studies(path) for path in study.pictures if path.stat().st_size <= LARGEST_PICTURE]
-    return pieces.section(study.title, pieces.paragraph(text), old, *shown, level=3)
-
-
-def _picture_of_studies(path: Path) -> str:
-    content = base64.b64encode(path.read_bytes()).decode("ascii")
-    words = path.stem.replace("_", " ")
-    return pieces.picture(f"data:image/png;base64,{content}", words, STUDY_WIDTH)
+    return {
+        "title": study.title,
+        "fits": study.fits,
+        "words": f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}",
+        "pictures": [
+            (_address(path.read_bytes()), path.stem.replace("_", " "))
+            for path in study.pictures
+            if path.stat().st_size <= LARGEST_PICTURE
+        ],
+    }

@@ -8,92 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.choice import Choice
-from exugear.report.findings.context import Context, StoredResults
+from exugear.report.findings.context import MESH_MODEL_LABELS, Context, StoredResults
+from exugear.report.findings.design_changes import DesignStudy
 from exugear.report.findings.groups import RunGroup
+from exugear.report.findings.headline import Headline
 from exugear.report.findings.verdicts import ModelVariations
 from exugear.report.findings.words import Labels
-from exugear.report.web import html as pieces
 from exugear.report.web.document import ArrayStore
-from exugear.report.web.html import element
+from exugear.report.web.html import Figure
 from exugear.results.spectra.waterfall import OrderLine, order_lines
-
-
-@dataclass(frozen=True)
-class ReportData:
-    """Data from which all sections are made."""
-
-    context: Context
-    results: StoredResults
-    words: Labels
-    groups: Sequence[RunGroup]
-    """Groups of run-ups first, then of steady-state responses; in each, the default inertia set comes first."""
-    variations: Sequence[ModelVariations]
-    lines: Sequence[OrderLine]
-    """Orders drawn on the page."""
-    arrays: ArrayStore
-    """Store for the arrays of the page."""
-    run_data: Mapping[str, Any] = field(default_factory=dict)
-    """Run-ups and steady-state responses as data of the page, from `exugear.report.run_data.run_data`."""
-
-    @property
-    def input_words(self) -> str:
-        """Label of the overall input, whose speed is the abscissa of all diagrams."""
-        return self.words.of(self.context.gearbox.case.overall.input)
-
-    @property
-    def file_words(self) -> str:
-        """Gearbox file with its folder only, as the page may be passed on and should not show local paths."""
-        return "/".join(Path(self.context.gearbox.source).parts[-2:])
-
-
-def lines_of(context: Context) -> tuple[OrderLine, ...]:
-    """Return the orders drawn on the page."""
-    return order_lines(context.gearbox)
-
-
-@dataclass(frozen=True)
-class Part:
-    """Output of a section."""
-
-    html: str
-    """HTML of the section; empty if it has nothing to show."""
-    data: Mapping[str, Any] = field(default_factory=dict)
-    """Data for the scripts, under keys of this section."""
-    title: str = ""
-    name: str = ""
-    """Title and anchor of the entry in the table of contents; empty for none."""
-
-
-def only_for(content: str, group: str, variant: str = "") -> str:
-    """Mark content as belonging to a result group or a variant: scripts show the selected one, print shows all."""
-    if content:
-        return element("div", content, data_group=group, data_variant=variant or None)
-    return ""
-
-
-def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
-    """Return a short label that identifies a group: source, and mesh model and inertia set where these differ."""
-    parts = [own.source]
-    if len({group.mesh_model for group in groups}) > 1:
-        parts.append(f"mesh model {own.mesh_model}")
-    if len({group.inertias for group in groups}) > 1:
-        parts.append(f"inertia set {own.inertias}")
-    words = ", ".join(parts)
-    return words[0].upper() + words[1:]
-
-
-def summary_groups(groups: Sequence[RunGroup]) -> list[RunGroup]:
-    """List the groups that the command line reports: run-ups, or steady-state responses if there are none."""
-    return [group for group in groups if not group.responses] or list(groups)
-
-
-def model_name(choice: Choice) -> str:
-    """Return the name of a model for links and data: variant, mesh model, inertia set."""
-    return f"{choice.variant}-{choice.mesh_model}-{choice.inertias}"
-
 
 # Line charts as data: curves with axes and marks, drawn by one script
 
@@ -121,44 +48,105 @@ class Axis:
     logarithmic: bool = False
 
 
-def chart(
-    name: str,
-    title: str,
-    hint: str,
-    words: str,
-    curves: Sequence[Curve],
-    axes: Sequence[Axis],
-    arrays: ArrayStore,
-    marks: Sequence[tuple[float, str]] = (),
-) -> tuple[str, dict[str, Any]]:
-    """Return the HTML and data of a line chart.
+@dataclass(frozen=True)
+class ReportData:
+    """Data from which all sections are made."""
 
-    Parameters
-    ----------
-    name : identifier in the page
-    title, hint, words : heading, note on the use of the chart, and its content as text
-    axes : below, on the left, and on the right if any curve needs it
-    arrays : store for the curves
-    marks : vertical lines at values of x, with labels
+    context: Context
+    results: StoredResults
+    words: Labels
+    groups: Sequence[RunGroup]
+    """Groups of run-ups first, then of steady-state responses; in each, the default inertia set comes first."""
+    variations: Sequence[ModelVariations]
+    lines: Sequence[OrderLine]
+    """Orders drawn on the page."""
+    headline: Headline | None
+    """Ranking that the report leads with; None if nothing is ranked."""
+    arrays: ArrayStore
+    """Store for the arrays of the page."""
+    design_study: DesignStudy | None = None
+    """Computed design changes."""
+    run_data: Mapping[str, Any] = field(default_factory=dict)
+    """Run-ups and steady-state responses as data of the page, from `exugear.report.run_data.run_data`."""
+    charts: dict[str, Any] = field(default_factory=dict)
+    """Data of all line charts by name, from `chart`."""
 
-    Returns
-    -------
-    html
-    data : under the key ``charts`` of the page's data, by name
-    """
-    spec = {
-        "title": title,
-        "axes": [{"label": axis.label, "logarithmic": axis.logarithmic} for axis in axes],
-        "curves": [
-            {
-                "label": curve.label,
-                "style": curve.style,
-                "right": curve.right,
-                "x": arrays.add(np.asarray(curve.x, dtype="f4")),
-                "y": arrays.add(np.asarray(curve.y, dtype="f4")),
-            }
-            for curve in curves
-        ],
-        "marks": [{"x": value, "label": label} for value, label in marks],
-    }
-    return pieces.figure(name, title, hint, words, "chart"), {name: spec}
+    @property
+    def input_words(self) -> str:
+        """Label of the overall input, whose speed is the abscissa of all diagrams."""
+        return self.words.of(self.context.gearbox.case.overall.input)
+
+    @property
+    def file_words(self) -> str:
+        """Gearbox file with its folder only, as the page may be passed on and should not show local paths."""
+        return "/".join(Path(self.context.gearbox.source).parts[-2:])
+
+    def chart(
+        self,
+        name: str,
+        title: str,
+        hint: str,
+        words: str,
+        curves: Sequence[Curve],
+        axes: Sequence[Axis],
+        marks: Sequence[tuple[float, str]] = (),
+    ) -> Figure:
+        """Add the data of a line chart to the page and return its frame.
+
+        Parameters
+        ----------
+        name : identifier in the page
+        title, hint, words : heading, note on the use of the chart, and its content as text
+        axes : below, on the left, and on the right if any curve needs it
+        marks : vertical lines at values of x, with labels
+        """
+        self.charts[name] = {
+            "title": title,
+            "axes": [{"label": axis.label, "logarithmic": axis.logarithmic} for axis in axes],
+            "curves": [
+                {
+                    "label": curve.label,
+                    "style": curve.style,
+                    "right": curve.right,
+                    "x": self.arrays.add(np.asarray(curve.x, dtype="f4")),
+                    "y": self.arrays.add(np.asarray(curve.y, dtype="f4")),
+                }
+                for curve in curves
+            ],
+            "marks": [{"x": value, "label": label} for value, label in marks],
+        }
+        return Figure(name, title, hint, words, "chart")
+
+
+def lines_of(context: Context) -> tuple[OrderLine, ...]:
+    """Return the orders drawn on the page."""
+    return order_lines(context.gearbox)
+
+
+@dataclass(frozen=True)
+class Part:
+    """Output of a section."""
+
+    html: Markup = Markup()
+    """HTML of the section; empty if it has nothing to show."""
+    data: Mapping[str, Any] = field(default_factory=dict)
+    """Data for the scripts, under keys of this section."""
+    title: str = ""
+    name: str = ""
+    """Title and anchor of the entry in the table of contents; empty for none."""
+
+
+def group_words(groups: Sequence[RunGroup], own: RunGroup) -> str:
+    """Return a short label that identifies a group: source, and mesh model and inertia set where these differ."""
+    parts = [own.source]
+    if len({group.mesh_model for group in groups}) > 1:
+        parts.append(MESH_MODEL_LABELS[own.mesh_model])
+    if len({group.inertias for group in groups}) > 1:
+        parts.append(f"inertia set {own.inertias}")
+    words = ", ".join(parts)
+    return words[0].upper() + words[1:]
+
+
+def model_name(choice: Choice) -> str:
+    """Return the name of a model for links and data: variant, mesh model, inertia set."""
+    return f"{choice.variant}-{choice.mesh_model}-{choice.inertias}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -11,21 +10,20 @@ import numpy as np
 import xarray as xr
 
 from exugear.gearbox.choice import Choice
-from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.findings.context import REFERENCE_VARIANT, VISIBLE_SHARE, model_label
+from exugear.report.findings.context import MESH_MODEL_LABELS, REFERENCE_VARIANT, VISIBLE_SHARE, model_label
 from exugear.report.findings.facts import best_words, sensitivities_of, shift_text
 from exugear.report.findings.groups import RunGroup
-from exugear.report.findings.verdicts import ModelVariations, best_change, track_mode
+from exugear.report.findings.headline import headline_of_group
+from exugear.report.findings.verdicts import best_change, track_mode
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name, only_for
-from exugear.report.web import html as pieces
+from exugear.report.material import Axis, Curve, Part, ReportData, model_name
 from exugear.report.web.document import rounded
-from exugear.report.web.html import Cell
-from exugear.report.web.stage import stage_data, stage_figure
-from exugear.results.spectra.run_spectra import LEAST_SHARE, NEAR, ModeReport, nearest_mode, report_mode
+from exugear.report.web.html import Cell, Figure, Table, render
+from exugear.report.web.stage import stage_data
+from exugear.results.spectra.run_spectra import NEAR, ModeReport, nearest_mode, report_mode
 from exugear.system.modes import modes_of
-from exugear.system.sensitivity import FrequencyMatch, assumed_parameters, frequency_matches
+from exugear.system.sensitivity import FrequencyMatch, ParameterVariation, assumed_parameters, frequency_matches
 
 DEFORMED = 32
 """Number of modes in which flexible bodies deform on the page: those of resonances, and the most visible ones."""
@@ -35,31 +33,17 @@ def modes_section(material: ReportData) -> Part:
     """Show Campbell diagram and list of modes of all models."""
     modes = material.results.modes
     if not modes:
-        return Part("")
+        return Part()
     for model, data in modes.items():
         growth = float(data.attrs["growth_rate"])
         if growth > 0.0:
             unstable = f"{model_label(model)}: unstable, disturbances grow at up to {growth:.3g} 1/s."
             material.context.notes.statements.append(unstable)
     models = {model_name(model): _model(material, model, data) for model, data in modes.items()}
-    campbell = pieces.figure(
-        "campbell",
-        "Campbell diagram",
-        "Horizontal lines: modes with TE participation. Dots: an order crosses a mode; size: TE amplification. Click "
-        "a dot to show the mode shape.",
-        "The list below gives frequency, damping and TE amplification of each mode.",
-    )
-    chooser = pieces.element(
-        "div",
-        pieces.element("label", "Model " + pieces.element("select", "", id="model")),
-        class_="controls scripts-only",
-    )
-    # Without run-ups, no other section has the animated mode shapes.
-    stage = "" if material.groups else pieces.element("div", stage_figure(), class_="scripts-only")
     lists = [_all_modes(material, model, data) for model, data in modes.items()]
-    framed = pieces.element("div", campbell, class_="scripts-only")
-    html = pieces.section("Modes and orders", chooser, framed, stage, *lists, name="modes")
-    return Part(html, {"models": models}, "Modes and orders", "modes")
+    # Without run-ups, no other section has the animated mode shapes.
+    html = render("modes", alone=not material.groups, lists=lists)
+    return Part(html, {"models": models}, "Modes", "modes")
 
 
 def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, Any]:
@@ -78,28 +62,10 @@ def _model(material: ReportData, model: Choice, data: xr.Dataset) -> dict[str, A
                 "frequency": rounded(report.frequency, 6),
                 "damping": rounded(report.damping_ratio, 4),
                 "words": material.words.moves(data, report.index),
-                "seen": report.share >= LEAST_SHARE,
-                "amplification": rounded(report.amplification, 4),
-                "mesh": material.words.of(report.mesh),
             }
             for report in reports
         ],
-        "fastest": rounded(_fastest(material, model), 5),
     }
-
-
-def _fastest(material: ReportData, model: Choice) -> float:
-    """Return the highest speed (rpm) of the run-ups of a model, or of the load cases."""
-    speeds = [
-        float(group.runs[model.variant].spectra.speed.max())
-        for group in material.groups
-        if model.variant in group.runs and group.choice(model.variant) == model
-    ]
-    if speeds:
-        return max(speeds) / RPM
-    cases = material.context.gearbox.load_cases.values()
-    ends = [abs(speed) for case in cases for speed in (case.start_speed, case.end_speed or 0.0)]
-    return max([*ends, RPM]) / RPM
 
 
 def _deformed(material: ReportData, model: Choice, data: xr.Dataset) -> set[int]:
@@ -118,14 +84,14 @@ def _deformed(material: ReportData, model: Choice, data: xr.Dataset) -> set[int]
     return set(most[: max(DEFORMED, len(matched))])
 
 
-def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> str:
+def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> Table:
     reports = [report_mode(data, index) for index in range(data.sizes["mode"])]
     rows = [
         {
-            "No.": Cell(str(mode.index + 1), mode.index),
+            "No.": Cell(str(mode.index + 1), mode.index + 1),
             "Frequency / Hz": Cell(f"{mode.frequency:.1f}", mode.frequency, f"mode:{model_name(model)}:{mode.index}"),
-            "Damping / %": Cell(f"{100 * mode.damping_ratio:.2f}", mode.damping_ratio),
-            "TE participation / %": Cell(f"{100 * mode.share:.2f}", mode.share),
+            "Damping / %": Cell(f"{100 * mode.damping_ratio:.2f}", 100 * mode.damping_ratio),
+            "TE participation / %": Cell(f"{100 * mode.share:.2f}", 100 * mode.share),
             "Amplification": Cell(f"{mode.amplification:.2f}", mode.amplification),
             "by mesh": material.words.of(mode.mesh) if mode.amplification >= 0.01 else "–",
             "Mode shape": material.words.moves(data, mode.index),
@@ -133,20 +99,14 @@ def _all_modes(material: ReportData, model: Choice, data: xr.Dataset) -> str:
         }
         for mode in reports
     ]
-    title = f"All {len(rows)} modes of {model_label(model)}"
-    table = pieces.table(
+    return Table(
         rows,
         ("by mesh", "Mode shape", "Strain energy"),
-        caption=title,
+        caption=f"All {len(rows)} modes of {model_label(model)}",
         name=f"modes-{model_name(model)}",
         hidden=("TE participation / %", "by mesh"),
         sortable=True,
     )
-    note = (
-        "TE participation: squared mass-normalised participation of the mode in the overall TE. TE amplification: "
-        "overall TE at resonance per static TE of the mesh listed."
-    )
-    return pieces.folded(title, pieces.paragraph(note, "note") + table)
 
 
 # Section on modes near a target frequency from the gearbox file or the command line, such as a measured one
@@ -170,7 +130,7 @@ def target_frequency_section(material: ReportData) -> Part:
     target = material.context.target
     modes = material.results.modes
     if target is None or not modes:
-        return Part("")
+        return Part()
     rows = []
     for model, data in modes.items():
         nearest = nearest_mode(data, target)
@@ -179,27 +139,32 @@ def target_frequency_section(material: ReportData) -> Part:
             continue
         rows += [_row(material, model, data, mode, target) for mode in dict.fromkeys([nearest.index, visible.index])]
         material.context.notes.statements.append(_statement(model, data, nearest, visible, target))
-    words = (
-        "TE participation: squared mass-normalised participation of the mode in the overall TE. If it is below "
-        f"{100 * VISIBLE_SHARE:g} % for the nearest mode, the nearest mode above that is listed, too. Near: within "
-        f"{100 * NEAR:g} %."
+    html = render(
+        "target",
+        target=target,
+        near=Table(rows, ("inertia set", "mode shape"), caption=f"Modes near {target:.0f} Hz", name="near"),
+        visible=100 * VISIBLE_SHARE,
+        within=100 * NEAR,
+        matches=Table(
+            _matches(material, target),
+            ("inertia set", "assumption", "mode shape"),
+            caption="Assumptions",
+            name="matches",
+        ),
     )
-    title = f"Modes near {target:.0f} Hz"
-    table = pieces.table(rows, ("inertia set", "mode shape"), caption=title, name="near")
-    html = pieces.section(title, pieces.paragraph(words, "note"), table, *_matches(material, target), name="target")
-    return Part(html, {}, title, "target")
+    return Part(html, title=f"Modes near {target:.0f} Hz", name="target")
 
 
 def _row(material: ReportData, model: Choice, data: xr.Dataset, index: int, target: float) -> dict[str, object]:
     mode = report_mode(data, index)
     return {
         "variant": model.variant,
-        "inertia set": f"{model.inertias} ({model.mesh_model})",
+        "inertia set": f"{model.inertias} ({MESH_MODEL_LABELS[model.mesh_model]})",
         "frequency / Hz": f"{mode.frequency:.1f}",
         "near": "yes" if mode.is_near(target) else "no",
         "damping / %": f"{100 * mode.damping_ratio:.2f}",
         "TE part. / %": f"{100 * mode.share:.1f}",
-        "amplification": f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})",
+        "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
         "mode shape": material.words.moves(data, index),
     }
 
@@ -223,29 +188,23 @@ def _statement(model: Choice, data: xr.Dataset, nearest: ModeReport, visible: Mo
     )
 
 
-def _matches(material: ReportData, target: float) -> Iterator[str]:
-    """Tabulate the parameter changes that shift a mode to the target, or state that there is none."""
-    modelmatchs = [
+def _matches(material: ReportData, target: float) -> list[dict[str, object]]:
+    """Return the rows of the parameter changes that shift a mode to the target."""
+    found = [
         ModelMatch(variation.choice, match)
         for variation in material.variations
         for match in frequency_matches(variation.variations, target, VISIBLE_SHARE)
     ]
-    yield pieces.element("h3", f"Assumptions that shift a mode to {target:.0f} Hz")
-    if not modelmatchs:
-        yield pieces.paragraph(
-            f"No value within the varied ranges shifts a mode with TE participation to {target:.0f} Hz."
+    if found:
+        entries = "; ".join(
+            f"{own.assumption} instead of {own.match.parameter.default:g} ({model_label(own.model)}: "
+            f"{own.match.frequency:.0f} Hz)"
+            for own in found
         )
-        return
-    entries = "; ".join(
-        f"{modelmatch.assumption} instead of {modelmatch.match.parameter.default:g} ({model_label(modelmatch.model)}: "
-        f"{modelmatch.match.frequency:.0f} Hz)"
-        for modelmatch in modelmatchs
-    )
-    material.context.notes.statements.append(
-        f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
-    )
-    rows = [_match_row(material, modelmatch, target) for modelmatch in modelmatchs]
-    yield pieces.table(rows, ("inertia set", "assumption", "mode shape"), caption="Assumptions", name="matches")
+        material.context.notes.statements.append(
+            f"Assumptions that shift a mode with TE participation to {target:.0f} Hz: {entries}."
+        )
+    return [_match_row(material, own, target) for own in found]
 
 
 def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[str, object]:
@@ -254,11 +213,11 @@ def _match_row(material: ReportData, found: ModelMatch, target: float) -> dict[s
     mode = report_mode(data, match.index)
     return {
         "variant": found.model.variant,
-        "inertia set": f"{found.model.inertias} ({found.model.mesh_model})",
+        "inertia set": f"{found.model.inertias} ({MESH_MODEL_LABELS[found.model.mesh_model]})",
         "assumption": material.words.change(match.parameter.label, match.value, match.parameter.default),
         "frequency / Hz": f"{mode.frequency:.0f}",
         "TE part. / %": f"{100 * mode.share:.1f}",
-        "amplification": f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})",
+        "amplification": Cell(f"{mode.amplification:.2f} ({material.words.of(mode.mesh)})", mode.amplification),
         (
             f"nearest with TE participation in {REFERENCE_VARIANT} / Hz"
         ): f"{_reference_frequency(material, found, target):.0f}",
@@ -287,38 +246,38 @@ SHOWN_SENSITIVITIES = 8
 
 
 def change_section(material: ReportData) -> Part:
-    """Show the sensitivity of the mode with the highest resonance of each group."""
-    charts: dict[str, Any] = {}
-    content = [only_for(_group(material, group, charts), group.name) for group in material.groups]
-    if not any(content):
-        return Part("")
-    return Part(
-        pieces.section(("Design sensitivity"), *content, name="change"),
-        {"charts": charts},
-        "Design sensitivity",
-        "change",
-    )
+    """Show the sensitivity of the mode of the first resonance in the ranking of each group."""
+    content = list(filter(None, (_group(material, group) for group in material.groups)))
+    if not content:
+        return Part()
+    return Part(render("change", groups=content), title="Design sensitivity", name="change")
 
 
-def _group(material: ReportData, group: RunGroup, charts: dict[str, Any]) -> str:
-    top = group.loudest
-    modes = group.runs[group.main].modes
-    if top is None or modes is None or top.finding.mode is None:
-        return ""
-    mode = top.finding.mode
+def _group(material: ReportData, group: RunGroup) -> dict[str, Any] | None:
+    own = headline_of_group(group)
+    found = own.mode_of(own.top) if own.top else None
+    modes = own.modes
+    if found is None or modes is None:
+        return None
+    mode = found.index
     frequency = float(modes["frequency"][mode])
     scope = (
         f"For the mode at {frequency:.1f} Hz {Variant.of(group.main).label}, inertia set {group.inertias}: "
         f"{material.words.moves(modes, mode)}."
     )
-    own = next((variation for variation in material.variations if variation.choice == group.choice(group.main)), None)
-    full = _variations(material, group, own, frequency, charts) if own and own.variations else ""
-    return pieces.paragraph(scope, "note") + _sensitivity_table(material, group, mode) + full
+    varied = next((one.variations for one in material.variations if one.choice == own.choice), ())
+    return {
+        "name": group.name,
+        "scope": scope,
+        "table": _sensitivity_table(material, group, modes, mode),
+        "variations": [
+            _variation(material, f"variation-{group.name}-{number}", variation, frequency)
+            for number, variation in enumerate(varied)
+        ],
+    }
 
 
-def _sensitivity_table(material: ReportData, group: RunGroup, mode: int) -> str:
-    modes = group.runs[group.main].modes
-    assert modes is not None
+def _sensitivity_table(material: ReportData, group: RunGroup, modes: xr.Dataset, mode: int) -> Table:
     sensitivities = sensitivities_of(material.words, modes, mode)
     largest = max((abs(sensitivity.shift) for sensitivity in sensitivities), default=1.0)
     kinds = [
@@ -329,60 +288,40 @@ def _sensitivity_table(material: ReportData, group: RunGroup, mode: int) -> str:
         {
             "+10 %": sensitivity.kind,
             "of": sensitivity.what,
-            "energy fraction / %": Cell(f"{100.0 * sensitivity.share:.1f}", sensitivity.share),
-            "frequency shift": Cell(shift_text(sensitivity), sensitivity.shift, bar=abs(sensitivity.shift) / largest),
+            "energy fraction / %": Cell(f"{100.0 * sensitivity.share:.1f}", 100.0 * sensitivity.share),
+            "frequency shift / Hz": Cell(
+                shift_text(sensitivity), sensitivity.shift, bar=abs(sensitivity.shift) / largest
+            ),
         }
         for own in kinds
         for sensitivity in own
     ]
-    caption = "First-order frequency shifts of the mode with the highest peak"
-    table = pieces.table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True)
-    words = (
-        "First-order estimate with the mode shape unchanged: +10 % stiffness of an element with strain energy "
-        "fraction s shifts the frequency by f (√(1 + 0.1 s) − 1); added inertia lowers it."
-    )
-    return pieces.element("h3", "First-order sensitivity (+10 %)") + pieces.paragraph(words, "note") + table
+    caption = "First-order frequency shifts of the mode of the first resonance"
+    return Table(rows, ("of",), caption=caption, name=f"levers-{group.name}", sortable=True)
 
 
-def _variations(
-    material: ReportData, group: RunGroup, variations: ModelVariations, frequency: float, charts: dict[str, Any]
-) -> str:
-    figures = []
-    entries = []
-    for number, variation in enumerate(variations.variations):
-        parameter = variation.parameter
-        seen = track_mode(variation, frequency)
-        best = best_change(variation, frequency)
-        label = material.words.parameter(parameter.label)
-        entries.append(f"{label.partition(' / ')[0]}: {best_words(material.words, best)}")
-        values = np.array(parameter.values)
-        html, data = chart(
-            f"variation-{group.name}-{number}",
-            label,
-            f"{_range(seen.frequency)} Hz; TE amplification {_range(seen.amplification)}",
-            best_words(material.words, best),
-            [
-                Curve("this mode / Hz", values, seen.frequency),
-                Curve("TE amplification", values, seen.amplification, "dashed", True),
-                Curve("highest within one octave", values, seen.loudest, "thin", True),
-            ],
-            [Axis(label, parameter.logarithmic), Axis("Hz"), Axis("amplification")],
-            material.arrays,
-            [(parameter.default, "value used")],
-        )
-        figures.append(html)
-        charts.update(data)
-    words = (
-        "Full eigenvalue analysis at each value; dotted: value used. Thick line, left axis: frequency of this mode. "
-        "Dashed, right axis: its TE amplification. Thin, right axis: largest TE amplification of any mode within one "
-        "octave. Where only the dashed line falls, another mode becomes dominant and the response does not decrease."
+def _variation(material: ReportData, name: str, variation: ParameterVariation, frequency: float) -> tuple[Figure, str]:
+    """Return the chart of a mode over a parameter, and the best value as text."""
+    parameter = variation.parameter
+    seen = track_mode(variation, frequency)
+    best = best_words(material.words, best_change(variation, frequency))
+    label = material.words.parameter(parameter.label)
+    title = label.partition(" / ")[0]
+    values = np.array(parameter.values)
+    figure = material.chart(
+        name,
+        label,
+        f"{_range(seen.frequency)} Hz; TE amplification {_range(seen.amplification)}",
+        best,
+        [
+            Curve("this mode / Hz", values, seen.frequency),
+            Curve("TE amplification", values, seen.amplification, "dashed", True),
+            Curve("highest within one octave", values, seen.loudest, "thin", True),
+        ],
+        [Axis(label, parameter.logarithmic), Axis("Hz"), Axis("amplification")],
+        [(parameter.default, "value used")],
     )
-    return (
-        pieces.element("h3", "Parameter variation")
-        + pieces.paragraph(words, "note")
-        + pieces.element("div", "".join(figures), class_="grid")
-        + pieces.bullets(entries)
-    )
+    return figure, f"{title}: {best}"
 
 
 def _range(values: np.ndarray[Any, Any]) -> str:

@@ -12,6 +12,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, channels_of, dominant_order
+from exugear.report.findings.headline import SAME_FREQUENCY
 from exugear.report.findings.loudness import TOP, ConstantSpeed
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.material import ReportData, group_words, model_name
@@ -82,11 +83,11 @@ def tenths(levels: Floats) -> NDArray[Any]:
 
 # Run-ups and steady-state responses as data of the page
 
-SPEEDS, CHANNEL_SPEEDS = 438, 160
+SPEEDS, CHANNEL_SPEEDS = 400, 140
 """Columns of the waterfalls of the transmission error and of the other channels."""
 STEP, CHANNEL_STEP = 0.5, 1.5
 """Level difference per byte step, dB; for the transmission error and the other channels."""
-SPAN = 110.0
+SPAN = 80.0
 """Minimum stored span below the highest level, dB."""
 CHANNEL_LINES = 3
 """Number of spectral lines of another channel that are drawn as one."""
@@ -144,7 +145,23 @@ def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str
         "loudest": loudest,
         "constant": _constant(material, group.constant.get(run.variant)),
         "resonances": [_resonance(material, group, run, own) for own in group.ranked[run.variant]],
+        "first": _first(group, run.variant),
     }
+
+
+def _first(group: RunGroup, variant: str) -> int:
+    """Return the place of the resonance that is chosen first: that of the ranking, or else the highest steady one."""
+    ranked = group.ranked[variant]
+    top = next(iter(group.in_operation.resonances), None)
+    if top is not None:
+        for number, own in enumerate(ranked):
+            if any(
+                math.isclose(pick.line.order, top.order, rel_tol=1e-6)
+                and math.isclose(pick.frequency, top.frequency, rel_tol=SAME_FREQUENCY)
+                for pick in own.finding.resonance.picks
+            ):
+                return number
+    return next((number for number, own in enumerate(ranked) if own.steady), 0)
 
 
 def _highest(material: ReportData, spectra: Waterfall) -> int:

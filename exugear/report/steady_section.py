@@ -13,10 +13,10 @@ from exugear.gearbox.load_cases import static_load_in_words, summarise_loads
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import Context, choice_of, model_label
+from exugear.report.findings.context import METHOD_LABELS, Context, choice_of, model_label
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name
-from exugear.report.web import html as pieces
+from exugear.report.material import Axis, Curve, Part, ReportData, model_name
+from exugear.report.web.html import Figure, Table, render
 from exugear.results.run_file import read_run
 from exugear.results.spectra.resonances import MAX_SWEEP_RATIO, run_up_cut, sweep_rate, sweep_severity
 from exugear.results.spectra.run_spectra import VariantRun
@@ -48,81 +48,67 @@ SAME_SPEED = 0.02
 def steady_section(material: ReportData) -> Part:
     """Show the steady-state responses, each with the run-ups of the same variant, mesh model and inertia set."""
     if not material.results.steady:
-        return Part("")
-    charts: dict[str, Any] = {}
-    content = [_response(material, data, charts) for data in material.results.steady]
-    html = pieces.section("Steady-state response", *content, name="steady")
-    return Part(html, {"charts": charts}, "Steady-state response", "steady")
+        return Part()
+    html = render("steady", responses=[_response(material, data) for data in material.results.steady])
+    return Part(html, title="Steady-state response", name="steady")
 
 
-def _response(material: ReportData, data: xr.Dataset, charts: dict[str, Any]) -> str:
+def _response(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
     context = material.context
     choice = choice_of(data.attrs)
     level = str(data.attrs["method"])
     runs = [run for run in material.results.runs if choice_of(run.attributes) == choice]
-    label = f"{model_label(choice)}, method {level}"
+    label = f"{model_label(choice)}, {METHOD_LABELS[level]}"
     context.tell(f"steady-state response, {label}")
     found = peaks(data)[:SHOWN]
     rates = {str(run.attributes["load_case"]): _unit_rate(run) for run in runs}
     rows = [_row(material, peak, data, rates) for peak in found]
     lost = [row for row in rows if any(value == TOO_FAST for value in row.values())]
-    note = ""
-    if lost:
-        message = f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
-        context.notes.statements.append(f"Steady-state response, {label}: {message}")
-        note = pieces.paragraph(f"Warning: {message}", "warning")
-    growth = float(data.attrs["growth_rate"])
-    others = [
+    warnings = [
         f"the run-up of the load case {run.attributes['load_case']} has another load ({run.attributes['load']}), which "
         "also changes its levels."
         for run in runs
         if run.attributes.get("table_doubt")
     ]
-    context.notes.statements.extend(f"Steady-state response, {label}: {other}" for other in others)
-    content = [
-        pieces.paragraph(f"At the static load: {static_load_in_words(context.gearbox)}.", "note"),
-        *(pieces.paragraph(f"Warning: {other}", "warning") for other in others),
-        pieces.alert("Unstable", [f"disturbances grow at up to {growth:.3g} 1/s"]) if growth > 0.0 else "",
-        note,
-        _shared_lines(material, data),
-        _remarks(data, f"remarks-{level}-{model_name(choice)}"),
-        _order_charts(material, data, runs, f"steady-{level}-{model_name(choice)}", charts),
-        pieces.element("h4", f"Highest peaks: first {len(rows)}"),
-        pieces.table(
+    if lost:
+        warnings.append(
+            f"run-ups are too fast for {len(lost)} of the {len(rows)} highest peaks and underestimate them."
+        )
+    context.notes.statements.extend(f"Steady-state response, {label}: {warning}" for warning in warnings)
+    name = f"{level}-{model_name(choice)}"
+    return {
+        "title": label[0].upper() + label[1:],
+        "load": static_load_in_words(context.gearbox),
+        "warnings": warnings,
+        "growth": float(data.attrs["growth_rate"]),
+        # A source of shared orders is not identifiable by frequency.
+        "shared": material.words.labelled(str(data.attrs["shared_lines"])),
+        "remarks": Table(_remarks(data), ("remark",), caption="Warnings by speed", name=f"remarks-{name}"),
+        "speeds": data.sizes["point"] + len(json.loads(str(data.attrs["not_converged"]))),
+        "run_ups": bool(runs),
+        "branches": settings_of(data.attrs).branches,
+        "orders": _order_charts(material, data, runs, f"steady-{name}"),
+        "peaks": Table(
             rows,
             ("order",),
             caption=f"Peaks of the steady-state response, {label}",
-            name=f"peaks-{level}-{model_name(choice)}",
+            name=f"peaks-{name}",
             sortable=True,
         ),
-        _contributions_table(material, data, f"made-by-{level}-{model_name(choice)}"),
-        _campbell(material, data, f"campbell-{level}-{model_name(choice)}", label, charts),
-        _sidebands_table(material, data, peaks(data)),
-        pieces.paragraph(
-            f"Slowest decay rate of a disturbance: {-growth:.3g} 1/s. A run-up is too fast for a resonance if the "
-            f"sweep-rate ratio f′ / (2π ζ² f²) is above {MAX_SWEEP_RATIO:g}: the peak does not build up. f: peak "
-            "frequency; f′: its rate of change in the run-up; ζ: damping ratio of the mode; –: no mode known.",
-            "note",
-        ),
-    ]
-    return pieces.section(label[0].upper() + label[1:], *content, level=3)
+        "contributions": _contributions_table(material, data, f"made-by-{name}"),
+        "campbell": _campbell(material, data, f"campbell-{name}", label),
+        "ranges": [
+            f"{load_case}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm"
+            for load_case, (slow, fast) in _ranges(context).items()
+        ],
+        "sidebands": Table(_sidebands(material, data, peaks(data)), ("sideband", "cause"), name=f"sidebands-{name}"),
+        "passages": material.words.labelled(_passages(context, _carriers(context))),
+        "ratio": MAX_SWEEP_RATIO,
+    }
 
 
-def _shared_lines(material: ReportData, data: xr.Dataset) -> str:
-    """State which mesh frequencies have common orders: the source of such an order is not identifiable by frequency."""
-    shared = str(data.attrs["shared_lines"])
-    if not shared:
-        return ""
-    orders = material.words.labelled(shared)
-    return pieces.paragraph(
-        f"Note: coinciding orders of several meshes: {orders}. Each is named after the simplest of them; its level is "
-        "the sum of all.",
-        "warning",
-    )
-
-
-def _remarks(data: xr.Dataset, name: str) -> str:
-    """Tabulate the speeds with warnings, and those without a converged state."""
+def _remarks(data: xr.Dataset) -> list[dict[str, object]]:
+    """Return rows of the speeds with warnings, and those without a converged state."""
     speeds = data["speed"].to_numpy()
     said = [(abs(float(speed)), str(words)) for speed, words in zip(speeds, data["remark"].to_numpy(), strict=True)]
     lost = [
@@ -130,40 +116,26 @@ def _remarks(data: xr.Dataset, name: str) -> str:
         for load in json.loads(str(data.attrs["not_converged"]))
     ]
     entries = sorted([own for own in said if own[1]] + lost)
-    if not entries:
-        return ""
-    rows: list[dict[str, object]] = [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in entries]
-    table = pieces.table(rows, ("remark",), caption="Warnings by speed", name=name)
-    return pieces.folded(f"Warnings at {len(rows)} of {len(speeds) + len(lost)} speeds", table)
+    return [{"speed / rpm": f"{speed / RPM:.2f}", "remark": words} for speed, words in entries]
 
 
-def _order_charts(
-    material: ReportData, data: xr.Dataset, runs: Sequence[VariantRun], name: str, charts: dict[str, Any]
-) -> str:
+def _order_charts(material: ReportData, data: xr.Dataset, runs: Sequence[VariantRun], name: str) -> list[Figure]:
     """Draw order cuts at constant speed together with those of run-ups, one chart per order."""
-    figures = []
-    for number, line in enumerate(order_lines(material.context.gearbox, 2)):
-        if _place(data, line) is None:
-            continue
-        html, spec = chart(
+    return [
+        material.chart(
             f"{name}-{number}",
             material.words.line(line),
             "",
             f"Overall transmission error along {material.words.line_sentence(line)}.",
             _curves(data, runs, line),
             [Axis(f"{material.input_words} speed / rpm"), Axis("level / dB re 1 µm")],
-            material.arrays,
         )
-        figures.append(html)
-        charts.update(spec)
-    words = "Order cuts of the overall transmission error: at constant speed"
-    words += ", and in the run-ups, with a window length matched to their sweep rate." if runs else "."
-    if settings_of(data.attrs).branches:
-        words += " Continuation curves turn back at turning points; dashed parts are unstable."
-    return pieces.paragraph(words, "note") + pieces.element("div", "".join(figures), class_="grid")
+        for number, line in enumerate(order_lines(material.context.gearbox, 2))
+        if _place(data, line) is not None
+    ]
 
 
-def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> str:
+def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> Table:
     """Tabulate the contributions to the strongest resonances (method `linear`)."""
     labelled = material.words.labelled
     bases = tuple(str(name) for name in data["base"].to_numpy())
@@ -182,28 +154,15 @@ def _contributions_table(material: ReportData, data: xr.Dataset, name: str) -> s
                 "sensitivity to inertia of": labelled(_slopes_of(load["bodies"])),
             }
         )
-    if not rows:
-        return ""
-    said = (
-        "Contributions to resonances: fractions of the amplitude; sensitivity: relative change of the amplitude per "
-        "relative change of the parameter"
-    )
-    return pieces.folded(
-        said,
-        pieces.table(
-            rows,
-            ("order", "excited by", "responding modes", "sensitivity to stiffness of", "sensitivity to inertia of"),
-            caption="Contributions to resonances",
-            name=name,
-        ),
-    )
+    texts = ("order", "excited by", "responding modes", "sensitivity to stiffness of", "sensitivity to inertia of")
+    return Table(rows, texts, caption="Contributions to resonances", name=name)
 
 
-def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, charts: dict[str, Any]) -> str:
+def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str) -> tuple[Figure, Table] | None:
     """Draw and tabulate the modes over speed, with the crossings that excite them."""
     diagram = campbell_from(data)
     if not diagram.names or len(diagram.speeds) < 2:
-        return ""
+        return None
     crossings = json.loads(data.attrs["crossings"])
     speeds = np.abs(diagram.speeds) / RPM
     curves = [
@@ -225,35 +184,17 @@ def _campbell(material: ReportData, data: xr.Dataset, name: str, label: str, cha
         f"Natural frequencies over speed in the fixed frame, {label}; dots: crossings of modes and mesh harmonics that "
         "excite them."
     )
-    html, spec = chart(
+    figure = material.chart(
         name,
         "Natural frequencies over speed",
         "Horizontal lines: modes, by type. Dashed: mesh orders. Dots: excited crossings.",
         caption,
         curves,
         [Axis(f"{material.input_words} speed / rpm"), Axis("frequency / Hz")],
-        material.arrays,
     )
-    charts.update(spec)
     rows = _mode_rows(material, diagram, data, crossings)
-    return (
-        html
-        + _speed_ranges(material.context)
-        + pieces.folded(
-            "Modes over speed, each with its strongest order crossing; fraction: of the largest peak of the signal",
-            pieces.table(
-                rows, ("type", "strongest crossing", "mode shape"), caption=caption, name=f"{name}-modes", sortable=True
-            ),
-        )
-    )
-
-
-def _speed_ranges(context: Context) -> str:
-    """List the speed ranges of the load cases as text."""
-    entries = [f"{name}: {slow / RPM:.4g} to {fast / RPM:.4g} rpm" for name, (slow, fast) in _ranges(context).items()]
-    if entries:
-        return pieces.paragraph(f"Speeds of the load cases. {'; '.join(entries)}.", "note")
-    return ""
+    texts = ("type", "strongest crossing", "mode shape")
+    return figure, Table(rows, texts, caption=caption, name=f"{name}-modes", sortable=True)
 
 
 def _ranges(context: Context) -> dict[str, tuple[float, float]]:
@@ -307,15 +248,15 @@ def _mode_rows(
     return rows
 
 
-def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Peak]) -> str:
-    """Tabulate the sidebands of the highest peaks, each with its cause."""
+def _sidebands(material: ReportData, data: xr.Dataset, found: Sequence[Peak]) -> list[dict[str, object]]:
+    """Return rows of the sidebands of the highest peaks, each with its cause."""
     context = material.context
     labelled = material.words.labelled
     carriers = _carriers(context)
     loudest: dict[str, Peak] = {}
     for peak in found:
         loudest.setdefault(peak.line, peak)
-    rows = []
+    rows: list[dict[str, object]] = []
     for peak in list(loudest.values())[:SIDEBAND_PEAKS]:
         bands = (*sidebands(data, peak)[:SHOWN_SIDEBANDS], *planet_sidebands(data, peak, carriers)[:SHOWN_SIDEBANDS])
         for band in bands:
@@ -331,13 +272,7 @@ def _sidebands_table(material: ReportData, data: xr.Dataset, found: Sequence[Pea
                     "cause": labelled(band.cause),
                 }
             )
-    if not rows:
-        return ""
-    said = (
-        "Sidebands of the highest peaks and their causes: orders at the speed of the peak due to other meshes or the "
-    )
-    table = pieces.table(rows, ("sideband", "cause"))
-    return pieces.folded(f"{said}rotating planets", pieces.paragraph(labelled(_passages(context, carriers))) + table)
+    return rows
 
 
 def _passages(context: Context, carriers: Mapping[str, tuple[str, float]]) -> str:

@@ -13,13 +13,13 @@ import xarray as xr
 
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
-from exugear.report.findings.context import choice_of, model_label
+from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
 from exugear.report.findings.verdicts import run_figures
-from exugear.report.material import Axis, Curve, Part, ReportData, chart, model_name
-from exugear.report.web import html as pieces
+from exugear.report.material import Axis, Curve, Part, ReportData, model_name
 from exugear.report.web.document import libraries, licences
+from exugear.report.web.html import Figure, Table, render
 from exugear.results.folder import times_spent
-from exugear.results.run_file import verdict_of
+from exugear.results.run_file import invalidity_of
 from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.system.modal_damping import damping_in_words
@@ -67,30 +67,51 @@ GLOSSARY = {
 
 def trust_section(material: ReportData) -> Part:
     """List assumptions, checks, inputs and provenance of the results."""
-    charts: dict[str, Any] = {}
-    compared = "".join(_exudyn_comparison(material, run, charts) for run in material.results.runs)
-    rows = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
-    inputs = pieces.table(rows, ("value",), caption="All inputs of the gearbox file", name="inputs")
-    terms = "".join(f"<dt>{pieces.text(term)}</dt><dd>{pieces.text(words)}</dd>" for term, words in GLOSSARY.items())
-    parts = [
-        pieces.folded("Assumptions", _assumptions(material), opened=True),
-        pieces.folded("Runs and energy balance", _runs(material)),
-        pieces.folded("All inputs of the gearbox file", inputs),
-        pieces.folded("Provenance: hashes and versions", _provenance(material)),
-        pieces.folded("Run time", _times(material)),
-        pieces.folded("Glossary", pieces.element("dl", terms)),
-        pieces.folded(
-            "Libraries in this page and their licences",
-            pieces.element("pre", pieces.text(licences()), class_="licences"),
+    results = material.results
+    inputs = [{"key": key, "value": value} for key, value in flat_keys(material.context.gearbox.content)]
+    html = render(
+        "trust",
+        assumptions=_assumptions(material),
+        source=material.file_words,
+        runs=Table(
+            [_run_row(material, run) for run in results.runs],
+            ("run", "load", "solver", "analysis"),
+            caption="Runs",
+            name="runs",
         ),
-    ]
-    if compared:
-        parts.insert(2, pieces.folded("Comparison with Exudyn", compared))
-    html = pieces.section("Assumptions and checks", *parts, name="trust")
-    return Part(html, {"charts": charts}, "Assumptions and checks", "trust")
+        responses=Table(
+            [_response_row(data) for data in results.steady],
+            ("steady-state response",),
+            caption="Steady-state responses",
+            name="responses",
+        ),
+        compared=list(filter(None, (_exudyn_comparison(material, run) for run in results.runs))),
+        inputs=Table(inputs, ("value",), caption="All inputs of the gearbox file", name="inputs"),
+        hashes=Table(_hashes(material), ("SHA-256 of its input",), caption="Hashes", name="hashes"),
+        versions=[
+            f"Python {platform.python_version()}",
+            *(f"{name} {_version(name)}" for name in PACKAGES),
+            *(f"{library.name} {library.version}" for library in libraries()),
+        ],
+        platform=platform.platform(),
+        times=Table(
+            [
+                {
+                    "step": spent.step,
+                    "wall / s": f"{spent.seconds:.1f}",
+                    "peak memory / MB": f"{1e-6 * spent.memory:.0f}",
+                }
+                for spent in times_spent(material.context.folder)
+            ],
+            caption="Run time",
+        ),
+        glossary=GLOSSARY,
+        licences=licences(),
+    )
+    return Part(html, title="Assumptions and checks", name="trust")
 
 
-def _assumptions(material: ReportData) -> str:
+def _assumptions(material: ReportData) -> list[str]:
     gearbox = material.context.gearbox
     case = material.context.gearbox.case
     acceleration = np.linalg.norm(case.gravity.acceleration_m_per_s2)
@@ -106,9 +127,7 @@ def _assumptions(material: ReportData) -> str:
     ]
     if friction := case.damping.tooth_friction:
         listed.append(f"Friction of teeth in runs and steady-state responses: coefficient {friction:g}.")
-    return pieces.bullets(listed) + pieces.paragraph(
-        f"The sources of the inputs are in the comments of {material.file_words} and in files of its folder.", "note"
-    )
+    return listed
 
 
 def _elastic_words(material: ReportData) -> Iterator[str]:
@@ -130,49 +149,33 @@ def _elastic_words(material: ReportData) -> Iterator[str]:
         yield f"In the variant {assembly.variant} the flexible housing replaces the housing stiffness factor."
 
 
-def _runs(material: ReportData) -> str:
-    rows = [_run_row(material, run) for run in material.results.runs]
-    steady = [_response_row(data) for data in material.results.steady]
-    tables = []
-    if rows:
-        tables.append(pieces.table(rows, ("run", "load", "solver", "analysis"), caption="Runs", name="runs"))
-    if steady:
-        tables.append(
-            pieces.table(steady, ("steady-state response",), caption=("Steady-state responses"), name="responses")
-        )
-    return "".join(tables) or pieces.paragraph("No runs.")
-
-
-def _exudyn_comparison(material: ReportData, run: VariantRun, charts: dict[str, Any]) -> str:
+def _exudyn_comparison(material: ReportData, run: VariantRun) -> Figure | None:
     """Compare the compiled solver with Exudyn where both integrated the beginning of the run."""
     name = material.context.name_of(run.path)
     path = material.context.folder / EXUDYN_FOLDER / name
     if not path.exists():
-        return ""
+        return None
     try:
         found = compare_solvers(run.path, path)
     except FileError as error:
         material.context.notes.left_out.append(str(error))
-        return ""
+        return None
     middle = found.overall[1].mean()
     own, other = (1e6 * (values - middle) for values in found.overall)
-    html, data = chart(
+    return material.chart(
         f"exudyn-{model_name(choice_of(run.attributes))}",
         f"Overall transmission error by both solvers, {model_label(choice_of(run.attributes))}",
         "Deviation from the mean of the Exudyn result.",
         found.words,
         [Curve("compiled solver", found.time, own), Curve("Exudyn", found.time, other, "dashed")],
         [Axis("time / s"), Axis("overall transmission error / µm")],
-        material.arrays,
     )
-    charts.update(data)
-    return pieces.paragraph(found.words) + html
 
 
 def _response_row(data: xr.Dataset) -> dict[str, object]:
     speed = np.abs(data["speed"].to_numpy()) / RPM
     return {
-        "steady-state response": f"{model_label(choice_of(data.attrs))}, method {data.attrs['method']}",
+        "steady-state response": f"{model_label(choice_of(data.attrs))}, {METHOD_LABELS[str(data.attrs['method'])]}",
         "speeds": data.sizes["point"],
         "lowest speed / rpm": f"{speed.min():.1f}",
         "highest speed / rpm": f"{speed.max():.1f}",
@@ -189,7 +192,7 @@ def _run_row(material: ReportData, run: VariantRun) -> dict[str, object]:
     return {
         "run": str(material.context.name_of(run.path)),
         "load": str(run.attributes.get("load", "")),
-        "valid": "NO, see top of page" if verdict_of(run.attributes) else "yes",
+        "valid": "NO, see top of page" if invalidity_of(run.attributes) else "yes",
         "solver": run.attributes["solver"],
         "step / µs": f"{1e6 * float(run.attributes['step']):g}",
         "simulated / s": f"{figures.end:.2f}" + ("" if int(run.attributes["complete"]) else " (stopped)"),
@@ -215,22 +218,16 @@ def flat_keys(content: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
             yield f"{before}{key}", value if isinstance(value, str) else json.dumps(value, ensure_ascii=False)
 
 
-def _provenance(material: ReportData) -> str:
+def _hashes(material: ReportData) -> list[dict[str, str]]:
     results = material.results
     context = material.context
     hashes = {f"table {name}": table.input_hash for name, table in results.tables.items()}
     hashes |= {str(context.name_of(run.path)): run.attributes["input_hash"] for run in results.runs}
-    hashes |= {
-        f"steady-state response {model_label(choice_of(data.attrs))}, {data.attrs['method']}": data.attrs["input_hash"]
-        for data in results.steady
-    }
+    for data in results.steady:
+        method = METHOD_LABELS[str(data.attrs["method"])]
+        hashes[f"steady-state response {model_label(choice_of(data.attrs))}, {method}"] = data.attrs["input_hash"]
     hashes |= {f"modes {model_label(model)}": data.attrs["input_hash"] for model, data in results.modes.items()}
-    rows = [{"result": name, "SHA-256 of its input": sha256} for name, sha256 in hashes.items()]
-    versions = [f"Python {platform.python_version()}", *(f"{name} {_version(name)}" for name in PACKAGES)]
-    carried = [f"{library.name} {library.version}" for library in libraries()]
-    return pieces.table(rows, ("SHA-256 of its input",), caption="Hashes", name="hashes") + pieces.paragraph(
-        f"{', '.join([*versions, *carried])}; {platform.platform()}.", "note"
-    )
+    return [{"result": name, "SHA-256 of its input": sha256} for name, sha256 in hashes.items()]
 
 
 def _version(package: str) -> str:
@@ -238,12 +235,3 @@ def _version(package: str) -> str:
         return version(package)
     except PackageNotFoundError:
         return "(not installed)"
-
-
-def _times(material: ReportData) -> str:
-    rows = [
-        {"step": entry.step, "wall / s": f"{entry.seconds:.1f}", "peak memory / MB": f"{1e-6 * entry.memory:.0f}"}
-        for entry in times_spent(material.context.folder)
-    ]
-    note = pieces.paragraph("Each step was a separate process; some ran in parallel.", "note") if rows else ""
-    return pieces.table(rows, caption="Run time") + note

@@ -6,16 +6,19 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from exugear.gearbox.choice import Choice
+from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.variant import Variant
+from exugear.report.answer_section import ranking_section, short_section
 from exugear.report.bearings_section import bearings_section
+from exugear.report.changes_section import changes_section, stored_study
 from exugear.report.findings.context import (
     Context,
     StoredResults,
@@ -25,45 +28,22 @@ from exugear.report.findings.context import (
     with_responses,
 )
 from exugear.report.findings.groups import groups_of
+from exugear.report.findings.headline import headline_of
 from exugear.report.findings.verdicts import begin_variations, model_variations
 from exugear.report.findings.words import Labels
 from exugear.report.gears_section import gears_section
 from exugear.report.life_section import life_section, studies_section
 from exugear.report.material import Part, ReportData, lines_of
 from exugear.report.modes_section import change_section, modes_section, target_frequency_section
+from exugear.report.results_section import checks_section, resonances_section, results_section, waterfall_section
 from exugear.report.run_data import run_data
 from exugear.report.steady_section import steady_section
-from exugear.report.summary_section import ranking_section, summary_section, waterfall_section
 from exugear.report.trust_section import trust_section
-from exugear.report.web import html
 from exugear.report.web.document import ArrayStore, whole_page
+from exugear.report.web.html import render
 from exugear.results.folder import REPORT_FILE, read_stored_gearbox
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.files import write_file
-
-# Page elements outside the sections: head, table of contents, controls of the whole page, footer
-
-
-def page_body(material: ReportData, parts: Sequence[Part]) -> str:
-    """Combine the sections: invalid runs first, then the findings, then skipped results."""
-    notes = material.context.notes
-    warning = "Invalid runs; they are included in the results below"
-    links = "".join(
-        html.element("a", html.text(part.title), href=f"#{part.name}") for part in parts if part.title and part.html
-    )
-    contents = html.element("nav", links, aria_label="Sections")
-    head = html.element("header", _headline(material) + _tools() + contents, class_="top")
-    above = html.alert(warning, notes.invalid_runs) if notes.invalid_runs else ""
-    left_out = html.section("Skipped", html.bullets(notes.left_out), name="left-out") if notes.left_out else ""
-    if commands := commands_for_missing(material.context, material.results):
-        left_out += html.section("Not computed", html.bullets(commands), name="not-computed")
-    main = html.element("main", above + _sets(material) + "".join(part.html for part in parts) + left_out, id="content")
-    text = f"Created by exugear from {material.file_words}. This page makes no network requests."
-    foot = html.element("footer", html.paragraph(text))
-    skip = html.element("a", "Skip to the content", class_="skip", href="#content")
-    live = html.element("p", "", id="said", class_="toast", role="status", aria_live="polite")
-    tip = html.element("p", "", id="tip", class_="tip", hidden=True)
-    return skip + head + main + foot + live + tip
 
 
 def commands_for_missing(context: Context, results: StoredResults) -> list[str]:
@@ -105,44 +85,29 @@ def _shown(path: str | Path) -> str:
     return absolute.name
 
 
-def _headline(material: ReportData) -> str:
+def _scope(material: ReportData) -> str:
+    """Describe the gearbox and the results below the name of the page."""
     gearbox = material.context.gearbox
-    shown = ", ".join(dict.fromkeys(run.variant for run in material.results.runs))
-    line = f"Resonance report. Speed ratio output/input {gearbox.train.ratio:.6f}"
-    steady = ", ".join(dict.fromkeys(str(data.attrs["variant"]) for data in material.results.steady))
-    line += f"; run-ups: {shown}" if shown else ""
-    line += f"; constant speed: {steady}." if steady else "."
-    return html.element("div", f"<h1>{html.text(gearbox.name)}</h1>{html.paragraph(line)}", class_="brand")
-
-
-def _tools() -> str:
-    def button(name: str, shown: str, label: str) -> str:
-        return html.element("button", shown, type="button", id=name, aria_label=label)
-
-    buttons = [
-        button("share", "Copy view", "Copy a link to exactly this view"),
-        button("save-data", "Data (JSON)", "Save the data of this page as JSON"),
-        button("print", "Print", "Print this page"),
-        button("theme", "◐", "Dark or light colours"),
-    ]
-    return html.element("div", "".join(buttons), class_="page-tools scripts-only")
-
-
-def _sets(material: ReportData) -> str:
-    """Return the selector of the result group, if there are several."""
-    if len(material.groups) < 2:
-        return ""
-    choices = html.element("div", "", class_="choices", id="group", role="group", aria_label="Results shown")
-    return html.element("div", f"Results of: {choices}", class_="controls scripts-only")
+    rated = gearbox.case.operation.rated_speed_rpm
+    parts = [] if rated is None else [f"rated {rated:g} rpm"]
+    parts += [material.words.labelled(static_load_in_words(gearbox)), f"speed ratio {gearbox.train.ratio:.4g}"]
+    if material.headline is not None:
+        parts += [Variant.of(material.headline.choice.variant).label, material.headline.source]
+    text = ", ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
 
 
 # The report of a results folder as a self-contained web page
 
 SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
-    summary_section,
-    waterfall_section,
+    short_section,
+    checks_section,
     ranking_section,
+    changes_section,
     change_section,
+    results_section,
+    waterfall_section,
+    resonances_section,
     bearings_section,
     life_section,
     steady_section,
@@ -171,6 +136,8 @@ class Report:
     """Path of the page."""
     statements: tuple[str, ...]
     """Statements of the summary."""
+    resonances: tuple[dict[str, Any], ...]
+    """Ranking that the page leads with, as `exugear steady` has it in ``--json``; the first is the headline."""
     missing: tuple[str, ...]
     """Results that are not in the folder, each with the command that computes it."""
     left_out: tuple[str, ...]
@@ -209,17 +176,30 @@ def write_report(
     context = Context(folder, gearbox, reference, tell or (lambda what: None))
     material = _material(context, executor)
     parts = [section(material) for section in SECTIONS]
+    missing = tuple(commands_for_missing(context, material.results))
     # The body is made last, because sections add notes that its head shows.
-    body = page_body(material, parts)
+    body = render(
+        "report",
+        name=gearbox.name,
+        scope=_scope(material),
+        parts=[part for part in parts if part.html],
+        notes=context.notes,
+        missing=missing,
+        steady=material.headline is not None and material.headline.response is not None,
+        source=material.file_words,
+    )
     rated = gearbox.case.operation.rated_speed_rpm
     head: dict[str, Any] = {"name": gearbox.name, "input": material.input_words, "rated": rated}
-    data = {**head, "lines": [], "groups": [], "models": {}, **_merged(parts)}
+    data = {**head, "lines": [], "groups": [], "models": {}, "charts": material.charts}
+    for part in parts:
+        data |= part.data
     title = f"{gearbox.name}: resonance report"
     path = folder / REPORT_FILE
     page = whole_page(title, body, "report", data, material.arrays, LIBRARIES)
     write_file(path, page.encode("utf-8", "replace"))
-    missing = tuple(commands_for_missing(context, material.results))
-    return Report(path, tuple(context.notes.statements), missing, tuple(context.notes.left_out))
+    ranked = () if material.headline is None else material.headline.ranking.resonances
+    resonances = tuple(resonance.summary() for resonance in ranked)
+    return Report(path, tuple(context.notes.statements), resonances, missing, tuple(context.notes.left_out))
 
 
 def _material(context: Context, executor: Executor | None) -> ReportData:
@@ -233,19 +213,13 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
         raise ReportError("\n".join([f"{context.folder}: no results of this gearbox file", *reasons]))
     groups = groups_of(context, results)
     words = Labels(context.gearbox)
-    material = ReportData(context, results, words, groups, (), lines_of(context), ArrayStore())
+    headline = headline_of(context, results, groups)
+    material = ReportData(context, results, words, groups, (), lines_of(context), headline, ArrayStore())
     # Variations come last; another process may compute them in the meantime.
     drawn = run_data(material)
-    return replace(material, run_data=drawn, variations=model_variations(context, results.modes, begun))
-
-
-def _merged(parts: list[Part]) -> Mapping[str, Any]:
-    """Merge the data of all sections; their charts are collected under ``charts``."""
-    merged: dict[str, Any] = {"charts": {}}
-    for part in parts:
-        for key, value in part.data.items():
-            if key == "charts":
-                merged["charts"].update(value)
-            else:
-                merged[key] = value
-    return merged
+    return replace(
+        material,
+        run_data=drawn,
+        design_study=stored_study(context),
+        variations=model_variations(context, results.modes, begun),
+    )

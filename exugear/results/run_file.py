@@ -516,12 +516,12 @@ def _load_pieces(folder: Path, wanted: list[str] | None) -> xr.Dataset:
     return data[wanted]
 
 
-def verdict_of(attributes: Mapping[str, Any]) -> str:
+def invalidity_of(attributes: Mapping[str, Any]) -> str:
     """Reason why a run is invalid, from the attributes of its file; empty for a valid run.
 
     Examples
     --------
-    >>> verdict_of({"valid": 0, "validity_message": "energy: ..."}), verdict_of({"valid": 1}), verdict_of({})
+    >>> invalidity_of({"valid": 0, "validity_message": "energy: ..."}), invalidity_of({"valid": 1}), invalidity_of({})
     ('energy: ...', '', '')
     """
     if int(attributes.get("valid", 1)):

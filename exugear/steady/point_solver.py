@@ -300,7 +300,7 @@ def _with_passing(state: ContactLossState) -> ContactLossState:
         try:
             readings, products = solve_balance(balance, start, enough)
         except HarmonicBalanceError:
-            return _remarked(state, "passing planets add orders, but no solution including them was found")
+            return _with_warnings(state, "passing planets add orders, but no solution including them was found")
         response = response_of_readings(balance, readings, found.response.products + products)
         found = replace(state, model=model, readings=readings, response=response, averaged=state)
     if found is state:
@@ -310,12 +310,12 @@ def _with_passing(state: ContactLossState) -> ContactLossState:
     share = float(np.linalg.norm(overall[found.model.lines.index[1:, bases:].any(axis=1)]) / np.linalg.norm(overall))
     if share < SIDEBAND_WARNING:
         return found
-    return _remarked(
+    return _with_warnings(
         found, f"passing planets add {100.0 * share:.2g} % of the overall transmission error at other orders"
     )
 
 
-def _remarked(state: ContactLossState, remark: str) -> ContactLossState:
+def _with_warnings(state: ContactLossState, remark: str) -> ContactLossState:
     return replace(state, remark="; ".join(filter(None, (state.remark, remark))))
 
 

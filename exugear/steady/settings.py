@@ -22,6 +22,7 @@ from fe_ste.tools.arrays import Floats
 Method = Literal["linear", "parametric", "nonlinear"]
 METHODS: tuple[Method, ...] = get_args(Method)
 USUAL_COUNT = 400
+OPERATING_COUNT = 180
 MOST_COUNT = 20000
 MOST_HARMONICS = 100
 SLOWEST = 1e-6
@@ -110,6 +111,22 @@ def usual_speeds(gearbox: Gearbox) -> SpeedRange:
             "in rpm of the input"
         )
     return SpeedRange(0.0, math.copysign(fastest, sense), USUAL_COUNT)
+
+
+def operating_speeds(gearbox: Gearbox) -> SpeedRange:
+    """Return the speeds of the operating range, in the sense of the first load case; all of its speeds without a range.
+
+    Examples
+    --------
+    >>> operating_speeds(Gearbox.from_toml("cases/grc750/gearbox.toml")).text
+    '-11.05:-27.625:180'
+    """
+    usual = usual_speeds(gearbox)
+    stated = operating_range(gearbox)
+    if stated is None:
+        return usual
+    low, high = (math.copysign(speed, usual.last) for speed in stated)
+    return SpeedRange(low, high, OPERATING_COUNT)
 
 
 def check_speeds(gearbox: Gearbox, speeds: SpeedRange) -> None:

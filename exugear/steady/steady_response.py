@@ -275,7 +275,7 @@ ROUNDS = 5
 """Times that tops are looked for between speeds, at most."""
 SLOWEST_BRANCH = 0.01
 """Share of the fastest speed at which a branch from standstill begins."""
-LONGEST_REMARK = 300
+LONGEST_WARNING = 300
 """Letters of a remark."""
 Kept = Callable[[SolvedPoints], None]
 
@@ -483,10 +483,10 @@ def _solve_one(out: SolvedPoints, n: int, solver: PointSolver) -> None:
     except HarmonicBalanceError as error:
         for values in (out.amplitude, out.drive_torque, out.energy_error, out.apart, out.free):
             values[n] = np.nan
-        out.remark[n] = str(error)[:LONGEST_REMARK]
+        out.remark[n] = str(error)[:LONGEST_WARNING]
         return
     if solver.state is not None:
-        out.growth[n], out.remark[n] = solver.state.growth, solver.state.remark[:LONGEST_REMARK]
+        out.growth[n], out.remark[n] = solver.state.growth, solver.state.remark[:LONGEST_WARNING]
 
 
 def _contributions(model: HarmonicBalanceModel, found: tuple[Crossing, ...]) -> tuple[tuple[int, Contributions], ...]:
@@ -529,7 +529,7 @@ def _empty(model: HarmonicBalanceModel, speeds: Floats) -> SolvedPoints:
         apart=np.zeros((points, len(model.waves.waves))),
         free=np.zeros((points, len(model.bearing_names))),
         growth=np.full(points, np.nan),
-        remark=np.zeros(points, dtype=f"<U{LONGEST_REMARK}"),
+        remark=np.zeros(points, dtype=f"<U{LONGEST_WARNING}"),
     )
 
 

@@ -38,7 +38,7 @@ from exugear.results.folder import peak_memory
 from exugear.studies.point_results import PointResults, PointSettings, Shared
 from exugear.studies.quantities import Output, Values
 from exugear.studies.sampling import changed
-from exugear.system.readiness import check_parts
+from exugear.system.gearbox_checks import check_parts
 from fe_ste.tools.files import FileError, open_regular, write_all
 from fe_ste.tools.threads import AtOnce, StoppedError, Workers, available_cores, stop_if_asked
 
@@ -288,7 +288,7 @@ def _built(task: Task, work: Work) -> Gearbox:
             for path, value in work.changes.items()
         ]
         more = [f"and {len(own) - SHOWN_VALUES} more"] if len(own) > SHOWN_VALUES else []
-        raise GearboxFileError(*("; ".join([*own[:SHOWN_VALUES], *more]) for _ in own[:1]), *error.faults) from None
+        raise GearboxFileError(*("; ".join([*own[:SHOWN_VALUES], *more]) for _ in own[:1]), *error.errors) from None
 
 
 def _journal_form(values: Values) -> Any:

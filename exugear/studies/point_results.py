@@ -31,7 +31,7 @@ from exugear.system.statics import StaticState, static_state
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS, law_of
-from exugear.system.tooth_mesh.tables import TableRequest, doubts_about_table, requested_tables, wanted_table
+from exugear.system.tooth_mesh.tables import TableRequest, requested_tables, table_warnings, wanted_table
 from fe_ste.root_stress import MeshCycleStress
 from fe_ste.tools.stores import Store
 from fe_ste.tools.threads import stop_if_asked
@@ -101,7 +101,7 @@ class Shared:
             with _waiting(folder / "lock"):
                 (request,) = requested_tables(gearbox, folder, [pair], grid=grid)
                 table = request.stored or request.compute(progress)
-        doubts = list(doubts_about_table(pair, table))
+        doubts = list(table_warnings(pair, table))
         if doubts:
             raise SharedTableError("; ".join(doubts))
         return table
@@ -122,7 +122,7 @@ class Shared:
             request = replace(request, path=path, stored=_stored(path, request.wanted))
         with _waiting(folder / "lock"):
             table = request.stored or _stored(request.path, request.wanted) or request.compute(progress)
-            doubts = list(doubts_about_table(request.name, table))
+            doubts = list(table_warnings(request.name, table))
             if doubts:
                 raise SharedTableError("; ".join(doubts))
             return pair_stresses([replace(request, stored=table)], folder)[request.name]

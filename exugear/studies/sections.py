@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from exugear.gearbox.reading import fault_line, one_of, parsed, shortened
+from exugear.gearbox.reading import error_line, one_of, parsed, shortened
 from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.sections.entries import Name, Text
 from exugear.gearbox.variant import Variant
@@ -307,7 +307,7 @@ class StudyFile(StudyPart):
 
 LARGEST_STUDY = 10_000_000
 """Largest study file that is read, bytes."""
-SHOWN_FAULTS = 20
+SHOWN_ERRORS = 20
 
 
 class StudyError(ValueError):
@@ -360,10 +360,10 @@ def parse_study(content: dict[str, Any], source: str) -> StudyFile:
     try:
         return StudyFile.model_validate(content)
     except ValidationError as error:
-        faults = error.errors(include_url=False)
-    lines = list(dict.fromkeys(fault_line(source, _described(fault)) for fault in faults))
-    more = [f"and {len(lines) - SHOWN_FAULTS} more errors"] if len(lines) > SHOWN_FAULTS else []
-    raise StudyError("\n".join([*lines[:SHOWN_FAULTS], *more]))
+        errors = error.errors(include_url=False)
+    lines = list(dict.fromkeys(error_line(source, _described(error)) for error in errors))
+    more = [f"and {len(lines) - SHOWN_ERRORS} more errors"] if len(lines) > SHOWN_ERRORS else []
+    raise StudyError("\n".join([*lines[:SHOWN_ERRORS], *more]))
 
 
 _REMEDIES = {
@@ -378,11 +378,11 @@ _REMEDIES = {
 }
 
 
-def _described(fault: Any) -> str:
+def _described(error: Any) -> str:
     """Return key, value and what is permitted."""
-    location = [str(part) for part in fault["loc"] if part not in ("[key]", "int", "float", "str", "bool")]
+    location = [str(part) for part in error["loc"] if part not in ("[key]", "int", "float", "str", "bool")]
     key = ".".join(location) or "the file"
-    if fault["type"] == "extra_forbidden":
+    if error["type"] == "extra_forbidden":
         if hint := renamed_hint(location, STUDY_RENAMES):
             return f"{key}: {hint}"
         known = _known_keys(location[:-1])
@@ -390,14 +390,14 @@ def _described(fault: Any) -> str:
         return f"{key}: unknown key; " + (
             f"did you mean {near[0]!r}?" if near else f"known keys are {', '.join(known)}"
         )
-    remedy = _REMEDIES.get(fault["type"])
-    if fault["type"] == "literal_error":
-        remedy = one_of(fault["ctx"]["expected"], fault["input"])
+    remedy = _REMEDIES.get(error["type"])
+    if error["type"] == "literal_error":
+        remedy = one_of(error["ctx"]["expected"], error["input"])
     if remedy is None:
-        text = str(fault["msg"]).removeprefix("Value error, ").replace("Input should", "must", 1)
+        text = str(error["msg"]).removeprefix("Value error, ").replace("Input should", "must", 1)
         remedy = text[:1].lower() + text[1:]
-    value = fault["input"]
-    shown = "" if isinstance(value, dict) or fault["type"] == "missing" else f" = {shortened(value)}"
+    value = error["input"]
+    shown = "" if isinstance(value, dict) or error["type"] == "missing" else f" = {shortened(value)}"
     return f"{key}{shown}: {remedy}"
 
 

@@ -17,7 +17,7 @@ from exugear.exchange.series_files import file_digest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.named_files import NOTHING_MORE, Permissions
-from exugear.gearbox.reading import GearboxFileError, fault_line
+from exugear.gearbox.reading import GearboxFileError, error_line
 from exugear.gearbox.variant import Variant
 from exugear.gearbox.versions import LIFE, MODES, REDUCTION, RUN, STEADY, STUDY
 from exugear.results.folder import case_digest, read_content
@@ -80,7 +80,7 @@ SHOWN = 3
 """Maximum number of equal names listed in a line."""
 
 
-def faults_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
+def errors_of_names(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
     """Report parameters and outputs whose names the dataset reserves for other variables."""
     taken = dict.fromkeys(OF_POINTS, "the results of each point")
     drawn = [name for name, parameter in study.parameters.items() if parameter.is_drawn]
@@ -121,7 +121,7 @@ def _taken_by_tolerances(study: StudyFile) -> dict[str, str]:
     return {SAMPLE: "the draws", **taken, **sides}
 
 
-def faults_of_search(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
+def errors_of_search(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[str]:
     """Report outputs with several numbers where an optimisation requires one."""
     if study.optimise is None:
         return
@@ -135,7 +135,7 @@ def faults_of_search(study: StudyFile, kept: Mapping[str, Output]) -> Iterator[s
                 )
 
 
-def faults_of_paths(study: StudyFile) -> Iterator[str]:
+def errors_of_paths(study: StudyFile) -> Iterator[str]:
     """Report paths that two parameters set, or one of them twice, because only the last value would be effective.
 
     A tolerance may shift or scale the value of a parameter.
@@ -162,7 +162,7 @@ def faults_of_paths(study: StudyFile) -> Iterator[str]:
             owners.append((table, name, path))
 
 
-def faults_of_values(design: Design) -> Iterator[str]:
+def errors_of_values(design: Design) -> Iterator[str]:
     """Report values that give the same point: listed twice, or scaled from zero."""
     for dimension, changes in design.levels.items():
         seen: dict[str, int] = {}
@@ -175,7 +175,7 @@ def faults_of_values(design: Design) -> Iterator[str]:
                 break
 
 
-def faults_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
+def errors_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
     """Report invalid options of the built-in outputs: out of range, or missing in this gearbox."""
     own = {id(quantity) for quantity in QUANTITIES.values()}
     known = _names(gearbox, choice)
@@ -190,10 +190,10 @@ def faults_of_options(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
                 yield f"outputs.{name}.{key} = {value!r}: must be finite, and lie between {low:g} and {high:g}"
             elif key in known and value and value not in known[key]:
                 yield f"outputs.{name}.{key} = {str(value)[:200]!r}: no such {key}; there are {_listed(known[key])}"
-        yield from _faults_of_orders(name, output.options, gearbox)
+        yield from _errors_of_orders(name, output.options, gearbox)
 
 
-def _faults_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -> Iterator[str]:
+def _errors_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -> Iterator[str]:
     """Report options that contradict each other, or the positions of the table."""
     if options.get("from_Hz", 0.0) > options.get("to_Hz", math.inf):
         yield f"outputs.{name}.from_Hz = {options['from_Hz']:g}: must be below to_Hz = {options['to_Hz']:g}"
@@ -205,7 +205,7 @@ def _faults_of_orders(name: str, options: Mapping[str, Any], gearbox: Gearbox) -
         )
 
 
-def faults_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearbox) -> Iterator[str]:
+def errors_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearbox) -> Iterator[str]:
     """Report outputs that need results which the study does not compute."""
     for name, output in kept.items():
         needs = output.quantity.needs
@@ -218,7 +218,7 @@ def faults_of_needs(study: StudyFile, kept: Mapping[str, Output], gearbox: Gearb
             )
 
 
-def faults_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
+def errors_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choice) -> Iterator[str]:
     """Report signals and orders that neither runs nor steady-state responses of this gearbox have."""
     tabled = choice.mesh_model == "table"
     jointed = choice.variant.spins_only
@@ -240,10 +240,10 @@ def faults_of_signals(kept: Mapping[str, Output], gearbox: Gearbox, choice: Choi
             if signal != OVERALL and not any(rest.split(" ")[0] == part for part in parts.get(quantity, ())):
                 known = [OVERALL, *(f"{own} {part}" for own, of in parts.items() for part in dict.fromkeys(of))]
                 yield f"outputs.{name}.signal = {signal[:200]!r}: no such signal; there are {_listed(known)}"
-            yield from _faults_of_line(name, output, families)
+            yield from _errors_of_line(name, output, families)
 
 
-def _faults_of_line(name: str, output: Output, families: Sequence[str]) -> Iterator[str]:
+def _errors_of_line(name: str, output: Output, families: Sequence[str]) -> Iterator[str]:
     line = output.options.get("line")
     unknown = [word for word in str(line).split() if not word.isdecimal() and word not in ("x", "+", "-", *families)]
     if line is not None and (unknown or not line):
@@ -374,13 +374,13 @@ class Study(ReprMixin):
         except (PathError, OutputError, SteadyError, ValueError) as error:
             if isinstance(error, GearboxFileError | StudyError):
                 raise
-            raise StudyError(fault_line(source, str(error))) from None
+            raise StudyError(error_line(source, str(error))) from None
         choice = Choice(**file.choice.model_dump()).of(gearbox)
-        faults = [*faults_of_names(file, kept), *faults_of_paths(file), *faults_of_values(design)]
-        faults += [*faults_of_options(kept, gearbox, choice), *faults_of_needs(file, kept, gearbox)]
-        faults += [*faults_of_signals(kept, gearbox, choice), *faults_of_search(file, kept)]
-        if faults:
-            raise StudyError("\n".join(fault_line(source, fault) for fault in faults))
+        errors = [*errors_of_names(file, kept), *errors_of_paths(file), *errors_of_values(design)]
+        errors += [*errors_of_options(kept, gearbox, choice), *errors_of_needs(file, kept, gearbox)]
+        errors += [*errors_of_signals(kept, gearbox, choice), *errors_of_search(file, kept)]
+        if errors:
+            raise StudyError("\n".join(error_line(source, error) for error in errors))
         of_life = _reads_life(kept)
         if of_life:
             life_loads(gearbox, choice)

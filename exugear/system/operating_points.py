@@ -112,12 +112,12 @@ def _with_contacts(assembly: Assembly) -> tuple[Assembly, Floats | None]:
         near, _laws = _loaded_state(assembly, near)
         assembly = even.with_contacts(static_contacts(contact_places(assembly, near)))
     for remark in assembly.contacts.remarks:
-        _log_remark(remark)
+        _log_warning(remark)
     return assembly, near
 
 
 @cache
-def _log_remark(remark: str) -> None:
+def _log_warning(remark: str) -> None:
     """Say it once in a process, whoever asks for the assembly: most doors to it have no other way to."""
     _log.warning(remark)
 

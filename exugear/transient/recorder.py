@@ -165,7 +165,7 @@ class Recorder:
         Where states wait to be written.
     last_time : float
         Time of the last state that counts, s.
-    fault : str
+    error : str
         The error that ended the run, empty if none.
     past : (n, size) array
         Accelerations from which a multistep solver continues after the last state, the latest last.
@@ -175,7 +175,7 @@ class Recorder:
         self, plan: RunPlan, start: RunStart, file: RunFile, progress: Callable[[float], None] | None = None
     ) -> None:
         self.last_time = 0.0
-        self.fault = ""
+        self.error = ""
         self._plan = plan
         self._start = start
         self._file = file
@@ -209,8 +209,8 @@ class Recorder:
 
     @property
     def halted(self) -> bool:
-        """Whether the run is known to be beyond a limit that no run may pass, or has a fault."""
-        return bool(self.fault) or self._stopped
+        """Whether the run is known to be beyond a limit that no run may pass, or has an error."""
+        return bool(self.error) or self._stopped
 
     def begin(self, time: float, q: Floats, v: Floats) -> None:
         """Take the state that the run starts from, at a time (s); a resumed run has it in its pieces already."""
@@ -218,14 +218,14 @@ class Recorder:
             self.last_time = time
             return
         self.keep(time, q, v)
-        if not self.fault:
+        if not self.error:
             self._observe_rest(self.buffer)
             self._account.begin(self.buffer.states()[1].energies[0, len(ENERGIES) :])
 
     def keep(self, time: float, q: Floats, v: Floats) -> None:
-        """Take one state at a time (s); one that is not finite is a fault."""
+        """Take one state at a time (s); one that is not finite is an error."""
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
-            self.fault = f"the state is not finite at t = {time:.6g} s"
+            self.error = f"the state is not finite at t = {time:.6g} s"
             return
         room = self.buffer.room(1)
         room.q[0], room.v[0] = q, v
@@ -263,9 +263,9 @@ class Recorder:
         self._await_writing()
         if self._stopped:
             self.buffer.clear()
-            self.fault = ""  # of a state beyond the end
+            self.error = ""  # of a state beyond the end
         elif self.buffer.filled:
-            against = (self.fault,) if self.fault else ()
+            against = (self.error,) if self.error else ()
             self._writing = self._writer.submit(self._write, self.buffer, self.past, against)
             self.buffer, self._spare = self._spare, self.buffer
 
@@ -295,7 +295,7 @@ class Recorder:
         centre, samples = self._decimator.push(rows.signals)
         numbers = centre + self._decimator.factor * np.arange(len(samples), dtype=np.float64)
         end = float(times[-1])
-        self._note_verdict(against + self._reasons(end))
+        self._note_validity(against + self._reasons(end))
         state = self._checkpoint(end, rows, past)
         pieces = self._start.pieces
         self._file.add(pieces.append(self._plan.step * numbers, samples, times[written], balances, state))
@@ -330,11 +330,11 @@ class Recorder:
     def _reasons(self, time: float) -> tuple[str, ...]:
         return self._judge.reasons(self._mesh_times, time)
 
-    def note_verdict(self) -> None:
+    def note_validity(self) -> None:
         """Add to the pieces that follow what the run may claim so far, and what speaks against it."""
-        self._note_verdict(((self.fault,) if self.fault else ()) + self.reasons())
+        self._note_validity(((self.error,) if self.error else ()) + self.reasons())
 
-    def _note_verdict(self, against: tuple[str, ...]) -> None:
+    def _note_validity(self, against: tuple[str, ...]) -> None:
         pieces = self._start.pieces
         pieces.note("limits", self._judge.limits.to_json())
         pieces.note("validity_message", "; ".join(against) or "within all limits")

@@ -78,7 +78,7 @@ def interruptible() -> Iterator[Interruption]:
             signal.signal(number, handler)
 
 
-# A run from its start to its end, or to the first fault or interruption, by either solver
+# A run from its start to its end, or to the first error or interruption, by either solver
 
 STEPS_AT_ONCE = 2000
 """Steps of one call of the compiled solver: Ctrl-C is heard between calls, and a step takes up to half a ms."""
@@ -87,7 +87,7 @@ STEP_TOLERANCE = 1e-3
 
 
 def integrate(plan: RunPlan, start: RunStart, recorder: Recorder, interruption: Interruption) -> None:
-    """Integrate as planned; the recorder takes the states and any fault."""
+    """Integrate as planned; the recorder takes the states and any error."""
     if start.state.step >= plan.steps:  # a kill fell between the last step and the joining of the pieces
         recorder.last_time = start.state.step * plan.step
     elif plan.solver == "compiled":
@@ -108,7 +108,7 @@ def _integrate_compiled(plan: RunPlan, start: RunStart, recorder: Recorder, inte
         room = recorder.buffer.room(min(plan.steps - done, STEPS_AT_ONCE))
         good = system.advance(done, *room)
         if good < len(room.q):
-            recorder.fault = f"the state is not finite at t = {(done + good + 1) * step:.6g} s"
+            recorder.error = f"the state is not finite at t = {(done + good + 1) * step:.6g} s"
         recorder.past = system.past
         recorder.take_observed(step * np.arange(done + 1, done + good + 1, dtype=np.float64))
         done += good
@@ -126,7 +126,7 @@ def _integrate_in_exudyn(plan: RunPlan, start: RunStart, recorder: Recorder, int
     try:
         system.run(state.step * step, plan.steps - state.step, step, follow, not plan.is_implicit)
     except SolverFailure as error:
-        recorder.fault = recorder.fault or f"Exudyn stopped at t = {recorder.last_time:.6g} s: {error}"
+        recorder.error = recorder.error or f"Exudyn stopped at t = {recorder.last_time:.6g} s: {error}"
 
 
 class _StepFollower:
@@ -150,7 +150,7 @@ class _StepFollower:
             return not self._interruption.asked and not recorder.halted
         if np.isfinite(q).all() and np.isfinite(v).all() and abs(t - due) > STEP_TOLERANCE * self._step:
             recorder.last_time = t
-            recorder.fault = (
+            recorder.error = (
                 f"Exudyn reduced the step at t = {t:.9g} s, expected {due:.9g} s: the equations did not converge; use "
                 "a smaller step"
             )
@@ -232,7 +232,7 @@ def simulate(
     """
     choice = choice.of(gearbox)
     if choice.load_case not in gearbox.load_cases:
-        raise gearbox.fault(f"no load case {choice.load_case!r}; choose one of: {', '.join(gearbox.load_cases)}")
+        raise gearbox.error(f"no load case {choice.load_case!r}; choose one of: {', '.join(gearbox.load_cases)}")
     case = gearbox.load_cases[choice.load_case]
     directory = run_directory(out, choice)
     if resume and duration is None:
@@ -245,7 +245,7 @@ def simulate(
 
     assembly = assemble(gearbox, choice, stiffness, bodies, angles=angles, before_balance=begin_to_compile)
     if lack := friction_lack(assembly.elements):
-        raise gearbox.fault(lack)
+        raise gearbox.error(lack)
     total = case.duration if duration is None else duration
     if integrator is not None and integrator not in INTEGRATORS:
         raise RunError(f"integrator {integrator!r} is unknown; integrators are {', '.join(INTEGRATORS)}")
@@ -253,7 +253,7 @@ def simulate(
     kind = integrator if chosen == "compiled" else "rk4"  # Exudyn's explicit method is the same
     integration = choose_integration(assembly, sample_rate, band, step=step, integrator=kind)
     if step is None and too_fine(integration.step, total, sample_rate):
-        raise gearbox.fault(f"{fastest_motion(assembly)}; {too_fine(integration.step, total, sample_rate)}")
+        raise gearbox.error(f"{fastest_motion(assembly)}; {too_fine(integration.step, total, sample_rate)}")
     with held(directory):
         plan = plan_run(assembly, case, directory, total, integration, band, sample_rate, chosen, mesh_route)
         if not resume:
@@ -263,7 +263,7 @@ def simulate(
 
 
 def _carry_out(plan: RunPlan, start: RunStart, progress: Callable[[Progress], None] | None) -> Run:
-    """Integrate to the end, or to the first fault or interruption, and keep the file of a complete run."""
+    """Integrate to the end, or to the first error or interruption, and keep the file of a complete run."""
     with RunFile(plan.final_path, start.pieces, plan.samples) as file:
         meter = ProgressMeter(start.state.step * plan.step, plan.duration, progress)
         run = _integrate(plan, start, file, meter)
@@ -279,12 +279,12 @@ def _integrate(plan: RunPlan, start: RunStart, file: RunFile, meter: ProgressMet
     with Recorder(plan, start, file, meter.reach) as recorder, interruptible() as interruption:
         integrate(plan, start, recorder, interruption)
         recorder.finish()
-        if recorder.fault:
-            recorder.note_verdict()
+        if recorder.error:
+            recorder.note_validity()
             start.pieces.mark()
     reasons = recorder.reasons()
-    if recorder.fault:
-        raise RunError(f"{'; '.join((recorder.fault, *reasons))}; results so far: {plan.partial_path}")
+    if recorder.error:
+        raise RunError(f"{'; '.join((recorder.error, *reasons))}; results so far: {plan.partial_path}")
     complete = not interruption.asked and not recorder.halted
     path = plan.final_path if complete else plan.partial_path
     run = Run(path, complete, recorder.last_time, meter.wall, reasons, recorder.halted)

@@ -186,7 +186,7 @@ class _KernelFiles(CompileResultCacheImpl):
 
 
 class _KernelCache(FunctionCache):
-    """numba's cache of a function, whose faults cost a compilation and never the work."""
+    """numba's cache of a function, whose errors cost a compilation and never the work."""
 
     _impl_class = _KernelFiles
 

@@ -92,8 +92,8 @@ def losses(
 
 def _duties(gearbox: Gearbox) -> Any:
     """Return the loads of catalogue bearings, with the tooth stiffness of ISO 6336-1; none without bearings."""
+    from exugear.system.gearbox_checks import lacking
     from exugear.system.operating_points import bearing_duties
-    from exugear.system.readiness import lacking
 
     if not gearbox.bearings or lacking(gearbox, Variant.bushing):
         return ()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
-from dataclasses import asdict
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,8 +14,10 @@ import typer
 from exugear.cli.case import FilesBelowOption, JsonOption, check_allow_dir
 from exugear.cli.console import (
     BadInputError,
+    FailedError,
     exit_codes,
     interruption,
+    model_errors,
     note,
     print_json,
     progress_bar,
@@ -25,7 +27,7 @@ from exugear.cli.tables import print_table
 from exugear.gearbox.units import RPM
 
 if TYPE_CHECKING:
-    from exugear.report.design_study import DesignStudy
+    from exugear.report.findings.design_changes import DesignStudy
     from exugear.report.writer import Report
 
 
@@ -35,6 +37,10 @@ def report(
         float | None,
         typer.Option(min=1.0, metavar="HZ", help="Target frequency to compare with modes. (default: gearbox file)"),
     ] = None,
+    stored: Annotated[
+        bool,
+        typer.Option("--stored", help="Use stored results only: do not compute missing modes and responses."),
+    ] = False,
     levers: Annotated[
         bool,
         typer.Option(
@@ -47,7 +53,8 @@ def report(
     """Write a report of a results folder as one web page.
 
     The page lists the resonances, their amplitudes and causes, and needs no other file. It compares all variants with
-    runs and modes. gmsh scripts are not run; their meshes must exist.
+    runs and modes. Missing modes of these models are computed first, and a steady-state response over the operating
+    range if there is none. gmsh scripts are not run; their meshes must exist.
     """
     with exit_codes():
         from exugear.report.writer import ReportError, write_report
@@ -57,6 +64,8 @@ def report(
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
         folder = _results_of(folder)
+        if not stored:
+            _compute_missing(folder, allow_dir)
         study = None
         if levers:
             study = _design_changes(folder, allow_dir)
@@ -74,6 +83,41 @@ def report(
         _print_report(folder, written, study, as_json)
 
 
+def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
+    """Compute missing modes of all models with runs, and a response of the one with most degrees of freedom.
+
+    Existing files stay as they are, even if they are damaged or belong to other input. What takes long (tables, contact
+    loss) or fails is left to the report, which lists it with its command.
+    """
+    from exugear.cli.watched import WatchedProject
+    from exugear.gearbox.named_files import Permissions
+    from exugear.gearbox.variant import Variant
+    from exugear.report.findings.context import choice_of
+    from exugear.results.folder import read_stored_gearbox
+    from exugear.results.run_file import load_run
+    from exugear.steady.settings import SteadySettings, operating_speeds
+    from exugear.system.tooth_mesh.laws.registry import LAWS
+    from fe_ste.tools.files import FileError
+
+    models = []
+    for path in sorted(folder.glob("*/*/run.nc")):
+        with suppress(FileError, ValueError, KeyError):
+            models.append(choice_of(load_run(path, ()).attrs))
+    if not models:
+        return
+    with suppress(BadInputError, FailedError), model_errors():
+        project = WatchedProject(read_stored_gearbox(folder, Permissions(below=allow_dir)), folder)
+        chosen = [replace(project, choice=model) for model in dict.fromkeys(models)]
+        ready = [own for own in chosen if LAWS[own.choice.mesh_model].has_force and not own.missing_tables()]
+        for own in ready:
+            if not own.modes_path.exists():
+                own.modes()
+        linear = [own for own in ready if not LAWS[own.choice.mesh_model].loses_contact]
+        if linear and not any(folder.glob("*/*/steady-*.nc")):
+            richest = max(linear, key=lambda own: list(Variant).index(own.choice.variant))
+            richest.steady(SteadySettings(operating_speeds(project.gearbox)))
+
+
 def _design_changes(folder: Path, allow_dir: Path | None) -> DesignStudy:
     """Compute the design changes of the variant with most degrees of freedom that the file allows."""
     from exugear.cli.watched import WatchedProject
@@ -81,7 +125,7 @@ def _design_changes(folder: Path, allow_dir: Path | None) -> DesignStudy:
     from exugear.gearbox.named_files import Permissions
     from exugear.gearbox.variant import Variant
     from exugear.results.folder import read_stored_gearbox
-    from exugear.system.readiness import lacking
+    from exugear.system.gearbox_checks import lacking
 
     gearbox = read_stored_gearbox(folder, Permissions(below=allow_dir))
     variant = Variant.bushing
@@ -126,7 +170,7 @@ def _print_report(folder: Path, written: Report, study: DesignStudy | None, as_j
         note(f"Not computed: {line}")
     if as_json:
         times = {entry.step: entry.seconds for entry in spent}
-        lists = {name: list(getattr(written, name)) for name in ("statements", "missing", "left_out")}
+        lists = {name: list(getattr(written, name)) for name in ("statements", "resonances", "missing", "left_out")}
         changes = [asdict(result) for result in (study.results if study else ())]
         print_json({"report": str(written.path), **lists, "design_changes": changes, "seconds": times})
         return
@@ -148,27 +192,26 @@ QUANTITIES = {"error": "TE", "force": "force", "acceleration": "accel."}
 
 def _print_changes(study: DesignStudy) -> None:
     """Print the effects of the design changes: on this peak, and on the highest amplitude in the operating range."""
-    from exugear.report.findings.design_changes import effects_in_decibels
+    from exugear.report.findings.design_changes import Effect
 
-    resonance = study.resonance
-    speed = abs(resonance.speed) / RPM
-    title = f"Design changes for {resonance.frequency:.3g} Hz at {speed:.4g} rpm, {resonance.line}, dB"
+    speed = abs(study.speed) / RPM
+    title = f"Design changes for {study.frequency:.3g} Hz at {speed:.4g} rpm, {study.line}, dB"
     rows = []
-    effects = effects_in_decibels(study.results)
-    for number, result in enumerate(study.results):
+    for result in study.results:
         row = {"change": result.change.words}
         for name, words in QUANTITIES.items():
-            here, highest = effects[name][number]
-            row[f"{words}\nhere"] = _decibels(here)
-            row[f"{words}\nrange"] = _decibels(highest)
+            effect = result.effects.get(name, Effect(None, None))
+            row[f"{words}\nhere"] = _decibels(effect.this_peak)
+            row[f"{words}\nrange"] = _decibels(effect.highest)
         rows.append({**row, "price": result.refusal or result.price})
     print_table(title, rows, ("change", "price"), legend="here: this peak; range: highest amplitude of any order.")
 
 
-def _decibels(value: float) -> str:
-    if math.isnan(value):
+def _decibels(value: float | None) -> str:
+    if value is None:
         return "–"
-    return f"{value:+.1f}"
+    text = f"{value:+.1f}"
+    return "0.0" if text in ("+0.0", "-0.0") else text
 
 
 def _megabytes(memory: float) -> str:

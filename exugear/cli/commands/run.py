@@ -172,7 +172,7 @@ def _compare(project: Project, duration: float, kept: Mapping[str, float]) -> So
 def _load_case(project: Project) -> LoadCase:
     """Load case of the run; it exists unless the file has no load cases."""
     if project.choice.load_case is None:
-        raise BadInputError(project.gearbox.fault("no load case; add a section [load_cases.NAME]"))
+        raise BadInputError(project.gearbox.error("no load case; add a section [load_cases.NAME]"))
     return project.gearbox.load_cases[project.choice.load_case]
 
 
@@ -266,8 +266,8 @@ def _warn_before_run(project: Project, duration: float | None, band: float) -> N
     from exugear.gearbox.load_cases import (
         band_warning,
         bearing_range_warning,
-        doubts_about,
         friction_warning,
+        load_warnings,
         other_load_warning,
         summarise_loads,
     )
@@ -279,7 +279,7 @@ def _warn_before_run(project: Project, duration: float | None, band: float) -> N
     of_bearings = bearing_range_warning(project.gearbox, loads, project.choice.variant)
     of_tables = other_load_warning(project.gearbox, loads, law.uses_single_load)
     of_friction = friction_warning(project.gearbox, loads)
-    for doubt in filter(None, (*doubts_about(loads), of_bearings, of_tables, band_warning(loads, band), of_friction)):
+    for doubt in filter(None, (*load_warnings(loads), of_bearings, of_tables, band_warning(loads, band), of_friction)):
         note(f"Warning: load_cases.{load_case.name}: {doubt}", style="yellow")
 
 

@@ -151,7 +151,7 @@ def _requested_tables(
             without_table(gearbox, gearbox.pairs)
             or "pairs: no pair has table = true; set it for a pair, or use --mesh NAME"
         )
-        raise BadInputError(gearbox.fault(why))
+        raise BadInputError(gearbox.error(why))
     make_results_folder(project.folder)
     project.keep_case()
     for request in requests:
@@ -173,7 +173,7 @@ def _compute_references(
     from exugear.project import default_folder
     from exugear.results.folder import keep_case, time_noted
     from exugear.system.tooth_mesh.reference_tables import (
-        doubts_of_references,
+        reference_warnings,
         requested_references,
         summarise_reference,
     )
@@ -195,14 +195,14 @@ def _compute_references(
         print_table("Static transmission error, nonlinear finite elements", rows, legend=REFERENCE_LEGEND)
         say(f"Results: {folder / 'tables'}")
     failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
-    doubts = doubts_of_references(summaries)
-    faults = []
+    doubts = reference_warnings(summaries)
+    errors = []
     if failures:
-        faults += ["positions not converged:", *failures]
+        errors += ["positions not converged:", *failures]
     if doubts:
-        faults += ["the methods differ by more than the limit:", *doubts]
-    if faults:
-        raise FailedError("\n".join(faults))
+        errors += ["the methods differ by more than the limit:", *doubts]
+    if errors:
+        raise FailedError("\n".join(errors))
 
 
 def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -> NonlinearTable:

@@ -218,7 +218,7 @@ def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, 
             ],
         }
         print_json({**summary, **remarks})
-        _fail_if_doubtful(data, growth)
+        _fail_if_invalid(data, growth)
         return
     title = f"Resonance ranking, {_speeds_of(ranking)}, variant {project.choice.variant}, {settings.method}"
     title += f", at {static_load_in_words(project.gearbox)}".replace(" N m", f"{HARD_SPACE}N{HARD_SPACE}m")
@@ -233,7 +233,7 @@ def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, 
         damping += f"; friction of teeth included, coefficient {friction:g}"
     print_text(f"{data.sizes['point']} speeds up to {fastest:.4g} rpm; {stable}; damping {damping}.")
     say(f"Results: {project.steady_path(settings)}")
-    _fail_if_doubtful(data, growth)
+    _fail_if_invalid(data, growth)
 
 
 def _print_bands(gearbox: Gearbox, ranking: Ranking) -> None:
@@ -319,7 +319,7 @@ def _whole_summary(
         "ranked_speeds_rpm": [speed / RPM for speed in ranking.speeds],
         "ranked_over_all_speeds": ranking.whole,
         "accelerations_of": ranking.accelerates,
-        "resonances": [resonance.to_row() for resonance in ranking.resonances],
+        "resonances": [resonance.summary() for resonance in ranking.resonances],
         "peaks_of_overall_dte": [_summary(peak) for peak in found],
         "file": str(project.steady_path(settings)),
     }
@@ -343,7 +343,7 @@ def _print_speed_range(ranking: Ranking) -> None:
         note(f"No resonance at {_speeds_of(ranking)}")
 
 
-def _fail_if_doubtful(data: xr.Dataset, growth: float) -> None:
+def _fail_if_invalid(data: xr.Dataset, growth: float) -> None:
     """End with code 1 if the response is unstable; stability known for each speed is left to the result file.
 
     The command also fails if meshes use table states next to non-converged ones, or if the continuation is incomplete.

@@ -128,7 +128,7 @@ def _read(path: Path, allow_dir: Path | None, scripts: bool) -> Study:
     from exugear.gearbox.reading import GearboxFileError
     from exugear.studies.sections import StudyError
     from exugear.studies.study import Study
-    from exugear.system.readiness import check_parts
+    from exugear.system.gearbox_checks import check_parts
 
     check_allow_dir(allow_dir)
     try:

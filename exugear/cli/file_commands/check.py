@@ -60,7 +60,7 @@ def check(
             _rate(case, out, allow_dir, as_json)
             return
         from exugear.life.rating.lacks import missing_for_life
-        from exugear.system.readiness import lacking, remarks
+        from exugear.system.gearbox_checks import gearbox_warnings, lacking
 
         gearbox = _read(case, allow_dir, as_json)
         _print_scripts(gearbox)
@@ -71,7 +71,7 @@ def check(
         assemblies = _assemblies(gearbox, variants)
         steady = _steady_lacks(assemblies)
         bearings, doubts = _bearing_summaries(gearbox, assemblies.get(Variant.bushing))
-        warnings = [*remarks(gearbox), *doubts, *_damping_warnings(assemblies)]
+        warnings = [*gearbox_warnings(gearbox), *doubts, *_damping_warnings(assemblies)]
         lives = missing_for_life(gearbox)
         if as_json:
             summary = {"case": str(case), "name": gearbox.name, "ratio": gearbox.train.ratio, "pairs": pairs}
@@ -177,7 +177,7 @@ def _read(case: Path, allow_dir: Path | None, as_json: bool) -> Gearbox:
         return read_gearbox(case, allow_dir, tell=False)
     except BadInputError as error:
         if as_json and isinstance(error.__cause__, GearboxFileError):
-            print_json({"case": str(case), "errors": list(error.__cause__.faults)})
+            print_json({"case": str(case), "errors": list(error.__cause__.errors)})
         raise
 
 
@@ -227,7 +227,7 @@ def _print_scripts(gearbox: Gearbox) -> None:
 
 
 def _pair_summary(gearbox: Gearbox, name: str) -> dict[str, Any]:
-    from exugear.system.plausibility import backlash_range, pair_margins
+    from exugear.system.part_warnings import backlash_range, pair_margins
 
     spec = gearbox.pairs[name]
     pair = spec.pair
@@ -294,7 +294,7 @@ def _backlash(ends: list[float]) -> str:
 
 def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     """Summarise the tooth thickness of gears with allowances."""
-    from exugear.system.plausibility import thickness_range
+    from exugear.system.part_warnings import thickness_range
 
     summaries = []
     for name, section in gearbox.case.gears.items():
@@ -306,7 +306,7 @@ def _thickness_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                     "normal_tooth_thickness_mm": [1e3 * end for end in one.thickness],
                     "span_teeth": one.span_teeth,
                     "base_tangent_length_mm": [1e3 * end for end in one.span] if one.span_teeth else None,
-                    "span_doubt": one.span_doubt or None,
+                    "span_doubt": one.span_warning or None,
                 }
             )
     return summaries
@@ -411,7 +411,7 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
     from exugear.gearbox.load_cases import (
         band_warning,
         bearing_range_warning,
-        doubts_about,
+        load_warnings,
         other_load_warning,
         summarise_loads,
     )
@@ -439,7 +439,7 @@ def _load_summaries(gearbox: Gearbox) -> list[dict[str, Any]]:
                 "loaded_flanks": dict(loads.flanks),
                 "reversed_flanks": list(loads.reversed_flanks),
                 "doubts": [
-                    *doubts_about(loads),
+                    *load_warnings(loads),
                     *filter(None, [bearing_range_warning(gearbox, loads, Variant.bushing)]),
                     *filter(None, [other_load_warning(gearbox, loads)]),
                     *filter(None, [band_warning(loads, BAND)]),

@@ -88,6 +88,6 @@ def _imported(file: Path, target: Path, rules: Rules) -> Imported:
         try:
             return to_case(model, file.name, target, rules)
         except RexsError as error:
-            raise RexsError(*(f"{file}: {fault}" for fault in error.faults)) from None
+            raise RexsError(*(f"{file}: {line}" for line in error.errors)) from None
     except RexsError as error:
         raise BadInputError(error) from error

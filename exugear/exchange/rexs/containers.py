@@ -150,7 +150,7 @@ def _errors_naming(path: str | Path) -> Iterator[None]:
     try:
         yield
     except RexsError as error:
-        raise RexsError(*(f"{path}: {fault}" for fault in error.faults)) from None
+        raise RexsError(*(f"{path}: {line}" for line in error.errors)) from None
 
 
 def _is_archive(content: bytes) -> bool:

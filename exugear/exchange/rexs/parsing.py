@@ -407,21 +407,21 @@ def parse_model(content: bytes) -> Model:
     head = document.head(document.model)
     version = str(head.get("version", ""))
     _check_version(version)
-    faults: list[str] = []
+    errors: list[str] = []
     components: dict[int, Component] = {}
     for node in document.children(document.model, "components"):
         component = _component(document, node)
         if component.number in components:
-            faults.append(f"two components have the id {component.number}")
+            errors.append(f"two components have the id {component.number}")
         components[component.number] = component
         outside = [key for key in _FORBIDDEN if key in component.attributes]
         if outside:
-            faults.append(f"{component}: {outside[0]} refers to data outside the file, which are not read")
+            errors.append(f"{component}: {outside[0]} refers to data outside the file, which are not read")
     relations = [
-        _relation(document, node, components, faults) for node in document.children(document.model, "relations")
+        _relation(document, node, components, errors) for node in document.children(document.model, "relations")
     ]
-    if faults:
-        raise RexsError(*faults)
+    if errors:
+        raise RexsError(*errors)
     cases = tuple(
         LoadCase(
             number,
@@ -462,7 +462,7 @@ def _load_cases(document: Document) -> Iterator[tuple[int, Any]]:
             yield _identifier(document.head(node).get("id"), "a load case"), node
 
 
-def _relation(document: Document, node: Any, components: Mapping[int, Component], faults: list[str]) -> Relation:
+def _relation(document: Document, node: Any, components: Mapping[int, Component], errors: list[str]) -> Relation:
     head = document.head(node)
     kind = str(head.get("type", ""))
     roles = {}
@@ -471,7 +471,7 @@ def _relation(document: Document, node: Any, components: Mapping[int, Component]
         number = _identifier(reference.get("id"), "a reference")
         roles[ROLES.get(role, role)] = number
         if number not in components:
-            faults.append(f"relation {plain(head.get('id'))} ({plain(kind)}): component {number} does not exist")
+            errors.append(f"relation {plain(head.get('id'))} ({plain(kind)}): component {number} does not exist")
     order = head.get("order")
     return Relation(RELATIONS.get(kind, kind), 0 if order is None else _identifier(order, "an order"), roles)
 

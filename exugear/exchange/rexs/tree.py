@@ -35,7 +35,7 @@ def unit_factor(unit: str, wanted: str) -> float | None:
 
 # Errors of a REXS file: one clear sentence each, reported together
 
-SHOWN_FAULTS = 20
+SHOWN_ERRORS = 20
 """Maximum number of errors that a message shows."""
 LONGEST_TEXT = 80
 """Maximum number of characters of a file's text in a message or comment."""
@@ -46,19 +46,19 @@ class RexsError(ValueError):
 
     Attributes
     ----------
-    faults : tuple of str
-        All errors, one sentence each; the message shows the first `SHOWN_FAULTS`.
+    errors : tuple of str
+        All errors, one sentence each; the message shows the first `SHOWN_ERRORS`.
     """
 
-    def __init__(self, *faults: str) -> None:
-        self.faults = tuple(dict.fromkeys(faults))
-        more = len(self.faults) - SHOWN_FAULTS
+    def __init__(self, *errors: str) -> None:
+        self.errors = tuple(dict.fromkeys(errors))
+        more = len(self.errors) - SHOWN_ERRORS
         many = "s" if more > 1 else ""
         rest = [f"and {more} more error{many}"] if more > 0 else []
-        super().__init__("\n".join([*self.faults[:SHOWN_FAULTS], *rest]))
+        super().__init__("\n".join([*self.errors[:SHOWN_ERRORS], *rest]))
 
 
-class Faults(list[str]):
+class Errors(list[str]):
     """Errors collected over several attempts."""
 
     @contextmanager
@@ -67,7 +67,7 @@ class Faults(list[str]):
         try:
             yield
         except RexsError as error:
-            self.extend(error.faults)
+            self.extend(error.errors)
 
     def tell(self) -> None:
         """Raise the collected errors, if any.

@@ -133,7 +133,7 @@ def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:
     """
     if body in gearbox.case.static_load.locked:
         held = ", ".join(gearbox.case.static_load.locked)
-        raise gearbox.fault(f"loads.body = {body!r}: static_load.locked locks {held}; set the body at the other end")
+        raise gearbox.error(f"loads.body = {body!r}: static_load.locked locks {held}; set the body at the other end")
     return {body: 1.0}
 
 

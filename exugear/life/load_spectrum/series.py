@@ -258,7 +258,7 @@ class SeriesReader:
                         counts[name].add(column)
         if first is None or last is None or begin is None or last == first:
             length = series.time[-1] - series.time[0]
-            raise self.gearbox.fault(
+            raise self.gearbox.error(
                 f"{self.key}.skip_s = {self.source.skip_s:g}: no samples remain of a series of {length:g} s ("
                 f"{path.name})"
             )
@@ -273,7 +273,7 @@ class SeriesReader:
     def _wanted(self, series: Channels) -> list[tuple[str, str]]:
         """Return names and quantities of the channels: torque, speed, rotor loads if any, wind if required."""
         if self.source.skip_s is None:
-            raise self.gearbox.fault(
+            raise self.gearbox.error(
                 f"{self.key}.skip_s: this key is missing; set the time to skip at the start, 0 for none"
             )
         own = {}
@@ -284,7 +284,7 @@ class SeriesReader:
             name = given or own.get(quantity)
             if name is None:
                 shown = ", ".join(series.names[:8])
-                raise self.gearbox.fault(
+                raise self.gearbox.error(
                     f"{self.key}.{quantity}: this key is missing; set a channel of the file, such as {shown}"
                 )
             found.append((name, quantity))

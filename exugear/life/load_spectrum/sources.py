@@ -102,7 +102,7 @@ def rexs_load_cases(gearbox: Gearbox, path: Path, body: str) -> tuple[Floats, Fl
         raise RexsError(f"{path}: holds no load spectrum; expected load cases with their share of the time")
     places = Places(model)
     bodies = find_bodies(model, places, notes)
-    notes.faults.tell()
+    notes.errors.tell()
     rows = []
     for case, loads in zip(model.load_cases, loads_of(model, places, bodies, notes), strict=True):
         where = f"{path}: load case {case.number}"
@@ -217,7 +217,7 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
     """
     loads = section_of(gearbox)
     if loads.body not in gearbox.spinning:
-        raise gearbox.fault(f"loads.body = {loads.body!r}: does not rotate; bodies are {', '.join(gearbox.spinning)}")
+        raise gearbox.error(f"loads.body = {loads.body!r}: does not rotate; bodies are {', '.join(gearbox.spinning)}")
     paths = {name: _paths(gearbox, f"loads.sources.{name}", source) for name, source in loads.sources.items()}
     total = sum(map(len, paths.values()))
     done = 0
@@ -234,10 +234,10 @@ def load_sources(gearbox: Gearbox, progress: Progress | None = None) -> tuple[Lo
     sources = tuple(draft.source(by_wind) for draft in drafts)
     yearly = sum(float(source.hours.sum()) for source in sources) / loads.life_years
     if yearly > HOURS_PER_YEAR * (1.0 + 1e-9):
-        raise gearbox.fault(f"loads.sources: {yearly:.6g} hours per year in total; a year has {HOURS_PER_YEAR:g}")
+        raise gearbox.error(f"loads.sources: {yearly:.6g} hours per year in total; a year has {HOURS_PER_YEAR:g}")
     is_output = loads.body == gearbox.case.overall.output
     return tuple(
-        replace(source, remarks=(*source.remarks, *_doubt_about_torque_sign(source, is_output))) for source in sources
+        replace(source, remarks=(*source.remarks, *_torque_sign_warning(source, is_output))) for source in sources
     )
 
 
@@ -250,7 +250,7 @@ def section_of(gearbox: Gearbox) -> LoadsSection:
         There is none.
     """
     if gearbox.case.loads is None:
-        raise gearbox.fault("loads: this section is missing; add [loads] with the loaded body and the load files")
+        raise gearbox.error("loads: this section is missing; add [loads] with the loaded body and the load files")
     return gearbox.case.loads
 
 
@@ -258,10 +258,10 @@ def distribution(gearbox: Gearbox, sources: tuple[LoadSource, ...]) -> DurationD
     """Return the load duration distribution of all fatigue sources together."""
     worn = [source for source in sources if source.kind == "fatigue"]
     if not worn:
-        raise gearbox.fault("loads.sources: no source of kind 'fatigue'; set one, fatigue damage requires it")
+        raise gearbox.error("loads.sources: no source of kind 'fatigue'; set one, fatigue damage requires it")
     torque, speed, hours = (np.concatenate([getattr(one, key) for one in worn]) for key in ("torque", "speed", "hours"))
     if not np.any(torque * speed * hours):
-        raise gearbox.fault(
+        raise gearbox.error(
             "loads.sources: no fatigue source has torque, speed and hours at the same time; no fatigue damage can be "
             "computed"
         )
@@ -284,22 +284,22 @@ def _paths(gearbox: Gearbox, key: str, source: SourceSection) -> list[Path]:
         path = gearbox.file(f"{key}.file", source.file, LARGEST_SERIES)
         if path.suffix.lower() not in (*SERIES_ENDINGS, *REXS_ENDINGS):
             known = ", ".join((*SERIES_ENDINGS, *REXS_ENDINGS))
-            raise gearbox.fault(f"{key}.file = {source.file!r}: load files end in {known}")
+            raise gearbox.error(f"{key}.file = {source.file!r}: load files end in {known}")
         return [path]
     folder = Path(gearbox.source).parent
     pattern = str(source.files)
     try:
         names = sorted(path.relative_to(folder).as_posix() for path in folder.glob(pattern) if path.is_file())
     except (ValueError, NotImplementedError, OSError) as error:
-        raise gearbox.fault(f"{key}.files = {pattern!r}: {error}") from None
+        raise gearbox.error(f"{key}.files = {pattern!r}: {error}") from None
     if not names:
-        raise gearbox.fault(f"{key}.files = {pattern!r}: no matching file in {folder}")
+        raise gearbox.error(f"{key}.files = {pattern!r}: no matching file in {folder}")
     if len(names) > MOST_FILES:
-        raise gearbox.fault(f"{key}.files = {pattern!r}: {len(names)} files; at most {MOST_FILES} are read")
+        raise gearbox.error(f"{key}.files = {pattern!r}: {len(names)} files; at most {MOST_FILES} are read")
     paths = [gearbox.file(f"{key}.files", name, LARGEST_SERIES) for name in names]
     other = next((name for name in names if Path(name).suffix.lower() not in SERIES_ENDINGS), None)
     if other is not None:
-        raise gearbox.fault(
+        raise gearbox.error(
             f"{key}.files = {pattern!r}: {other} does not end in one of {', '.join(SERIES_ENDINGS)}; specify the "
             "ending, such as *.outb"
         )
@@ -328,20 +328,20 @@ class _Draft:
             if self._table is None:
                 self._take_series(path)
         except (LoadFileError, RexsError) as error:
-            raise self.gearbox.fault(f"{self.key}.{'file' if self.section.file else 'files'}: {error}") from error
+            raise self.gearbox.error(f"{self.key}.{'file' if self.section.file else 'files'}: {error}") from error
         if self._table is not None:
             self._check_table(path)
 
     def _take_series(self, path: Path) -> None:
         if self.section.kind == "fatigue" and not self._weighed:
-            raise self.gearbox.fault(f"{self.key}.hours_per_year: this key is missing; a time series requires it")
+            raise self.gearbox.error(f"{self.key}.hours_per_year: this key is missing; a time series requires it")
         pool = Pool(self.section.kind == "extreme")
         taken = self._reader.take(path, pool)
         self._skipped = max(self._skipped, taken.skipped)
         group = 0.0
         if self._hours is not None:
             if path.name not in self._hours:
-                raise self.gearbox.fault(f"{self.key}.hours_table: has no line for {path.name}")
+                raise self.gearbox.error(f"{self.key}.hours_table: has no line for {path.name}")
             group = self._hours[path.name]
         elif self.section.wind is not None and self.loads.wind is not None:
             group = bin_of_wind(self.loads.wind, taken.wind)
@@ -368,15 +368,15 @@ class _Draft:
         try:
             lines = [line for line in first_lines(path, MOST_FILES + 1) if line.strip()]
         except LoadFileError as error:
-            raise self.gearbox.fault(f"{key}: {error}") from None
+            raise self.gearbox.error(f"{key}: {error}") from None
         rows = [tuple(cell.strip() for cell in row) for row in csv.reader(lines)]
         if not rows or rows[0] != HOURS_HEADINGS:
-            raise self.gearbox.fault(f"{key}: {path}: a table of hours begins with {','.join(HOURS_HEADINGS)}")
+            raise self.gearbox.error(f"{key}: {path}: a table of hours begins with {','.join(HOURS_HEADINGS)}")
         found: dict[str, float] = {}
         for number, row in enumerate(rows[1:], start=2):
             hours = _hours_in(row)
             if hours is None or row[0] in found:
-                raise self.gearbox.fault(
+                raise self.gearbox.error(
                     f"{key}: {path}: line {number} has {shortened(','.join(row), 80)}; required are a file, each "
                     f"once, and its hours per year from 0 to {HOURS_PER_YEAR:g}"
                 )
@@ -425,11 +425,11 @@ class _Draft:
     def _check_table(self, path: Path) -> None:
         for superfluous in ("skip_s", "torque", "speed", "events_per_year", "wind", "hub_forces", "hub_moments"):
             if getattr(self.section, superfluous) is not None:
-                raise self.gearbox.fault(
+                raise self.gearbox.error(
                     f"{self.key}.{superfluous}: not applicable to a table of loads; remove the key"
                 )
         if self.section.files is not None:
-            raise self.gearbox.fault(f"{self.key}.files: {path.name} is a table of counted loads; set it in `file`")
+            raise self.gearbox.error(f"{self.key}.files: {path.name} is a table of counted loads; set it in `file`")
 
     def source(self, by_wind: Mapping[float, float]) -> LoadSource:
         """Return the source with all samples in hours of the life."""
@@ -551,7 +551,7 @@ def describe_sources(sources: tuple[LoadSource, ...]) -> Iterator[str]:
         yield from source.remarks
 
 
-def _doubt_about_torque_sign(source: LoadSource, is_output: bool) -> Iterator[str]:
+def _torque_sign_warning(source: LoadSource, is_output: bool) -> Iterator[str]:
     """Warn of torques that oppose the speed of a driving body, most often because of a wrong sign of one channel.
 
     Braking and coasting give some such samples; a negative speed under a positive torque is rarely intended. At the

@@ -33,14 +33,14 @@ def missing_for_life(gearbox: Gearbox) -> dict[str, tuple[str, ...]]:
     checks: tuple[Callable[[Gearbox], object], ...] = (section_of, _checked_by_keys, _checked_by_keys)
     if _are_quick(gearbox):
         checks = (count_loads, checked_loads, rated_loads)
-    return {verb: _faults(gearbox, check) for verb, check in zip(COMMANDS, checks, strict=True)}
+    return {verb: _errors(gearbox, check) for verb, check in zip(COMMANDS, checks, strict=True)}
 
 
-def _faults(gearbox: Gearbox, check: Callable[[Gearbox], object]) -> tuple[str, ...]:
+def _errors(gearbox: Gearbox, check: Callable[[Gearbox], object]) -> tuple[str, ...]:
     try:
         check(gearbox)
     except GearboxFileError as error:
-        return tuple(fault.removeprefix(f"{gearbox.source}: ") for fault in error.faults)
+        return tuple(line.removeprefix(f"{gearbox.source}: ") for line in error.errors)
     return ()
 
 

@@ -369,7 +369,7 @@ def nominal_load_values(
     }
 
 
-def remarks_on(stresses: Mapping[str, MeshCycleStress]) -> list[str]:
+def stress_warnings(stresses: Mapping[str, MeshCycleStress]) -> list[str]:
     """State which finite element results are for aligned gears."""
     straight = [name for name, stress in stresses.items() if len(stress.misalignment) < 2]
     if straight:
@@ -402,19 +402,19 @@ def nominal_loads(gearbox: Gearbox, rating: RatingSection, factor: float = 1.0) 
     torques = gearbox.case.static_load.torques_N_m
     rated = gearbox.case.operation.rated_speed_rpm
     if rated is None:
-        raise gearbox.fault(
+        raise gearbox.error(
             "operation.rated_speed_rpm: this key is missing; without [loads] gears are rated at the speed of "
             f"{overall.input}"
         )
     if len(torques) != 1:
-        raise gearbox.fault(
+        raise gearbox.error(
             f"static_load.torques_N_m: {', '.join(torques) or 'nothing'} has a torque; without [loads] the rating "
             "requires a load on one body; add [loads]"
         )
     body, torque = next(iter(torques.items()))
     speed = abs(gearbox.train.rolling_speeds(overall.input, rated * RPM).get(body, 0.0))
     if speed == 0.0 or torque == 0.0:
-        raise gearbox.fault(f"static_load.torques_N_m.{body} = {torque:g}: {body} transmits no power at rated speed")
+        raise gearbox.error(f"static_load.torques_N_m.{body} = {torque:g}: {body} transmits no power at rated speed")
     teeth = tooth_exposures(gearbox, body)
     least = min((one.cycles for one in teeth if one.cycles > 0.0), default=1.0)
     torque *= factor

@@ -15,7 +15,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.variant import Variant, VariantError
 from exugear.results.folder import bodies_folder
-from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, load_run, verdict_of
+from exugear.results.run_file import FINAL_NAME, PARTIAL_NAME, invalidity_of, load_run
 from exugear.results.spectra.run_spectra import RunSignals, VariantRun, analysed, run_signals
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.steady_file import load_response, settings_of
@@ -47,9 +47,27 @@ def choice_of(attributes: Mapping[str, Any]) -> Choice:
     return Choice(*(str(attributes[key]) for key in ("variant", "mesh_model", "inertias")))
 
 
+MESH_MODEL_LABELS = {
+    "kinematic": "kinematic constraint",
+    "constant": "mean mesh stiffness",
+    "iso6336": "mesh stiffness to ISO 6336",
+    "tangential": "tangential mesh model",
+    "line_of_action": "mesh stiffness over the mesh cycle",
+    "table": "mesh stiffness with contact loss",
+}
+"""Names of the mesh models on the page."""
+METHOD_LABELS = {
+    "linear": "mean stiffness",
+    "parametric": "time-varying stiffness",
+    "nonlinear": "nonlinear, with contact loss",
+}
+"""Names of the methods of steady-state responses on the page."""
+
+
 def model_label(choice: Choice) -> str:
     """Return model settings as text for headings."""
-    return f"{choice.variant}, mesh model {choice.mesh_model}, inertia set {choice.inertias}"
+    label = Variant.of(choice.variant).label
+    return f"{choice.variant} ({label}), {MESH_MODEL_LABELS[choice.mesh_model]}, inertia set {choice.inertias}"
 
 
 @dataclass(frozen=True)
@@ -206,7 +224,7 @@ def _fitting_signals(context: Context, path: Path) -> tuple[RunSignals, float] |
         attributes = load_run(path, ()).attrs
         if not _fits(context, path, attributes):
             return None
-        if verdict := verdict_of(attributes):
+        if verdict := invalidity_of(attributes):
             name = context.name_of(path)
             context.notes.invalid_runs.append(f"{name}: {verdict}")
             context.notes.statements.append(f"Invalid: {name}: {verdict}")

@@ -9,9 +9,11 @@ changes of the design, but show how much the answer depends on what is not known
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,13 +24,17 @@ from exugear.gearbox.sections.gears import ModificationSection
 from exugear.gearbox.units import MM, UM
 from exugear.report.findings.loudness import Resonance
 from exugear.steady.mean_system.signals import SIGNALS, quantities_of
+from exugear.steady.settings import SteadySettings, operating_speeds
 from fe_ste.geometry.gears import GearPair
 from fe_ste.geometry.involute import involute
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable
+from fe_ste.tools.files import FileError, write_file
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
 NEAR = 0.05
 """Relative speed difference within which a peak counts as the same one."""
@@ -42,7 +48,8 @@ STIFFER = 1.3
 """Changes of a bearing: contact angle, axial preload of a pair, factor of a stated stiffness and of its inverse."""
 STEEL = 7850.0
 """Density for the mass of wider gears, kg/m3."""
-GROUPS = ("gear", "modification", "bearing", "assumption")
+ASSUMPTION = "assumption"
+GROUPS = ("gear", "modification", "bearing", ASSUMPTION)
 """Groups of changes, in the order of the table."""
 
 
@@ -80,6 +87,107 @@ class ChangeResult:
     """What the change costs: mass, axial force, contact stress, bearing life."""
     refusal: str = ""
     """Reason why the change cannot be made."""
+
+
+@dataclass(frozen=True)
+class DesignStudy:
+    """Results of all design changes of a gearbox."""
+
+    model: Mapping[str, str]
+    """Model settings as in the attributes of a steady-state response: ``variant``, ``mesh_model``, ``inertias``."""
+    input_hash: str
+    """Of the steady-state response without changes."""
+    line: str
+    frequency: float
+    speed: float
+    """Order, frequency (Hz) and input speed (rad/s) of the resonance that the changes are to reduce: the first of the
+    ranking in the operating range."""
+    amplitudes: Mapping[str, float]
+    """Its amplitudes by quantity, SI units."""
+    results: Sequence[ChangeResult]
+    """Changes of the design by their effect, then assumptions, then changes that cannot be made."""
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw what each change does to the three quantities, in dB, as `exugear report --levers` lists it.
+
+        Narrow dark bars: this peak; wide pale bars: highest amplitude of any order in the operating range. Changes that
+        cannot be made are left out.
+
+        Parameters
+        ----------
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Examples
+        --------
+        >>> wider = DesignChange("wider", "face width 40 to 48 mm", "gear", {})
+        >>> results = (ChangeResult(wider, {"error": Effect(-6.0, -3.5)}, "+2 kg"),)
+        >>> ax = DesignStudy({}, "", "stage_1", 334.0, 100.0, {"error": 1e-6}, results).plot()
+        >>> [label.get_text() for label in ax.get_yticklabels()], [float(bar.get_width()) for bar in ax.patches]
+        (['face width 40 to 48 mm'], [-3.5, -6.0])
+        """
+        made = [result for result in self.results if not result.refusal]
+        names = [name for name in SIGNALS if any(name in result.effects for result in made)]
+        height = 0.8 / max(1, len(names))
+        with axes_or_new(ax, 8.0, 1.2 + 0.45 * len(made)) as panel:
+            for number, name in enumerate(names):
+                at = np.arange(len(made)) + (number - 0.5 * (len(names) - 1)) * height
+                effects = [result.effects.get(name, Effect(None, None)) for result in made]
+                here = np.array([effect.this_peak for effect in effects], dtype=np.float64)
+                highest = np.array([effect.highest for effect in effects], dtype=np.float64)
+                colour = COLOURS[number]
+                panel.barh(at, highest, 0.95 * height, color=colour, alpha=0.35, label=f"{name}, highest in range")
+                panel.barh(at, here, 0.4 * height, color=colour, label=f"{name}, this peak")
+            labels = [drawable(result.change.words) for result in made]
+            panel.set_yticks(range(len(made)), labels, parse_math=False)
+            panel.invert_yaxis()
+            panel.axvline(0.0, color="black", linewidth=0.8)
+            panel.set_xlabel("Change of the amplitude / dB")
+            if names:
+                panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(names))
+            return panel
+
+
+def settings_of_study(gearbox: Gearbox) -> SteadySettings:
+    """Return the settings of all steady-state responses of a study: the operating range."""
+    return SteadySettings(operating_speeds(gearbox))
+
+
+def write_design_study(path: Path, study: DesignStudy) -> None:
+    """Write a study as JSON."""
+    write_file(path, json.dumps(asdict(study), indent=1).encode("utf-8"))
+
+
+def read_design_study(path: Path) -> DesignStudy:
+    """Read a study that `write_design_study` wrote.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read or is not such a study.
+    """
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        results = [_result_from(one) for one in content.pop("results")]
+        study = DesignStudy(**content, results=results)
+        if not all(math.isfinite(value) for value in (study.frequency, study.speed, *study.amplitudes.values())):
+            raise ValueError("numbers are not finite")
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise FileError(f"{path}: cannot be read as design changes ({error}); run `exugear report --levers`") from None
+    return study
+
+
+def _result_from(content: Mapping[str, Any]) -> ChangeResult:
+    effects = {str(name): Effect(*map(_number, effect.values())) for name, effect in content["effects"].items()}
+    change = DesignChange(**content["change"])
+    if change.group not in GROUPS:
+        raise ValueError(f"no group {change.group!r}")
+    return ChangeResult(change, effects, str(content["price"]), str(content["refusal"]))
+
+
+def _number(value: float | None) -> float | None:
+    if value is None:
+        return None
+    return float(value)
 
 
 # Proposals
@@ -268,7 +376,7 @@ def _assumptions(gearbox: Gearbox) -> Iterator[DesignChange]:
     for other in (0.5 * factor, min(2.0 * factor, 1.0)):
         if other != factor:
             words = f"housing stiffness factor {factor:g} to {other:g}"
-            yield DesignChange(f"housing-{other:g}", words, "assumption", {"housing.factor": other})
+            yield DesignChange(f"housing-{other:g}", words, ASSUMPTION, {"housing.factor": other})
 
 
 # Effects
@@ -370,20 +478,6 @@ def _gear_mass(gearbox: Gearbox) -> float:
     return sum(masses)
 
 
-def effects_in_decibels(results: Sequence[ChangeResult]) -> dict[str, Floats]:
-    """Effects (changes, 2) on this peak and on the highest amplitude in the range, dB, by quantity; NaN without one."""
-    return {
-        quantity: np.array(
-            [
-                (math.nan, math.nan) if effect is None else (effect.this_peak, effect.highest)
-                for effect in (result.effects.get(quantity) for result in results)
-            ],
-            dtype=np.float64,
-        ).reshape(-1, 2)
-        for quantity in SIGNALS
-    }
-
-
 def ordered(results: Sequence[ChangeResult]) -> list[ChangeResult]:
     """Sort changes of the design by their effect on the highest transmission error; assumptions and refusals follow."""
 
@@ -392,6 +486,6 @@ def ordered(results: Sequence[ChangeResult]) -> list[ChangeResult]:
         size = math.inf
         if effect is not None and effect.highest is not None:
             size = effect.highest
-        return bool(result.refusal), result.change.group == "assumption", size
+        return bool(result.refusal), result.change.group == ASSUMPTION, size
 
     return sorted(results, key=key)

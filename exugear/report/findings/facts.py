@@ -12,7 +12,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
-from exugear.report.findings.loudness import PeakAmplitude, Ranking
+from exugear.report.findings.headline import headline_of_group
 from exugear.report.findings.verdicts import GAIN, BestChange, ModelVariations, best_change
 from exugear.report.findings.words import Labels, figure_text
 from exugear.results.spectra.waterfall import order_lines
@@ -78,13 +78,13 @@ def sensitivities_of(words: Labels, modes: xr.Dataset, index: int) -> tuple[Sens
 
 DAMPING = "mesh damping"
 """Beginning of the labels of mesh damping parameters."""
-SAME_MODE = 0.01
-"""Relative frequency difference below which resonances belong to the same mode."""
 NO_GAIN = 0.1
 """Gain (dB) below which a change has no effect."""
 AROUND_RATED = 1.25
 """Ratio to the rated speed up to which a resonance counts as near the rated speed."""
 
+HIGHEST = "Highest transmission error"
+"""Heading of the card with the highest peak at all speeds."""
 MOST_WORDS = 25
 """Maximum number of words in the text of a card."""
 MIN_EXCESS_DB = 1.0
@@ -111,12 +111,12 @@ class SummaryCard:
         return f"{self.kind}: {self.figure} {self.beside}. {self.sentence}"
 
 
-def _short(*sentences: str) -> str:
+def short(*sentences: str) -> str:
     """Join sentences while they fit on a card; the first is always included.
 
     Examples
     --------
-    >>> _short("Order sun_planet.", "", "One word more than a card takes: " + MOST_WORDS * "word ")
+    >>> short("Order sun_planet.", "", "One word more than a card takes: " + MOST_WORDS * "word ")
     'Order sun_planet.'
     """
     text = sentences[0]
@@ -170,29 +170,27 @@ def facts_of_response(words: Labels, response: xr.Dataset) -> tuple[SummaryCard,
     amplitude = f"{amplitude_text(level)} ({figure_text(level)} dB)"
     said = f"Order {words.labelled(top.line)}. Overall TE {amplitude}, constant speed."
     beside = f"at {speed_text(top.speed)}, {Variant.of(choice_of(response.attrs).variant).label}"
-    return (SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "steady"),)
+    return (SummaryCard(HIGHEST, frequency_text(top.frequency), beside, said, "steady"),)
 
 
 def _loudest(context: Context, words: Labels, group: RunGroup) -> SummaryCard | None:
-    if group.in_operation is not None:
-        return _operating_resonance(words, group, group.in_operation)
     top = group.loudest
     if top is None:
         highest = max(float(run.spectra.speed.max()) for run in group.runs.values())
         with_all = "" if group.responses else " with all window lengths"
         said = f"No resonance found up to {speed_text(highest)}{with_all}."
-        return SummaryCard("Highest resonance", "none", "found", said, "ranking")
+        return SummaryCard(HIGHEST, "none", "found", said, "ranking")
     unseen = _unseen(context, words, group, top)
     if unseen is not None:
         return unseen
-    said = _short(
+    said = short(
         f"Order {words.line(top.peak.line)}.",
         f"Overall TE {amplitude_text(top.ranking_level)} ({figure_text(top.ranking_level)} dB){_how(group, top)}.",
         *_speed_relative_to_rated(context, group),
         _moves(words, group, top),
     )
     beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
-    return SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "rings")
+    return SummaryCard(HIGHEST, frequency_text(top.frequency), beside, said, "rings")
 
 
 def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
@@ -205,33 +203,6 @@ def _moves(words: Labels, group: RunGroup, resonance: RankedResonance) -> str:
     return ""
 
 
-def _operating_resonance(words: Labels, group: RunGroup, ranking: Ranking) -> SummaryCard:
-    """Return the first-ranked resonance at constant speed in the operating range, by any of the three quantities."""
-    low, high = (speed_text(speed) for speed in ranking.speeds)
-    where = f"{low} to {high}" + ("" if ranking.whole else " (operating range)")
-    if not ranking.resonances:
-        return SummaryCard("Highest resonance", "none", "found", f"No resonance at {where}.", "ranking")
-    top = ranking.resonances[0]
-    parts = [quantity_text(words, name, own, ranking) for name, own in top.amplitudes.items()]
-    near = (own for own in group.ranked[group.main] if abs(own.frequency / top.frequency - 1.0) < SAME_MODE)
-    moves = next((text for text in (_moves(words, group, own) for own in near) if text), "")
-    said = _short(f"Order {words.labelled(top.line)}.", *(f"{part[:1].upper()}{part[1:]}." for part in parts), moves)
-    beside = f"at {speed_text(top.speed)}, {Variant.of(group.main).label}"
-    return SummaryCard("Highest resonance", frequency_text(top.frequency), beside, said, "ranking")
-
-
-def quantity_text(words: Labels, name: str, peak: PeakAmplitude, ranking: Ranking) -> str:
-    """Return the amplitude of a resonance in one of the three quantities as text, with rank and location."""
-    count = sum(other.amplitudes[name].place is not None for other in ranking.resonances)
-    place = "no peak" if peak.place is None else f"rank {peak.place}/{count}"
-    if name == "error":
-        return f"overall TE ±{figure_text(1e6 * peak.amplitude)} µm ({place})"
-    at = words.of(peak.at)
-    if name == "force":
-        return f"bearing force ±{figure_text(1e-3 * peak.amplitude)} kN ({place}), {at}"
-    return f"acceleration ±{figure_text(peak.amplitude)} m/s² ({place})"
-
-
 def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonance) -> SummaryCard | None:
     """Return a resonance that is higher at constant speed than all that the run-up resolves; None if there is none."""
     levels = group.constant.get(group.main)
@@ -239,14 +210,14 @@ def _unseen(context: Context, words: Labels, group: RunGroup, top: RankedResonan
     if found is None or found[1].level < top.ranking_level + MIN_EXCESS_DB:
         return None
     line, at = found
-    said = _short(
+    said = short(
         f"Order {words.line(line)}.",
         f"Overall TE {amplitude_text(at.level)} ({figure_text(at.level)} dB), constant speed.",
         f"Not resolved in the run-up; highest there: {frequency_text(top.finding.resonance.frequency)}, "
         f"{amplitude_text(top.peak.level)}.",
     )
     beside = f"at {speed_text(at.speed)}, {Variant.of(group.main).label}"
-    return SummaryCard("Highest resonance", frequency_text(at.frequency), beside, said, "steady")
+    return SummaryCard(HIGHEST, frequency_text(at.frequency), beside, said, "steady")
 
 
 def _how(group: RunGroup, resonance: RankedResonance) -> str:
@@ -289,7 +260,7 @@ def _compliance(group: RunGroup) -> SummaryCard | None:
     gone = sum(own.steady and group.main in own.lacking for own in reference)
     counted = "" if group.responses else " (found with all window lengths)"
     elastic = Variant.of(group.main).is_elastic
-    said = _short(
+    said = short(
         f"Torsional model: highest resonance {frequency_text(stiff.finding.resonance.frequency)} at "
         f"{speed_text(stiff.peak.speed)}, {amplitude_text(stiff.peak.level)}.",
         f"{'Flexible bodies add' if elastic else 'Bearing stiffness adds'} {fresh} "
@@ -302,19 +273,20 @@ def _compliance(group: RunGroup) -> SummaryCard | None:
 
 def _sensitivity(words: Labels, group: RunGroup, variations: Sequence[ModelVariations]) -> SummaryCard | None:
     """Report the parameters that shift the highest resonance, and whether any change reduces its amplitude."""
-    top = group.loudest
-    modes = group.runs[group.main].modes
-    if top is None or modes is None or top.finding.mode is None:
+    own = headline_of_group(group)
+    mode = own.mode_of(own.top) if own.top else None
+    modes = own.modes
+    if mode is None or modes is None:
         return None
-    sensitivities = sensitivities_of(words, modes, top.finding.mode)
+    sensitivities = sensitivities_of(words, modes, mode.index)
     stiffest = next((sensitivity for sensitivity in sensitivities if sensitivity.kind == "stiffness"), None)
     heaviest = next((sensitivity for sensitivity in sensitivities if sensitivity.kind == "inertia"), None)
     if stiffest is None:
         return None
     lighter = "" if heaviest is None else f"Inertia of {heaviest.what} +10 %: {shift_text(heaviest)}."
-    said = _short(
+    said = short(
         f"Strain energy {100.0 * stiffest.share:.0f} %.",
-        *_amplitude_reductions(words, group, modes, top.finding.mode, variations),
+        *_amplitude_reductions(words, group, modes, mode.index, variations),
         lighter,
     )
     return SummaryCard("Sensitivity", shift_text(stiffest), f"for +10 % stiffness of {stiffest.what}", said, "change")

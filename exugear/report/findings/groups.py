@@ -9,6 +9,7 @@ response, each multi-blade component (mean, cosine, sine) is a channel.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -18,8 +19,17 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from exugear.gearbox.choice import Choice
+from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.variant import OFFERED, Variant
-from exugear.report.findings.context import REFERENCE_VARIANT, Context, StoredResults, choice_of, run_key
+from exugear.report.findings.context import (
+    MESH_MODEL_LABELS,
+    METHOD_LABELS,
+    REFERENCE_VARIANT,
+    Context,
+    StoredResults,
+    choice_of,
+    run_key,
+)
 from exugear.report.findings.loudness import (
     ConstantSpeed,
     Highest,
@@ -29,6 +39,7 @@ from exugear.report.findings.loudness import (
     most_complete_levels,
     most_complete_response,
     ranking_of,
+    ranking_of_errors,
     response_spectra,
 )
 from exugear.report.findings.words import Labels
@@ -49,6 +60,7 @@ from exugear.results.spectra.run_spectra import (
 )
 from exugear.results.spectra.waterfall import OrderLine, Waterfall, order_lines, waterfall
 from exugear.steady.campbell import campbell_from
+from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import settings_of, steady_path
 from fe_ste.tools.arrays import Floats
 
@@ -119,14 +131,16 @@ class RunGroup:
     """By variant, levels at constant speed of run-ups that have a steady-state response."""
     responses: Mapping[str, xr.Dataset] = field(default_factory=dict)
     """By variant, the steady-state responses of the group; empty for run-ups."""
-    in_operation: Ranking | None = None
-    """Resonances of the main variant's steady-state response in the operating range, ranked by three quantities; None
-    without such a response."""
+    in_operation: Ranking = field(kw_only=True)
+    """Resonances of the main variant in the operating range: those of its steady-state response, ranked by three
+    quantities, or else those of the run-up."""
+    response: xr.Dataset | None = field(kw_only=True)
+    """Steady-state response of the main variant that they are from; None if they are from the run-up."""
 
     @property
     def name(self) -> str:
         """Name for files and links."""
-        return f"{self.source.replace(', ', '_').replace(' ', '_')}-{self.mesh_model}-{self.inertias}"
+        return f"{re.sub(r'[^a-z0-9]+', '_', self.source.lower())}-{self.mesh_model}-{self.inertias}"
 
     @property
     def main(self) -> str:
@@ -147,16 +161,16 @@ class RunGroup:
         """Common properties of its runs as text."""
         factors = sorted({f"{float(run.attributes['housing_factor']):g}" for run in self.runs.values()})
         return (
-            f"{self.source}, mesh model {self.mesh_model}, inertia set {self.inertias}, housing stiffness factor "
-            f"{', '.join(factors)}"
+            f"{self.source}, {MESH_MODEL_LABELS[self.mesh_model]}, inertia set {self.inertias}, housing stiffness "
+            f"factor {', '.join(factors)}"
         )
 
 
 def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
-    """Group the run-ups of a folder, then its steady-state responses over a speed range.
+    """Group the steady-state responses and the run-ups of a folder, the most informative first.
 
-    The default inertia set comes first. Steady-state responses are evaluated along the same orders and by the same
-    rules as run-ups.
+    The default inertia set comes first, and constant speed before run-ups. Steady-state responses are evaluated along
+    the same orders and by the same rules as run-ups.
     """
     runs: dict[tuple[str, str, str], list[VariantRun]] = {}
     for run in results.runs:
@@ -170,9 +184,21 @@ def groups_of(context: Context, results: StoredResults) -> tuple[RunGroup, ...]:
     def rank(key: tuple[str, str, str]) -> tuple[bool, tuple[str, str, str]]:
         return key[2] != default, key
 
-    return (
-        *(_group_runs(context, key, runs[key], results) for key in sorted(runs, key=rank)),
+    groups = (
         *(_group_responses(context, key, responses[key], results) for key in sorted(responses, key=rank)),
+        *(_group_runs(context, key, runs[key], results) for key in sorted(runs, key=rank)),
+    )
+    return tuple(sorted(groups, key=lambda group: _priority(group, default)))
+
+
+def _priority(group: RunGroup, default: str) -> tuple[bool, bool, int, int]:
+    """Return the sort key of a group: default inertia set, constant speed, fewest simplifications, best method."""
+    method = "" if group.response is None else str(group.response.attrs["method"])
+    return (
+        group.inertias != default,
+        not group.responses,
+        -OFFERED.index(Variant.of(group.main)),
+        -METHODS.index(method) if group.responses else 0,
     )
 
 
@@ -186,7 +212,7 @@ def _group_runs(
     constant = {variant: level for variant, level in levels.items() if level is not None}
     response = most_complete_response(results.steady, Choice(list(by_variant)[-1], *key[1:]))
     loud = response if response is not None and is_over_speed(response) else None
-    return _group(f"run-up {key[0]}", key, by_variant, windows, constant, {}, loud)
+    return _group(context, f"run-up {key[0].replace('_', ' ')}", key, by_variant, windows, constant, {}, loud)
 
 
 def _group_responses(
@@ -195,10 +221,11 @@ def _group_responses(
     context.tell(f"orders at constant speed, {', '.join(key)}")
     own = {str(variant): responses[variant] for variant in OFFERED if variant in responses}
     runs = {variant: _spectra_of_response(context, data, results) for variant, data in own.items()}
-    return _group(f"constant speed, method {key[0]}", key, runs, (), {}, own, list(own.values())[-1])
+    return _group(context, f"constant speed, {METHOD_LABELS[key[0]]}", key, runs, (), {}, own, list(own.values())[-1])
 
 
 def _group(
+    context: Context,
     source: str,
     key: tuple[str, str, str],
     runs: Mapping[str, VariantRun],
@@ -212,8 +239,33 @@ def _group(
     reference = runs.get(REFERENCE_VARIANT)
     others = {variant: run for variant, run in runs.items() if run is not reference}
     comparisons = {} if reference is None else {name: compare(run, reference) for name, run in others.items()}
-    in_operation = None if loud is None else ranking_of(loud)
-    return RunGroup(source, *key[1:], runs, ranked, comparisons, constant, responses, in_operation)
+    main = list(runs)[-1]
+    stated = operating_range(context.gearbox)
+    in_operation = _ranking(runs[main], ranked[main], loud, stated)
+    if not in_operation.resonances and not in_operation.whole:
+        speed = runs[main].spectra.speed
+        everywhere = _ranking(runs[main], ranked[main], loud, (float(speed.min()), float(speed.max())))
+        in_operation = replace(everywhere, whole=True, without=in_operation.speeds)
+    return RunGroup(
+        source, *key[1:], runs, ranked, comparisons, constant, responses, in_operation=in_operation, response=loud
+    )
+
+
+def _ranking(
+    run: VariantRun,
+    ranked: Sequence[RankedResonance],
+    response: xr.Dataset | None,
+    stated: tuple[float, float] | None,
+) -> Ranking:
+    """Rank the resonances of a steady-state response, or else of a run-up, within given speeds (rad/s)."""
+    if response is not None:
+        return ranking_of(response, stated)
+    peaks = [
+        (own.peak.line, own.speed, own.frequency, 1e-6 * 10.0 ** (own.peak.level / 20.0))
+        for own in ranked
+        if own.steady
+    ]
+    return ranking_of_errors(peaks, run.spectra.speed, stated)
 
 
 def _spectra_of_response(context: Context, data: xr.Dataset, results: StoredResults) -> VariantRun:

@@ -36,11 +36,11 @@ MIN_RELATIVE_PEAK = 1e-9
 """Peaks below this fraction of the largest peak of their quantity are round-off."""
 MIN_EXCITED = {"error": 1e-12, "force": 1e-6, "acceleration": 1e-9}
 """Amplitudes below which nothing is excited, in the units of the quantities."""
+UNIT_KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2"}
+"""Units in the keys of ``--json``."""
 SHAFTS = "shafts"
 HOUSING = "housing"
 BOTH = "shafts and housing"
-UNITS_IN_KEYS = {"error": "m", "force": "N", "acceleration": "m_per_s2"}
-"""Units of the quantities in keys of tables."""
 
 
 @dataclass(frozen=True)
@@ -95,9 +95,9 @@ class Resonance:
         """Best rank in any quantity."""
         return min(own.place for own in self.amplitudes.values() if own.place is not None)
 
-    def to_row(self) -> dict[str, Any]:
-        """Row of a table, as `resonances` and the command `steady --json` have it; units in the keys."""
-        row: dict[str, Any] = {
+    def summary(self) -> dict[str, Any]:
+        """Return all values for ``--json``, with units in the keys."""
+        found: dict[str, Any] = {
             "line": self.line,
             "order": self.order,
             "speed_rpm": self.speed / RPM,
@@ -105,17 +105,16 @@ class Resonance:
             "best_place": self.best,
         }
         for quantity, peak in self.amplitudes.items():
-            unit = UNITS_IN_KEYS[quantity]
-            row[f"{quantity}_{unit}"] = peak.amplitude
-            row[f"{quantity}_place"] = peak.place
+            unit = UNIT_KEYS[quantity]
+            found |= {f"{quantity}_{unit}": peak.amplitude, f"{quantity}_place": peak.place}
             if peak.at:
-                row[f"{quantity}_at"] = peak.at
+                found[f"{quantity}_at"] = peak.at
             if peak.limits:
                 lowest, highest = peak.limits
-                row[f"{quantity}_lowest_damping_{unit}"] = lowest.amplitude
-                row[f"{quantity}_highest_damping_{unit}"] = highest.amplitude
-                row[f"{quantity}_places_over_damping"] = peak.places
-        return row
+                found[f"{quantity}_lowest_damping_{unit}"] = lowest.amplitude
+                found[f"{quantity}_highest_damping_{unit}"] = highest.amplitude
+                found[f"{quantity}_places_over_damping"] = peak.places
+        return found
 
 
 @dataclass(frozen=True)
@@ -129,14 +128,17 @@ class Ranking:
     """Whether these are all speeds: the file has no operating range, or the response was not computed there."""
     accelerates: str
     """Parts whose acceleration is given: the shafts where the housing is rigid."""
+    without: tuple[float, float] | None = None
+    """Operating range (rad/s) in which there is no resonance, where all speeds are ranked instead."""
 
 
-def ranking_of(data: xr.Dataset) -> Ranking:
-    """Rank the resonances of a steady-state response within the operating range.
+def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None) -> Ranking:
+    """Rank the resonances of a steady-state response within the operating range or other speeds.
 
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
+    speeds : lowest and highest absolute input speed, rad/s; by default the operating range of the file
 
     Notes
     -----
@@ -144,7 +146,7 @@ def ranking_of(data: xr.Dataset) -> Ranking:
     share and the cosine and sine components around the carrier.
     """
     speed = np.abs(data["speed"].to_numpy().astype(np.float64))
-    low, high, whole = _range(data, speed)
+    low, high, whole = _range(json.loads(str(data.attrs["operating_range"])) if speeds is None else speeds, speed)
     inside = (speed >= low) & (speed <= high)
     amplitude: Floats = data["amplitude"].to_numpy()[:, 1:].astype(np.float64)
     quantities = quantities_of([str(name) for name in data["signal"].to_numpy()])
@@ -200,23 +202,37 @@ def resonances(data: xr.Dataset) -> pd.DataFrame:
     """
     import pandas as pd
 
-    table = pd.DataFrame([resonance.to_row() for resonance in ranking_of(data).resonances])
+    table = pd.DataFrame([resonance.summary() for resonance in ranking_of(data).resonances])
     return table.astype({name: "Int64" for name in table if str(name).endswith("_place")})
 
 
-def order_amplitudes(data: xr.Dataset, quantity: str) -> Floats:
-    """Amplitude (points, orders) of a quantity along each order but 0, at the bearing where it is largest.
+@dataclass(frozen=True)
+class Envelope:
+    """Largest single order of a quantity over speed."""
 
-    Raises
-    ------
-    ValueError
-        The response has no such quantity; those of bearings are missing without bearings.
+    speed: Floats
+    """(n,) absolute input speed, rad/s, ascending."""
+    amplitude: Floats
+    """(n,) in the unit of the quantity."""
+
+
+def envelopes(data: xr.Dataset) -> dict[str, Envelope]:
+    """Return the largest amplitude of a single order at each speed, by quantity, of the bearing with the largest.
+
+    Parameters
+    ----------
+    data : as `exugear.steady.steady_file.load_response` reads it
     """
-    quantities = {own.name: own for own in quantities_of([str(name) for name in data["signal"].to_numpy()])}
-    if quantity not in quantities:
-        raise ValueError(f"quantity = {quantity!r}: must be one of {', '.join(quantities)}")
-    sizes = quantities[quantity].sizes(data["amplitude"].to_numpy()[:, 1:].astype(np.float64))
-    return np.asarray(sizes.max(axis=2))
+    speed = np.sort(np.abs(data["speed"].to_numpy().astype(np.float64)))
+    return {name: Envelope(speed, values.max(axis=1)) for name, values in order_amplitudes(data).items()}
+
+
+def order_amplitudes(data: xr.Dataset) -> dict[str, Floats]:
+    """Amplitude (points, orders) of each order but 0, by quantity, of the bearing with the largest; speeds ascend."""
+    rising = np.argsort(np.abs(data["speed"].to_numpy()), kind="stable")
+    amplitude: Floats = data["amplitude"].to_numpy()[rising, 1:].astype(np.float64)
+    quantities = quantities_of([str(name) for name in data["signal"].to_numpy()])
+    return {own.name: own.sizes(amplitude).max(axis=2) for own in quantities}
 
 
 Limits = Mapping[tuple[int, int, str], tuple[Limit, Limit]]
@@ -245,12 +261,31 @@ def _limits(data: xr.Dataset, quantities: tuple[Quantity, ...], peaks: Mapping[s
     return found
 
 
-def _range(data: xr.Dataset, speed: Floats) -> tuple[float, float, bool]:
+def _range(stated: Sequence[float] | None, speed: Floats) -> tuple[float, float, bool]:
     """Return the evaluated speed range, and whether it covers all speeds."""
-    stated = json.loads(str(data.attrs["operating_range"]))
     if stated is not None and ((speed >= stated[0]) & (speed <= stated[1])).any():
         return float(stated[0]), float(stated[1]), False
     return float(speed.min()), float(speed.max()), True
+
+
+def ranking_of_errors(
+    peaks: Sequence[tuple[OrderLine, float, float, float]], speed: Floats, stated: tuple[float, float] | None
+) -> Ranking:
+    """Rank resonances of which only the transmission error is known, such as those of a run-up.
+
+    Parameters
+    ----------
+    peaks : order, absolute input speed (rad/s), frequency (Hz) and amplitude (m) of each
+    speed : all evaluated absolute input speeds, rad/s
+    stated : operating range, rad/s
+    """
+    low, high, whole = _range(stated, speed)
+    inside = sorted((peak for peak in peaks if low <= peak[1] <= high), key=lambda peak: -peak[3])
+    found = tuple(
+        Resonance(line.name, line.order, at, frequency, {"error": PeakAmplitude(amplitude, "", place)})
+        for place, (line, at, frequency, amplitude) in enumerate(inside, start=1)
+    )
+    return Ranking(found, (low, high), whole, SHAFTS)
 
 
 def _peaks(quantity: Quantity, values: Floats, inside: Booleans) -> list[tuple[int, int]]:

@@ -25,7 +25,7 @@ from exugear.report.findings.context import REFERENCE_VARIANT, Context
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
 from exugear.results.folder import read_stored_gearbox
-from exugear.results.run_file import read_run, verdict_of
+from exugear.results.run_file import invalidity_of, read_run
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.steady.peaks import bearing_swings, pulls
 from exugear.system.bearings.rolling.rows import BearingError
@@ -115,7 +115,7 @@ def _check_run(run: VariantRun, figures: RunFigures) -> list[CheckResult]:
         if math.isnan(residual)
         else [CheckResult(residual < ENERGY, f"energy balance closed to {100.0 * residual:.1g} %")]
     )
-    doubtful = verdict_of(run.attributes)
+    doubtful = invalidity_of(run.attributes)
     if doubtful:
         verdicts.append(CheckResult(False, f"the run is invalid: {doubtful}"))
     for doubt in ("table_doubt", "band_doubt", "bearing_doubt"):
@@ -161,11 +161,11 @@ def _check_response(response: xr.Dataset) -> list[CheckResult]:
         where = f"{pull.count} of {response.sizes['point']} speeds, longest at {abs(pull.speed) / RPM:.4g} rpm"
         said = f"tensile mesh force in {pull.mesh} at {where}: contact loss is neglected, amplitudes there are invalid"
         verdicts.append(CheckResult(False, said))
-    for swing in bearing_swings(response):
-        said = (
-            f"dynamic load of bearing {swing.bearing} up to {100.0 * swing.share:.0f} % of its static load ("
-            f"{abs(swing.speed) / RPM:.4g} rpm). Outside the linear range; amplitudes there are overestimated"
+    if swings := bearing_swings(response):
+        listed = ", ".join(
+            f"{swing.bearing} {100.0 * swing.share:.0f} % ({abs(swing.speed) / RPM:.3g} rpm)" for swing in swings
         )
+        said = f"dynamic over static load of bearings: {listed}. Outside the linear range; amplitudes are overestimated"
         verdicts.append(CheckResult(False, said))
     apart = float(np.nanmax(response["contact_loss_fraction"], initial=0.0))
     if apart > 0.0:

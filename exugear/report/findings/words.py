@@ -28,6 +28,7 @@ DESCRIBED_ENERGY, MIN_ENERGY = 0.8, 0.1
 """Fraction of the kinetic energy that a mode description covers, and the minimum fraction of each listed part."""
 SHOWN_ELEMENTS = 2
 """Maximum number of elements in a strain energy list."""
+_HARMONIC = re.compile(r"(?:(\d+) × )?[^ ]+")
 _COPY = re.compile(r"^(.*)_(\d+)$")
 _OF = re.compile(r"(?<= of )\w+")
 _NAME = re.compile(r"\w+(?:-\w+)*")
@@ -131,6 +132,8 @@ class Labels:
 
     def line(self, line: OrderLine) -> str:
         """Return a short label of an order: harmonic and mesh."""
+        if _HARMONIC.fullmatch(line.name) is None:
+            return self.labelled(line.name)
         harmonic, mesh = self._split(line)
         if harmonic == 1:
             return mesh
@@ -138,19 +141,31 @@ class Labels:
 
     def line_sentence(self, line: OrderLine) -> str:
         """Return an order as a noun phrase, such as "the 2nd harmonic of the mesh high-speed"."""
+        if _HARMONIC.fullmatch(line.name) is None:
+            return f"the combination {self.labelled(line.name)}"
         harmonic, mesh = self._split(line)
         ordinal = {1: "mesh frequency", 2: "2nd harmonic", 3: "3rd harmonic"}.get(harmonic, f"{harmonic}th harmonic")
         return f"the {ordinal} of the mesh {mesh}"
 
-    def _split(self, line: OrderLine) -> tuple[int, str]:
-        number, _, family = line.name.rpartition(" × ")
-        harmonic = int(number) if number else 1
+    def pairs(self, line: OrderLine) -> tuple[int, list[str]]:
+        """Return the harmonic of an order and the families of the meshes that excite it; none for a combination."""
+        match = _HARMONIC.fullmatch(line.name)
+        if match is None:
+            return 1, []
+        harmonic = int(match[1] or 1)
         order = line.order / harmonic
-        meshes = next((f for o, f in self._families.items() if abs(o - order) < 1e-6 * order), [family])
-        return harmonic, " and ".join(self.of(mesh) for mesh in meshes)
+        return harmonic, next((f for o, f in self._families.items() if abs(o - order) < 1e-6 * order), [])
 
-    def moves(self, modes: xr.Dataset, index: int) -> str:
-        """Describe a mode shape by its largest parts of the kinetic energy."""
+    def _split(self, line: OrderLine) -> tuple[int, str]:
+        harmonic, families = self.pairs(line)
+        return harmonic, " and ".join(self.of(family) for family in families or [line.name.rpartition(" × ")[2]])
+
+    def order(self, line: str, order: float) -> OrderLine:
+        """Return an order of a steady-state response, such as ``2 x intermediate``, with its name as in run-ups."""
+        return OrderLine(line.replace(" x ", " × "), order)
+
+    def kinetic_energy(self, modes: xr.Dataset, index: int) -> dict[tuple[str, str], float]:
+        """Return fractions of the kinetic energy by body label and motion; planets are summed."""
         kinetic = modes["kinetic_energy_share"].isel(mode=index).to_numpy()
         carried = {body.name for body in self._gearbox.bodies() if body.carrier}
         shares: dict[tuple[str, str], float] = {}
@@ -158,6 +173,11 @@ class Labels:
             name = "planets" if str(body) in carried else self.of(str(body))
             for motion, share in zip(modes["motion"].to_numpy(), of_body, strict=True):
                 shares[name, str(motion)] = shares.get((name, str(motion)), 0.0) + float(share)
+        return shares
+
+    def moves(self, modes: xr.Dataset, index: int) -> str:
+        """Describe a mode shape by its largest parts of the kinetic energy."""
+        shares = self.kinetic_energy(modes, index)
         described = 0.0
         verbs: dict[str, list[str]] = {}
         for (name, motion), share in sorted(shares.items(), key=lambda item: -item[1]):
@@ -222,3 +242,16 @@ def figure_text(value: float, digits: int = 3) -> str:
             return f"{value:.0f}"
         return f"{value:.{digits - 1}e}"
     return f"{value:.{digits}g}"
+
+
+def rounded_text(value: float) -> str:
+    """Return a number with three significant digits.
+
+    Examples
+    --------
+    >>> rounded_text(12.0), rounded_text(129.04), rounded_text(0.5), rounded_text(1234.6), rounded_text(0.0)
+    ('12.0', '129', '0.500', '1235', '0')
+    """
+    if value == 0.0 or abs(value) >= 999.5:
+        return figure_text(value)
+    return f"{value:#.3g}".rstrip(".")

@@ -1,4 +1,4 @@
-"""Diagrams of modes (Campbell), of steady-state responses and design changes, and pictures of tables."""
+"""Diagrams of modes (Campbell), and of steady-state responses, and pictures of tables."""
 
 from __future__ import annotations
 
@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.units import RPM
-from exugear.report.findings.loudness import order_amplitudes, ranking_of
+from exugear.report.findings.loudness import envelopes, order_amplitudes, ranking_of
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.system.diagrams import draw_campbell
 from exugear.system.tooth_mesh.tables import TableRequest
 from fe_ste.pictures.teeth import contact_quads, draw_tooth_contact, meshed_teeth
-from fe_ste.tools.arrays import Floats
 from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable, drawing_style, finish_figure, new_figure
 from fe_ste.transmission_error.diagrams import plot_load_share, plot_ste_curves
 from fe_ste.transmission_error.search import contact_state
@@ -71,7 +70,7 @@ def plot_campbell(
         return finish_figure(figure, path)
 
 
-# Steady-state responses over speed, and design changes
+# Steady-state responses over speed
 
 QUANTITIES = {
     "error": ("Overall transmission error / µm", 1e6),
@@ -116,9 +115,12 @@ def plot_response(
     >>> ax.get_xlabel(), ax.get_ylabel()
     ('Input speed / rpm', 'Overall transmission error / µm')
     """
-    amplitude = order_amplitudes(data, quantity)
+    curves = envelopes(data)
+    if quantity not in curves:
+        raise ValueError(f"quantity = {quantity!r}: must be one of {', '.join(curves)}")
+    amplitude = order_amplitudes(data)[quantity]
     label, factor = QUANTITIES[quantity]
-    speed = np.abs(data["speed"].to_numpy()) / RPM
+    speed = curves[quantity].speed / RPM
     orders = data["order"].to_numpy()[1:]
     ranking = ranking_of(data)
     places = {own.amplitudes[quantity].place: own for own in ranking.resonances}
@@ -126,7 +128,7 @@ def plot_response(
     lines = {own.line: int(np.argmin(np.abs(orders - own.order))) for own in ranked.values()}
     colours = dict(zip(lines, itertools.cycle(COLOURS), strict=False))
     with axes_or_new(ax, 6.5, 4.0) as panel:
-        panel.plot(speed, factor * amplitude.max(axis=1), color="#BBBBBB", linewidth=3.0, label="highest order")
+        panel.plot(speed, factor * curves[quantity].amplitude, color="#BBBBBB", linewidth=3.0, label="highest order")
         for name, colour in colours.items():
             panel.plot(speed, factor * amplitude[:, lines[name]], color=colour, linewidth=1.0, label=drawable(name))
         for place, resonance in ranked.items():
@@ -142,32 +144,6 @@ def plot_response(
             panel.set(yscale="log", ylim=(SHOWN_RANGE * highest, 2.0 * highest))
         panel.set(xlabel="Input speed / rpm", ylabel=label)
         panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
-        return panel
-
-
-def draw_effects(names: Sequence[str], effects: Mapping[str, Floats], ax: Axes | None = None) -> Axes:
-    """Draw effects (changes, 2) of design changes as bars, see `exugear.report.design_study.DesignStudy.plot`.
-
-    Parameters
-    ----------
-    names : of the changes
-    effects : on this peak and on the highest amplitude in the range, dB, by quantity
-    """
-    known = {quantity: values for quantity, values in effects.items() if not np.isnan(values).all()}
-    places = np.arange(len(names))
-    height = 0.8 / max(1, len(known))
-    with axes_or_new(ax, 8.0, 1.2 + 0.45 * len(names)) as panel:
-        for number, (quantity, values) in enumerate(known.items()):
-            at = places + (number - 0.5 * (len(known) - 1)) * height
-            label = QUANTITIES[quantity][0].partition(" / ")[0]
-            panel.barh(at, values[:, 1], 0.95 * height, color=COLOURS[number], alpha=0.35, label=f"{label}, range")
-            panel.barh(at, values[:, 0], 0.4 * height, color=COLOURS[number], label=f"{label}, this peak")
-        panel.set_yticks(places, [drawable(name) for name in names], parse_math=False)
-        panel.invert_yaxis()
-        panel.axvline(0.0, color="black", linewidth=0.8)
-        panel.set_xlabel("Change of the amplitude / dB")
-        if known:
-            panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(known))
         return panel
 
 

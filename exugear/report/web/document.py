@@ -20,9 +20,10 @@ from importlib.resources import files
 from typing import Any, Final
 
 import numpy as np
+from markupsafe import Markup
 from numpy.typing import NDArray
 
-from exugear.report.web.html import text
+from exugear.report.web.html import render
 
 # Libraries in every page: fixed versions in ``vendor``, with their licences and hashes
 
@@ -220,7 +221,7 @@ THEME = (
 
 
 def whole_page(
-    title: str, body: str, script: str, data: Mapping[str, Any], arrays: ArrayStore, libraries: Sequence[str]
+    title: str, body: Markup, script: str, data: Mapping[str, Any], arrays: ArrayStore, libraries: Sequence[str]
 ) -> str:
     """Return the whole page.
 
@@ -246,15 +247,16 @@ def whole_page(
         f"default-src 'none'; script-src {' '.join(map(_digest, [THEME, *scripts]))}; style-src {_digest(style)}; "
         "img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
-    return (
-        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<meta name="color-scheme" content="light dark"><title>{text(title)}</title>\n'
-        f"<style>{style}</style><script>{THEME}</script></head>\n<body>{body}\n"
-        f"{json_element('data', data)}\n{arrays.elements()}\n"
-        + "\n".join(f"<script>{script}</script>" for script in scripts)
-        + "\n</body></html>\n"
+    return render(
+        "page",
+        title=title,
+        body=body,
+        policy=Markup(policy),
+        style=Markup(style),
+        theme=Markup(THEME),
+        data=Markup(json_element("data", data)),
+        arrays=Markup(arrays.elements()),
+        scripts=map(Markup, scripts),
     )
 
 

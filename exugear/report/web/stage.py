@@ -22,37 +22,11 @@ from exugear.report.pictures.shapes import (
     gear_surface,
     motions_of,
 )
-from exugear.report.web import html
 from exugear.report.web.document import ArrayStore, rounded, rounded_list, whole_page
-from exugear.report.web.html import Cell
+from exugear.report.web.html import Cell, Table, render
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.files import write_file
-
-# Frame of the animated 3-D view with its controls
-
-HINT = "Drag: rotate. Right drag or two fingers: pan. Wheel or pinch: zoom. Arrow keys: rotate."
-
-
-def stage_figure() -> str:
-    """Return the frame; the scripts ``stage`` and ``mode_view`` fill it."""
-    element = html.element
-    canvas = element("canvas", "", id="view-3d", tabindex=0, role="img", aria_label="Mode shape, animated")
-    still = element("img", id="still", alt="Mode shape at maximum deflection")
-    missing = element("p", "This browser has no WebGL 2: the mode cannot be drawn.", id="no-gl", hidden=True)
-    stage = element("div", canvas + still + missing, class_="stage")
-    slider = element("input", type="range", id="amplitude", min=0, max=3, step=0.05, value=1)
-    amplitude = element("label", f"Amplitude {slider}")
-    play = element("button", "Pause", type="button", id="play", aria_pressed="true")
-    by_body = element("label", element("input", type="checkbox", id="by-body") + " body colours")
-    ends = element("span", "0 <i></i> max. displacement", class_="ends")
-    controls = element("div", play + amplitude + by_body + ends, class_="controls")
-    chips = element("div", "", class_="chips", id="bodies", role="group", aria_label="Bodies shown")
-    title = element("strong", "Mode", id="mode-title")
-    caption = element("figcaption", title + element("span", HINT, class_="hint"))
-    tools = element("div", "", class_="tools", id="mode-tools")
-    return element("figure", caption + tools + stage + controls + chips, class_="panel", id="mode")
-
 
 # Bodies of a gearbox for the page: rigid ones with their teeth, flexible ones with gears on their seats
 
@@ -315,16 +289,12 @@ def write_mode_page(
             MODEL: {
                 "words": heading,
                 "variant": assembly.variant,
-                "fastest": 1.0,
                 "stage": stage_data(assembly, shapes, labels or {}, arrays, near if assembly.elastic_bodies else ()),
                 "modes": [
                     {
                         "frequency": rounded(frequency, 6),
                         "damping": 0.0,
                         "words": words,
-                        "seen": True,
-                        "amplification": 0.0,
-                        "mesh": "",
                     }
                     for frequency, words in titles
                 ],
@@ -332,35 +302,16 @@ def write_mode_page(
         },
     }
     target = Path(path)
-    page = whole_page(heading, _body(heading, titles), "mode_page", data, arrays, ("three.min.js",))
-    write_file(target, page.encode("utf-8", errors="replace"))
-    return target
-
-
-def _body(heading: str, titles: Sequence[tuple[float, str]]) -> str:
     rows = [
         {
-            "No.": Cell(str(number + 1), number),
+            "No.": Cell(str(number + 1), number + 1),
             "Frequency / Hz": Cell(f"{frequency:.1f}", frequency, f"mode:{MODEL}:{number}"),
             "Mode shape": words,
         }
         for number, (frequency, words) in enumerate(titles)
     ]
-    table = html.table(rows, ("Mode shape",), caption="Modes", name="modes", sortable=True)
-    theme = html.element("button", "◐", type="button", id="theme", aria_label="Dark or light colours")
-    tools = html.element("div", theme, class_="page-tools scripts-only")
-    brand = html.element("div", html.element("h1", html.text(heading)), class_="brand")
-    steps = html.element("button", "‹", type="button", id="before", aria_label="Mode before") + html.element(
-        "button", "›", type="button", id="next", aria_label="Next mode"
-    )
-    element = html.element("p", "", id="mode-words", aria_live="polite")
-    shown = html.element("div", steps, class_="controls") + element + stage_figure()
-    main = html.element(
-        "main",
-        html.element(
-            "section",
-            html.element("div", html.element("div", shown, class_="scripts-only") + table, class_="split"),
-        ),
-    )
-    toast = html.element("p", "", id="said", class_="toast", role="status", aria_live="polite")
-    return html.element("header", brand + tools, class_="top") + main + toast
+    table = Table(rows, ("Mode shape",), caption="Modes", name="modes", sortable=True)
+    body = render("mode_page", heading=heading, table=table)
+    page = whole_page(heading, body, "mode_page", data, arrays, ("three.min.js",))
+    write_file(target, page.encode("utf-8", errors="replace"))
+    return target

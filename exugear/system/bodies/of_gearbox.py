@@ -97,21 +97,21 @@ def shaft_model(gearbox: Gearbox, name: str) -> ShaftModel:
     body = gearbox.body(name)
     shape = _shape_of(gearbox, body)
     if frame_of(gearbox, body) == "carrier":
-        raise gearbox.fault(f"bodies.{body.family}.shape: the body carries planets; use a [.solid] table instead")
+        raise gearbox.error(f"bodies.{body.family}.shape: the body carries planets; use a [.solid] table instead")
     sections = tuple(map(_section_of, shape.sections))
     seats = tuple(narrowed(sections, seat) for seat in _seats(gearbox, body, shape))
     names = [seat.name for seat in seats]
     doubled = next((seat for seat in names if names.count(seat) > 1), None)
     if doubled is not None:
-        raise gearbox.fault(f"bodies.{body.family}: a gear and a bearing on it are both named {doubled!r}; rename one")
+        raise gearbox.error(f"bodies.{body.family}: a gear and a bearing on it are both named {doubled!r}; rename one")
     key = f"bodies.{body.family}.shape"
     unknown = next((blank for blank in shape.blanks if blank not in names), None)
     if unknown is not None:
-        raise gearbox.fault(f"{key}.blanks.{unknown}: no such seat; seats are {', '.join(names)}")
+        raise gearbox.error(f"{key}.blanks.{unknown}: no such seat; seats are {', '.join(names)}")
     shared = _shared(seats)
     blanks = {shared.get(seat, seat): blank_of(blank) for seat, blank in shape.blanks.items()}
     if len(blanks) < len(shape.blanks):
-        raise gearbox.fault(
+        raise gearbox.error(
             f"{key}.blanks: two of {', '.join(shape.blanks)} are at one seat; define one blank for both"
         )
     return ShaftModel(
@@ -165,7 +165,7 @@ def _shape_of(gearbox: Gearbox, body: Body) -> ShapeSection:
     """Section of a body's shape, which must be there."""
     shape = gearbox.case.bodies[body.family].shape
     if shape is None:
-        raise gearbox.fault(f"bodies.{body.family}: no shape; add a [bodies.{body.family}.shape] table")
+        raise gearbox.error(f"bodies.{body.family}: no shape; add a [bodies.{body.family}.shape] table")
     return shape
 
 
@@ -262,10 +262,10 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
     key = f"bodies.{body.family}.solid"
     solid = section.solid
     if solid is None:
-        raise gearbox.fault(f"bodies.{body.family}: no solid; add a [{key}] table")
+        raise gearbox.error(f"bodies.{body.family}: no solid; add a [{key}] table")
     frame = frame_of(gearbox, body)
     if section.flexibility in ("nonrotating", "ffrf") and frame != "nonrotating":
-        raise gearbox.fault(
+        raise gearbox.error(
             f"bodies.{body.family}.flexibility = {section.flexibility!r}: the body carries planets and is described "
             "in its own rotating frame; set 'elastic'"
         )
@@ -278,16 +278,16 @@ def solid_body(gearbox: Gearbox, name: str) -> SolidBody:
     )
     if not file.is_geometry and not file.is_mesh:
         endings = ", ".join((*GEOMETRY, *MESHES))
-        raise gearbox.fault(f"{key}.file = {solid.file!r}: unknown format; its name must end in {endings}")
+        raise gearbox.error(f"{key}.file = {solid.file!r}: unknown format; its name must end in {endings}")
     if file.is_geometry and solid.element_size_mm is None:
-        raise gearbox.fault(f"{key}.element_size_mm: this key is missing; it is required to mesh {solid.file}")
+        raise gearbox.error(f"{key}.element_size_mm: this key is missing; it is required to mesh {solid.file}")
     band = solid.band_Hz or gearbox.case.elasticity.band_Hz
     if band >= gearbox.case.elasticity.limit_Hz:
-        raise gearbox.fault(f"{key}.band_Hz = {band:g}: must be below elasticity.limit_Hz")
+        raise gearbox.error(f"{key}.band_Hz = {band:g}: must be below elasticity.limit_Hz")
     seats, sectors, shared = _solid_seats(gearbox, body, solid)
     names = [seat.name for seat in seats]
     if solid.torque_seat is not None and solid.torque_seat not in names:
-        raise gearbox.fault(f"{key}.torque_seat = {solid.torque_seat!r}: no such seat; seats are {', '.join(names)}")
+        raise gearbox.error(f"{key}.torque_seat = {solid.torque_seat!r}: no such seat; seats are {', '.join(names)}")
     model = SolidModel(
         name=name,
         mesh=file,
@@ -361,7 +361,7 @@ def _solid_seats(
             seat = _solid_seat(gearbox, f"{key}.{name}", name, item, section or SolidSeatSection())
             count = None if section is None else section.sectors
             if count is not None and (item is None or item.noun != "gear"):
-                raise gearbox.fault(f"{key}.{name}.sectors = {count}: only the seat of a gear has sectors")
+                raise gearbox.error(f"{key}.{name}.sectors = {count}: only the seat of a gear has sectors")
             parts = [seat] if count is None else _parts(seat, count)
             seats += parts
             if count is not None:
@@ -369,12 +369,12 @@ def _solid_seats(
     names = [seat.name for seat in seats]
     doubled = next((name for name in names if names.count(name) > 1), None)
     if doubled is not None:
-        raise gearbox.fault(f"{key}: two seats are both named {doubled!r}; rename one")
+        raise gearbox.error(f"{key}: two seats are both named {doubled!r}; rename one")
     for name, other in shared_seats.items():
         if other not in names:
-            raise gearbox.fault(f"{key}.{name}.same_as = {other!r}: no such seat; seats are {', '.join(names)}")
+            raise gearbox.error(f"{key}.{name}.same_as = {other!r}: no such seat; seats are {', '.join(names)}")
     if not seats:
-        raise gearbox.fault(f"{key}: the body has no seat; define at least one")
+        raise gearbox.error(f"{key}: the body has no seat; define at least one")
     return seats, sectors, shared_seats
 
 
@@ -395,7 +395,7 @@ def _solid_seat(gearbox: Gearbox, key: str, name: str, item: _Item | None, secti
     missing = [word for word, value in given if value is None]
     if missing or diameter is None or width is None or position is None:
         what = "seat without gear, bearing or mount" if item is None else item.noun
-        raise gearbox.fault(
+        raise gearbox.error(
             f"{key}: {what} {name!r} requires its position and size; set {' and '.join(missing)} in [{key}]"
         )
     return SolidSeat(name, position, diameter / 2.0, width, 0.5 * MM * (section.inner_diameter_mm or 0.0))
@@ -417,7 +417,7 @@ def _solid_blanks(gearbox: Gearbox, body: Body, solid: SolidSection, names: list
     for name, section in solid.blanks.items():
         on = [seat for seat in names if name in (seat, families.get(seat))]
         if not on:
-            raise gearbox.fault(f"bodies.{body.family}.solid.blanks.{name}: no such seat; seats are {', '.join(names)}")
+            raise gearbox.error(f"bodies.{body.family}.solid.blanks.{name}: no such seat; seats are {', '.join(names)}")
         blanks |= dict.fromkeys(on, blank_of(section))
     return blanks
 
@@ -451,7 +451,7 @@ def check_solids(gearbox: Gearbox, folder: Path) -> None:
     for key, model in solids_of(gearbox):
         file: SolidFile = model.mesh
         if file.is_script and not file.scripts and not reduction_file(model, folder).is_file():
-            raise gearbox.fault(f"{key}.file = {file.path.name!r}: {UNPERMITTED}")
+            raise gearbox.error(f"{key}.file = {file.path.name!r}: {UNPERMITTED}")
 
 
 # The elastic bodies of a gearbox: all that are elastic, reduced, with the rigid inertia of an inertia set
@@ -493,7 +493,7 @@ def _elastic_body(gearbox: Gearbox, body: Body, folder: Path | None) -> ElasticB
         else:
             of_shape = _reduced(_Hashed(model), folder)
     except (ShaftError, SolidError, ReductionError) as error:
-        raise gearbox.fault(f"bodies.{body.family}.{key}: {error}") from None
+        raise gearbox.error(f"bodies.{body.family}.{key}: {error}") from None
     wanted = RigidInertia(body.mass, (*body.axis, body.centre_of_mass_z), body.transverse, body.axial)
     reduced = of_shape if body.fixed else with_rigid_inertia(of_shape, wanted)
     floating = None if floating is None else with_inertia(floating, wanted)
@@ -523,16 +523,16 @@ def check_elastic_body(gearbox: Gearbox, name: str) -> None:
             try:
                 _ = mesh.mesh
             except SolidError as error:
-                raise gearbox.fault(f"bodies.{family}.solid.file = {mesh.path.name!r}: {error}") from None
+                raise gearbox.error(f"bodies.{family}.solid.file = {mesh.path.name!r}: {error}") from None
         return
     model = shaft_model(gearbox, name)
     if not model.seats:
-        raise gearbox.fault(f"bodies.{family}.shape: the body has no seat; add a gear, a bearing or torque_z_mm")
+        raise gearbox.error(f"bodies.{family}.shape: the body has no seat; add a gear, a bearing or torque_z_mm")
     try:
         start = MM * _shape_of(gearbox, gearbox.body(name)).start_z_mm
         check_shaft(model.sections, model.seats, start=start)
     except ShaftError as error:
-        raise gearbox.fault(f"bodies.{family}.shape: {error}") from None
+        raise gearbox.error(f"bodies.{family}.shape: {error}") from None
 
 
 class _Hashed:

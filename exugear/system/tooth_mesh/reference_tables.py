@@ -76,7 +76,7 @@ def requested_references(
     ]
 
 
-def doubts_of_references(summaries: Iterable[dict[str, Any]]) -> list[str]:
+def reference_warnings(summaries: Iterable[dict[str, Any]]) -> list[str]:
     """Say of which pairs the two methods differ by more than they may."""
     doubts = []
     for summary in summaries:

@@ -203,7 +203,7 @@ def requested_tables(
             known = ", ".join(gearbox.pairs)
             raise GearboxFileError(f"{gearbox.source}: no gear pair {name!r}; the pairs are {known}")
         if not gearbox.pairs[name].static_torque > 0.0 or name in gearbox.stated_stiffness:
-            raise gearbox.fault(without_table(gearbox, [name]))
+            raise gearbox.error(without_table(gearbox, [name]))
     grid = grid or gearbox.ste.grid
     own = axes or {}
     count = positions or gearbox.ste.positions
@@ -442,7 +442,7 @@ def stored_tables(gearbox: Gearbox, out: Path, positions: int | None = None) -> 
 # What there is to say of tables: states that are not solved, and contact that is cut off at form circles
 
 
-def remarks_about_table(name: str, table: MeshTable) -> Iterator[str]:
+def table_notes(name: str, table: MeshTable) -> Iterator[str]:
     """Say what is missing or cut off in the table of a pair, and what becomes of it; a line each."""
     missing, states = _missing(table)
     if missing:
@@ -461,7 +461,7 @@ def remarks_about_table(name: str, table: MeshTable) -> Iterator[str]:
         )
 
 
-def doubts_about_table(name: str, table: MeshTable) -> Iterator[str]:
+def table_warnings(name: str, table: MeshTable) -> Iterator[str]:
     """Return why the table of a pair is invalid; one line each, none if valid."""
     missing, states = _missing(table)
     if missing > MOST_MISSING * states:

@@ -17,7 +17,7 @@ from exugear.project import Project
 from exugear.studies.executors import processes
 from exugear.studies.runner import run_study
 from exugear.studies.study import Study
-from exugear.system.readiness import check_parts, remarks
+from exugear.system.gearbox_checks import check_parts, gearbox_warnings
 from exugear.system.tooth_mesh import tables
 from exugear.system.tooth_mesh.laws.iso6336 import iso6336_stiffness
 from exugear.system.tooth_mesh.placement import loaded_flanks
@@ -124,7 +124,7 @@ def coarse(monkeypatch):
 
 
 def test_the_case_behind_the_doubtful_ones_is_beyond_doubt():
-    assert remarks(Gearbox.from_dict(shafted())) == ()
+    assert gearbox_warnings(Gearbox.from_dict(shafted())) == ()
 
 
 @pytest.mark.validation
@@ -141,7 +141,7 @@ def test_every_verb_accepts_a_doubtful_case_with_the_same_remark(name, tmp_path)
         assert one_line(result.stderr).count(remark) == 1, (verb, result.stderr)
     gearbox = Gearbox.from_dict(shafted()).varied(content_of(change))
     check_parts(gearbox)
-    assert sum(remark in line for line in remarks(gearbox)) == 1
+    assert sum(remark in line for line in gearbox_warnings(gearbox)) == 1
     assert Project(gearbox, folder).modes().frequency.size > 0
 
 
@@ -165,12 +165,12 @@ def test_a_study_accepts_a_doubtful_case(name, tmp_path):
 def test_what_reaches_too_far_across_a_shoulder_every_verb_refuses_alike(tmp_path):
     content = shafted()
     content["bodies"]["shaft_1"]["shape"]["sections"] = shaft(12.0)
-    case, folder, fault = written(content, tmp_path), tmp_path / "results", "seat left: a shoulder lies between"
+    case, folder, error = written(content, tmp_path), tmp_path / "results", "seat left: a shoulder lies between"
     for verb, options in COMMANDS.items():
         out = () if verb == "check" else ("--out", folder)
         result = exugear(verb, case, *options, *out)
-        assert result.exit_code == 2 and fault in one_line(result.stderr), (verb, result.output)
-    with pytest.raises(GearboxFileError, match=fault):
+        assert result.exit_code == 2 and error in one_line(result.stderr), (verb, result.output)
+    with pytest.raises(GearboxFileError, match=error):
         check_parts(Gearbox.from_dict(shafted()).varied(content))
     assert not folder.exists()
 

@@ -310,7 +310,7 @@ def test_loads(printed: Printed) -> None:
 def test_report(printed: Printed, tmp_path: Any) -> None:
     step = f"comparison with Exudyn, flexible, {', '.join(NAMES)}"
     (tmp_path / "times.jsonl").write_text(json.dumps({"step": step, "seconds": 123456.7, "memory": 1.234e11}) + "\n")
-    report._print_report(tmp_path, Report(tmp_path.relative_to(tmp_path), (), (), ()), None, False)
+    report._print_report(tmp_path, Report(tmp_path.relative_to(tmp_path), (), (), (), ()), None, False)
     printed.check(1)
 
 

@@ -11,7 +11,7 @@ import pytest
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.connections import TYPES_OF_KEYS
-from exugear.system.readiness import check_parts
+from exugear.system.gearbox_checks import check_parts
 
 from ..cases.case_mutations import bases
 

@@ -14,8 +14,8 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import summarise_loads
 from exugear.gearbox.reading import GearboxFileError
+from exugear.system.gearbox_checks import check_parts, gearbox_warnings, lacking
 from exugear.system.modes import eigenmodes
-from exugear.system.readiness import check_parts, lacking, remarks
 from exugear.system.statics import locked_equilibrium
 from exugear.system.tooth_mesh.tables import wanted_table
 
@@ -140,7 +140,7 @@ def test_a_differential_has_modes_and_runs_and_no_steady_response(
             case("planetary", **DIFFERENTIAL, **static)
         return
     gearbox = case("planetary", **DIFFERENTIAL, **static)
-    assert any("2 degrees of freedom" in line for line in remarks(gearbox))
+    assert any("2 degrees of freedom" in line for line in gearbox_warnings(gearbox))
     for variant in ("rigid", "bushing"):
         assert (modes_with_bodies(gearbox, Choice(variant), ISO).frequency < 0.1).sum() == 2
     file = tmp_path / "case.toml"
@@ -273,7 +273,8 @@ def test_what_carries_nothing_in_the_static_load_is_told(case: Any) -> None:
     gearbox = case("spur", static_load={"torques_N_m": {"shaft_1": 100.0}, "locked": ["shaft_1"]})
     assert gearbox.train.static_mesh_forces() == {"spur": 0.0}  # not the rounding of zero
     assert any(
-        "so no table is computed: mesh stiffness to ISO 6336-1, no excitation" in line for line in remarks(gearbox)
+        "so no table is computed: mesh stiffness to ISO 6336-1, no excitation" in line
+        for line in gearbox_warnings(gearbox)
     )
     still = case("grc", static_load__torques_N_m={"carrier": 0.0})
     assert set(still.train.static_mesh_forces().values()) == {0.0}
@@ -391,7 +392,7 @@ def test_axes_that_follow_from_the_static_state_stay_where_the_gears_run(case: A
     check_parts(fine)
 
 
-# -- all faults at once, types, files ---------------------------------------------------------------------------------
+# -- all errors at once, types, files --------------------------------------------------------------------------------
 
 
 def test_each_fault_has_a_line_and_there_is_an_end_to_them(case: Any) -> None:
@@ -423,13 +424,13 @@ def test_faults_that_have_nothing_to_do_with_each_other_are_told_at_once(tmp_pat
     file.write_text(toml_text(content), encoding="utf-8")
     outcome = exugear("check", file, "--json")
     assert outcome.exit_code == 2
-    faults = json.loads(outcome.stdout)["errors"]
+    errors = json.loads(outcome.stdout)["errors"]
     told = ("gears.sun", "joints.sun", "overall.output")
-    assert all(any(f": {key}" in fault for fault in faults) for key in told), faults
-    assert all(fault in outcome.stderr for fault in faults)
+    assert all(any(f": {key}" in error for error in errors) for key in told), errors
+    assert all(error in outcome.stderr for error in errors)
     with pytest.raises(GearboxFileError) as caught:
         Gearbox.from_toml(file)
-    assert list(caught.value.faults) == faults
+    assert list(caught.value.errors) == errors
 
 
 def test_faults_of_writing_hide_no_faults_of_what_could_be_read(tmp_path: Path) -> None:
@@ -448,27 +449,27 @@ def test_faults_of_writing_hide_no_faults_of_what_could_be_read(tmp_path: Path) 
     file.write_text(toml_text(content), encoding="utf-8")
     outcome = exugear("check", file, "--json")
     assert outcome.exit_code == 2
-    faults = json.loads(outcome.stdout)["errors"]
-    assert [fault.split(": ")[1] for fault in faults[:2]] == ["static_load", "gears.planet.theeth = 3"]
-    assert any(": gears.sun: " in fault for fault in faults)
-    assert any(".catalogue: " in fault for fault in faults)
+    errors = json.loads(outcome.stdout)["errors"]
+    assert [error.split(": ")[1] for error in errors[:2]] == ["static_load", "gears.planet.theeth = 3"]
+    assert any(": gears.sun: " in error for error in errors)
+    assert any(".catalogue: " in error for error in errors)
     # What rests on the planet is left alone: its pairs, and the body that carries it.
-    assert not any(f": {key}" in fault for fault in faults for key in ("pairs.", "bodies.", "meshes."))
+    assert not any(f": {key}" in error for error in errors for key in ("pairs.", "bodies.", "meshes."))
 
 
 def test_a_gear_that_follows_from_a_pair_is_left_alone_where_the_pair_cannot_be_read(case: Any) -> None:
     with pytest.raises(GearboxFileError) as caught:
         case("spur", gears__pinion__profile_shift=0.0, gears__pinion__profile_shift_from_centre_distance=True,
              pairs__spur__centre_distance_mm="far")  # fmt: skip
-    assert len(caught.value.faults) == 1
-    assert "pairs.spur.centre_distance_mm = 'far': must be a number" in caught.value.faults[0]
+    assert len(caught.value.errors) == 1
+    assert "pairs.spur.centre_distance_mm = 'far': must be a number" in caught.value.errors[0]
 
 
 @pytest.mark.parametrize("gears", [3, {"pinion": 4}, {"pinion": {"teeth": []}}])
 def test_tables_that_are_none_are_told_and_nothing_more(case: Any, gears: Any) -> None:
     with pytest.raises(GearboxFileError, match="gears") as caught:
         case("spur", gears=gears)
-    assert not any("no such gear" in fault for fault in caught.value.faults)
+    assert not any("no such gear" in error for error in caught.value.errors)
 
 
 def test_a_seat_beside_its_shaft_makes_the_variant_flexible_impossible() -> None:

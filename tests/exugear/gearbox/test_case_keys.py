@@ -36,9 +36,9 @@ from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.stiffness import catalogue_stiffness, elastic_names, linear_law
 from exugear.system.bodies.of_gearbox import check_elastic_body
 from exugear.system.build import assemble
+from exugear.system.gearbox_checks import check_parts, gearbox_warnings, lacking
 from exugear.system.modal_damping import damping_in_words
 from exugear.system.operating_points import bearing_duties
-from exugear.system.readiness import check_parts, lacking, remarks
 from exugear.system.tooth_mesh.tables import wanted_table
 
 from ..cases import gear_trains
@@ -112,7 +112,7 @@ def test_every_key_is_read(read_keys: set[tuple[str, str]], tmp_path: Path) -> N
         file.write_text(toml_text(content), encoding="utf-8")
         gearbox = Gearbox.from_toml(file)
         check_parts(gearbox)
-        remarks(gearbox)
+        gearbox_warnings(gearbox)
         for pair, spec in gearbox.pairs.items():
             assert spec.table != bool(spec.stiffness)
             wanted_table(gearbox, pair, gearbox.ste.positions, gearbox.ste.grid)

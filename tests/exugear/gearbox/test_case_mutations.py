@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from exugear.cli.app import app
-from exugear.gearbox.reading import LONGEST_FAULT, SHOWN_FAULTS
+from exugear.gearbox.reading import LONGEST_ERROR, SHOWN_ERRORS
 
 from ..cases.case_mutations import bases, mutant, toml_text
 
@@ -42,7 +42,7 @@ def exugear(*arguments: object) -> Any:
 
 
 def is_refused_in_words(outcome: Any, file: Path) -> bool:
-    """Tell whether a file was refused: exit code 2, and a line for each fault that names the file."""
+    """Tell whether a file was refused: exit code 2, and a line for each error that names the file."""
     assert outcome.exit_code in (0, 2), f"exit code {outcome.exit_code}: {outcome.exception!r} {outcome.stderr}"
     assert outcome.exception is None or isinstance(outcome.exception, SystemExit)
     if outcome.exit_code == 0:
@@ -51,10 +51,10 @@ def is_refused_in_words(outcome: Any, file: Path) -> bool:
     lines = [line for line in lines if not line.startswith("Warning: ")]
     assert lines[0].startswith("Bad input: ")
     lines[0] = lines[0].removeprefix("Bad input: ")
-    assert len(lines) <= SHOWN_FAULTS + 1
+    assert len(lines) <= SHOWN_ERRORS + 1
     for number, line in enumerate(lines):
-        assert str(file.parent) in line or (number == SHOWN_FAULTS and line.startswith("and ")), line
-        assert len(line) <= len(str(file)) + LONGEST_FAULT + 100, line
+        assert str(file.parent) in line or (number == SHOWN_ERRORS and line.startswith("and ")), line
+        assert len(line) <= len(str(file)) + LONGEST_ERROR + 100, line
         assert line.isprintable(), line
     return True
 

@@ -11,7 +11,7 @@ from exugear.gearbox.gear_parts import with_usual_rounding
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.sections.case import GearboxFile
-from exugear.system.readiness import remarks
+from exugear.system.gearbox_checks import gearbox_warnings
 from fe_ste.geometry.gear_relations import BasicRack, GearInputs
 
 from ..cases.spur import SPUR_CASE
@@ -28,7 +28,7 @@ def test_gears_of_25_degrees_have_the_largest_rounding_that_fits() -> None:
     """By hand: (pi / 4 - 1.25 tan 25 deg) cos 25 deg / (1 - sin 25 deg) = 0.318 normal modules."""
     gearbox = Gearbox.from_dict(content(normal_pressure_angle_deg=25.0), "case.toml")
     assert [gear.rack.tip_radius for gear in gearbox.gears.values()] == pytest.approx([0.318, 0.318], abs=1e-3)
-    told = [line for line in remarks(gearbox) if "rack.tip_radius" in line]
+    told = [line for line in gearbox_warnings(gearbox) if "rack.tip_radius" in line]
     assert len(told) == 2 and all(
         "the default of 0.38" in line and ", the largest possible value, is used" in line for line in told
     )
@@ -44,7 +44,7 @@ def test_a_radius_of_the_file_is_refused_where_it_does_not_fit(rack: dict[str, f
 def test_the_default_stays_where_it_fits(gears: dict[str, Any]) -> None:
     gearbox = Gearbox.from_dict(content(**gears), "case.toml")
     assert {gear.rack.tip_radius for gear in gearbox.gears.values()} == {0.38}
-    assert not [line for line in remarks(gearbox) if "rack.tip_radius" in line]
+    assert not [line for line in gearbox_warnings(gearbox) if "rack.tip_radius" in line]
 
 
 def test_a_ring_of_very_low_teeth_has_a_rounding_of_half_their_height() -> None:

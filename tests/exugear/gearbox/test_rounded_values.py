@@ -10,7 +10,7 @@ import pytest
 
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
-from exugear.system.readiness import remarks
+from exugear.system.gearbox_checks import gearbox_warnings
 
 from ..cases.spur import SPUR_CASE
 
@@ -53,7 +53,7 @@ def test_published_pairs_without_backlash_are_taken_and_told(
     assert 0.0 <= pair.circumferential_backlash < 1e-11
     (line,) = (
         line
-        for line in remarks(gearbox)
+        for line in gearbox_warnings(gearbox)
         if "µm, within the rounding of the input; zero backlash is used, with teeth thinner by that amount" in line
     )
     assert line.startswith("gears.wheel: ")

@@ -14,7 +14,7 @@ import pytest
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.templates.kinds import template
-from exugear.system.plausibility import backlash_range, thickness_range
+from exugear.system.part_warnings import backlash_range, thickness_range
 
 from ..cases.command import exugear
 
@@ -91,7 +91,7 @@ def test_a_span_that_needs_a_wider_face_is_told():
     assert thickness_range(gearbox_of(), "pinion").span_teeth == 3
     for width, doubt in ((needed + 0.01, ""), (needed - 0.01, "too narrow for the base tangent length over 3 teeth")):
         found["gears"]["pinion"]["face_width_mm"] = width
-        told = thickness_range(Gearbox.from_dict(found, "case.toml"), "pinion").span_doubt
+        told = thickness_range(Gearbox.from_dict(found, "case.toml"), "pinion").span_warning
         assert doubt in told and bool(doubt) == bool(told)
 
 

@@ -333,7 +333,7 @@ def test_gears_that_bend_both_ways_need_their_factor(tmp_path):
     ) as raised:
         checked_loads(gearbox)
     missing = [f"rating.gears.{name}.mean_stress_factor: this key is missing" for name in ("pinion", "wheel")]
-    assert len(raised.value.faults) == 2
+    assert len(raised.value.errors) == 2
     found = missing_for_life(gearbox)
     assert found["loads"] == ()
     for verb in ("life", "check --rating"):

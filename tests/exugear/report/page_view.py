@@ -23,7 +23,7 @@ class View:
     """A page in a browser, and what went wrong in it."""
 
     page: Any
-    faults: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
 
     def open(self, path: Path, fragment: str = "") -> None:
         self.page.goto("about:blank")
@@ -48,9 +48,9 @@ def opened(browser: Any, size: str, **options: Any) -> View:
         viewport={"width": width, "height": height}, reduced_motion="reduce", accept_downloads=True, **options
     )
     view = View(context.new_page())
-    view.page.on("pageerror", lambda error: view.faults.append(str(error)))
-    view.page.on("console", lambda told: view.faults.append(told.text) if told.type == "error" else None)
-    view.page.on("dialog", lambda dialog: view.faults.append(dialog.message))
+    view.page.on("pageerror", lambda error: view.errors.append(str(error)))
+    view.page.on("console", lambda told: view.errors.append(told.text) if told.type == "error" else None)
+    view.page.on("dialog", lambda dialog: view.errors.append(dialog.message))
     local = ("file:", "data:", "blob:", "about:")
-    view.page.on("request", lambda asked: None if asked.url.startswith(local) else view.faults.append(asked.url))
+    view.page.on("request", lambda asked: None if asked.url.startswith(local) else view.errors.append(asked.url))
     return view

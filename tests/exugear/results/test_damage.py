@@ -78,12 +78,12 @@ def test_a_report_leaves_damaged_files_out_and_names_them(out: Path) -> None:
     content = (out / MODES).read_bytes()
     for damaged in damages(content, 4):
         (out / MODES).write_bytes(damaged)
-        outcome = exugear("report", out)
+        outcome = exugear("report", out, "--stored")
         assert outcome.exit_code == 0, outcome.stderr
         assert f"Warning: skipped: {out / MODES}: " in outcome.stderr
         assert "checksum" in outcome.stderr
     (out / RUN).write_bytes((out / RUN).read_bytes()[:-1000])
-    outcome = exugear("report", out)
+    outcome = exugear("report", out, "--stored")
     assert outcome.exit_code == 2
     assert f"{out / RUN}: has no checksum at its end" in outcome.stderr
 
@@ -123,7 +123,7 @@ def test_a_case_that_was_changed_since_is_refused(out: Path) -> None:
 )
 def test_a_case_that_somebody_made_up_is_one_message(out: Path, content: str) -> None:
     (out / "case.json").write_bytes(content.encode("utf-8", errors="surrogateescape"))
-    outcome = exugear("report", out)
+    outcome = exugear("report", out, "--stored")
     assert outcome.exit_code == 2
     assert "case.json: cannot be used" in outcome.stderr
 
@@ -134,13 +134,13 @@ def test_an_account_of_times_with_nonsense_in_it_serves_as_far_as_it_can(out: Pa
     with (out / "times.jsonl").open("ab") as file:
         file.write("\n".join(nonsense).encode() + b"\n\xff\xfe\n")
     assert [spent.step for spent in times_spent(out)] == before
-    assert exugear("report", out).exit_code == 0
+    assert exugear("report", out, "--stored").exit_code == 0
 
 
 def test_results_of_an_earlier_version_of_a_method_do_not_fit(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("exugear.system.system.MODES", 1000)
     monkeypatch.setattr("exugear.system.system.RUN", 1000)
-    outcome = exugear("report", out)
+    outcome = exugear("report", out, "--stored")
     assert outcome.exit_code == 2
     assert f"{MODES}: was computed from another input; recompute it" in outcome.stderr
     assert f"{RUN}: was computed from another input; recompute it" in outcome.stderr

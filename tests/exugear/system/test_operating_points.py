@@ -20,9 +20,9 @@ from exugear.system.bearings.rolling.contact import (
 from exugear.system.bearings.rolling.rows import BearingError, BearingOfRows
 from exugear.system.bearings.stiffness import LEAST_LOAD, catalogue_stiffness
 from exugear.system.build import assemble
+from exugear.system.gearbox_checks import lacking
 from exugear.system.loads import LoadTable
 from exugear.system.modes import modes_of
-from exugear.system.readiness import lacking
 from exugear.system.statics import BalanceError, static_state
 from exugear.system.system import Assembly
 from exugear.transient.compiled.solver import CompiledSystem

@@ -12,8 +12,8 @@ import pytest
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
+from exugear.system.gearbox_checks import lacking
 from exugear.system.modes import eigenmodes
-from exugear.system.readiness import lacking
 
 from ..cases.spur import SPUR_CASE
 

@@ -1,4 +1,4 @@
-"""Runs in time: energy, files, interruption, faults."""
+"""Runs in time: energy, files, interruption, errors."""
 
 from __future__ import annotations
 

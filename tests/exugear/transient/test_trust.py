@@ -23,7 +23,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import summarise_loads
 from exugear.report.writer import write_report
-from exugear.results.run_file import load_run, verdict_of
+from exugear.results.run_file import invalidity_of, load_run
 from exugear.system.build import assemble
 from exugear.system.kernels.table_law import piece_at
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES
@@ -97,7 +97,7 @@ def test_teeth_that_pull_for_the_whole_run_end_with_code_1_and_a_red_box_in_the_
     assert reason.startswith("tensile mesh force: spur for up to 100 % of the run") and "check torque signs" in reason
     assert Path(summary["file"]).name == "run.nc"
     kept = attributes(Path(summary["file"]))
-    assert verdict_of(kept) == reason
+    assert invalidity_of(kept) == reason
     assert json.loads(str(kept["limits"]))["pulling_marked"] == LIMITS.pulling_marked
     page = write_report(tmp_path / "out", target=1000.0).path.read_text(encoding="utf-8")
     head = page[: page.index('<section id="short"')]
@@ -130,7 +130,7 @@ def test_parametric_instability_is_stopped_at_a_part_of_the_tooth_height(tmp_pat
     with pytest.raises(LimitError, match="s: mesh spur, tooth height 6.75 mm, exceeds 5 %") as error:
         simulate(gearbox, Choice("rigid", load_case="run_up"), {"spur": samples}, tmp_path, duration=0.6, solver=solver)
     assert not error.value.run.trusted
-    assert verdict_of(attributes(error.value.run.path)).startswith("tooth deflection at t = 0.00")
+    assert invalidity_of(attributes(error.value.run.path)).startswith("tooth deflection at t = 0.00")
 
 
 def test_energy_that_a_coarse_step_loses_marks_the_run(tmp_path):
@@ -319,7 +319,7 @@ def test_a_run_that_diverges_names_the_time_and_is_marked(tmp_path, monkeypatch)
     monkeypatch.setattr("exugear.transient.plan.unstable", lambda integration: "")
     with pytest.raises(RunError, match=r"not finite at t = 0\.\d+ s; .*results so far"):
         simulate(gearbox, choice, soft, tmp_path, **options)
-    assert verdict_of(attributes(next(tmp_path.rglob("run.partial")))).startswith("the state is not finite")
+    assert invalidity_of(attributes(next(tmp_path.rglob("run.partial")))).startswith("the state is not finite")
 
 
 # -- how large a run may be -----------------------------------------------------------------------------------------

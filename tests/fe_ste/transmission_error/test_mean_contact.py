@@ -243,13 +243,13 @@ def test_damaged_files_are_solved_again(kept: Path, solved: list[str]) -> None:
     (first,) = known_contacts([WANTED])
     (path,) = kept.glob("contact-*.npz")
     whole = path.read_bytes()
-    faults = [b"", b"text", *damages(whole, 14)]
-    for damaged in faults:
+    errors = [b"", b"text", *damages(whole, 14)]
+    for damaged in errors:
         path.write_bytes(damaged)
         forget_contacts()
         assert_same(*known_contacts([WANTED]), first)
         assert path.read_bytes() == whole
-    assert len(solved) == 1 + len(faults)
+    assert len(solved) == 1 + len(errors)
 
 
 def test_a_file_of_another_make_runs_no_code_and_is_replaced(kept: Path, solved: list[str]) -> None:

@@ -214,11 +214,11 @@ def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
     RexsError
         The file lacks gears or pairs of the gearbox, or gears differ in tooth number, module or type.
     """
-    faults = []
+    errors = []
     for kind, own, others in (("gears", gearbox.gears, imported.gears), ("pairs", gearbox.pairs, imported.pairs)):
         missing = [name for name in own if name not in others]
         if missing:
-            faults.append(
+            errors.append(
                 f"{gearbox.source}: {kind} {', '.join(missing)} do not originate from this file, whose {kind} are "
                 f"imported as {', '.join(others)}; keep the names of the import"
             )
@@ -227,12 +227,12 @@ def check_same_gears(gearbox: Gearbox, imported: Gearbox) -> None:
         other = imported.gears[name]
         for key in ("teeth", "normal_module", "internal"):
             if not math.isclose(getattr(gear, key), getattr(other, key), rel_tol=EQUAL):
-                faults.append(
+                errors.append(
                     f"{gearbox.source}: gears.{name} has {key} = {getattr(gear, key):g}, in this file it is "
                     f"{getattr(other, key):g}; export results of the same gear only"
                 )
-    if faults:
-        raise RexsError(*faults)
+    if errors:
+        raise RexsError(*errors)
 
 
 def put_gears(results: Results) -> None:

@@ -68,7 +68,7 @@ from exugear.exchange.rexs.to_case.toothing import is_rigid, material_of, materi
 from exugear.exchange.rexs.tree import Model, RexsError, plain
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
-from exugear.system.readiness import check_parts
+from exugear.system.gearbox_checks import check_parts
 from fe_ste.tools.display import ReprMixin
 
 # Bodies of a REXS file as tables of the gearbox file: position, inertia, and the shape of shafts
@@ -83,7 +83,7 @@ def sections_of_bodies(model: Model, places: Places, bodies: Bodies, notes: Note
     for body in bodies.members:
         pieces: list[Cylinder] = []
         for shaft in body.parts_of_type("shaft"):
-            with notes.faults.gathered():
+            with notes.errors.gathered():
                 pieces += sections_of(model, places, shaft, body, notes)
         found[body.name] = sorted(pieces, key=lambda one: one.start)
     return found
@@ -230,7 +230,7 @@ def gear_places(teeth: Teeth, bodies: Bodies) -> dict[str, float]:
 
 SPEED_TOLERANCE = 1e-3
 """Largest relative difference between a speed in the file and the kinematic speed."""
-_SHAPE_FAULT = re.compile(r"bodies\.(\w+)\.shape: (.*)")
+_SHAPE_ERROR = re.compile(r"bodies\.(\w+)\.shape: (.*)")
 
 
 @dataclass(frozen=True)
@@ -289,10 +289,10 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     model = dataclasses.replace(model, relations=tuple(relations))
     _refuse_types(model, notes)
     _refuse_misplaced(model, notes)
-    notes.faults.tell()
+    notes.errors.tell()
     places = Places(model)
     draft = _Draft(model, places, notes)
-    notes.faults.tell()
+    notes.errors.tell()
     static = draft.static.value[draft.ends.input]
     draft.leave_stiff(source, path)
     gearbox = draft.checked(draft.text(source, {}), path)
@@ -303,7 +303,7 @@ def to_case(model: Model, source: str, path: str | Path = "gearbox.toml", rules:
     life = life_blocks(model, draft.loads, draft.ends, ratio, gears)
     draft.settings |= life.blocks
     _compare_speeds(gearbox, draft.loads, draft.ends, notes)
-    notes.faults.tell()
+    notes.errors.tell()
     _note_ignored(model, notes)
     text = draft.text(source, cases)
     gearbox = draft.checked(text, path)
@@ -319,10 +319,10 @@ def _refuse_types(model: Model, notes: Notes) -> None:
         parts = [part for part in parts if part.type.endswith(("_gear", "_wheel", "_stage"))]
         if parts:
             names = ", ".join(str(part) for part in parts)
-            notes.faults.append(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
-    notes.faults.tell()
+            notes.errors.append(f"{names}: {words} cannot be imported, only cylindrical gears on parallel axes")
+    notes.errors.tell()
     if not any(True for _ in model.relations_of("stage")) or not model.components_of_type(*GEARS):
-        notes.faults.append("the file has no stage of two cylindrical gears; nothing to import")
+        notes.errors.append("the file has no stage of two cylindrical gears; nothing to import")
 
 
 def _refuse_misplaced(model: Model, notes: Notes) -> None:
@@ -331,7 +331,7 @@ def _refuse_misplaced(model: Model, notes: Notes) -> None:
         for role, number in relation.roles.items():
             wanted = TYPES_OF_ROLES.get((relation.type, role))
             if wanted is not None and model.components[number].type not in wanted:
-                notes.faults.append(
+                notes.errors.append(
                     f"a relation '{relation.type}' has {model.components[number]} as {role}; expected a component of "
                     f"type {' or '.join(wanted[:3])}: correct the id"
                 )
@@ -353,7 +353,7 @@ class _Draft:
         gears = gear_blocks(model, self.teeth, sections, notes)
         body_blocks = {}
         for body in bodies.members:
-            with notes.faults.gathered():
+            with notes.errors.gathered():
                 body_blocks[body.name] = _body_block(model, places, body, self.teeth, sections[body.name], notes)
         joints = joint_blocks(bodies, bearings, gear_places(self.teeth, bodies))
         self.groups = [
@@ -383,27 +383,27 @@ class _Draft:
             gearbox = Gearbox.from_dict(content, str(path))
             check_parts(gearbox)
         except GearboxFileError as error:
-            faults = [self._with_components(fault.removeprefix(f"{path}: ")) for fault in error.faults]
-            raise RexsError(*faults) from None
+            errors = [self._with_components(line.removeprefix(f"{path}: ")) for line in error.errors]
+            raise RexsError(*errors) from None
         return gearbox
 
-    def _with_components(self, fault: str) -> str:
+    def _with_components(self, error: str) -> str:
         """Return an error of the gearbox file with the REXS components of the named parts."""
-        words = set(re.split(r"[^\w.]", fault)) | set(re.split(r"\W", fault))
+        words = set(re.split(r"[^\w.]", error)) | set(re.split(r"\W", error))
         blocks = {name: block.comment for _, group in self.groups for name, block in group.items() if block.comment}
         entries = [
             f"{name} is {comment}" for name, comment in blocks.items() if name in words or name.split(".")[1] in words
         ]
         if entries:
-            return f"{fault} ({'; '.join(entries)})"
-        return fault
+            return f"{error} ({'; '.join(entries)})"
+        return error
 
     def leave_stiff(self, source: str, path: str | Path) -> None:
         """Set bodies to rigid in all variants if their shape cannot contain the seats, and record the reason."""
         try:
             self.checked(self.text(source, {}), path)
         except RexsError as error:
-            found = (_SHAPE_FAULT.search(fault) for fault in error.faults)
+            found = (_SHAPE_ERROR.search(line) for line in error.errors)
             reasons = {match[1]: match[2] for match in found if match}
         else:
             return
@@ -514,7 +514,7 @@ def _compare_speeds(gearbox: Gearbox, loads: Sequence[Loads], ends: Ends, notes:
                 f"{load.name}: {body} rotates at {speed:.6g} rpm, kinematics result in {rolls:.6g} rpm"
             )
             if abs(rolls - speed) > SPEED_TOLERANCE * max(abs(rolls), abs(speed)):
-                notes.faults.append(
+                notes.errors.append(
                     f"{load.name}: the file has {body} at {speed:g} rpm, but with {ends.input} at {base:g} rpm the "
                     f"kinematics result in {rolls:g} rpm"
                 )

@@ -62,25 +62,25 @@ def teeth_of(model: Model, places: Places, bodies: Bodies, notes: Notes) -> Teet
     first = first_of_planets(model, places, bodies)
     met: dict[frozenset[int], tuple[Component, list[Component]]] = {}
     for relation in model.relations_of("stage"):
-        with notes.faults.gathered():
+        with notes.errors.gathered():
             part, both = _stage(model, relation.roles)
             pair = frozenset(first.get(gear.number, gear.number) for gear in both)
             if len(pair) == 1:
                 raise RexsError(f"{part}: planets of one set mesh with each other; correct the stage")
             met.setdefault(pair, (part, [model.components[number] for number in sorted(pair)]))
             _check_direction(places, part, both, notes)
-    notes.faults.tell()
+    notes.errors.tell()
     mates: dict[int, list[Component]] = {}
     for _, (one, other) in met.values():
         mates.setdefault(one.number, []).append(other)
         mates.setdefault(other.number, []).append(one)
     gears: dict[int, Toothing] = {}
     for number, partners in mates.items():
-        with notes.faults.gathered():
+        with notes.errors.gathered():
             gears[number] = toothing_of(model, model.components[number], partners, notes)
-    notes.faults.tell()
+    notes.errors.tell()
     stages = _ordered(places, met.values(), gears, notes)
-    notes.faults.tell()
+    notes.errors.tell()
     _check_equal_planets(model, first, gears, notes)
     gears = with_equal_racks(gears, stages, notes)
     gears = with_shifts(gears, stages, notes)
@@ -141,7 +141,7 @@ def _ordered(
 ) -> list[Stage]:
     stages = []
     for part, (one, other) in met:
-        with notes.faults.gathered():
+        with notes.errors.gathered():
             if gears[one.number].internal and gears[other.number].internal:
                 raise RexsError(f"{part}: two ring gears cannot mesh")
             pinion, gear = sorted(
@@ -183,8 +183,8 @@ def _check_equal_planets(model: Model, first: Mapping[int, int], gears: Mapping[
         mate = gears[own]
         for key in ("module", "face_width", "helix_angle", "pressure_angle"):
             if abs(getattr(other, key).value - getattr(mate, key).value) > 1e-9:
-                notes.faults.append(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
-    notes.faults.tell()
+                notes.errors.append(f"{other.part}: differs from {mate.part} in {key}; planets of a set must be equal")
+    notes.errors.tell()
 
 
 def axes_to_move(
@@ -301,7 +301,7 @@ def gear_blocks(
     for number, gear in teeth.gears.items():
         entries = _entries(model, gear, teeth.z[number], sections[teeth.bodies[number].name], notes)
         block = blocks[teeth.names[number]] = Block(str(gear.part), entries)
-        with notes.faults.gathered():
+        with notes.errors.gathered():
             modification = modification_of(model, gear, notes)
             if modification:
                 block.blocks["modification"] = Block("", modification)

@@ -148,9 +148,9 @@ def with_shifts(gears: Mapping[int, Toothing], stages: Sequence[Stage], notes: N
                 )
             break
     for stage in stages:
-        with notes.faults.gathered():
+        with notes.errors.gathered():
             _check_shifts(solved, stage, notes)
-    notes.faults.tell()
+    notes.errors.tell()
     return solved
 
 

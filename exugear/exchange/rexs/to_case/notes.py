@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from exugear.exchange.rexs.mapping import Row
-from exugear.exchange.rexs.tree import Component, Faults, Model, RexsError
+from exugear.exchange.rexs.tree import Component, Errors, Model, RexsError
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 
@@ -96,7 +96,7 @@ class Notes:
     """Notes collected during an import."""
 
     rules: Rules = Rules()
-    faults: Faults = field(default_factory=Faults)
+    errors: Errors = field(default_factory=Errors)
     """Errors because of which the file cannot be imported."""
     changed: list[str] = field(default_factory=list)
     """Values of the file that were replaced, and important assumptions."""
@@ -212,12 +212,12 @@ class Places(ReprMixin):
         self._moved: dict[int, tuple[float, float]] = {}
         self._frames: dict[int, tuple[Floats, Floats]] = {}
         _refuse_lost_vectors(model)
-        faults = Faults()
+        errors = Errors()
         directions: dict[Component, Floats] = {}
         for part in model.components_of_type(*TURNING):
-            with faults.gathered():
+            with errors.gathered():
                 directions[part] = self._frame(part, 0)[1][:, 0]
-        faults.tell()
+        errors.tell()
         self._axes = _axes(list(directions.values()), self._outermost(list(directions)))
         skew = [part for part, direction in directions.items() if abs(direction @ self._axes[2]) < 1.0 - PARALLEL]
         if skew:

@@ -44,7 +44,7 @@ def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -
     """Tables of all bearings by name, and of connections that support a body without joining it rigidly."""
     blocks: dict[str, Block] = {}
     for part in model.components_of_type(*BEARINGS, *PLAIN_BEARINGS):
-        with notes.faults.gathered():
+        with notes.errors.gathered():
             block = _bearing(model, places, bodies, part, notes)
             if block is not None:
                 blocks[f"bearing_{len(blocks) + 1}"] = block
@@ -52,7 +52,7 @@ def bearing_blocks(model: Model, places: Places, bodies: Bodies, notes: Notes) -
         entries = _stiffness(part, notes)
         if not entries:
             continue
-        with notes.faults.gathered():
+        with notes.errors.gathered():
             blocks[f"bearing_{len(blocks) + 1}"] = _placed(places, part, body, on, {"stiffness": Block("", entries)})
     return blocks
 

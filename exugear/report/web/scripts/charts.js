@@ -30,7 +30,8 @@ export async function redrawCharts(all) {
   const drawn = [];
   for (const name of Object.keys(pageData.charts)) {
     const box = find(name)?.querySelector(".plot");
-    if (box && (all || plotIn(box))) drawn.push(drawChart(name));
+    // What is hidden has no width; drawn all the same, it would be printed in giant letters.
+    if (box?.clientWidth && (all || plotIn(box))) drawn.push(drawChart(name));
   }
   await Promise.all(drawn);
 }
@@ -57,12 +58,18 @@ async function drawChart(name) {
   if (words && !figure?.querySelector(".legend")) words.before(legendOf(curves));
   addTools(figure?.querySelector(".tools"), () => chart.title, {
     rows: () => [
-      [chart.axes[0].label, ...curves.map((curve) => curve.label)],
+      [chart.axes[0].label, ...curves.map((curve) => headingOf(chart, curve))],
       ...Array.from(joined[0], (_, row) => joined.map((column) => column[row])),
     ],
     canvas: () => /** @type {HTMLCanvasElement} */ (box.querySelector("canvas")),
     extra: chart.axes[0].logarithmic ? [] : zoomButtons(box),
   });
+}
+
+/** Heading of a column of data, with its unit. @param {import("./page_data.js").ChartData} chart @param {Curve} curve */
+function headingOf(chart, curve) {
+  const axis = chart.axes[curve.right ? 2 : 1].label;
+  return curve.label.includes(" / ") || !axis.includes(" / ") ? curve.label : `${curve.label}, ${axis}`;
 }
 
 /** @param {import("./page_data.js").CurveData} data @returns {Promise<Curve>} */

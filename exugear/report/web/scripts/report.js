@@ -1,5 +1,4 @@
 // The report: all parts begun, and told what changes.
-import { beginCampbell, drawCampbell } from "./campbell.js";
 import { beginCharts, redrawCharts, unpackCharts } from "./charts.js";
 import { drawCuts } from "./cuts.js";
 import { drawDetail } from "./detail.js";
@@ -29,7 +28,6 @@ async function redraw(changed) {
     const over = ["group", "variant", "view", "channel", "limit", "resonance", "lines"];
     if (any(changed, over)) drawn.push(drawWaterfall(), drawCuts());
   }
-  if (any(changed, ["model", "mode", "lines"])) drawCampbell();
   if (any(changed, ["model", "mode"])) drawn.push(drawMode());
   return Promise.all(drawn);
 }
@@ -41,7 +39,6 @@ onChange((changed) => (drawing = redraw(changed)));
 /** Draw all figures anew, in the colours of now. @param {boolean} all also those that were not in view so far */
 function recolour(all) {
   if (hasRuns) void Promise.all([drawWaterfall(), drawCuts()]);
-  drawCampbell();
   void redrawCharts(all);
 }
 
@@ -51,7 +48,6 @@ function begin() {
   if (hasRuns) beginLimit();
   beginTables();
   beginModeView();
-  beginCampbell();
   recall();
   beginCharts();
   void drawing.finally(() => {

@@ -16,7 +16,7 @@ export const state = {
   limit: 0,
 };
 
-/** Stands for the loudest resonance: no place, so that it falls back to it. */
+/** Stands for the first resonance of the ranking: no place, so that it falls back to it. */
 const LOUDEST = -2;
 
 /** @type {((changed: Set<string>) => void)[]} */
@@ -78,7 +78,7 @@ function mendRuns(group, choice) {
   if (state.view === "difference" || !channels.includes(state.channel)) state.channel = "overall";
   const count = variant.resonances.length;
   if (!(Number.isInteger(state.resonance) && state.resonance >= -1 && state.resonance < count)) {
-    state.resonance = loudestOf(variant);
+    state.resonance = variant.first;
   }
   if (!count) state.resonance = -1;
   const top = fastest(group);
@@ -88,12 +88,6 @@ function mendRuns(group, choice) {
   if (moved) followResonance(variant, choice);
   if (!state.lines.length && pageData.lines.length) state.lines = [0];
 }
-
-/**
- * Place of the loudest resonance that every window shows; of the loudest, if none is so steady.
- * @param {import("./page_data.js").VariantData} variant
- */
-const loudestOf = (variant) => Math.max(0, variant.resonances.findIndex((own) => own.steady));
 
 /** Choose the loudest resonance of what is chosen otherwise. @param {Partial<State>} choice */
 export const chooseLoudest = (choice) => choose({ ...choice, resonance: LOUDEST });

@@ -9,10 +9,10 @@ export function drawSwitches() {
   const group = chosenGroup();
   const variant = chosenVariant();
   if (!group || !variant) return;
-  const box = find("group");
+  const box = /** @type {HTMLSelectElement | null} */ (find("group"));
   if (box) {
-    const words = pageData.groups.map((own) => /** @type {[string, string]} */ ([own.name, own.words]));
-    fillChoices(box, words, state.group, (name) => chooseLoudest({ group: name }));
+    box.replaceChildren(...pageData.groups.map((own) => make("option", { value: own.name }, own.words)));
+    box.value = state.group;
   }
   const variants = Object.entries(group.variants).map(
     ([name, own]) => /** @type {[string, string]} */ ([name, sentenceCase(own.words)]),
@@ -46,6 +46,9 @@ export function beginSwitches() {
   find("channel")?.addEventListener("change", (event) =>
     choose({ channel: /** @type {HTMLSelectElement} */ (event.target).value, view: "variant" }),
   );
+  find("group")?.addEventListener("change", (event) =>
+    chooseLoudest({ group: /** @type {HTMLSelectElement} */ (event.target).value }),
+  );
   find("share")?.addEventListener("click", copyAddress);
   find("print")?.addEventListener("click", () => window.print());
   find("save-data")?.addEventListener("click", () => saveJson("data", pageData));
@@ -61,9 +64,6 @@ export function beginSwitches() {
       target.focus({ preventScroll: true });
     });
   }
-  window.addEventListener("beforeprint", () => {
-    for (const part of document.querySelectorAll("details")) part.open = true;
-  });
   watchSections();
 }
 

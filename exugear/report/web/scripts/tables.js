@@ -49,7 +49,9 @@ function sort(table, column, head) {
   const rows = rowsOf(table);
   const key = (/** @type {HTMLTableRowElement} */ row) => {
     const cell = row.cells[column];
-    return cell.dataset.order === undefined ? (cell.textContent ?? "") : Number(cell.dataset.order);
+    const order = cell.dataset.order;
+    if (order === undefined) return cell.textContent ?? "";
+    return order === "" ? -Infinity : Number(order.replace("inf", "Infinity"));
   };
   rows.sort((a, b) => {
     const [one, two] = [key(a), key(b)];
@@ -64,10 +66,15 @@ function addCsv(table) {
   const title = table.dataset.title || table.id;
   const button = make("button", { type: "button", "aria-label": `CSV: ${title}` }, "CSV");
   button.addEventListener("click", () => {
-    const text = (/** @type {HTMLTableCellElement} */ cell) => (cell.textContent ?? "").trim();
-    saveTable(title, [...table.rows].map((row) => [...row.cells].map(text)));
+    saveTable(title, [...table.rows].map((row) => [...row.cells].map(plain)));
   });
   table.parentElement?.before(make("div", { class: "tools of-table" }, button));
+}
+
+/** Content of a cell for data: its number in the unit of the heading, or its text. @param {HTMLTableCellElement} cell */
+function plain(cell) {
+  const text = (cell.textContent ?? "").trim();
+  return cell.dataset.order ?? (text === "–" ? "" : text);
 }
 
 /** Show the rows of the ranking that fit; the same for all of its tables. */

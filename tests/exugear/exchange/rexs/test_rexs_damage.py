@@ -95,8 +95,8 @@ def imports_or_is_refused_in_words(text):
     try:
         to_case(parse_model(text.encode()), "damaged.rexs")
     except RexsError as error:
-        assert error.faults
-        assert all(len(fault) > 10 for fault in error.faults)
+        assert error.errors
+        assert all(len(line) > 10 for line in error.errors)
         return False
     return True
 

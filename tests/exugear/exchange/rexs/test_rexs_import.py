@@ -18,7 +18,7 @@ from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.tree import Attribute, RexsError
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.bearings.rolling.dimensions import boundary_of
-from exugear.system.readiness import lacking
+from exugear.system.gearbox_checks import lacking
 
 from ...cases.command import exugear
 
@@ -82,7 +82,7 @@ def test_the_train_rolls_as_its_teeth_say(name, imported):
 def test_what_is_no_gearbox_of_cylindrical_gears_is_refused_by_name(name):
     with pytest.raises(RexsError, match=REFUSED[name].replace("[", r"\[").replace("]", r"\]")) as refusal:
         to_case(read_rexs(DATA / name), name)
-    assert len(refusal.value.faults) == 1
+    assert len(refusal.value.errors) == 1
 
 
 @pytest.mark.parametrize("name", IMPORTED)

@@ -12,7 +12,7 @@ import pytest
 from exugear.exchange.rexs.containers import read_rexs
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.tree import Attribute, Component, Model, Relation, RexsError
-from exugear.system.readiness import lacking
+from exugear.system.gearbox_checks import lacking
 from fe_ste.geometry.involute import inverse_involute, involute
 
 DATA = Path(__file__).parent / "data"

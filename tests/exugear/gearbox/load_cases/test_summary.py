@@ -16,8 +16,8 @@ from exugear.gearbox.load_cases import (
     BURSTING_RIM_SPEED,
     LoadSummary,
     bearing_range_warning,
-    doubts_about,
     gearbox_at_load,
+    load_warnings,
     other_load_warning,
     summarise_loads,
 )
@@ -61,7 +61,7 @@ def test_two_gears_accelerate_as_by_hand():
     # What the pinion does not need to accelerate itself goes through the mesh.
     assert loads.mesh_forces["spur"] == pytest.approx((100.0 - 1e-2 * net / INERTIA) / BASE, rel=1e-12)
     assert (dict(loads.flanks), loads.reversed_flanks) == ({"spur": "+"}, ())
-    assert doubts_about(loads) == ()
+    assert load_warnings(loads) == ()
 
 
 @pytest.mark.parametrize("name", ["reference", "generating", "rated"])

@@ -44,12 +44,12 @@ def test_every_example_is_a_value_that_the_program_takes() -> None:
 @pytest.mark.parametrize("text", [*(template(kind) for kind in KINDS), GRC.read_text(encoding="utf-8")])
 def test_files_that_run_have_only_keys_and_ranges_of_the_schema(text: str) -> None:
     schema = json_schema()
-    assert _faults(tomllib.loads(text), schema, schema) == []
+    assert _errors(tomllib.loads(text), schema, schema) == []
     broken = tomllib.loads(text.replace("teeth = ", "teeth = 9000", 1).replace("face_width_mm", "face_width", 1))
-    assert len(_faults(broken, schema, schema)) == 3  # too many teeth, an unknown key, a missing one
+    assert len(_errors(broken, schema, schema)) == 3  # too many teeth, an unknown key, a missing one
 
 
-def _faults(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> list[str]:
+def _errors(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> list[str]:
     """Check what of JSON schema the tables use: references, keys, numbers."""
     if "$ref" in schema:
         schema = root["$defs"][schema["$ref"].rpartition("/")[2]]
@@ -58,16 +58,16 @@ def _faults(value: Any, schema: dict[str, Any], root: dict[str, Any]) -> list[st
         for key, entry in value.items():
             patterns = list(schema.get("patternProperties", {}).values())
             if key in schema.get("properties", {}):
-                found += _faults(entry, schema["properties"][key], root)
+                found += _errors(entry, schema["properties"][key], root)
             elif patterns:
-                found += _faults(entry, patterns[0], root)
+                found += _errors(entry, patterns[0], root)
             else:
                 found.append(f"unknown {key}")
         return found
     if isinstance(value, int | float) and not isinstance(value, bool) and "minimum" in schema:
         return [] if schema["minimum"] <= value <= schema["maximum"] else [f"range {value}"]
     if isinstance(value, list):
-        return [fault for entry in value for fault in _faults(entry, schema.get("items", {}), root)]
+        return [error for entry in value for error in _errors(entry, schema.get("items", {}), root)]
     return []
 
 

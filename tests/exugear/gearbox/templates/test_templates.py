@@ -1,4 +1,4 @@
-"""Gearbox files to start from: without a fault or a warning, and through the verbs as they are."""
+"""Gearbox files to start from: without an error or a warning, and through the verbs as they are."""
 
 from __future__ import annotations
 

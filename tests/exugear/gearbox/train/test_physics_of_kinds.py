@@ -302,7 +302,7 @@ def test_a_law_that_needs_a_table_refuses_a_stated_stiffness() -> None:
 
 
 @pytest.mark.parametrize(
-    ("keys", "fault"),
+    ("keys", "error"),
     [
         ({"mean_N_per_m": 4e8, "cosine_N_per_m": [5e8]}, "falls to -1e\\+08 N/m"),
         (
@@ -313,10 +313,10 @@ def test_a_law_that_needs_a_table_refuses_a_stated_stiffness() -> None:
         ({}, "set mean_N_per_m, with or without harmonics, or over_cycle_N_per_m"),
     ],
 )
-def test_a_stated_stiffness_is_one_positive_thing(keys: dict[str, object], fault: str) -> None:
+def test_a_stated_stiffness_is_one_positive_thing(keys: dict[str, object], error: str) -> None:
     content = pair()
     content["pairs"]["helical"]["stiffness"] = keys
-    with pytest.raises(GearboxFileError, match=fault):
+    with pytest.raises(GearboxFileError, match=error):
         Gearbox.from_dict(content)
 
 
@@ -331,7 +331,7 @@ def test_a_pair_has_a_table_or_a_stated_stiffness() -> None:
 
 
 def test_planets_that_mesh_are_told_when_they_do_not_fit() -> None:
-    from exugear.system.readiness import check_parts
+    from exugear.system.gearbox_checks import check_parts
 
     content = meshing_planets()
     content["bodies"]["short"]["planet_angles_deg"] = [angle + 2.0 for angle in (0.0, 120.0, 240.0)]

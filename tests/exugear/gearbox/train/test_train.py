@@ -55,7 +55,7 @@ def train_of(grc: Gearbox, locked: tuple[str, ...] = ("b",), **changes: object) 
         "output": "c",
         "torques": {"c": 10.0},
         "locked": locked,
-        "fault": ValueError,
+        "error": ValueError,
     }
     return Train(**(values | changes))
 

@@ -162,7 +162,7 @@ HEADED = "time_s,carrier_N_m,carrier_rpm\n"
 def test_bad_sources_are_one_error_each(tmp_path, text, keys, message):
     with pytest.raises(GearboxFileError, match=message) as caught:
         load_sources(loaded(tmp_path, text, **keys))
-    assert len(caught.value.faults) == 1
+    assert len(caught.value.errors) == 1
 
 
 @pytest.mark.parametrize(

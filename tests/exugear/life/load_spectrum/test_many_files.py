@@ -224,7 +224,7 @@ def test_bad_patterns_are_one_error_each(dlc, keys, message):
     (dlc / "other.csv").write_text("name,hours\na,1\n")
     with pytest.raises(GearboxFileError, match=message) as caught:
         load_sources(gearbox(dlc, all={"skip_s": 0.0, "torque": "RotTorq", "speed": "RotSpeed", **keys}))
-    assert len(caught.value.faults) == 1
+    assert len(caught.value.errors) == 1
 
 
 def test_a_series_needs_its_hours(tmp_path):

@@ -16,20 +16,24 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
 from exugear.report import design_study
+from exugear.report.findings.context import OTHER_INPUT
 from exugear.report.findings.design_changes import (
     ChangeResult,
     DesignChange,
+    DesignStudy,
     Effect,
-    effects_in_decibels,
     effects_of,
     helix_change,
     ordered,
     peaks_of,
     price_of,
     propose_changes,
+    read_design_study,
 )
 from exugear.report.findings.loudness import Resonance
+from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.system.tooth_mesh import tables
+from fe_ste.tools.files import FileError
 
 from ...cases.spur import COARSE_INPUT, SPUR_CASE
 
@@ -117,12 +121,11 @@ def test_the_diagram_of_changes_has_both_effects_of_those_that_can_be_made() -> 
         ChangeResult(DesignChange(name, f"{name} it", "gear", {}), effects, "", refusal)
         for name, effects, refusal in (("widen", known, ""), ("turn", {}, "does not fit"), ("soften", {}, ""))
     )
-    panel = design_study.DesignStudy(RESONANCE, results, Path("changes.json")).plot()
+    panel = DesignStudy({}, "", "spur", 184.0, 2.4, {}, results).plot()
     assert [label.get_text() for label in panel.get_yticklabels()] == ["widen it", "soften it"]
-    effects = effects_in_decibels([results[0], results[2]])
     drawn = np.array([bar.get_width() for bar in panel.patches]).reshape(2, 2, 2)  # quantity, range or peak, change
-    np.testing.assert_array_equal(drawn, [effects[name].T[::-1] for name in ("error", "force")])
-    np.testing.assert_array_equal(effects["error"], [[-6.0, -2.0], [math.nan, math.nan]])
+    expected = [[[known[name].highest, None], [known[name].this_peak, None]] for name in ("error", "force")]
+    np.testing.assert_array_equal(drawn, np.array(expected, dtype=np.float64))
     assert panel.get_xlabel() == "Change of the amplitude / dB"
 
 
@@ -155,7 +158,7 @@ def test_a_study_computes_each_change_once_and_names_what_cannot_be_made(tmp_pat
     assert names == ["crowned", "housing", "wide"]
     assert all(math.isfinite(effect.this_peak) for effect in study.results[0].effects.values())
     assert study.results[2].refusal and not study.results[2].effects
-    stored = json.loads(study.path.read_text(encoding="utf-8"))
+    stored = json.loads((tmp_path / DESIGN_CHANGES_FILE).read_text(encoding="utf-8"))
     assert [result["change"]["name"] for result in stored["results"]] == names
     # Repeated, everything is read: no file of a response or table is written again.
     files = sorted((tmp_path / design_study.FOLDER).rglob("*.nc"))
@@ -163,3 +166,53 @@ def test_a_study_computes_each_change_once_and_names_what_cannot_be_made(tmp_pat
     again = project.design_changes()
     assert [result.effects for result in again.results] == [result.effects for result in study.results]
     assert [path.stat().st_mtime_ns for path in files] == before
+    # The page lists what the file has, and nothing of another gearbox.
+    path = tmp_path / DESIGN_CHANGES_FILE
+    assert read_design_study(path) == study
+    page = project.report()
+    text = page.path.read_text(encoding="utf-8")
+    assert "too far apart" in text and 'id="design-changes"' in text and not page.left_out
+    reduction = next(line for line in page.statements if line.startswith("Reduction"))
+    assert ("crowned" in reduction) == (study.results[0].effects["error"].this_peak < 0.0)
+    path.write_text(json.dumps(stored | {"input_hash": "0"}), encoding="utf-8")
+    page = project.report()
+    assert page.left_out == (f"{DESIGN_CHANGES_FILE}: {OTHER_INPUT}",)
+    assert 'id="design-changes"' not in page.path.read_text(encoding="utf-8")
+
+
+def damaged_studies() -> dict[str, str]:
+    """Contents of files that are no studies."""
+    result = {"change": {"name": "a", "words": "a", "group": "gear", "keys": {}}, "effects": {}, "price": ""}
+    study = {
+        "model": {"variant": "bushing", "mesh_model": "table", "inertias": "discs"},
+        "input_hash": "0",
+        "line": "spur",
+        "frequency": 1.0,
+        "speed": 1.0,
+        "amplitudes": {},
+        "results": [result | {"refusal": ""}],
+    }
+    first = study["results"][0]
+    changed = {
+        "not JSON": "{",
+        "a list": "[]",
+        "deep": "[" * 100_000,
+        "no results": json.dumps({key: value for key, value in study.items() if key != "results"}),
+        "a text as results": json.dumps(study | {"results": "none"}),
+        "another key": json.dumps(study | {"more": 1}),
+        "a text as frequency": json.dumps(study | {"frequency": "high"}),
+        "NaN": json.dumps(study | {"speed": math.nan}),
+        "another group": json.dumps(study | {"results": [first | {"change": first["change"] | {"group": "?"}}]}),
+        "an effect of text": json.dumps(study | {"results": [first | {"effects": {"error": {"here": "much"}}}]}),
+    }
+    assert DesignStudy(**json.loads(json.dumps(study)))
+    return changed
+
+
+@pytest.mark.parametrize("damage", damaged_studies())
+def test_a_damaged_study_is_one_message(tmp_path: Path, damage: str) -> None:
+    path = tmp_path / DESIGN_CHANGES_FILE
+    path.write_text(damaged_studies()[damage], encoding="utf-8")
+    with pytest.raises(FileError, match="cannot be read as design changes") as caught:
+        read_design_study(path)
+    assert "--levers" in str(caught.value) and len(str(caught.value)) < 500

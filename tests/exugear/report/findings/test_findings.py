@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,6 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings import facts
 from exugear.report.findings.facts import sensitivities_of
-from exugear.report.findings.loudness import PeakAmplitude, Ranking, Resonance
 from exugear.report.findings.verdicts import best_change, track_mode
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.run_spectra import is_among, other_windows, survives
@@ -89,21 +86,19 @@ def test_words_are_labels_and_copies_are_numbered(gearbox):
     assert words.family("hss") == "hss"
 
 
-def test_a_card_has_25_words_at_most_whatever_the_names(gearbox):
+def test_a_card_has_25_words_at_most_whatever_the_names():
     """Names of four words at each place: what has no room is left to the table."""
     names = ("generator side planet carrier", "rotor side cylindrical roller bearing")
+    damping = facts.short("Strain energy 16 %.", *(f"A change of {name}: −2.5 dB." for name in 4 * names))
+    assert len(damping.split()) <= facts.MOST_WORDS == 25
+
+
+def test_orders_have_one_name_whatever_they_are_read_from(gearbox):
     words = Labels(gearbox)
-    loudness = {
-        "error": PeakAmplitude(55.6e-6, "", 1234),
-        "force": PeakAmplitude(12e3, names[1], 2345),
-        "acceleration": PeakAmplitude(129.0, names[1], None),
-    }
-    resonance = Resonance(f"2 x {names[0]} + {names[1]}", 66.0, 2.5, 185.0, loudness)
-    ranking = Ranking((resonance,), (1.0, 3.0), False, "shafts")
-    group = SimpleNamespace(main="bushing", ranked={"bushing": []})
-    fact = facts._operating_resonance(words, group, ranking)
-    assert fact.sentence.startswith("Order 2")
-    assert "TE ±55.6 µm (rank 1234/1)" in fact.sentence
-    assert len(fact.sentence.split()) <= facts.MOST_WORDS == 25
-    damping = facts._short("Strain energy 16 %.", *(f"A change of {name}: −2.5 dB." for name in 4 * names))
-    assert len(damping.split()) <= 25
+    second = words.order("2 x sun_planet", 198.0)
+    assert words.line(second) == "2 × sun–planet and ring–planet"
+    assert words.pairs(second) == (2, ["sun_planet", "ring_planet"])
+    combined = words.order("high_speed - 2 x intermediate", 900.0)
+    assert words.line(combined) == "high-speed - 2 × intermediate"
+    assert words.line_sentence(combined).startswith("the combination high-speed")
+    assert words.pairs(combined) == (1, [])

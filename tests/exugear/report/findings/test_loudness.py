@@ -12,7 +12,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
-from exugear.report.findings.loudness import HOUSING, SHAFTS, order_amplitudes, ranking_of, resonances
+from exugear.report.findings.loudness import HOUSING, SHAFTS, envelopes, order_amplitudes, ranking_of, resonances
 from exugear.report.pictures.diagrams import plot_response
 from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.settings import SpeedRange, SteadySettings
@@ -74,7 +74,7 @@ def test_three_quantities_stand_side_by_side_and_the_best_place_in_any_comes_fir
 
 def test_the_table_of_resonances_has_their_places_and_amplitudes():
     table = resonances(response(None))
-    rows = [own.to_row() for own in ranking_of(response(None)).resonances]
+    rows = [own.summary() for own in ranking_of(response(None)).resonances]
     assert table["line"].to_list() == [row["line"] for row in rows] == ["mesh", "2 x mesh", "2 x mesh"]
     assert table["force_N"].to_list() == [row["force_N"] for row in rows]
     assert table["speed_rpm"].to_list() == pytest.approx([-2.0 / RPM, -3.99 / RPM, -1.5 / RPM])
@@ -88,8 +88,10 @@ def test_the_diagram_over_speed_marks_the_ranked_peaks_on_the_curves_of_their_or
     table = resonances(data).dropna(subset=f"{quantity}_place").sort_values(f"{quantity}_place")
     panel = plot_response(data, quantity)
     curves = {line.get_label(): line.get_xydata() for line in panel.lines if len(line.get_xdata()) > 1}
-    amplitude = factor * order_amplitudes(data, quantity)
-    np.testing.assert_array_equal(curves.pop("highest order").T, [SPEED / RPM, amplitude.max(axis=1)])
+    amplitude = factor * order_amplitudes(data)[quantity]
+    envelope = envelopes(data)[quantity]  # what the page draws
+    np.testing.assert_array_equal(curves.pop("highest order").T, [envelope.speed / RPM, factor * envelope.amplitude])
+    np.testing.assert_allclose(factor * envelope.amplitude, amplitude.max(axis=1), rtol=1e-12)
     assert list(curves) == list(dict.fromkeys(table["line"]))
     for name, curve in curves.items():
         np.testing.assert_array_equal(curve[:, 1], amplitude[:, ["mesh", "2 x mesh"].index(name)])

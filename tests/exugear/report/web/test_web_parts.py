@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 
 from exugear.report.web.document import (
     ArrayStore,
@@ -99,7 +100,9 @@ def test_equal_arrays_are_kept_once():
 
 
 def test_the_policy_lets_these_scripts_run_and_nothing_leave():
-    page = whole_page("<title>", "<p>body</p>", "mode_page", {"name": "</script>"}, ArrayStore(), ["three.min.js"])
+    page = whole_page(
+        "<title>", Markup("<p>body</p>"), "mode_page", {"name": "</script>"}, ArrayStore(), ["three.min.js"]
+    )
     (policy,) = re.findall(r'http-equiv="Content-Security-Policy" content="([^"]*)"', page)
     rules = dict(rule.strip().split(" ", 1) for rule in policy.split(";"))
     assert rules["default-src"] == "'none'"

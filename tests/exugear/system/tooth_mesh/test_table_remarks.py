@@ -12,10 +12,10 @@ from exugear.system.tooth_mesh.element import MeshCurve
 from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
 from exugear.system.tooth_mesh.placement import MeshError
 from exugear.system.tooth_mesh.tables import (
-    doubts_about_table,
-    remarks_about_table,
     requested_tables,
+    table_notes,
     table_path,
+    table_warnings,
     wanted_table,
 )
 from fe_ste.transmission_error.states import CUT_OFF
@@ -52,8 +52,8 @@ def cut(table: MeshTable, share: float) -> MeshTable:
 
 def test_a_whole_table_leaves_nothing_to_say(computed: tuple[Gearbox, Path, MeshTable]) -> None:
     table = computed[2]
-    assert not list(remarks_about_table("spur", table))
-    assert not list(doubts_about_table("spur", table))
+    assert not list(table_notes("spur", table))
+    assert not list(table_warnings("spur", table))
 
 
 def test_few_missing_positions_are_a_remark_and_dynamics_go_on(
@@ -61,9 +61,9 @@ def test_few_missing_positions_are_a_remark_and_dynamics_go_on(
 ) -> None:
     gearbox, _, table = computed
     few = holed(table, [5, 6])
-    (line,) = remarks_about_table("spur", few)
+    (line,) = table_notes("spur", few)
     assert line.startswith(f"spur: 2 of 20 states not converged, first {REASON}; they are marked in the table")
-    assert not list(doubts_about_table("spur", few))
+    assert not list(table_warnings("spur", few))
     few.save(table_path(tmp_path, "spur"))
     assert wanted_table(gearbox, "spur", 20).hash == few.input_hash
     curve = mesh_stiffness(gearbox, "line_of_action", tmp_path)["spur"]
@@ -78,7 +78,7 @@ def test_many_missing_positions_are_a_doubt_and_dynamics_refuse_them(
 ) -> None:
     gearbox, _, table = computed
     many = holed(table, [1, 2, 3])
-    assert list(doubts_about_table("spur", many)) == [
+    assert list(table_warnings("spur", many)) == [
         "spur: 3 of 20 states not converged, more than 10 %",
         *[f"spur: {REASON}"] * 3,
     ]
@@ -91,10 +91,10 @@ def test_what_is_cut_off_is_told_with_its_share_and_doubtful_from_one_per_cent_o
     computed: tuple[Gearbox, Path, MeshTable],
 ) -> None:
     table = computed[2]
-    (line,) = remarks_about_table("spur", cut(table, 0.002))
+    (line,) = table_notes("spur", cut(table, 0.002))
     assert ": in 1 of 20 states contact extends beyond a form diameter" in line
-    assert not list(doubts_about_table("spur", cut(table, 0.002)))
-    (doubt,) = doubts_about_table("spur", cut(table, 0.02))
+    assert not list(table_warnings("spur", cut(table, 0.002)))
+    (doubt,) = table_warnings("spur", cut(table, 0.02))
     assert (
         ": in the static state 2 % of the load is beyond a form diameter, where a tip would press on a fillet" in doubt
     )

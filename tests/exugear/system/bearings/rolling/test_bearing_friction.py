@@ -17,7 +17,7 @@ from exugear.system.bearings.rolling.friction import (
     friction_series,
     frictional_moment,
 )
-from exugear.system.readiness import check_parts
+from exugear.system.gearbox_checks import check_parts
 
 CONSTANT = {
     "deep_groove_ball": 0.0015,

@@ -15,14 +15,14 @@ import numpy as np
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import torque_series
 from exugear.gearbox.parts import Bearing, Body
-from exugear.gearbox.reading import GearboxFileError, fault_line, readable
+from exugear.gearbox.reading import GearboxFileError, error_line, readable
 from exugear.gearbox.variant import Variant
 from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.friction import friction_series
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bearings.stiffness import elastic_names, linear_law, misplaced_factor, mounts_at_work, unsupported
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
-from exugear.system.plausibility import doubts_about_pairs, doubts_about_parts
+from exugear.system.part_warnings import pair_warnings, part_warnings
 from exugear.system.tooth_mesh.placement import MeshError, line_of_action_row, loaded_flanks, tooth_places
 from fe_ste.tools.arrays import Floats
 
@@ -161,24 +161,24 @@ def check_parts(gearbox: Gearbox) -> None:
     attempts += [partial(gearbox.table_distances, name) for name in _pairs_with_axes(gearbox)]
     attempts += [partial(torque_series, gearbox, case) for case in gearbox.load_cases.values()]
     attempts += [partial(_build_elastic_body, gearbox, name) for name in elastic_names(gearbox)]
-    faults: list[str] = []
+    errors: list[str] = []
     for attempt in attempts:
         try:
             attempt()
         except GearboxFileError as error:
-            faults += error.faults
-    if faults:
-        raise GearboxFileError(*faults)
+            errors += error.errors
+    if errors:
+        raise GearboxFileError(*errors)
 
 
-def faults_of_bearings(content: Mapping[str, Any], source: str) -> Iterator[str]:
+def errors_of_bearings(content: Mapping[str, Any], source: str) -> Iterator[str]:
     """Return rolling bearings with inconsistent data, in content that may have other errors."""
     for name, section in readable(content).bearings.items():
         if section.catalogue is not None:
             try:
                 catalogue_rows(section.catalogue)
             except BearingError as error:
-                yield fault_line(source, f"bearings.{name}.catalogue: {error}")
+                yield error_line(source, f"bearings.{name}.catalogue: {error}")
 
 
 def lacking(gearbox: Gearbox, variant: str) -> str:
@@ -203,7 +203,7 @@ def _misfits(gearbox: Gearbox, variant: Variant) -> str:
         try:
             _build_elastic_body(gearbox, name)
         except GearboxFileError as error:
-            return error.faults[0].removeprefix(f"{gearbox.source}: ")
+            return error.errors[0].removeprefix(f"{gearbox.source}: ")
     return ""
 
 
@@ -215,7 +215,7 @@ def _misplaced_factors(gearbox: Gearbox, variant: Variant) -> str:
     return next(filter(None, reasons), "")
 
 
-def remarks(gearbox: Gearbox) -> tuple[str, ...]:
+def gearbox_warnings(gearbox: Gearbox) -> tuple[str, ...]:
     """Return implausible inputs, and how they are interpreted; one line each, the same for every command."""
     lines = list(gearbox.warnings)
     lines += (
@@ -230,8 +230,8 @@ def remarks(gearbox: Gearbox) -> tuple[str, ...]:
             f"meshes: the gear train has {train.degrees_of_freedom} degrees of freedom; ratio, orders and input "
             f"speeds apply while {others} do{'es' if len(train.independent) == 2 else ''} not rotate"
         )
-    lines += doubts_about_pairs(gearbox)
-    lines += doubts_about_parts(gearbox)
+    lines += pair_warnings(gearbox)
+    lines += part_warnings(gearbox)
     lines += _narrowed_seats(gearbox)
     return tuple(dict.fromkeys(lines))
 
@@ -250,16 +250,16 @@ def _build_bearing(gearbox: Gearbox, bearing: Bearing) -> None:
         if bearing.catalogue is not None:
             friction_series(bearing.catalogue)
     except BearingError as error:
-        raise gearbox.fault(f"bearings.{bearing.family}.catalogue: {error}") from None
+        raise gearbox.error(f"bearings.{bearing.family}.catalogue: {error}") from None
     if not np.all(np.isfinite(stiffness)):
-        raise gearbox.fault(f"bearings.{bearing.family}.catalogue: stiffness is not finite; check its dimensions")
+        raise gearbox.error(f"bearings.{bearing.family}.catalogue: stiffness is not finite; check its dimensions")
 
 
 def _place_teeth(gearbox: Gearbox) -> None:
     try:
         tooth_places(gearbox, loaded_flanks(gearbox))
     except MeshError as error:
-        raise gearbox.fault(str(error)) from None
+        raise gearbox.error(str(error)) from None
 
 
 def _count_states(gearbox: Gearbox) -> None:
@@ -267,7 +267,7 @@ def _count_states(gearbox: Gearbox) -> None:
     states = axes.positions * len(axes.torque_factors) * len(axes.centre_distance_offsets_um or _FOLLOWING)
     states *= len(axes.misalignment_um or _FOLLOWING)
     if states > MOST_STATES:
-        raise gearbox.fault(f"ste: the axes result in {states} table states; at most {MOST_STATES} are permitted")
+        raise gearbox.error(f"ste: the axes result in {states} table states; at most {MOST_STATES} are permitted")
 
 
 def _pairs_with_axes(gearbox: Gearbox) -> list[str]:

@@ -14,8 +14,8 @@ from exugear.exchange.rexs.containers import read_rexs
 from exugear.exchange.rexs.to_case.conversion import to_case
 from exugear.exchange.rexs.tree import RexsError
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.plausibility import doubts_about_parts, usual_backlash
-from exugear.system.readiness import check_parts, remarks
+from exugear.system.gearbox_checks import check_parts, gearbox_warnings
+from exugear.system.part_warnings import part_warnings, usual_backlash
 
 from ...cases.gear_trains import KINDS
 
@@ -141,21 +141,21 @@ def test_a_mistake_is_told_with_key_value_and_what_it_is_compared_with(mistake: 
     change(content)
     gearbox = Gearbox.from_dict(content)
     check_parts(gearbox)  # possible, all of them
-    assert sum(words in line for line in remarks(gearbox)) == 1, remarks(gearbox)
+    assert sum(words in line for line in gearbox_warnings(gearbox)) == 1, gearbox_warnings(gearbox)
 
 
 @pytest.mark.parametrize("name", ["pair", "parallel", "planetary", "wind"])
 def test_templates_raise_no_alarm(name: str) -> None:
-    assert remarks(Gearbox.from_dict(template(name))) == ()
+    assert gearbox_warnings(Gearbox.from_dict(template(name))) == ()
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_trains_of_every_kind_raise_no_alarm(kind: str) -> None:
-    assert list(doubts_about_parts(Gearbox.from_dict(KINDS[kind]()))) == []
+    assert list(part_warnings(Gearbox.from_dict(KINDS[kind]()))) == []
 
 
 def test_the_reference_gearbox_raises_no_alarm(grc: Gearbox) -> None:
-    assert list(doubts_about_parts(grc)) == []
+    assert list(part_warnings(grc)) == []
 
 
 @pytest.mark.parametrize("path", sorted(REXS.glob("*.rexs*")), ids=lambda path: path.name)
@@ -164,7 +164,7 @@ def test_imports_raise_no_alarm(path: Path) -> None:
         gearbox = to_case(read_rexs(path), path.name).gearbox
     except RexsError:
         pytest.skip("refused in words, which the tests of imports hold")
-    assert list(doubts_about_parts(gearbox)) == []
+    assert list(part_warnings(gearbox)) == []
 
 
 def test_backlash_of_the_recommendation_is_that_of_its_formula() -> None:
@@ -181,9 +181,9 @@ def test_a_wheel_narrower_than_the_shaft_that_is_drawn_under_it_is_told():
     ):
         content = tomllib.loads((ROOT / "cases/grc750/gearbox.toml").read_text("utf-8"))
         content["gears"][name]["held_diameter_mm"] *= 0.5
-        found = [*doubts_about_parts(Gearbox.from_dict(content, str(ROOT / "cases/grc750/gearbox.toml")))]
+        found = [*part_warnings(Gearbox.from_dict(content, str(ROOT / "cases/grc750/gearbox.toml")))]
         assert any(name in line and words in line for line in found), found
     for name in ("im_pinion", "hs_pinion"):
         content = tomllib.loads((ROOT / "cases/grc750/gearbox.toml").read_text("utf-8"))
         content["gears"][name]["held_diameter_mm"] *= 0.5
-        assert not [*doubts_about_parts(Gearbox.from_dict(content, str(ROOT / "cases/grc750/gearbox.toml")))]
+        assert not [*part_warnings(Gearbox.from_dict(content, str(ROOT / "cases/grc750/gearbox.toml")))]

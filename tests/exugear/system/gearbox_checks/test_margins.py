@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.plausibility import PROPOSED_MARGIN, doubts_about_pairs, pair_margins
-from exugear.system.readiness import remarks
+from exugear.system.gearbox_checks import gearbox_warnings
+from exugear.system.part_warnings import PROPOSED_MARGIN, pair_margins, pair_warnings
 from fe_ste.contact.kinematics import reaches_form_circle
 from fe_ste.transmission_error.search import contact_state, pitch_point_pressure
 from fe_ste.transmission_error.table import MeshTable, prepared_compliance
@@ -45,7 +45,9 @@ def at_form_circle(gearbox: Gearbox, torque: float = 100.0) -> int:
 def test_a_small_margin_foretells_contact_at_the_form_circle_and_the_proposal_mends_it() -> None:
     gearbox = spur(0.9)
     assert pair_margins(gearbox.pairs["helical"]).form[0] < 0.01
-    (doubt,) = (line for line in remarks(gearbox) if "% of the profile length from the root form diameter of" in line)
+    (doubt,) = (
+        line for line in gearbox_warnings(gearbox) if "% of the profile length from the root form diameter of" in line
+    )
     assert doubt.startswith("gears.large.tip_diameter_mm = ")
     assert at_form_circle(gearbox) > 0
     assert not table_of(gearbox).failures
@@ -53,7 +55,7 @@ def test_a_small_margin_foretells_contact_at_the_form_circle_and_the_proposal_me
     assert proposed is not None
     mended = spur(0.9, tip_diameter_mm=float(proposed[1]))
     assert pair_margins(mended.pairs["helical"]).form[0] == pytest.approx(PROPOSED_MARGIN, abs=1e-4)
-    assert not list(doubts_about_pairs(mended))
+    assert not list(pair_warnings(mended))
     assert at_form_circle(mended) == 0
 
 
@@ -67,13 +69,15 @@ def test_a_pressure_that_no_steel_bears_is_a_warning() -> None:
         gearbox = Gearbox.from_dict(content)
         stress = 1e-6 * pair_margins(gearbox.pairs["helical"]).pitch_point_pressure
         expected = f"pairs.helical: Hertzian stress {stress:.4g} MPa"
-        assert any(line.startswith(expected) for line in remarks(gearbox)) == told
+        assert any(line.startswith(expected) for line in gearbox_warnings(gearbox)) == told
 
 
 def test_a_thin_tip_is_a_warning_and_a_pointed_one_a_fault() -> None:
     thin = spur(1.2)
     assert pair_margins(thin.pairs["helical"]).tip_thickness[0] == pytest.approx(0.120, abs=1e-3)
-    assert any("0.120 m_n; usual minimum 0.2 m_n, 0.4 m_n for case-hardened teeth" in line for line in remarks(thin))
+    assert any(
+        "0.120 m_n; usual minimum 0.2 m_n, 0.4 m_n for case-hardened teeth" in line for line in gearbox_warnings(thin)
+    )
     with pytest.raises(ValueError, match="at least 0.1 is needed"):
         spur(1.25)
 

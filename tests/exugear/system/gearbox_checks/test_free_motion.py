@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.system.readiness import free_motion, remarks
+from exugear.system.gearbox_checks import free_motion, gearbox_warnings
 
 from ...cases.spur import SPUR_CASE
 
@@ -41,5 +41,5 @@ def test_a_viscosity_is_judged_by_the_range_of_its_temperature(cold: float, hot:
     """Oils of ISO VG 32 to 150 have 5 to 15 mm2/s at 100 degrees."""
     found = tomllib.loads(SPUR_CASE)
     found["lubricant"] = {"viscosity_40_mm2_per_s": cold, "viscosity_100_mm2_per_s": hot}
-    lines = [line for line in remarks(Gearbox.from_dict(found, "case.toml")) if "viscosity" in line]
+    lines = [line for line in gearbox_warnings(Gearbox.from_dict(found, "case.toml")) if "viscosity" in line]
     assert bool(lines) == told

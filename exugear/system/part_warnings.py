@@ -48,7 +48,7 @@ TILTING = ("deep_groove_ball", "self_aligning_ball", "angular_contact_ball", "fo
 """Types of bearings of which a single row does not keep a shaft from tilting."""
 
 
-def doubts_about_parts(gearbox: Gearbox) -> Iterator[str]:
+def part_warnings(gearbox: Gearbox) -> Iterator[str]:
     """Say what looks like a mistake: key, value, and what it is compared with."""
     yield from _masses(gearbox)
     yield from _bores(gearbox)
@@ -69,7 +69,7 @@ def _masses(gearbox: Gearbox) -> Iterator[str]:
             key = f"bodies.{body.family}.inertia.{inertias}"
             if reach is None or body.fixed or key in reported:
                 continue
-            for doubt in _doubts_about_mass(body, *reach):
+            for doubt in _mass_warnings(body, *reach):
                 reported.add(key)
                 yield f"{key}.{doubt}"
 
@@ -85,7 +85,7 @@ def _reach(gearbox: Gearbox, body: Body) -> tuple[float, float] | None:
     return radius, max(ends) - min(ends)
 
 
-def _doubts_about_mass(body: Body, radius: float, length: float) -> Iterator[str]:
+def _mass_warnings(body: Body, radius: float, length: float) -> Iterator[str]:
     """Compare a body's mass and inertias with those of a cylinder of steel."""
     cylinder = STEEL * math.pi * radius**2 * length
     if not LEAST_MASS * cylinder < body.mass < MOST_MASS * cylinder:
@@ -361,7 +361,7 @@ class ThicknessRange:
     """Number of teeth of the base tangent; None for internal gears."""
     span: tuple[float, float]
     """Base tangent length over them, m; zero for internal gears."""
-    span_doubt: str = ""
+    span_warning: str = ""
     """Why an inspector cannot measure over this number of teeth; empty where nothing is in the way."""
 
 
@@ -374,10 +374,10 @@ def thickness_range(gearbox: Gearbox, name: str) -> ThicknessRange:
         return ThicknessRange(thickness, None, (0.0, 0.0))
     count = gear.usual_span
     spans = (thin.span_measurement(count), thick.span_measurement(count))
-    return ThicknessRange(thickness, count, spans, _span_doubt(thick, count))
+    return ThicknessRange(thickness, count, spans, _span_warning(thick, count))
 
 
-def _span_doubt(gear: Gear, count: int) -> str:
+def _span_warning(gear: Gear, count: int) -> str:
     """Say why the base tangent length over a number of teeth cannot be measured; empty where it can."""
     needed = gear.span_face_width(count)
     if gear.face_width <= needed:
@@ -431,7 +431,7 @@ def _margin(gear: Gear, roll_length: float) -> float:
     return (roll_length - gear.form_roll_length) / flank
 
 
-def doubts_about_pairs(gearbox: Gearbox) -> Iterator[str]:
+def pair_warnings(gearbox: Gearbox) -> Iterator[str]:
     """Yield the small margins of active pairs: key, value, and the recommended value."""
     at_work = {mesh.pair.name for mesh in gearbox.meshes}
     for name, spec in gearbox.pairs.items():

@@ -1,0 +1,467 @@
+"""Sections "Summary" (first resonance with cause and remedies), "Resonance ranking" and "Campbell diagram"."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from exugear.gearbox.load_cases import static_load_in_words
+from exugear.gearbox.units import RPM
+from exugear.gearbox.variant import Variant
+from exugear.report.changes_section import CHANGES_NAME, best_changes
+from exugear.report.findings.context import excitations
+from exugear.report.findings.facts import MOST_WORDS, facts_of_response, sensitivities_of, shift_text, short
+from exugear.report.findings.headline import (
+    Headline,
+    MatchedMode,
+    causes_of,
+    changes_of,
+    contributions_of,
+)
+from exugear.report.findings.loudness import HOUSING, SHAFTS, Envelope, Resonance
+from exugear.report.findings.verdicts import default_place, track_mode
+from exugear.report.findings.words import figure_text, percentages, rounded_text
+from exugear.report.material import Part, ReportData, model_name
+from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, Strips, campbell_of, strips_of
+from exugear.report.pictures.still import mode_picture
+from exugear.report.web.html import Cell, Table, render
+from exugear.report.web.stage import drawn_bodies, drawn_mode
+from exugear.steady.crossings import Contributions
+from exugear.system.modal_damping import damping_in_words
+
+SHOWN = NUMBERED
+"""Number of resonances in the ranking."""
+COUNTED = 1e-3
+"""Amplitude, over the highest of its quantity, from which a peak counts in "rank 3 of 40": 60 dB."""
+AT_RATED = 0.005
+"""Relative speed difference from the rated speed that counts as none."""
+SHOWN_ENERGIES = 3
+"""Number of listed fractions of an energy."""
+STRIPS = ((690.0, 350.0), (352.0, 440.0))
+"""Sizes of the diagrams of amplitude for windows of desktops and phones."""
+CAMPBELL = ((1120.0, 520.0), (352.0, 420.0))
+"""Sizes of the Campbell diagrams."""
+
+
+@dataclass(frozen=True)
+class QuantityLabel:
+    """Names of one of the three quantities."""
+
+    title: str
+    column: str
+    unit: str
+    factor: float
+    """From SI units."""
+
+
+QUANTITIES = {
+    "error": QuantityLabel("Transmission error", "transmission error", "µm", 1e6),
+    "force": QuantityLabel("Bearing force", "bearing force", "kN", 1e-3),
+    "acceleration": QuantityLabel("Acceleration at bearings", "acceleration", "m/s²", 1.0),
+}
+"""Labels of the quantities of a ranking."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """Box of the first screen: mode, cause or remedy."""
+
+    text: str
+    facts: Sequence[tuple[str, str]] = ()
+    """Terms with their values."""
+    changes: Sequence[tuple[str, str]] = ()
+    """Reduction in dB, and the change that causes it."""
+    picture: str = ""
+    """Address that contains the picture of the mode."""
+    link: str = ""
+    """Section with more."""
+
+    @property
+    def line(self) -> str:
+        """Content as one line."""
+        parts = [self.text.rstrip("."), *(f"{term}: {value}" for term, value in self.facts)]
+        return ". ".join([*parts, *(f"{change}: {gain}" for gain, change in self.changes)]) + "."
+
+
+def short_section(material: ReportData) -> Part:
+    """Show the first resonance of the ranking: amplitudes, mode, cause, remedies, and what could overturn it."""
+    headline = material.headline
+    notes = material.context.notes.statements
+    if headline is None:
+        # Continuation results and responses at few speeds are not ranked.
+        lines = [fact.line for data in material.results.steady for fact in facts_of_response(material.words, data)]
+        notes.extend(lines)
+        return Part(render("short", answer=None, lines=lines), title="Summary", name="short")
+    notes.append(f"Results: {_scope(material, headline)}")
+    top = headline.top
+    assert top is not None
+    mode = headline.mode_of(top)
+    known = contributions_of(material.context, headline)
+    curves = headline.envelopes(material.lines)
+    answer: dict[str, Any] = {
+        "scope": _scope(material, headline),
+        "kicker": _kicker(headline, top),
+        "frequency": f"{rounded_text(top.frequency)} Hz",
+        "speed": speed_text(top),
+        "off_rated": _off_rated(material, top),
+        "sentence": _sentence(material, headline, top, mode),
+        "quantities": [_quantity(material, headline, top, name) for name in top.amplitudes],
+        "note": _note(material, headline),
+        "strips": [_strips(material, headline, curves, size) for size in STRIPS if curves],
+        "resonance": _resonance_box(material, headline, mode),
+        "cause": _cause_box(material, top, known),
+        "remedy": _remedy_box(material, headline, top, mode, known),
+        "further": list(_further(material, headline, top, curves)),
+    }
+    quantities = ". ".join(
+        f"{one['title']} {one['value']} {one['unit']} (rank {one['rank']}{one['of']})" for one in answer["quantities"]
+    )
+    where = f"{answer['frequency']} at {answer['speed']}{answer['off_rated']}"
+    notes.append(f"Highest resonance: {where}. {answer['sentence']} {quantities}.")
+    boxes = (("Mode", "resonance"), ("Cause", "cause"), ("Reduction", "remedy"))
+    notes.extend(f"{title}: {answer[name].line}" for title, name in boxes)
+    notes.extend(f"{title}: {text}" for title, text in answer["further"])
+    return Part(
+        render("short", answer=answer, speed_label=f"{material.input_words} speed / rpm"),
+        title="Summary",
+        name="short",
+    )
+
+
+def _scope(material: ReportData, headline: Headline) -> str:
+    gearbox = material.context.gearbox
+    load = material.words.labelled(headline.load or f"static load, {static_load_in_words(gearbox)}")
+    return (
+        f"{Variant.of(headline.choice.variant).label}, {headline.source}. Load: {load}. Inertia set: "
+        f"{headline.choice.inertias}. Damping: {damping_in_words(gearbox.case.damping)}. Speeds: of the "
+        f"{material.input_words}."
+    )
+
+
+def amplitude_text(name: str, amplitude: float) -> str:
+    """Return an amplitude of one of the three quantities (SI units) as text."""
+    label = QUANTITIES[name]
+    return f"{label.column} ±{rounded_text(label.factor * amplitude)} {label.unit}"
+
+
+def speed_text(resonance: Resonance) -> str:
+    """Return the speed of a resonance as text."""
+    return f"{rounded_text(abs(resonance.speed) / RPM)} rpm"
+
+
+def _range_text(headline: Headline) -> str:
+    low, high = (rounded_text(speed / RPM) for speed in headline.ranking.speeds)
+    return f"{low} to {high} rpm"
+
+
+def _kicker(headline: Headline, top: Resonance) -> str:
+    where = "at all computed speeds" if headline.ranking.whole else "within the operating range"
+    first = [QUANTITIES[name].column for name, own in top.amplitudes.items() if own.place == 1]
+    if headline.ranking.without is not None:
+        low, high = (rounded_text(speed / RPM) for speed in headline.ranking.without)
+        return f"No resonance within the operating range, {low} to {high} rpm. Highest at all computed speeds"
+    if len(first) == len(QUANTITIES):
+        return f"Highest resonance {where}: first in all three quantities"
+    return f"Highest resonance {where}: first in {' and '.join(first)}"
+
+
+def _off_rated(material: ReportData, resonance: Resonance) -> str:
+    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    if rated is None:
+        return ""
+    off = abs(resonance.speed) / RPM / rated - 1.0
+    if abs(off) < AT_RATED:
+        return ", at rated speed"
+    return f", {100.0 * abs(off):.0f} % {'above' if off > 0.0 else 'below'} rated"
+
+
+def _sentence(material: ReportData, headline: Headline, top: Resonance, mode: MatchedMode | None) -> str:
+    line = material.words.line_sentence(material.words.order(top.line, top.order))
+    line = f"{line[0].upper()}{line[1:]}"
+    if mode is None or headline.modes is None:
+        name = material.words.labelled(headline.mode_name(top))
+        sentences = [f"{line} excites the mode {name}."] if name else []
+    else:
+        moves = material.words.moves(headline.modes, mode.index)
+        sentences = [f"{line} excites a mode in which {moves}.", f"{line} excites mode {mode.index + 1}."]
+    return next((own for own in sentences if len(own.split()) <= MOST_WORDS), f"{line} excites it.")
+
+
+def _quantity(material: ReportData, headline: Headline, top: Resonance, name: str) -> dict[str, Any]:
+    label = QUANTITIES[name]
+    own = top.amplitudes[name]
+    peaks = [other.amplitudes[name] for other in headline.ranking.resonances if other.amplitudes[name].place]
+    least = COUNTED * max((peak.amplitude for peak in peaks), default=0.0)
+    count = sum(peak.amplitude >= least for peak in peaks)
+    band = ""
+    if own.limits is not None:
+        band = " to ".join(rounded_text(label.factor * limit.amplitude) for limit in reversed(own.limits))
+    return {
+        "name": name,
+        "title": label.title,
+        "value": f"±{rounded_text(label.factor * own.amplitude)}",
+        "unit": label.unit,
+        "band": band,
+        "rank": own.place or "–",
+        "of": f" of {count}" * bool(own.place),
+        "place": material.words.of(own.at) if own.at else "input to output",
+    }
+
+
+def _note(material: ReportData, headline: Headline) -> str:
+    """Say what the amplitudes are of."""
+    if headline.group is None:
+        return "Estimate: amplification of the mode times static transmission error; `exugear steady` computes more."
+    if headline.response is None:
+        return "Amplitudes in the run-up; `exugear steady` adds bearing forces and accelerations at constant speed."
+    band = material.context.gearbox.case.damping.modal_band_percent
+    damping = "half to twice the value used" if band is None else f"{band[0]:g} to {band[1]:g} % of critical"
+    parts = {HOUSING: "of the housing at its bearing seats", SHAFTS: "of the shafts at bearings; the housing is rigid"}
+    accelerates = parts.get(headline.ranking.accelerates, f"of {headline.ranking.accelerates} at bearings")
+    text = f"Amplitude of this order at constant speed. Damping: {damping}."
+    if "acceleration" in headline.ranking.resonances[0].amplitudes:
+        text += f" Accelerations: {accelerates}."
+    return text
+
+
+def _strips(
+    material: ReportData, headline: Headline, curves: Mapping[str, Envelope], size: tuple[float, float]
+) -> Strips:
+    titles = {name: (f"{label.title}, ± {label.unit}", label.factor) for name, label in QUANTITIES.items()}
+    peaks = "; ".join(
+        f"{number}: {rounded_text(own.frequency)} Hz at {speed_text(own)}"
+        for number, own in enumerate(headline.ranking.resonances[:SHOWN], start=1)
+    )
+    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    return strips_of(headline.ranking, curves, titles, rated, size, f"Largest order over speed. {peaks}.")
+
+
+def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode | None) -> Box:
+    modes = headline.modes
+    if mode is None or modes is None:
+        return Box(
+            "No modes computed; run `exugear modes`." if modes is None else "No mode within 1 % of its frequency."
+        )
+    words = material.words
+    moving = {f"{body} {motion}": share for (body, motion), share in words.kinetic_energy(modes, mode.index).items()}
+    assembly = material.context.assembled(headline.choice)
+    bodies = drawn_bodies(assembly)
+    drawn = drawn_mode(assembly, bodies, modes["shape"].to_numpy()[:, mode.index], True)
+    picture = ""
+    if bodies:
+        shapes = [(body.shape, drawn.motions[n], drawn.fields.get(n)) for n, body in enumerate(bodies)]
+        picture = f"data:image/png;base64,{base64.b64encode(mode_picture(shapes)).decode('ascii')}"
+    return Box(
+        f"Mode {mode.index + 1} at {rounded_text(mode.frequency)} Hz, damping {rounded_text(100.0 * mode.damping)} %.",
+        [
+            ("Kinetic energy", percentages(moving, SHOWN_ENERGIES, 0.1)),
+            ("Strain energy", percentages(words.strain_energy(modes, mode.index), SHOWN_ENERGIES, 0.1)),
+        ],
+        picture=picture,
+        link="modes",
+    )
+
+
+def _cause_box(material: ReportData, top: Resonance, known: Contributions | None) -> Box:
+    found = excitations(material.context, material.results)
+    causes = causes_of(material.context, material.words, top, found, known)
+    line = material.words.order(top.line, top.order)
+    if not causes:
+        return Box(f"Excited by {material.words.line_sentence(line)}.", link="gears-section")
+    first = causes[0]
+    text = short(
+        f"Excited by {material.words.line_sentence(line)}.",
+        f"Its part of the static transmission error ({rounded_text(1e6 * first.swing)} µm peak-to-peak): "
+        f"±{rounded_text(1e6 * first.amplitude)} µm.",
+    )
+    facts = []
+    shared = [cause for cause in causes if cause.share is not None]
+    if shared:
+        shares = ", ".join(f"{material.words.of(cause.pair)} {100.0 * (cause.share or 0.0):.0f} %" for cause in shared)
+        facts.append(("Contribution", shares))
+    overlap = f"{rounded_text(first.overlap)}"
+    if first.overlap == 0.0:
+        overlap += " (spur gears)"
+    elif abs(first.overlap - round(first.overlap)) > 0.1:
+        overlap += "; with a whole number the total contact length is constant"
+    facts.append(("Overlap ratio", overlap))
+    return Box(text, facts, link="gears-section")
+
+
+def _remedy_box(
+    material: ReportData, headline: Headline, top: Resonance, mode: MatchedMode | None, known: Contributions | None
+) -> Box:
+    if computed := best_changes(material.design_study, headline, SHOWN_ENERGIES):
+        changes = [(gain, material.words.labelled(words)) for gain, words in computed]
+        return Box("Transmission error at this peak, computed for each change.", changes=changes, link=CHANGES_NAME)
+    changes = []
+    for change in changes_of(material.words, known):
+        sign = "+" if change.more else "−"
+        limit = "< " * change.bounded
+        changes.append((f"{limit}−{figure_text(change.gain, 2)} dB", f"{sign}10 % {change.what}"))
+    error = top.amplitudes["error"]
+    if error.limits is not None and error.place is not None and error.limits[1].amplitude > 0.0:
+        gain = 20.0 * math.log10(error.amplitude / error.limits[1].amplitude)
+        if gain > 0.0:
+            changes.append((f"−{figure_text(gain, 2)} dB", "highest plausible damping"))
+    if changes:
+        text = "Transmission error at this peak, to first order. `exugear report --levers` computes design changes."
+        return Box(text, changes=changes, link="change" * (mode is not None))
+    if mode is None or headline.modes is None:
+        return Box("Sensitivities need modes or a steady-state response: `exugear modes`, `exugear steady`.")
+    shifts = sensitivities_of(material.words, headline.modes, mode.index)[:SHOWN_ENERGIES]
+    changes = [(shift_text(shift), f"+10 % {shift.kind} of {shift.what}") for shift in shifts]
+    text = "Frequency shifts of this mode, to first order: they move the resonance. `exugear steady` adds its height."
+    return Box(text, changes=changes, link="change")
+
+
+def _further(
+    material: ReportData, headline: Headline, top: Resonance, curves: Mapping[str, Envelope]
+) -> Iterator[tuple[str, str]]:
+    """Yield title and text of the row of small cards."""
+    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    if rated is not None and curves:
+        yield f"At rated speed, {rounded_text(rated)} rpm", _rated_text(headline, curves, rated)
+    outside = headline.outside()
+    if outside is not None:
+        peaks = ", ".join(amplitude_text(name, own.amplitude) for name, own in outside.amplitudes.items())
+        yield "Just outside the range", f"{rounded_text(outside.frequency)} Hz at {speed_text(outside)}: {peaks}."
+    if doubts := list(_doubts(material, headline, top)):
+        yield "What could overturn this", short(*doubts)
+
+
+def _rated_text(headline: Headline, curves: Mapping[str, Envelope], rated: float) -> str:
+    parts = []
+    for name, curve in curves.items():
+        if curve.speed[0] <= rated * RPM <= curve.speed[-1]:
+            parts.append(amplitude_text(name, float(np.interp(rated * RPM, curve.speed, curve.amplitude))))
+    if not parts:
+        return "Not computed."
+    near = [
+        number
+        for number, own in enumerate(headline.ranking.resonances[:SHOWN], start=1)
+        if abs(abs(own.speed) / RPM / rated - 1.0) < 2.0 * AT_RATED
+    ]
+    at = f" Resonance {near[0]} of the ranking." if near else ""
+    text = ", ".join(parts)
+    return f"{text[0].upper()}{text[1:]}.{at}"
+
+
+def _doubts(material: ReportData, headline: Headline, top: Resonance) -> Iterator[str]:
+    """Yield what could make another resonance the first: inertia sets, assumed parameters, damping."""
+    group = headline.group
+    for other in material.groups:
+        same = group is not None and other.source == group.source and other.inertias != group.inertias
+        first = next(iter(other.in_operation.resonances), None) if same else None
+        if first is not None:
+            yield (
+                f"Inertia set {other.inertias}: {rounded_text(first.frequency)} Hz at {speed_text(first)}, "
+                f"{amplitude_text('error', first.amplitudes['error'].amplitude)}."
+            )
+    mode = headline.mode_of(top)
+    own = next((one.variations for one in material.variations if one.choice == headline.choice), ())
+    for variation in own:
+        label, _, unit = material.words.parameter(variation.parameter.label).partition(" / ")
+        if mode is None or not label.startswith("housing"):
+            continue
+        seen = track_mode(variation, mode.frequency).frequency
+        values = variation.parameter.values
+        place = default_place(variation)
+        ends = [rounded_text(float(seen[n])) for n in (0, -1)]
+        yield (
+            f"{label[0].upper()}{label[1:]} {values[0]:g} to {values[-1]:g} instead of {values[place]:g}: "
+            f"{ends[0]} to {ends[1]} Hz."
+        )
+    places = [peak.places for peak in top.amplitudes.values() if peak.places is not None and peak.places[0] == 1]
+    if places:
+        worst = min(place[1] for place in places)
+        yield "Damping does not change the first rank." if worst == 1 else f"Damping: rank 1 to {worst}."
+
+
+# Sections "Resonance ranking" and "Campbell diagram"
+
+
+def ranking_section(material: ReportData) -> Part:
+    """Tabulate the ranking by three quantities, with the mode of each resonance, and draw the Campbell diagram."""
+    headline = material.headline
+    if headline is None:
+        return Part()
+    shown = headline.ranking.resonances[:SHOWN]
+    rows = [_row(material, headline, number, own, shown) for number, own in enumerate(shown, start=1)]
+    title = f"Highest {len(rows)} resonances, {_range_text(headline)}"
+    table = Table(
+        rows,
+        ("excited by", "bearing", "mode shape"),
+        caption=title,
+        name="resonances",
+        sortable=True,
+        stacked=True,
+        hidden=("off rated / %", "bearing", "mode"),
+    )
+    html = render(
+        "ranking",
+        table=table,
+        whole=headline.ranking.whole,
+        note_text=_note(material, headline),
+        speed_label=f"{material.input_words} speed / rpm",
+        three=len(shown[0].amplitudes) > 1,
+        diagrams=[_campbell(material, headline, size) for size in CAMPBELL],
+    )
+    return Part(html, title="Ranking", name="ranking")
+
+
+def _row(
+    material: ReportData, headline: Headline, number: int, resonance: Resonance, shown: Sequence[Resonance]
+) -> dict[str, object]:
+    words = material.words
+    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    rpm = abs(resonance.speed) / RPM
+    row: dict[str, object] = {
+        "No.": Cell(str(number), number, tag="rank"),
+        "speed / rpm": Cell(rounded_text(rpm), rpm),
+        "frequency / Hz": Cell(rounded_text(resonance.frequency), resonance.frequency),
+    }
+    if rated is not None:
+        off = 100.0 * (rpm / rated - 1.0)
+        row["off rated / %"] = Cell(f"{off:+.0f}".replace("-", "−").replace("+0", "0").replace("−0", "0"), off)
+    row["excited by"] = words.line(words.order(resonance.line, resonance.order))
+    for name, own in resonance.amplitudes.items():
+        label = QUANTITIES[name]
+        value = label.factor * own.amplitude
+        largest = label.factor * max(other.amplitudes[name].amplitude for other in shown)
+        row[f"{label.column} ± / {label.unit}"] = Cell(rounded_text(value), value, bar=value / largest, kind=name)
+        row[f"rank, {name}"] = _number(own.place)
+        if name == "force":
+            row["bearing"] = words.of(own.at)
+    mode = headline.mode_of(resonance)
+    row["mode"] = _number(None)
+    row["mode shape"] = "–"
+    if mode is not None and headline.modes is not None:
+        choice = f"mode:{model_name(headline.choice)}:{mode.index}"
+        row["mode"] = replace(_number(mode.index + 1), choice=choice)
+        row["mode shape"] = words.moves(headline.modes, mode.index)
+    return row
+
+
+def _number(value: int | None) -> Cell:
+    if value is None:
+        return Cell("–", math.nan)
+    return Cell(str(value), value)
+
+
+def _campbell(material: ReportData, headline: Headline, size: tuple[float, float]) -> CampbellDrawing:
+    matched = {
+        number: mode.index
+        for number, own in enumerate(headline.ranking.resonances[:SHOWN], start=1)
+        if (mode := headline.mode_of(own)) is not None
+    }
+    frequencies = np.zeros(0) if headline.modes is None else headline.modes["frequency"].to_numpy()
+    lines = [(line, material.words.line(line)) for line in material.lines]
+    rated = material.context.gearbox.case.operation.rated_speed_rpm
+    words = "Orders are lines through the origin, modes are horizontal lines; the ranking numbers the circles."
+    return campbell_of(headline.ranking, lines, frequencies, matched, rated, size, words)

@@ -1,0 +1,161 @@
+"""The first screen of the GRC: headline, ranking and command line agree; printed pages, phones, no scripts."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.report.writer import write_report
+from exugear.results.folder import keep_case, modes_path
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import load_response, steady_path, stored_or_computed
+from exugear.system.build import assemble
+from exugear.system.modes import modes_of
+
+from ..cases.command import exugear
+from .page_view import IN_BROWSER, View, opened
+
+CHOICE = Choice("bushing", "line_of_action", "assemblies")
+SETTINGS = SteadySettings(SpeedRange.from_text("-10:-35:60"), harmonics=4)
+MOST_PAGES = 8
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, stiffness: dict[str, np.ndarray]) -> Iterator[Path]:
+    """Modes and a steady response of the GRC with given mesh stiffness, without tables."""
+    folder = tmp_path_factory.mktemp("grc")
+    gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    keep_case(gearbox, folder)
+    assembly = assemble(gearbox, CHOICE, stiffness)
+    stored_or_computed(steady_path(folder, CHOICE, SETTINGS), assembly, SETTINGS)
+    modes_of(assembly).save(modes_path(folder, CHOICE))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("exugear.report.findings.context.mesh_stiffness", lambda *arguments: stiffness)
+        yield folder
+
+
+@pytest.fixture(scope="module")
+def told(folder: Path) -> dict[str, Any]:
+    """What the command line says as JSON; it writes the page."""
+    outcome = exugear("report", folder, "--json")
+    assert outcome.exit_code == 0, outcome.stderr
+    return json.loads(outcome.stdout)
+
+
+@pytest.fixture(scope="module")
+def view(browser: Any, folder: Path, told: dict[str, Any]) -> Iterator[View]:
+    view = opened(browser, "desk")
+    view.open(folder / "report.html")
+    yield view
+    assert view.faults == []
+    view.page.context.close()
+
+
+@pytest.mark.validation
+def test_a_higher_peak_outside_the_operating_range_does_not_lead(folder, told, tmp_path, monkeypatch):
+    def planted(path: Path) -> Any:
+        data = load_response(path)
+        low, high = json.loads(data.attrs["operating_range"])
+        speed = np.abs(data["speed"].to_numpy())
+        amplitude = data["amplitude"].to_numpy().copy()
+        amplitude[(speed < low) | (speed > high)] *= 1e3
+        return data.assign(amplitude=(data["amplitude"].dims, amplitude))
+
+    shutil.copytree(folder, tmp_path / "planted")
+    monkeypatch.setattr("exugear.report.findings.context.load_response", planted)
+    monkeypatch.setattr("exugear.report.writer.model_variations", lambda *arguments: ())
+    report = write_report(tmp_path / "planted")
+    assert report.resonances[0]["frequency_Hz"] == told["resonances"][0]["frequency_Hz"]
+    outside = next(line for line in report.statements if line.startswith("Just outside the range"))
+    amplitude = re.search(r"transmission error ±(\d+)", outside)
+    assert amplitude and float(amplitude[1]) > 1e8 * told["resonances"][0]["error_m"]
+
+
+class TestInABrowser:
+    pytestmark = IN_BROWSER
+
+    def test_headline_first_row_and_json_agree(self, view: View, told: dict[str, Any]) -> None:
+        first = told["resonances"][0]
+        large = view.page.locator("#short .headline .large").inner_text()
+        frequency, speed = (float(text) for text in re.findall(r"([\d.]+) (?:Hz|rpm)", large))
+        assert frequency == pytest.approx(first["frequency_Hz"], rel=5e-3)
+        assert speed == pytest.approx(abs(first["speed_rpm"]), rel=5e-3)
+        row = view.page.locator("#resonances tbody tr").first
+        assert float(row.locator("[data-label='frequency / Hz']").inner_text()) == frequency
+        assert float(row.locator("[data-label='speed / rpm']").inner_text()) == speed
+        values = view.page.locator(".quantities .value").all_inner_texts()
+        factors = {"error_m": 1e6, "force_N": 1e-3, "acceleration_m_per_s2": 1.0}
+        for shown, (key, factor) in zip(values, factors.items(), strict=True):
+            assert float(shown.split()[0].removeprefix("±")) == pytest.approx(factor * first[key], rel=5e-3)
+        assert f"Highest resonance: {frequency:.0f} Hz" in " ".join(told["statements"])
+
+    def test_the_first_screen_is_seen_without_scrolling(self, view: View) -> None:
+        view.page.set_viewport_size({"width": 1440, "height": 900})
+        boxes = [box.bounding_box() for box in view.page.locator("#short .chain").all()]
+        assert len(boxes) == 3
+        assert max(box["y"] + box["height"] for box in boxes) <= 900
+        assert view.page.locator("#short svg.drawing:visible").count() == 1
+        assert view.page.locator("#short img.mode-picture").count() == 1
+        sentences = view.page.locator("#short .card > p, #short .about p, #short .further p").all_inner_texts()
+        assert max(len(text.split()) for text in sentences) <= 25
+
+    def test_circles_are_those_of_the_ranking(self, view: View) -> None:
+        circles = view.page.locator("#campbell svg.wide-only .ranked text").all_text_contents()
+        rows = view.page.locator("#resonances tbody tr").count()
+        assert sorted(map(int, circles)) == list(range(1, rows + 1))
+        assert view.page.locator("#campbell svg.wide-only .rated").count() == 1
+
+    def test_data_files_have_plain_numbers(self, view: View) -> None:
+        with view.page.expect_download() as got:
+            view.page.locator("#ranking .of-table button").click()
+        text = Path(got.value.path()).read_text(encoding="utf-8-sig")
+        head, *rows = csv.reader(io.StringIO(text))
+        texts = {"excited by", "bearing", "mode shape"}
+        for row in rows:
+            for name, value in zip(head, row, strict=True):
+                assert name in texts or value == "" or np.isfinite(float(value)), (name, value)
+
+    def test_nothing_scrolls_sideways_on_a_phone(self, view: View, folder: Path) -> None:
+        view.page.set_viewport_size({"width": 390, "height": 844})
+        view.open(folder / "report.html")
+        assert view.page.evaluate("document.documentElement.scrollWidth") <= 390
+        assert view.page.locator("#short svg.drawing:visible").count() == 1
+        inside = "[...document.querySelectorAll('#short *, #resonances *')].map(e => e.getBoundingClientRect().right)"
+        assert max(view.page.evaluate(inside)) <= 390.5
+        view.page.set_viewport_size({"width": 1440, "height": 900})
+        view.open(folder / "report.html")
+
+    def test_few_pages_are_printed(self, view: View) -> None:
+        view.page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
+        pages = len(re.findall(rb"/Type\s*/Page\b", view.page.pdf(prefer_css_page_size=True)))
+        assert 2 <= pages <= MOST_PAGES
+        view.page.emulate_media(media="print")
+        view.page.set_viewport_size({"width": 711, "height": 1039})  # A4 without its margins
+        first = view.page.locator("#short").bounding_box()
+        assert first["y"] + first["height"] <= 1039
+        assert not view.page.locator("#rings, #modes, #inputs").locator("visible=true").count()
+        assert view.page.locator(".paper-only").is_visible()
+        view.page.emulate_media(media="screen")
+        view.page.set_viewport_size({"width": 1440, "height": 900})
+        view.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
+
+    def test_without_scripts_text_and_drawings_are_there(self, browser: Any, folder: Path, view: View) -> None:
+        plain = opened(browser, "desk", java_script_enabled=False)
+        plain.page.goto((folder / "report.html").as_uri())
+        assert plain.page.locator("#short svg.drawing:visible").count() == 1
+        assert "Hz" in plain.page.locator("#short .headline").inner_text()
+        assert plain.page.locator("#campbell svg:visible").count() == 1
+        assert plain.page.locator("#resonances tbody tr:visible").count() >= 5
+        assert plain.faults == []
+        plain.page.context.close()
