@@ -140,7 +140,7 @@ def _families(assembly: Assembly) -> dict[str, str]:
 
 
 def participation(overall: Floats) -> Floats:
-    """Participation (n,) of each mode in the overall transmission error (TE), shape (n,); the sum is one.
+    """Participation (n,) of each mode in the overall transmission error (TE); the sum is one.
 
     The participation is the square of the overall TE of a mode with unit modal mass, divided by the sum of these
     squares over all modes. This sum is r M^-1 r^T, independent of the stiffness, so that the participation is
