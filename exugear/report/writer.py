@@ -19,6 +19,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.answer_section import ranking_section, short_section
 from exugear.report.bearings_section import bearings_section
 from exugear.report.changes_section import changes_section, stored_study
+from exugear.report.contact_section import contact_section
 from exugear.report.findings.context import (
     Context,
     StoredResults,
@@ -113,6 +114,7 @@ SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
     steady_section,
     modes_section,
     target_frequency_section,
+    contact_section,
     gears_section,
     studies_section,
     trust_section,

@@ -227,6 +227,34 @@ def mean_contact(wanted: TableInput) -> MeanContact:
     )
 
 
+def states_of_contact(
+    table: TableInput, force: float, misalignments: Sequence[float], centre_distance: float, positions: int
+) -> xr.Dataset:
+    """Solve the contact over the mesh cycle at one force and centre distance.
+
+    Parameters
+    ----------
+    table : of the pair: its modifications and discretisation
+    force : on the transverse line of action, N
+    misalignments, centre_distance : rad, m
+    positions : of the mesh cycle
+
+    Returns
+    -------
+    over pmc and misalignment, as `fe_ste.transmission_error.transmission_error.static_transmission_error`
+
+    Raises
+    ------
+    ContactError
+        If the contact of a position could not be solved; the message says of which pair and why.
+    """
+    pair = table.pair
+    compliance = _compliance(pair, table.mesh, table.contact)
+    compliance = compliance.with_modifications(table.pinion_modification, table.gear_modification)
+    torque = force * pair.pinion.base_radius
+    return _cycle(compliance, StateAxes.checked(pair, torque, positions, centre_distance, misalignments))
+
+
 def _cycle(compliance: PairCompliance, axes: StateAxes) -> xr.Dataset:
     """States over the mesh cycle, at one torque and one centre distance."""
     data = solve_positions(compliance, axes, range(axes.positions)).dataset(axes)

@@ -172,6 +172,7 @@ def test_a_study_computes_each_change_once_and_names_what_cannot_be_made(tmp_pat
     page = project.report()
     text = page.path.read_text(encoding="utf-8")
     assert "too far apart" in text and 'id="design-changes"' in text and not page.left_out
+    assert 'id="contact"' in text
     reduction = next(line for line in page.statements if line.startswith("Reduction"))
     assert ("crowned" in reduction) == (study.results[0].effects["error"].this_peak < 0.0)
     path.write_text(json.dumps(stored | {"input_hash": "0"}), encoding="utf-8")

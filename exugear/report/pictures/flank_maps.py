@@ -1,0 +1,78 @@
+"""Contact pressure over a flank as a picture with the line load along the face below it, for SVG templates."""
+
+from __future__ import annotations
+
+import base64
+import io
+from dataclasses import dataclass
+
+import matplotlib.image
+import numpy as np
+from matplotlib.colors import LinearSegmentedColormap
+
+from exugear.report.pictures.scene import DISPLACEMENT_COLOURS
+from exugear.report.pictures.speed_diagrams import Mark, round_ticks
+from fe_ste.flank_pressure import FlankPressure
+
+WIDTH, HEIGHT = 400.0, 262.0
+LEFT, RIGHT = 60.0, 390.0
+MAP = (8.0, 138.0)
+"""Upper and lower edge of the pressure map."""
+LOAD = (150.0, 226.0)
+"""Upper and lower edge of the diagram of the line load."""
+
+
+@dataclass(frozen=True)
+class FlankMap:
+    """Drawing of one state; coordinates are those of the drawing, y down."""
+
+    width: float
+    height: float
+    left: float
+    right: float
+    map: tuple[float, float]
+    load: tuple[float, float]
+    picture: str
+    """Address that contains the pressure map as PNG; it has a row a place on the path of contact."""
+    curve: str
+    """Line load as path data."""
+    mean: float
+    """Height of the mean line load."""
+    ticks: tuple[Mark, ...]
+    """Of the position along the face, mm."""
+    loads: tuple[Mark, ...]
+    """Of the line load, N/mm."""
+    words: str
+    """Content as text."""
+
+
+def flank_map(flank: FlankPressure, highest: float, heaviest: float, words: str) -> FlankMap:
+    """Draw the pressure over a flank and the line load along its face.
+
+    Parameters
+    ----------
+    highest, heaviest : pressure (Pa) of the last colour, and line load (N/m) at the upper edge
+    """
+    colours = LinearSegmentedColormap.from_list("pressure", DISPLACEMENT_COLOURS)
+    content = io.BytesIO()
+    shares = np.clip(flank.pressure / highest, 0.0, 1.0)
+    matplotlib.image.imsave(content, colours(shares)[::-1], format="png")
+    half = 0.5 * len(flank.axial) * float(flank.axial[1] - flank.axial[0])
+    middle = 0.5 * float(flank.axial[0] + flank.axial[-1])
+    low, high = middle - half, middle + half
+
+    def across(axial: float) -> float:
+        return LEFT + (axial - low) / (high - low) * (RIGHT - LEFT)
+
+    def upward(load: float) -> float:
+        return LOAD[1] - load / heaviest * (LOAD[1] - LOAD[0])
+
+    points = zip(flank.axial.tolist(), flank.line_load.tolist(), strict=True)
+    curve = " L".join(f"{across(axial):.1f} {upward(load):.1f}" for axial, load in points)
+    places = round_ticks(1e3 * low, 1e3 * high, 5)
+    ticks = tuple(Mark(across(1e-3 * value), LOAD[1] + 14.0, f"{value:g}".replace("-", "−")) for value in places)
+    heights = round_ticks(0.0, 1e-3 * heaviest, 3)
+    loads = tuple(Mark(LEFT - 5.0, upward(1e3 * value) + 3.5, f"{value:g}") for value in heights)
+    address = f"data:image/png;base64,{base64.b64encode(content.getvalue()).decode('ascii')}"
+    mean = upward(float(flank.line_load.mean()))
+    return FlankMap(WIDTH, HEIGHT, LEFT, RIGHT, MAP, LOAD, address, f"M{curve}", mean, ticks, loads, words)
