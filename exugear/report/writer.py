@@ -16,10 +16,6 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.variant import Variant
-from exugear.report.answer_section import ranking_section, short_section
-from exugear.report.bearings_section import bearings_section
-from exugear.report.changes_section import changes_section, stored_study
-from exugear.report.contact_section import contact_section
 from exugear.report.findings.context import (
     Context,
     StoredResults,
@@ -32,14 +28,18 @@ from exugear.report.findings.groups import groups_of
 from exugear.report.findings.headline import headline_of
 from exugear.report.findings.verdicts import begin_variations, model_variations
 from exugear.report.findings.words import Labels
-from exugear.report.gears_section import gears_section
-from exugear.report.life_section import life_section, studies_section
-from exugear.report.material import Part, ReportData, lines_of
-from exugear.report.modes_section import change_section, modes_section, target_frequency_section
-from exugear.report.results_section import checks_section, resonances_section, results_section, waterfall_section
-from exugear.report.run_data import run_data
-from exugear.report.steady_section import steady_section
-from exugear.report.trust_section import trust_section
+from exugear.report.sections.answer import ranking_section, short_section
+from exugear.report.sections.bearings import bearings_section
+from exugear.report.sections.changes import changes_section, stored_study
+from exugear.report.sections.contact import contact_section
+from exugear.report.sections.gears import gears_section
+from exugear.report.sections.life import life_section, studies_section
+from exugear.report.sections.material import Part, ReportData, lines_of
+from exugear.report.sections.modes import change_section, modes_section, target_frequency_section
+from exugear.report.sections.results import checks_section, resonances_section, results_section, waterfall_section
+from exugear.report.sections.run_data import run_data
+from exugear.report.sections.steady import steady_section
+from exugear.report.sections.trust import trust_section
 from exugear.report.web.document import ArrayStore, whole_page
 from exugear.report.web.html import render
 from exugear.results.folder import REPORT_FILE, read_stored_gearbox

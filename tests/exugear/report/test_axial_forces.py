@@ -10,7 +10,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.project import Project
 from exugear.report.findings.groups import Channel
-from exugear.report.run_data import axial_of_shaft
+from exugear.report.sections.run_data import axial_of_shaft
 from exugear.results.run_file import load_run
 
 

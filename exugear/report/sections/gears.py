@@ -8,7 +8,7 @@ import numpy as np
 
 from exugear.report.findings.context import HARMONICS, PairExcitation, excitations
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Axis, Curve, Part, ReportData
+from exugear.report.sections.material import Axis, Curve, Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 
 

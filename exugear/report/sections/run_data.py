@@ -15,7 +15,7 @@ from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, c
 from exugear.report.findings.headline import SAME_FREQUENCY
 from exugear.report.findings.loudness import TOP, ConstantSpeed
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import ReportData, group_words, model_name
+from exugear.report.sections.material import ReportData, group_words, model_name
 from exugear.report.web.document import rounded
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.results.spectra.waterfall import OrderLine, Waterfall

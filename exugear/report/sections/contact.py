@@ -7,8 +7,8 @@ from typing import Any
 from exugear.report.findings.context import model_label
 from exugear.report.findings.flank_contacts import PairContact, flank_contacts, place_on_flank
 from exugear.report.findings.words import rounded_text
-from exugear.report.material import Part, ReportData
 from exugear.report.pictures.flank_maps import flank_map
+from exugear.report.sections.material import Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 
 UNEVEN = 1.5

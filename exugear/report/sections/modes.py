@@ -17,7 +17,7 @@ from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import headline_of_group
 from exugear.report.findings.verdicts import best_change, track_mode
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Axis, Curve, Part, ReportData, model_name
+from exugear.report.sections.material import Axis, Curve, Part, ReportData, model_name
 from exugear.report.web.document import rounded
 from exugear.report.web.html import Cell, Figure, Table, render
 from exugear.report.web.stage import stage_data

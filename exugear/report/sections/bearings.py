@@ -14,7 +14,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Part, ReportData, model_name
+from exugear.report.sections.material import Part, ReportData, model_name
 from exugear.report.web.html import Cell, Table, render
 from exugear.steady.peaks import line_name
 from exugear.system.bearings.duty import BearingLoadState

@@ -13,7 +13,7 @@ from exugear.report.findings.facts import facts_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.verdicts import CheckResult, validity_checks
 from exugear.report.findings.words import figure_text, percentages
-from exugear.report.material import Part, ReportData, group_words
+from exugear.report.sections.material import Part, ReportData, group_words
 from exugear.report.web.html import Cell, Figure, Table, render
 from exugear.results.spectra.run_spectra import WINDOW_FACTORS, AbsenceRule, VariantRun
 

@@ -15,7 +15,7 @@ from exugear.gearbox.sections.entries import GROUND
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import METHOD_LABELS, Context, choice_of, model_label
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Axis, Curve, Part, ReportData, model_name
+from exugear.report.sections.material import Axis, Curve, Part, ReportData, model_name
 from exugear.report.web.html import Figure, Table, render
 from exugear.results.run_file import read_run
 from exugear.results.spectra.resonances import MAX_SWEEP_RATIO, run_up_cut, sweep_rate, sweep_severity

@@ -17,7 +17,7 @@ from exugear.report.findings.design_changes import (
 )
 from exugear.report.findings.headline import Headline
 from exugear.report.findings.words import rounded_text
-from exugear.report.material import Part, ReportData
+from exugear.report.sections.material import Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.rotating_frame import SteadyError

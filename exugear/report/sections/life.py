@@ -17,7 +17,7 @@ from exugear.life.life_file import draw_life, limits, stored_lives
 from exugear.life.rating.sheet import RATED_AS, FlankKey, balanced, life_results, rated, rated_loads
 from exugear.report.findings.context import choice_of, model_label
 from exugear.report.findings.words import figure_text
-from exugear.report.material import Part, ReportData
+from exugear.report.sections.material import Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 from exugear.results.folder import StoredStudy, stored_studies
 from exugear.system.bearings.rolling.rows import BearingError

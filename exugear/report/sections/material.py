@@ -67,7 +67,7 @@ class ReportData:
     design_study: DesignStudy | None = None
     """Computed design changes."""
     run_data: Mapping[str, Any] = field(default_factory=dict)
-    """Run-ups and steady-state responses as data of the page, from `exugear.report.run_data.run_data`."""
+    """Run-ups and steady-state responses as data of the page, from `exugear.report.sections.run_data.run_data`."""
     charts: dict[str, Any] = field(default_factory=dict)
     """Data of all line charts by name, from `chart`."""
 

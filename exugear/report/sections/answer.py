@@ -13,7 +13,6 @@ import numpy as np
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
-from exugear.report.changes_section import CHANGES_NAME, best_changes
 from exugear.report.findings.context import excitations
 from exugear.report.findings.facts import MOST_WORDS, facts_of_response, sensitivities_of, shift_text, short
 from exugear.report.findings.headline import (
@@ -26,9 +25,10 @@ from exugear.report.findings.headline import (
 from exugear.report.findings.loudness import HOUSING, SHAFTS, Envelope, Resonance
 from exugear.report.findings.verdicts import default_place, track_mode
 from exugear.report.findings.words import figure_text, percentages, rounded_text
-from exugear.report.material import Part, ReportData, model_name
 from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, Strips, campbell_of, strips_of
 from exugear.report.pictures.still import mode_picture
+from exugear.report.sections.changes import CHANGES_NAME, best_changes
+from exugear.report.sections.material import Part, ReportData, model_name
 from exugear.report.web.html import Cell, Table, render
 from exugear.report.web.stage import drawn_bodies, drawn_mode
 from exugear.steady.crossings import Contributions
