@@ -12,6 +12,7 @@ varies the seat stiffness of all bearings and shows the natural frequencies.
 # needs no tables.
 
 import tomllib
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -51,6 +52,10 @@ for factor, modes in zip(factors, found, strict=True):
     panel.scatter(np.full(shown.sum(), factor), modes.frequency[shown], s=size, color="C0")
 panel.set(xscale="log", xlabel="housing factor", ylabel="natural frequency / Hz")
 panel.grid(True)
+picture = Path("results/bearing_stiffness.png")
+picture.parent.mkdir(exist_ok=True)
+figure.savefig(picture)
+print(f"diagram in {picture}")
 
 # %%
 # Modes that rise to the right depend on bearing stiffness; horizontal ones depend on mesh stiffness. Large points that

@@ -46,6 +46,8 @@ for panel, line in zip(figure.subplots(1, len(lines)), lines, strict=True):
     panel.set(title=line.name, xlabel="input speed / rpm", ylabel="level / dB re 1 um")
     panel.grid(True)
     panel.legend()
+figure.savefig("results/designs/order_cuts.png")
+print("diagrams in results/designs/order_cuts.png")
 
 # %%
 # These are the highest levels of each design, in dB re 1 µm. Tip relief changes the excitation; the resonance speeds

@@ -70,3 +70,5 @@ for side, modes in enumerate((old, new)):
     panel.plot([side] * len(shown), shown, "_", color="C1", markersize=26.0, markeredgewidth=2.0)
 panel.set(xlim=(-0.3, 1.3), xticks=(0.0, 1.0), ylabel="natural frequency / Hz")
 panel.set_xticklabels(("rigid shafts", "flexible middle shaft"))
+figure.savefig(folder / "modes.png")
+print(f"diagram in {folder / 'modes.png'}")

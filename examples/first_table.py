@@ -12,7 +12,7 @@ Two gears are described, meshed with finite elements, and rotated through one me
 import math
 
 from fe_ste import Gear, GearPair, static_transmission_error
-from fe_ste.pictures.diagrams import plot_load_share, plot_ste_curves
+from fe_ste.transmission_error.diagrams import plot_load_share, plot_ste_curves
 
 helix = math.radians(12.0)
 pinion = Gear(
@@ -38,9 +38,10 @@ print(f"mean {1e6 * float(ste.mean()):.2f} um, peak to peak {1e6 * float(ste.max
 # %%
 # The mean is the lag of the wheel under load. The variation about it excites the gearbox.
 
-plot_ste_curves({"helical pair at 150 N m": curve})
+print("diagrams in results/first_table")
+plot_ste_curves({"helical pair at 150 N m": curve}, "results/first_table/ste.png")
 
 # %%
 # Two or three tooth pairs share the load. A step in these curves would be an impact.
 
-plot_load_share(curve, title="helical pair at 150 N m")
+plot_load_share(curve, "results/first_table/load_share.png", title="helical pair at 150 N m")

@@ -11,6 +11,7 @@ distribution, stiffness and peak-to-peak transmission error.
 # peak-to-peak value is accurate to some percent.
 
 import math
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -76,6 +77,10 @@ for panel in panels:
     panel.set_xlabel("gap at the +z end / um")
     panel.grid(True)
 panels[0].legend()
+picture = Path("results/misalignment.png")
+picture.parent.mkdir(exist_ok=True)
+figure.savefig(picture)
+print(f"diagrams in {picture}")
 
 # %%
 # Without crowning, 20 µm move the load centroid far towards one end. Fewer slices of the face carry the load, and the

@@ -57,6 +57,8 @@ panels[1].set_ylabel("force on the bearing of the sun / kN")
 for panel in panels:
     panel.set_xlabel("speed of the sun / rpm")
     panel.legend()
+figure.savefig(case.with_name("run_ups.png"))
+print(f"diagrams in {case.with_name('run_ups.png')}")
 
 # %%
 # The overall transmission error (without its mean) of the second design is a third of the first. Its sun has a lateral

@@ -31,7 +31,9 @@ tables = project.tables(positions=10)
 run = project.run()
 spectra, lines = run_waterfall(run.path), order_lines(project.gearbox)
 picks = pick_resonances(spectra, lines, depth=25.0)
-plot_waterfalls({"on bearings": spectra}, lines, marks={"on bearings": picks}, highest_frequency=3500.0)
+print(f"diagrams in {case.parent}")
+shown = {"marks": {"on bearings": picks}, "highest_frequency": 3500.0}
+plot_waterfalls({"on bearings": spectra}, lines, case.with_name("waterfall.png"), **shown)
 
 # %%
 # Circles are peaks along the orders of the two meshes, down to 25 dB below the highest. Each belongs to a mode if one
@@ -48,4 +50,5 @@ for resonance, mode in zip(resonances, nearest, strict=True):
 # %%
 # The Campbell diagram shows all possible resonances: speeds at which a mesh order has a natural frequency.
 
-plot_campbell(modes.frequency[1:], lines, float(spectra.speed.max()), title="two parallel stages")
+fastest, picture = float(spectra.speed.max()), case.with_name("campbell.png")
+plot_campbell(modes.frequency[1:], lines, fastest, picture, title="two parallel stages")

@@ -67,3 +67,5 @@ elastic = modes.frequency > 1.0
 panel.stem(modes.frequency[elastic], modes.amplification.max(axis=1)[elastic], basefmt=" ")
 panel.set(xlim=(0.0, 8000.0), xlabel="natural frequency / Hz", ylabel="amplification")
 panel.grid(True)
+figure.savefig(case.with_name("amplification.png"))
+print(f"diagram in {case.with_name('amplification.png')}")

@@ -116,6 +116,8 @@ panels[0].legend()
 for panel in panels:
     panel.set_xlabel("speed of the pinion / rpm")
     panel.grid(True)
+figure.savefig(folder / "peaks.png")
+print(f"diagrams in {folder / 'peaks.png'}")
 
 # %%
 # Near the peak, the teeth are separated for up to a sixth of the time. The increase on the left becomes a step,

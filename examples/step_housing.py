@@ -66,7 +66,8 @@ gearbox = Gearbox.from_dict(case, str(folder / "gearbox.toml"))
 project = Project(gearbox, folder, Choice("flexible", "iso6336"))
 housing = project.bodies()["housing"]
 print(housing.reduced)
-plot = draw_free_vibration(housing.reduced, 0)
+plot = draw_free_vibration(housing.reduced, 0, folder / "free_vibration.png")
+print(f"picture in {folder / 'free_vibration.png'}")
 
 # %%
 # These are the natural frequencies of the gearbox on its bearings, in a rigid housing and in this one.

@@ -13,7 +13,7 @@ import numpy as np
 
 from fe_ste import FlankModification, Gear, GearPair, Relief, pair_compliance, static_transmission_error
 from fe_ste.flanks import radius_at_roll_length_from_tip
-from fe_ste.pictures.diagrams import plot_ripple, plot_ste_curves
+from fe_ste.transmission_error.diagrams import plot_ripple, plot_ste_curves
 
 gear = Gear(name="gear", teeth=40, normal_module=3e-3, face_width=25e-3, held_diameter=80e-3)
 pair = GearPair(name="spur", pinion=gear, gear=gear, centre_distance=120e-3)
@@ -43,7 +43,8 @@ ripples = {
     f"{amount:g} um": static_transmission_error(relieved(1e-6 * amount), torque=torques, positions=15)
     for amount in (0.0, 6.0, 12.0, 18.0)
 }
-plot_ripple(ripples)
+print("diagrams in results/tip_relief")
+plot_ripple(ripples, "results/tip_relief/ripple.png")
 
 # %%
 # Each relief has a load with a minimum of the peak-to-peak value; more relief suits a higher load. Below that load,
@@ -58,4 +59,5 @@ for name, dataset in ripples.items():
 # %%
 # The curves at 300 N m show the reason.
 
-plot_ste_curves({name: dataset.sel(torque=[300.0]) for name, dataset in ripples.items()})
+at_300 = {name: dataset.sel(torque=[300.0]) for name, dataset in ripples.items()}
+plot_ste_curves(at_300, "results/tip_relief/ste.png")

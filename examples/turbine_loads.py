@@ -11,6 +11,8 @@ applies them to the static equilibrium of a gearbox, and computes its bearing li
 # of the GRC turbine: the gearbox file scales torque and speed, and every output states it. Hours are those of a
 # Rayleigh distribution with a mean wind speed of 8.5 m/s.
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -54,6 +56,10 @@ lives.barh(place + 0.2, [one.reference_hours for one in life.bearings], height=0
 lives.axvline(found.hours.sum(), color="0.4", linestyle="--")
 lives.set(xscale="log", xlabel="life / h", yticks=place, yticklabels=[one.name for one in life.bearings])
 lives.legend()
+picture = Path("results/turbine/lives.png")
+picture.parent.mkdir(parents=True, exist_ok=True)
+figure.savefig(picture)
+print(f"diagrams in {picture}")
 
 # %%
 # The bearings of the high-speed shaft limit the life: they rotate eighty times as fast as the carrier. The broken line

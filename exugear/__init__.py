@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from exugear.gearbox.variant import Variant
     from exugear.life.life import compute_life
     from exugear.project import Project
-    from exugear.report.pictures.diagrams import plot_campbell, plot_waterfalls
+    from exugear.report.findings.loudness import resonances
+    from exugear.report.pictures.diagrams import plot_campbell, plot_response
     from exugear.report.writer import write_report
     from exugear.results.run_file import load_run
+    from exugear.results.spectra.diagrams import plot_waterfalls
     from exugear.results.spectra.run_spectra import run_waterfall
     from exugear.results.spectra.waterfall import order_lines
     from exugear.steady.settings import SpeedRange, SteadySettings
@@ -57,8 +59,10 @@ _HOMES = {
     "mesh_stiffness": "exugear.system.tooth_mesh.laws.stiffness",
     "order_lines": "exugear.results.spectra.waterfall",
     "plot_campbell": "exugear.report.pictures.diagrams",
-    "plot_waterfalls": "exugear.report.pictures.diagrams",
+    "plot_response": "exugear.report.pictures.diagrams",
+    "plot_waterfalls": "exugear.results.spectra.diagrams",
     "read_rexs": "exugear.exchange.rexs.containers",
+    "resonances": "exugear.report.findings.loudness",
     "run_waterfall": "exugear.results.spectra.run_spectra",
     "simulate": "exugear.transient.runup",
     "static_state": "exugear.system.statics",
@@ -90,8 +94,10 @@ __all__ = [
     "mesh_stiffness",
     "order_lines",
     "plot_campbell",
+    "plot_response",
     "plot_waterfalls",
     "read_rexs",
+    "resonances",
     "run_waterfall",
     "simulate",
     "static_state",

@@ -13,11 +13,14 @@ from fe_ste.geometry.gears import GearPair
 from fe_ste.root_stress import hertz_stress
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
-from fe_ste.transmission_error.mean_contact import face_load_factor, load_along_face, states_of_contact
+from fe_ste.tools.drawing import axes_or_new
+from fe_ste.transmission_error.contact_stress import face_load_factor, load_along_face
+from fe_ste.transmission_error.mean_contact import states_of_contact
 from fe_ste.transmission_error.table import TableInput
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
 POSITIONS = 20
 """Positions of the mesh cycle: rows of contact lines per base pitch."""
@@ -52,6 +55,29 @@ class FlankPressure(ReprMixin):
         """Highest Hertzian stress (Pa) with its place on the path and along the face (m)."""
         row, column = np.unravel_index(int(self.pressure.argmax()), self.pressure.shape)
         return float(self.pressure[row, column]), float(self.path[row]), float(self.axial[column])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the pressure over the flank, MPa, with the position along the face and the path of contact, mm.
+
+        Parameters
+        ----------
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Examples
+        --------
+        >>> path, axial = np.linspace(0.01, 0.02, 3), np.linspace(-0.01, 0.01, 2)
+        >>> ax = FlankPressure(0.0, path, axial, np.full((3, 2), 1e9), np.full(2, 1e5), 1.0, 0.0).plot()
+        >>> ax.get_xlabel(), ax.get_ylabel()
+        ('Position along the face / mm', 'Path of contact / mm')
+        """
+        with axes_or_new(ax, 5.0, 3.0) as panel:
+            image = panel.pcolormesh(
+                1e3 * self.axial, 1e3 * self.path, 1e-6 * self.pressure, cmap="inferno_r", vmin=0.0, shading="nearest"
+            )
+            panel.grid(False)
+            panel.set(xlabel="Position along the face / mm", ylabel="Path of contact / mm")
+            panel.figure.colorbar(image, ax=panel, label="Contact pressure / MPa")
+            return panel
 
 
 def flank_pressures(

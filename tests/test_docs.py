@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import ast
 import importlib
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -33,6 +36,22 @@ def test_every_example_is_a_question():
     for example in (ROOT / "examples").glob("*.py"):
         title = example.read_text(encoding="utf-8").splitlines()[1]
         assert title.endswith("?"), example.name
+
+
+@pytest.mark.parametrize("example", sorted((ROOT / "examples").glob("*.py")), ids=lambda path: path.stem)
+def test_every_example_saves_its_diagrams_and_says_where(example):
+    text = example.read_text(encoding="utf-8")
+    assert ".png" in text
+    assert re.search(r"print\(f?\"(diagrams?|picture) in ", text)
+
+
+@pytest.mark.validation
+def test_an_example_saves_its_diagram_where_it_says(tmp_path):
+    example = ROOT / "examples" / "bearing_stiffness.py"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    run = [sys.executable, str(example)]
+    outcome = subprocess.run(run, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert (tmp_path / re.findall(r"diagram in (.*)", outcome.stdout)[0]).read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_readme_links_to_files_that_are_there():

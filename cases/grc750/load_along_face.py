@@ -18,7 +18,7 @@ from one_variant import grc_project
 from exugear import Choice, Project, static_state
 from exugear.system.tooth_mesh.tables import wanted_table
 from fe_ste import PairCompliance, static_transmission_error
-from fe_ste.transmission_error.mean_contact import face_load_factor
+from fe_ste.transmission_error.contact_stress import face_load_factor
 from fe_ste.transmission_error.table import prepared_compliance
 
 POSITIONS = 10

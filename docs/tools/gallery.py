@@ -10,6 +10,7 @@ import hashlib
 from pathlib import Path
 from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from sphinx_gallery.scrapers import figure_rst
 
@@ -42,7 +43,7 @@ def settings(root: Path) -> dict[str, Any]:
         "run_stale_examples": sources_changed(root),
         "image_scrapers": ("gallery.figures_of_a_block",),
         "capture_repr": ("_repr_html_", "__repr__"),
-        "ignore_repr_types": r"Figure",
+        "ignore_repr_types": r"Figure|Axes",
         "write_computation_times": False,
         "show_signature": False,
         "download_all_examples": False,
@@ -52,9 +53,10 @@ def settings(root: Path) -> dict[str, Any]:
 
 
 def figures_of_a_block(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:
-    """Save the figures of an example block, also those without pyplot, and return their reST."""
+    """Save the figures of an example block, also those without pyplot or of axes, and return their reST."""
     names, shown = block_vars["example_globals"], block_vars.setdefault("shown", [])
-    found = {id(value): value for value in names.values() if isinstance(value, Figure)}
+    values = [value.figure if isinstance(value, Axes) else value for value in names.values()]
+    found = {id(value): value for value in values if isinstance(value, Figure)}
     new = [figure for key, figure in found.items() if key not in {id(old) for old in shown}]
     shown.extend(new)
     paths = []

@@ -8,6 +8,7 @@ written once in the file. Here it appears as one body, support and mesh per plan
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -414,6 +415,30 @@ class Gearbox(ReprMixin):
             The speeds of the load case contradict each other.
         """
         return self.train.rolling({self.case.overall.input: case.start_speed, **case.start_speeds})
+
+    def mesh_orders(self, count: int = 3) -> dict[str, float]:
+        """Orders of all meshes with harmonics, by name; meshes of equal frequency (sun and ring) share an order.
+
+        Parameters
+        ----------
+        count : harmonics of each mesh, including the first
+
+        Examples
+        --------
+        >>> orders = Gearbox.from_toml("cases/grc750/gearbox.toml").mesh_orders(2)
+        >>> {name: round(order, 3) for name, order in list(orders.items())[:3]}
+        {'sun_planet': 99.0, '2 × sun_planet': 198.0, 'intermediate': 468.571}
+        """
+        first: dict[str, float] = {}
+        by_mesh = self.train.mesh_frequencies(2.0 * math.pi)  # at one revolution per second
+        for mesh in self.meshes:
+            order = by_mesh[mesh.name]
+            if not any(abs(order - known) < 1e-6 * known for known in first.values()):
+                first[mesh.family] = order
+        orders: dict[str, float] = {}
+        for name, order in first.items():
+            orders |= {f"{n} × {name}" if n > 1 else name: n * order for n in range(1, count + 1)}
+        return orders
 
     @cached_property
     def pairs(self) -> dict[str, PairSpec]:

@@ -521,7 +521,7 @@ def invalidity_of(attributes: Mapping[str, Any]) -> str:
 
     Examples
     --------
-    >>> verdict_of({"valid": 0, "validity_message": "energy: ..."}), verdict_of({"valid": 1}), verdict_of({})
+    >>> invalidity_of({"valid": 0, "validity_message": "energy: ..."}), invalidity_of({"valid": 1}), invalidity_of({})
     ('energy: ...', '', '')
     """
     if int(attributes.get("valid", 1)):

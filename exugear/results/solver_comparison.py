@@ -8,13 +8,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from exugear.results.run_file import load_run
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
+from fe_ste.tools.drawing import axes_or_new
 from fe_ste.tools.files import FileError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 EXUDYN_FOLDER = "exudyn"
 COMPARED = {
@@ -46,6 +51,28 @@ class SolverComparison(ReprMixin, line=" of {exudyn}, {duration:.3g} s: {largest
     def largest(self) -> float:
         """Largest of all differences."""
         return max(self.difference.values())
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the overall transmission error by both solvers over time, as deviation from the mean by Exudyn, in µm.
+
+        Parameters
+        ----------
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Examples
+        --------
+        >>> time = np.linspace(0.0, 1.0, 3)
+        >>> comparison = SolverComparison("Exudyn", "Newmark", 1.0, {"overall_dte": 1e-4}, time, (time, time))
+        >>> [line.get_label() for line in comparison.plot().lines]
+        ['compiled solver', 'Exudyn']
+        """
+        with axes_or_new(ax, 6.0, 3.4) as panel:
+            names = ("compiled solver", "Exudyn")
+            for name, values, style in zip(names, self.overall, ("-", "--"), strict=True):
+                panel.plot(self.time, 1e6 * (values - self.overall[1].mean()), style, label=name)
+            panel.set(xlabel="Time / s", ylabel="Overall transmission error / µm")
+            panel.legend()
+            return panel
 
     @property
     def words(self) -> str:

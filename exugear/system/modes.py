@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import scipy
@@ -34,6 +34,7 @@ from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
 # Where the energy of modes sits: kinetic by body and motion, strain by element, and what moves in words
 
@@ -115,9 +116,7 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
             text = f"{family} {'torsion' if motion == 'spin' else motion}"
             moving[text] = moving.get(text, 0.0) + float(share)
     strained: dict[str, float] = {}
-    # Those of all planets together; other names keep their digits.
-    families = {mesh.name: mesh.family for mesh in assembly.gearbox.meshes}
-    families |= {support.name: support.family for support in assembly.supports}
+    families = _families(assembly)
     for name, share in zip(element_names, strain, strict=True):
         family = families.get(name, name)
         strained[family] = strained.get(family, 0.0) + float(share)
@@ -134,11 +133,34 @@ def mode_name(assembly: Assembly, element_names: tuple[str, ...], kinetic: Float
     return f"{', '.join(words)}; strain energy: {what} {100 * strained[most]:.0f} %"
 
 
+def _families(assembly: Assembly) -> dict[str, str]:
+    """Names of meshes and supports that those of all planets share; other names keep their digits."""
+    families = {mesh.name: mesh.family for mesh in assembly.gearbox.meshes}
+    return families | {support.name: support.family for support in assembly.supports}
+
+
+def participation(overall: Floats) -> Floats:
+    """Participation (n,) of each mode in the overall transmission error (TE); the sum is one.
+
+    The participation is the square of the overall TE of a mode with unit modal mass, divided by the sum of these
+    squares over all modes. This sum is r M^-1 r^T, independent of the stiffness, so that the participation is
+    dimensionless.
+
+    Parameters
+    ----------
+    overall : (n,) overall TE of modes with unit modal mass
+    """
+    squares = overall**2
+    return np.asarray(squares / max(float(squares.sum()), 1e-300))
+
+
 # Eigenmodes of a gearbox variant: frequencies, damping, where the energy sits, and what moves in words
 
 RIGID_COORDINATES = ("x", "y", "z", "tilt_x", "tilt_y", "spin")
 FREE_ROTATION = "rigid-body rotation"
 """Name of the modes without any deflection."""
+VISIBLE = 1e-3
+"""Participation in the overall transmission error from which a Campbell diagram has a mode."""
 SHOWN_MODES = 12
 """Modes in the table that a notebook shows."""
 
@@ -195,6 +217,63 @@ class Modes(ReprMixin):
     def nearest(self, frequency: float) -> int:
         """Find the number of the mode nearest to a frequency (Hz)."""
         return int(np.argmin(np.abs(self.frequency - frequency)))
+
+    def energies(self) -> dict[str, Floats]:
+        """Shares (n,) of each mode's energy, kinetic by body, then of strain by element; those of planets together."""
+        families = _families(self.assembly)
+        shares: dict[str, Floats] = {}
+        for body, share in zip(self.assembly.bodies, self.kinetic.sum(axis=2).T, strict=True):
+            name = f"{'planets' if body.carrier else body.name}, kinetic"
+            shares[name] = shares.get(name, 0.0) + share
+        for element, share in zip(self.element_names, self.strain.T, strict=True):
+            name = f"{families.get(element, element).removesuffix('_body')}, strain"
+            shares[name] = shares.get(name, 0.0) + share
+        return shares
+
+    def plot(self, kind: Literal["campbell", "energies"] = "campbell", ax: Axes | None = None) -> Axes:
+        """Draw the Campbell diagram, or the energy of all modes.
+
+        Parameters
+        ----------
+        kind
+            ``campbell``: modes with more than 0.1 % participation in the overall transmission error, and mesh orders;
+            size of a mark: participation. ``energies``: share of the kinetic energy by body and of the strain energy
+            by element.
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Raises
+        ------
+        ValueError
+            There is no such kind.
+
+        Examples
+        --------
+        >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+        >>> stiffness = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+        >>> modes = eigenmodes(gearbox, Choice("rigid"), stiffness)
+        >>> ax = modes.plot()
+        >>> ax.get_xlabel(), ax.get_ylabel()
+        ('Input speed / rpm', 'Frequency / kHz')
+        """
+        from exugear.system.diagrams import draw_campbell, draw_energies  # for drawing only
+        from fe_ste.tools.drawing import axes_or_new
+
+        if kind == "energies":
+            return draw_energies(self.energies(), ax)
+        if kind != "campbell":
+            raise ValueError(f"kind = {kind!r}: must be one of campbell, energies")
+        gearbox = self.assembly.gearbox
+        shares = participation(self.overall)
+        seen = (self.frequency > 0.0) & (shares >= VISIBLE)
+        highest = max(gearbox.train.mesh_frequencies(1.0).values(), default=0.0)
+        top = 1.1 * float(max(self.frequency[seen], default=1.0))
+        fastest = top / highest if highest else 1.0
+        weights = (shares[seen] / max(float(shares.max(initial=0.0)), 1e-300)) ** 0.5
+        with axes_or_new(ax, 7.2, 5.0) as panel:
+            draw_campbell(panel, self.frequency[seen], gearbox.mesh_orders(), fastest, top, weights)
+            if panel.lines:
+                panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+            return panel
 
     def to_dataset(self) -> xr.Dataset:
         """Labelled arrays with units, what `save` writes."""

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import scipy.linalg
@@ -27,6 +27,9 @@ from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Equations of motion linearised about a state, and their undamped modes
 
@@ -378,6 +381,27 @@ class StaticState(ReprMixin):
         """Transverse force F_bt of each mesh on the line of action, N; positive, the loaded flank pushes."""
         states = self.assembly.mesh_states(self.q, np.zeros_like(self.q), self.assembly.mean_meshes)
         return np.asarray(states[:, FORCE])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the misalignment of each mesh as a bar, in mrad, as `exugear bearings` lists it.
+
+        Parameters
+        ----------
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Examples
+        --------
+        >>> from exugear import Choice, Gearbox, assemble, mesh_stiffness, static_state, template
+        >>> import tomllib
+        >>> gearbox = Gearbox.from_dict(tomllib.loads(template("parallel")))
+        >>> choice = Choice("bushing", "iso6336")
+        >>> ax = static_state(assemble(gearbox, choice, mesh_stiffness(gearbox, "iso6336"))).plot()
+        >>> [label.get_text() for label in ax.get_yticklabels()], ax.get_xlabel()
+        (['stage_1', 'stage_2'], 'Misalignment / mrad')
+        """
+        from exugear.system.diagrams import draw_misalignment  # for drawing only
+
+        return draw_misalignment(self.assembly.mesh_names, self.misalignment, ax)
 
     def _line(self) -> str:
         meshes = zip(self.assembly.mesh_names, 1e6 * self.misalignment, strict=True)

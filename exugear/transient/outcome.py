@@ -15,14 +15,21 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, LoadSummary, rim_radii
+from exugear.results.folder import read_stored_gearbox
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from exugear.gearbox.gearbox import Gearbox
 
 
 class RunError(RuntimeError):
@@ -102,6 +109,49 @@ class Run(ReprMixin):
     """Reasons why the run is invalid; empty if it is valid."""
     halted: bool = False
     """Whether it was stopped beyond a limit, and cannot be resumed."""
+
+    def plot(
+        self,
+        kind: Literal["orders", "waterfall"] = "orders",
+        ax: Axes | None = None,
+        gearbox: Gearbox | None = None,
+    ) -> Axes:
+        """Draw the overall transmission error of a run-up.
+
+        Parameters
+        ----------
+        kind : ``orders``: level along the orders of the meshes over speed, in dB; ``waterfall``: level over speed and
+            frequency
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+        gearbox : gearbox with the meshes; by default that of the results folder of the run
+
+        Raises
+        ------
+        ValueError
+            There is no such kind, or the speed does not change, so that no window length follows from it.
+        FileError
+            The run is missing or damaged.
+        GearboxFileError
+            The run is not in a results folder.
+
+        Examples
+        --------
+        >>> Run(Path("rigid/run.nc"), complete=True, end=0.5, wall=1.25).plot("shape")
+        Traceback (most recent call last):
+        ValueError: kind = 'shape': must be one of orders, waterfall
+        """
+        from exugear.results.spectra.diagrams import draw_levels, draw_waterfall  # for drawing only
+        from exugear.results.spectra.run_spectra import run_waterfall
+        from exugear.results.spectra.waterfall import order_lines
+
+        if kind not in ("orders", "waterfall"):
+            raise ValueError(f"kind = {kind!r}: must be one of orders, waterfall")
+        # The results folder, as `exugear.results.folder.run_directory` has it.
+        lines = order_lines(gearbox or read_stored_gearbox(self.path.absolute().parents[2]))
+        spectra = run_waterfall(self.path)
+        if kind == "orders":
+            return draw_levels(spectra, lines, ax)
+        return draw_waterfall(spectra, lines, ax)
 
     @property
     def trusted(self) -> bool:
@@ -204,7 +254,8 @@ def energy_left_over(lines: Floats, start: float, scale: float) -> tuple[Floats,
 
     Examples
     --------
-    >>> lines = np.array([[0.0, 0.0, 1.0, 0, 0, 0, 0], [9.0, 9.0, 1.0, 0, 0, 0, 0], [10.0, 9.0, 1.0, 0, 0, 0, 0]])
+    >>> lines = np.zeros((3, len(BALANCE_TERMS)))
+    >>> lines[:, :3] = [[0.0, 0.0, 1.0], [9.0, 9.0, 1.0], [10.0, 9.0, 1.0]]
     >>> energy_left_over(lines, start=1.0, scale=0.0)[0]
     array([0. , 0. , 0.1])
     """

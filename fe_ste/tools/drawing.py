@@ -70,6 +70,24 @@ def new_figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+@contextmanager
+def axes_or_new(ax: Axes | None, width: float = 5.0, height: float = 3.4) -> Iterator[Axes]:
+    """Give axes to draw on inside a ``with`` block: those of the caller in their own style, or new ones in this style.
+
+    Parameters
+    ----------
+    width, height : size of a new picture, inches
+    """
+    if ax is None:
+        with drawing_style():
+            yield new_figure(width, height).add_subplot()
+        return
+    import matplotlib
+
+    with matplotlib.rc_context({"text.parse_math": False}):
+        yield ax
+
+
 def drawable(text: str) -> str:
     r"""Put a sign in place of what no font can draw: control characters but ends of lines, halves of characters.
 

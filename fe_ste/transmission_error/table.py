@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -36,6 +36,7 @@ from fe_ste.transmission_error.states import CUT_OFF, RESULTS, STATE_AXES, State
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
 
 #: Beyond this many states the start of processes is repaid.
@@ -217,6 +218,38 @@ class MeshTable(ReprMixin):
                 raise TableError(f"table of {chosen.attrs['pair']}: no {axis} of the static state among its values")
             chosen = chosen.isel({axis: int(at[0])})
         return chosen
+
+    def plot(self, kind: Literal["ste", "stiffness", "load_share", "contact"] = "ste", ax: Axes | None = None) -> Axes:
+        """Draw a quantity at the static state.
+
+        Parameters
+        ----------
+        kind
+            Over the mesh cycle the static transmission error ``ste`` (µm), the mesh ``stiffness`` (N/µm) or the
+            ``load_share`` of each tooth pair (%); ``contact``: line load along the face (N/mm), mean of the mesh cycle.
+            Positions that have not converged are crossed out.
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Raises
+        ------
+        TableError
+            As in `static_state`.
+        ValueError
+            There is no such kind.
+
+        Examples
+        --------
+        >>> from fe_ste.geometry.gears import Gear
+        >>> gear = Gear(name="gear", teeth=30, normal_module=3e-3, face_width=20e-3, held_diameter=50e-3)
+        >>> pair = GearPair(name="pair", pinion=gear, gear=gear, centre_distance=90e-3)
+        >>> coarse = MeshSettings(layers=3, flank=4, thickness=4)
+        >>> table = MeshTable.compute(TableInput(pair=pair, torque=(100.0,), positions=4, mesh=coarse))
+        >>> table.plot("stiffness").get_ylabel()
+        'Mesh stiffness / (N/µm)'
+        """
+        from fe_ste.transmission_error.diagrams import draw_table  # for drawing only
+
+        return draw_table(self.static_state, kind, ax)
 
     @property
     def failures(self) -> list[str]:

@@ -76,3 +76,14 @@ def test_aligned_spur_gears_are_pressed_most_where_one_tooth_pair_carries_all(pa
     stress = np.sqrt(FORCE / WIDTH * (1.0 / inner + 1.0 / other) / (np.pi * 2.0 * (1.0 - 0.3**2) / 2.06e11))
     middle = flanks[1].pressure[:, 8:16].max()
     assert middle == pytest.approx(stress, rel=0.04)
+
+
+def test_the_diagram_has_the_pressure_over_face_and_path() -> None:
+    path, axial = np.linspace(10e-3, 20e-3, 5), np.linspace(-9e-3, 9e-3, 4)
+    pressure = 1e8 * np.arange(20.0).reshape(5, 4)
+    panel = FlankPressure(0.0, path, axial, pressure, np.full(4, 1e5), 1.0, 0.0).plot()
+    (mesh,) = panel.collections
+    np.testing.assert_array_equal(mesh.get_array(), 1e-6 * pressure)
+    x, y = np.moveaxis(mesh.get_coordinates(), -1, 0)  # corners of the cells, around the places
+    np.testing.assert_allclose(0.5 * (x[0, 1:] + x[0, :-1]), 1e3 * axial)
+    np.testing.assert_allclose(0.5 * (y[1:, 0] + y[:-1, 0]), 1e3 * path)

@@ -75,27 +75,16 @@ def modes(
 
 
 def _draw_campbell(found: Modes, path: Path) -> Path:
-    """Plot modes with participation in the overall transmission error over the speeds of the fastest load case."""
-    from exugear.report.pictures.diagrams import plot_campbell
-    from exugear.results.spectra.run_spectra import mobility_shares
-    from exugear.results.spectra.waterfall import order_lines
+    """Draw the Campbell diagram of modes with participation in the overall transmission error next to their file."""
+    from exugear.system.modes import VISIBLE
+    from fe_ste.tools.drawing import drawing_style, finish_figure, new_figure
 
-    gearbox = found.assembly.gearbox
-    least = 1e-3
-    shares = mobility_shares(found.to_dataset())
-    seen = (found.frequency > 0.0) & (shares >= least)
-    highest = max(gearbox.train.mesh_frequencies(1.0).values(), default=0.0)
-    top = 1.1 * float(max(found.frequency[seen], default=1.0))
-    picture = path.with_name("campbell.png")
-    plot_campbell(
-        found.frequency[seen],
-        order_lines(gearbox),
-        top / highest if highest else 1.0,
-        picture,
-        weights=(shares[seen] / shares.max()) ** 0.5,
-        highest_frequency=top,
-        title=f"{found.label}: modes with more than {100 * least:g} % TE participation",
-    )
+    with drawing_style():
+        figure = new_figure(7.2, 5.0)
+        found.plot(ax=figure.add_subplot())
+        figure.suptitle(f"{found.label}\nModes with more than {100 * VISIBLE:g} % TE participation", fontsize=9.5)
+        picture = path.with_name("campbell.png")
+        finish_figure(figure, picture)
     return picture
 
 

@@ -23,16 +23,18 @@ from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG
 from exugear.gearbox.sections.gears import ModificationSection
 from exugear.gearbox.units import MM, UM
 from exugear.report.findings.loudness import Resonance
-from exugear.steady.mean_system.signals import quantities_of
+from exugear.steady.mean_system.signals import SIGNALS, quantities_of
 from exugear.steady.settings import SteadySettings, operating_speeds
 from fe_ste.geometry.gears import GearPair
 from fe_ste.geometry.involute import involute
 from fe_ste.standards.pitting import nominal_contact_stress
 from fe_ste.tools.arrays import Floats
+from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable
 from fe_ste.tools.files import FileError, write_file
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
 NEAR = 0.05
 """Relative speed difference within which a peak counts as the same one."""
@@ -104,6 +106,45 @@ class DesignStudy:
     """Its amplitudes by quantity, SI units."""
     results: Sequence[ChangeResult]
     """Changes of the design by their effect, then assumptions, then changes that cannot be made."""
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw what each change does to the three quantities, in dB, as `exugear report --levers` lists it.
+
+        Narrow dark bars: this peak; wide pale bars: highest amplitude of any order in the operating range. Changes that
+        cannot be made are left out.
+
+        Parameters
+        ----------
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+
+        Examples
+        --------
+        >>> wider = DesignChange("wider", "face width 40 to 48 mm", "gear", {})
+        >>> results = (ChangeResult(wider, {"error": Effect(-6.0, -3.5)}, "+2 kg"),)
+        >>> ax = DesignStudy({}, "", "stage_1", 334.0, 100.0, {"error": 1e-6}, results).plot()
+        >>> [label.get_text() for label in ax.get_yticklabels()], [float(bar.get_width()) for bar in ax.patches]
+        (['face width 40 to 48 mm'], [-3.5, -6.0])
+        """
+        made = [result for result in self.results if not result.refusal]
+        names = [name for name in SIGNALS if any(name in result.effects for result in made)]
+        height = 0.8 / max(1, len(names))
+        with axes_or_new(ax, 8.0, 1.2 + 0.45 * len(made)) as panel:
+            for number, name in enumerate(names):
+                at = np.arange(len(made)) + (number - 0.5 * (len(names) - 1)) * height
+                effects = [result.effects.get(name, Effect(None, None)) for result in made]
+                here = np.array([effect.this_peak for effect in effects], dtype=np.float64)
+                highest = np.array([effect.highest for effect in effects], dtype=np.float64)
+                colour = COLOURS[number]
+                panel.barh(at, highest, 0.95 * height, color=colour, alpha=0.35, label=f"{name}, highest in range")
+                panel.barh(at, here, 0.4 * height, color=colour, label=f"{name}, this peak")
+            labels = [drawable(result.change.words) for result in made]
+            panel.set_yticks(range(len(made)), labels, parse_math=False)
+            panel.invert_yaxis()
+            panel.axvline(0.0, color="black", linewidth=0.8)
+            panel.set_xlabel("Change of the amplitude / dB")
+            if names:
+                panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(names))
+            return panel
 
 
 def settings_of_study(gearbox: Gearbox) -> SteadySettings:

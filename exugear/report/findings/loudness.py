@@ -27,6 +27,7 @@ from exugear.steady.steady_file import settings_of
 from fe_ste.tools.arrays import Booleans, Floats
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
 
 SAME_SPEED_TOLERANCE = 0.01
@@ -171,6 +172,40 @@ def ranking_of(data: xr.Dataset, speeds: tuple[float, float] | None = None) -> R
     return Ranking(found, (low, high), whole, _accelerating_parts(data))
 
 
+def resonances(data: xr.Dataset) -> pd.DataFrame:
+    """Rank the resonances of a steady-state response within the operating range, as `exugear steady` lists them.
+
+    Parameters
+    ----------
+    data : result of `exugear.project.Project.steady` or `exugear.steady.steady_file.steady_response`
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row a resonance, sorted by the best rank in any quantity: order, input speed, frequency; amplitude, rank
+        (empty without a peak) and bearing of each quantity, and its amplitudes with the lowest and the highest
+        plausible damping. SI units, speeds in rpm.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from exugear import Choice, Gearbox, SpeedRange, SteadySettings, steady_response
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
+    >>> mean = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> stiffness = {name: value * shape for name, value in mean.items()}
+    >>> settings = SteadySettings(SpeedRange.from_text("15:25:11"))
+    >>> table = resonances(steady_response(gearbox, Choice("rigid"), stiffness, settings=settings))
+    >>> table[["line", "error_place"]].head(1)
+                  line  error_place
+    0  2 x intermediate            1
+    """
+    import pandas as pd
+
+    table = pd.DataFrame([resonance.summary() for resonance in ranking_of(data).resonances])
+    return table.astype({name: "Int64" for name in table if str(name).endswith("_place")})
+
+
 @dataclass(frozen=True)
 class Envelope:
     """Largest single order of a quantity over speed."""
@@ -188,11 +223,16 @@ def envelopes(data: xr.Dataset) -> dict[str, Envelope]:
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
     """
-    speed = np.abs(data["speed"].to_numpy().astype(np.float64))
-    rising = np.argsort(speed, kind="stable")
+    speed = np.sort(np.abs(data["speed"].to_numpy().astype(np.float64)))
+    return {name: Envelope(speed, values.max(axis=1)) for name, values in order_amplitudes(data).items()}
+
+
+def order_amplitudes(data: xr.Dataset) -> dict[str, Floats]:
+    """Amplitude (points, orders) of each order but 0, by quantity, of the bearing with the largest; speeds ascend."""
+    rising = np.argsort(np.abs(data["speed"].to_numpy()), kind="stable")
     amplitude: Floats = data["amplitude"].to_numpy()[rising, 1:].astype(np.float64)
     quantities = quantities_of([str(name) for name in data["signal"].to_numpy()])
-    return {own.name: Envelope(speed[rising], own.sizes(amplitude).max(axis=(1, 2))) for own in quantities}
+    return {own.name: own.sizes(amplitude).max(axis=2) for own in quantities}
 
 
 Limits = Mapping[tuple[int, int, str], tuple[Limit, Limit]]

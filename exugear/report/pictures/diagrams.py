@@ -1,30 +1,28 @@
-"""Diagrams of modes (Campbell), of run-ups (waterfalls with order lines) and of transmission error tables.
-
-Functions for modes and runs take arrays or spectra of `exugear.results.spectra` and return a matplotlib `Figure`;
-they need no display.
-"""
+"""Diagrams of modes (Campbell), and of steady-state responses, and pictures of tables."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.units import RPM
-from exugear.results.spectra.resonances import Pick
-from exugear.results.spectra.waterfall import OrderLine, Waterfall
+from exugear.report.findings.loudness import envelopes, order_amplitudes, ranking_of
+from exugear.results.spectra.waterfall import OrderLine
+from exugear.system.diagrams import draw_campbell
 from exugear.system.tooth_mesh.tables import TableRequest
-from fe_ste.pictures.diagrams import plot_load_share, plot_ste_curves
 from fe_ste.pictures.teeth import contact_quads, draw_tooth_contact, meshed_teeth
-from fe_ste.tools.arrays import Floats
-from fe_ste.tools.drawing import COLOURS, drawing_style, finish_figure, new_figure
+from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable, drawing_style, finish_figure, new_figure
+from fe_ste.transmission_error.diagrams import plot_load_share, plot_ste_curves
 from fe_ste.transmission_error.search import contact_state
 from fe_ste.transmission_error.table import MeshTable, prepared_compliance
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -55,166 +53,98 @@ def plot_campbell(
     """
     modes = np.asarray(eigenfrequencies, dtype=np.float64)
     size = np.ones(modes.size) if weights is None else np.asarray(weights, dtype=np.float64)
-    order_lines = tuple(lines)
+    orders = {line.name: line.order for line in lines}
     top = highest_frequency or 1.1 * float(max([modes.max(initial=0.0), 1.0]))
-    end_speed = fastest / RPM
     with drawing_style():
         figure = new_figure(7.2, 5.0)
         panel = figure.add_subplot()
-        panel.grid(False)
-        for mode in modes[modes <= top]:
-            panel.axhline(1e-3 * mode, color="#BBBBBB", linewidth=0.8, zorder=1)
-        for number, line in enumerate(order_lines):
-            colour = COLOURS[number % len(COLOURS)]
-            end = float(line.frequency(fastest))
-            reach = min(1.0, top / end)
-            panel.plot([0.0, reach * end_speed], [0.0, 1e-3 * reach * end], color=colour, label=line.name, zorder=2)
-            crossed = (modes <= reach * end) & (modes > 0.0)
-            speeds = end_speed * modes[crossed] / end
-            panel.scatter(speeds, 1e-3 * modes[crossed], s=8.0 + 60.0 * size[crossed], color=colour, zorder=3)
+        draw_campbell(panel, modes, orders, fastest, top, size)
         for name, mode in zip(names, modes, strict=False):
             if mode <= top:
                 panel.annotate(
-                    name, (end_speed, 1e-3 * mode), (4, 0), textcoords="offset points", va="center", fontsize=7.0
+                    name, (fastest / RPM, 1e-3 * mode), (4, 0), textcoords="offset points", va="center", fontsize=7.0
                 )
-        panel.set(xlim=(0.0, end_speed), ylim=(0.0, 1e-3 * top))
-        panel.set(xlabel="Input speed / rpm", ylabel="Frequency / kHz")
         panel.set_title(title, loc="left")
-        if order_lines:
+        if orders:
             figure.legend(loc="outside upper center", ncols=4)
         return finish_figure(figure, path)
 
 
-# Diagrams of runs: waterfalls with order lines
+# Steady-state responses over speed
 
-MARK_COLOUR = "#00E5FF"
-"""Colour of circled peaks, which contrasts with the colours of a waterfall."""
+QUANTITIES = {
+    "error": ("Overall transmission error / µm", 1e6),
+    "force": ("Bearing force / kN", 1e-3),
+    "acceleration": ("Acceleration at bearings / (m/s²)", 1.0),
+}
+"""Axis labels of the three quantities, and factors from SI units."""
+SHOWN_RESONANCES = 10
+"""Maximum number of resonances with a circle, whose orders have a curve."""
+SHOWN_RANGE = 1e-4
+"""Lowest drawn amplitude as a fraction of the highest."""
 
 
-def plot_waterfalls(
-    runs: Mapping[str, Waterfall],
-    lines: Iterable[OrderLine],
-    path: str | Path | None = None,
-    *,
-    marks: Mapping[str, Sequence[Pick]] | None = None,
-    highest_frequency: float | None = None,
-    dynamic_range: float = 110.0,
-    quantity: str = "overall transmission error",
-) -> Figure:
-    """Draw waterfalls next to each other on a common scale.
+def plot_response(
+    data: xr.Dataset, quantity: Literal["error", "force", "acceleration"] = "error", ax: Axes | None = None
+) -> Axes:
+    """Draw the amplitudes of a steady-state response over speed: the highest of all orders, and those with resonances.
+
+    Circles are the ten highest resonances that `exugear.resonances` and `exugear steady` rank, with their rank; the
+    operating range is tinted.
 
     Parameters
     ----------
-    runs : title and spectra of each panel
-    lines : order lines to draw and label
-    path : file for the picture
-    marks : peaks to circle and number in a panel, such as those that only this run shows
-    highest_frequency : end of the frequency axis, Hz
-    dynamic_range : span of the colours below the highest level of all runs, dB
-    quantity : quantity of the level, for the label of the colour bar
-
-    Returns
-    -------
-    frequency over speed of the carrier, with colours for the level
+    data : result of `exugear.project.Project.steady` or `exugear.steady.steady_file.steady_response`
+    quantity : force and acceleration: at the bearing with the largest amplitude, for planets root mean square
+    ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
 
     Raises
     ------
     ValueError
-        If there is no run, or the runs differ in unit or reference and so cannot share a scale.
+        The response has no such quantity; those of bearings are missing without bearings.
+
+    Examples
+    --------
+    >>> from exugear import Choice, Gearbox, SpeedRange, SteadySettings, steady_response
+    >>> gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    >>> shape = 1.0 + 0.05 * np.cos(2.0 * np.pi * np.arange(50) / 50)
+    >>> mean = {"sun_planet": 3.8e9, "ring_planet": 4.9e9, "intermediate": 3.1e9, "high_speed": 1.9e9}
+    >>> stiffness = {name: value * shape for name, value in mean.items()}
+    >>> settings = SteadySettings(SpeedRange.from_text("15:25:11"))
+    >>> ax = plot_response(steady_response(gearbox, Choice("rigid"), stiffness, settings=settings))
+    >>> ax.get_xlabel(), ax.get_ylabel()
+    ('Input speed / rpm', 'Overall transmission error / µm')
     """
-    if not runs:
-        raise ValueError("plot_waterfalls: no run specified")
-    if len({(run.unit, run.reference) for run in runs.values()}) > 1:
-        raise ValueError("plot_waterfalls: the runs differ in unit or reference; they share no scale")
-    reference = next(iter(runs.values())).reference_text  # one for all
-    top = highest_frequency or min(float(run.frequency[-1]) for run in runs.values())
-    fastest = max(float(run.speed.max()) for run in runs.values()) / RPM
-    highest = max(float(run.level[:, run.frequency <= top].max()) for run in runs.values())
-    order_lines = tuple(lines)
-    with drawing_style():
-        figure = new_figure(4.6 * len(runs) + 1.0, 5.0)
-        panels = figure.subplots(1, len(runs), sharex=True, sharey=True, squeeze=False)[0]
-        for panel, (name, run) in zip(panels, runs.items(), strict=True):
-            image = panel.imshow(
-                pooled_levels(run, top, fastest * RPM),
-                extent=(0.0, fastest, 0.0, 1e-3 * top),
-                origin="lower",
-                aspect="auto",
-                interpolation="nearest",
-                cmap="inferno",
-                clim=(highest - dynamic_range, highest),
-            )
-            panel.grid(False)
-            panel.set(xlim=(0.0, fastest), ylim=(0.0, 1e-3 * top), xlabel="Input speed / rpm")
-            panel.set_title(name, loc="left", pad=24.0)
-            _draw_order_lines(panel, order_lines, fastest, top, "white")
-            _draw_marks(panel, (marks or {}).get(name, ()))
-        panels[0].set_ylabel("Frequency / kHz")
-        label = f"{quantity[0].upper()}{quantity[1:]}, level / dB re {reference}"
-        figure.colorbar(image, ax=panels, label=label, extend="min", aspect=30)
-        caption = "; ".join(sorted({run.description for run in runs.values()}))
-        figure.supxlabel(caption, fontsize=7.5, color="#555555")
-        return finish_figure(figure, path)
-
-
-def pooled_levels(
-    run: Waterfall, highest_frequency: float, fastest: float, shape: tuple[int, int] = (700, 450)
-) -> Floats:
-    """Return the highest level in each cell of a picture, so that narrow lines are not lost between its pixels.
-
-    Parameters
-    ----------
-    run : spectra
-    highest_frequency, fastest : upper ends of the axes, Hz and rad/s; the axes begin at zero
-    shape : maximum number of cells along frequency and speed
-
-    Returns
-    -------
-    (frequencies, speeds) dB; NaN at speeds that the run does not reach
-    """
-    shown = run.frequency <= highest_frequency
-    rows = min(shape[0], max(1, int(np.count_nonzero(shown)) - 1))
-    columns = min(shape[1], max(1, run.speed.size // 2))
-    row = np.minimum((rows * run.frequency[shown] / highest_frequency).astype(np.int64), rows - 1)
-    column = np.minimum((columns * run.speed / fastest).astype(np.int64), columns - 1)
-    cells = np.full((columns, rows), -np.inf)
-    np.maximum.at(cells, (column[:, None], row[None, :]), run.level[:, shown])
-    empty = np.isneginf(cells).all(axis=1)
-    if empty.any():
-        # A cell between two frames takes the nearer frame; beyond the run, cells are empty.
-        filled = np.flatnonzero(~empty)
-        nearest = filled[np.abs(np.arange(columns)[:, None] - filled).argmin(axis=1)]
-        inside = (np.arange(columns) >= filled[0]) & (np.arange(columns) <= filled[-1])
-        cells = np.where(inside[:, None], cells[nearest], np.nan)
-    return np.where(np.isneginf(cells), np.nan, cells).T
-
-
-def _draw_order_lines(panel: Axes, lines: Sequence[OrderLine], fastest: float, top: float, colour: str) -> None:
-    """Draw lines from the origin (rpm, kHz) and name each where it leaves the panel, above or to the right."""
-    taken_above: list[float] = []
-    taken_right: list[float] = []
-    for line in sorted(lines, key=lambda line: line.order):
-        end = float(line.frequency(fastest * RPM))
-        above = end > top
-        speed, frequency = (fastest * top / end, top) if above else (fastest, end)
-        # Sparse dots, as a full line would hide the level along it.
-        panel.plot([0.0, speed], [0.0, 1e-3 * frequency], color=colour, linewidth=0.8, linestyle=(0, (1, 7)))
-        taken, position = (taken_above, speed / fastest) if above else (taken_right, frequency / top)
-        if all(abs(position - other) > 0.04 for other in taken):
-            taken.append(position)
-            label = panel.annotate(line.name, (speed, 1e-3 * frequency), (3.0, 2.0), textcoords="offset points")
-            label.set(fontsize=7.0, annotation_clip=False, va="bottom" if above else "center")
-            label.set_rotation(35.0 if above else 0.0)
-
-
-def _draw_marks(panel: Axes, picks: Sequence[Pick]) -> None:
-    for number, pick in enumerate(picks, start=1):
-        speed = pick.speed / RPM
-        frequency = 1e-3 * pick.frequency
-        panel.plot(speed, frequency, "o", markersize=9, markerfacecolor="none", markeredgecolor=MARK_COLOUR)
-        panel.annotate(
-            str(number), (speed, frequency), (6, 6), textcoords="offset points", fontsize=8, color=MARK_COLOUR
-        )
+    curves = envelopes(data)
+    if quantity not in curves:
+        raise ValueError(f"quantity = {quantity!r}: must be one of {', '.join(curves)}")
+    amplitude = order_amplitudes(data)[quantity]
+    label, factor = QUANTITIES[quantity]
+    speed = curves[quantity].speed / RPM
+    orders = data["order"].to_numpy()[1:]
+    ranking = ranking_of(data)
+    places = {own.amplitudes[quantity].place: own for own in ranking.resonances}
+    ranked = {place: places[place] for place in range(1, SHOWN_RESONANCES + 1) if place in places}
+    lines = {own.line: int(np.argmin(np.abs(orders - own.order))) for own in ranked.values()}
+    colours = dict(zip(lines, itertools.cycle(COLOURS), strict=False))
+    with axes_or_new(ax, 6.5, 4.0) as panel:
+        panel.plot(speed, factor * curves[quantity].amplitude, color="#BBBBBB", linewidth=3.0, label="highest order")
+        for name, colour in colours.items():
+            panel.plot(speed, factor * amplitude[:, lines[name]], color=colour, linewidth=1.0, label=drawable(name))
+        for place, resonance in ranked.items():
+            highest = resonance.amplitudes[quantity].amplitude
+            point = int(np.argmin(np.abs(amplitude[:, lines[resonance.line]] - highest)))
+            at = speed[point], factor * highest
+            panel.plot(*at, "o", color=colours[resonance.line], markerfacecolor="none")
+            panel.annotate(str(place), at, (0, 5), textcoords="offset points", ha="center", fontsize=7.0)
+        if not ranking.whole:
+            panel.axvspan(*(value / RPM for value in ranking.speeds), color="#EEEEEE", zorder=0)
+        highest = factor * float(amplitude.max(initial=0.0))
+        if highest > 0.0:
+            panel.set(yscale="log", ylim=(SHOWN_RANGE * highest, 2.0 * highest))
+        panel.set(xlabel="Input speed / rpm", ylabel=label)
+        panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+        return panel
 
 
 # Pictures of the transmission error tables of a gearbox

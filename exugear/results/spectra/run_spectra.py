@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from textwrap import shorten
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -24,8 +24,12 @@ from exugear.results.spectra.resonances import (
     pick_resonances,
 )
 from exugear.results.spectra.waterfall import OrderLine, Waterfall, sweep_matched_window, waterfall
+from exugear.system.modes import participation
 from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.display import ReprMixin, TitledRows
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Results of eigenmodes: kinetic and strain energy, and participation in the overall transmission error
 
@@ -34,16 +38,8 @@ NEAR = 0.05
 
 
 def mobility_shares(modes: xr.Dataset) -> Floats:
-    """Participation of each mode in the overall transmission error (TE), shape (n,); the sum is one.
-
-    The participation is the square of the overall TE of a mode with unit modal mass, divided by the sum of these
-    squares over all modes. This sum is r M^-1 r^T, independent of the stiffness, so that the participation is
-    dimensionless.
-    """
-    squares = modes["overall_dte"].to_numpy() ** 2
-    total = float(squares.sum())
-    shares: Floats = squares / total if total > 0.0 else np.zeros(squares.shape)
-    return shares
+    """Participation of each stored mode, see `exugear.system.modes.participation`."""
+    return participation(modes["overall_dte"].to_numpy())
 
 
 @dataclass(frozen=True)
@@ -395,6 +391,19 @@ class Comparison(ReprMixin):
     @property
     def _title(self) -> str:
         return f"{self.first.variant} with {self.second.variant}, {self.first.conditions}"
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the highest level of both runs over speed, with circles at resonances that are absent from the other.
+
+        Parameters
+        ----------
+        ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
+        """
+        from exugear.results.spectra.diagrams import draw_highest_levels  # for drawing only
+
+        only = {self.first.variant: self.only_first, self.second.variant: self.only_second}
+        marks = {name: [finding.strongest for finding in findings] for name, findings in only.items()}
+        return draw_highest_levels({run.variant: run.spectra for run in self.runs}, marks, ax)
 
     @cached_property
     def only_first(self) -> tuple[Finding, ...]:

@@ -47,25 +47,6 @@ class OrderLine:
         return self.order * np.abs(np.asarray(speed, dtype=np.float64)) / (2.0 * math.pi)
 
 
-def harmonics(name: str, order: float, count: int) -> tuple[OrderLine, ...]:
-    """Order lines of a mesh and its harmonics.
-
-    Parameters
-    ----------
-    name : name of the first harmonic
-    order : order of the first harmonic
-    count : number of harmonics, including the first
-
-    Examples
-    --------
-    >>> [(line.name, line.order) for line in harmonics("planetary", 99.0, 2)]
-    [('planetary', 99.0), ('2 × planetary', 198.0)]
-    """
-    return tuple(
-        OrderLine(name if number == 1 else f"{number} × {name}", number * order) for number in range(1, count + 1)
-    )
-
-
 def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
     """Order lines of all meshes with harmonics; meshes of equal frequency (sun and ring) share a line.
 
@@ -79,15 +60,7 @@ def order_lines(gearbox: Gearbox, count: int = 3) -> tuple[OrderLine, ...]:
     >>> [(line.name, round(line.order, 3)) for line in order_lines(gearbox, 1)]
     [('sun_planet', 99.0), ('intermediate', 468.571), ('high_speed', 1792.795)]
     """
-    mesh_orders = gearbox.train.mesh_frequencies(2.0 * math.pi)  # at one revolution per second
-    lines: list[OrderLine] = []
-    known_orders: list[float] = []
-    for mesh in gearbox.meshes:
-        order = mesh_orders[mesh.name]
-        if not any(abs(order - known) < 1e-6 * known for known in known_orders):
-            known_orders.append(order)
-            lines.extend(harmonics(mesh.family, order, count))
-    return tuple(lines)
+    return tuple(OrderLine(name, order) for name, order in gearbox.mesh_orders(count).items())
 
 
 # Amplitude spectra of signals, and the frequency resolution of a window for a sweeping tone

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
+from pandas import NA
 
+from exugear import resonances
 from exugear.cli.commands.steady import Method
 from exugear.steady.settings import METHODS
+from exugear.steady.steady_file import load_response
 from fe_ste.transmission_error.table import MeshTable
 
 from ..cases.bearing import BEARING_CASE
@@ -36,6 +39,9 @@ def test_steady_writes_a_response_and_sums_it_up(case):
     with xr.open_dataset(path, engine="h5netcdf") as data:
         assert data.sizes["point"] == summary["speeds"] >= 30
     assert summary["peaks_of_overall_dte"][0]["amplitude_m"] > 0.0
+    table = resonances(load_response(path))
+    assert [row["force_N"] for row in summary["resonances"]] == table["force_N"].to_list()
+    assert [row["error_place"] for row in summary["resonances"]] == table["error_place"].replace({NA: None}).to_list()
     assert summary["largest_energy_error"] < 1e-4
     again = steady(case, "--variant", "bushing", "--speeds", "500:8000:30")
     assert again.exit_code == 0

@@ -18,7 +18,7 @@ from exugear.system.build import assemble
 from exugear.system.operating_points import mesh_duties
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.tables import TableRequest
-from fe_ste.transmission_error.mean_contact import face_load_factor
+from fe_ste.transmission_error.contact_stress import face_load_factor
 
 from ..cases.coarse_contact import coarse_curves, coarse_input
 

@@ -14,6 +14,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.report.findings.loudness import resonances
 from exugear.report.writer import write_report
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks
@@ -91,6 +92,22 @@ def test_words_say_that_figures_are_of_constant_speed_and_name_the_mode_without_
         assert words in page, words
     assert "no modes computed; run `exugear modes` for mode shapes" not in page
     assert "window-dependent" not in page.partition('id="trust"')[0]
+
+
+def test_the_page_ranks_the_resonances_that_python_ranks(folder):
+    page = write_report(folder).path.read_text(encoding="utf-8")
+    (table,) = re.findall(r'<table id="resonances".*?</table>', page, re.DOTALL)
+    expected = resonances(load_response(response_path(folder, "bushing")))
+    for label, values in {
+        "speed / rpm": expected["speed_rpm"].abs(),
+        "frequency / Hz": expected["frequency_Hz"],
+        "transmission error ± / µm": 1e6 * expected["error_m"],
+        "bearing force ± / kN": 1e-3 * expected["force_N"],
+        "acceleration ± / m/s²": expected["acceleration_m_per_s2"],
+    }.items():
+        shown = [float(value) for value in re.findall(f'data-order="([^"]*)" data-label="{label}"', table)]
+        np.testing.assert_allclose(shown, values.head(len(shown)), rtol=1e-8)
+        assert len(shown) == 10
 
 
 @pytest.mark.validation

@@ -15,7 +15,7 @@ from fe_ste.reference.newton import NewtonSettings, solve_contact
 from fe_ste.reference.position import gear_model
 from fe_ste.root_stress import mesh_cycle_stress, root_gauges
 from fe_ste.transmission_error.compliance import pair_compliance
-from fe_ste.transmission_error.mean_contact import face_load_factor
+from fe_ste.transmission_error.contact_stress import face_load_factor
 from fe_ste.transmission_error.search import hertz_half_width, least_contact_length, normal_load
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 

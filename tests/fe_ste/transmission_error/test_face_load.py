@@ -9,7 +9,7 @@ import xarray as xr
 from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.geometry.gears import Gear, GearPair
-from fe_ste.transmission_error.mean_contact import face_load_factor, load_along_face
+from fe_ste.transmission_error.contact_stress import face_load_factor, load_along_face
 from fe_ste.transmission_error.transmission_error import static_transmission_error
 
 WIDTH = 20e-3

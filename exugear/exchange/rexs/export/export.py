@@ -41,7 +41,7 @@ from fe_ste.geometry.gears import Gear, GearPair
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.files import FileError
-from fe_ste.transmission_error.mean_contact import face_load_factor, load_along_face
+from fe_ste.transmission_error.contact_stress import face_load_factor, load_along_face
 from fe_ste.transmission_error.table import MeshTable, TableError
 
 # Results in a folder that belong to a gearbox; files computed from other input are skipped and reported

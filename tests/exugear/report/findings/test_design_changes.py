@@ -115,6 +115,20 @@ def test_changes_are_sorted_with_assumptions_and_refusals_behind() -> None:
     assert ordered([refused, assumed, worse, better]) == [better, worse, assumed, refused]
 
 
+def test_the_diagram_of_changes_has_both_effects_of_those_that_can_be_made() -> None:
+    known = {"error": Effect(-6.0, -2.0), "force": Effect(1.0, None)}
+    results = tuple(
+        ChangeResult(DesignChange(name, f"{name} it", "gear", {}), effects, "", refusal)
+        for name, effects, refusal in (("widen", known, ""), ("turn", {}, "does not fit"), ("soften", {}, ""))
+    )
+    panel = DesignStudy({}, "", "spur", 184.0, 2.4, {}, results).plot()
+    assert [label.get_text() for label in panel.get_yticklabels()] == ["widen it", "soften it"]
+    drawn = np.array([bar.get_width() for bar in panel.patches]).reshape(2, 2, 2)  # quantity, range or peak, change
+    expected = [[[known[name].highest, None], [known[name].this_peak, None]] for name in ("error", "force")]
+    np.testing.assert_array_equal(drawn, np.array(expected, dtype=np.float64))
+    assert panel.get_xlabel() == "Change of the amplitude / dB"
+
+
 def test_the_price_names_mass_axial_force_stress_and_life(grc: Gearbox) -> None:
     found = proposals(grc, ["intermediate"])
     helix = price_of(grc, grc.varied(found["intermediate-helix-angle"].keys), (100.0, 90.0))

@@ -12,7 +12,8 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
-from exugear.report.findings.loudness import HOUSING, SHAFTS, ranking_of
+from exugear.report.findings.loudness import HOUSING, SHAFTS, envelopes, order_amplitudes, ranking_of, resonances
+from exugear.report.pictures.diagrams import plot_response
 from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.steady.steady_file import to_dataset
@@ -69,6 +70,42 @@ def test_three_quantities_stand_side_by_side_and_the_best_place_in_any_comes_fir
     assert (low.amplitude, low.place, high.amplitude, high.place) == (80.0, 1, 6.0, 2)
     assert first.amplitudes["force"].places == second.amplitudes["force"].places == (1, 2)
     assert third.amplitudes["error"].limits is None and third.amplitudes["error"].places is None
+
+
+def test_the_table_of_resonances_has_their_places_and_amplitudes():
+    table = resonances(response(None))
+    rows = [own.summary() for own in ranking_of(response(None)).resonances]
+    assert table["line"].to_list() == [row["line"] for row in rows] == ["mesh", "2 x mesh", "2 x mesh"]
+    assert table["force_N"].to_list() == [row["force_N"] for row in rows]
+    assert table["speed_rpm"].to_list() == pytest.approx([-2.0 / RPM, -3.99 / RPM, -1.5 / RPM])
+    assert [table["acceleration_place"].isna()[n] for n in range(3)] == [True, False, True]
+    assert table["force_places_over_damping"][0] == (1, 2)
+
+
+@pytest.mark.parametrize(("quantity", "factor"), [("error", 1e6), ("force", 1e-3), ("acceleration", 1.0)])
+def test_the_diagram_over_speed_marks_the_ranked_peaks_on_the_curves_of_their_orders(quantity, factor):
+    data = response([1.0, 4.5])
+    table = resonances(data).dropna(subset=f"{quantity}_place").sort_values(f"{quantity}_place")
+    panel = plot_response(data, quantity)
+    curves = {line.get_label(): line.get_xydata() for line in panel.lines if len(line.get_xdata()) > 1}
+    amplitude = factor * order_amplitudes(data)[quantity]
+    envelope = envelopes(data)[quantity]  # what the page draws
+    np.testing.assert_array_equal(curves.pop("highest order").T, [envelope.speed / RPM, factor * envelope.amplitude])
+    np.testing.assert_allclose(factor * envelope.amplitude, amplitude.max(axis=1), rtol=1e-12)
+    assert list(curves) == list(dict.fromkeys(table["line"]))
+    for name, curve in curves.items():
+        np.testing.assert_array_equal(curve[:, 1], amplitude[:, ["mesh", "2 x mesh"].index(name)])
+    unit = {"error": "m", "force": "N", "acceleration": "m_per_s2"}[quantity]
+    marks = [line.get_xydata()[0] for line in panel.lines if len(line.get_xdata()) == 1]
+    assert [mark[1] for mark in marks] == pytest.approx((factor * table[f"{quantity}_{unit}"]).to_list())
+    assert [text.get_text() for text in panel.texts] == [str(place) for place in table[f"{quantity}_place"]]
+    assert all(any((mark == point).all() for curve in curves.values() for point in curve) for mark in marks)
+
+
+def test_a_response_without_bearings_has_no_forces_to_draw():
+    data = response(None).isel(signal=[0])
+    with pytest.raises(ValueError, match="quantity = 'force': must be one of error"):
+        plot_response(data, "force")
 
 
 def test_only_speeds_of_operation_are_ranked_and_all_where_none_of_them_was_computed():

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from exugear.gearbox.units import RPM
 from exugear.results.spectra.resonances import pick_resonances
 from exugear.results.spectra.run_spectra import AbsenceRule, compare, only_in_first, read_run
 from exugear.results.spectra.waterfall import waterfall
@@ -19,6 +20,18 @@ def test_what_only_one_run_shows(runs):
     assert only == pytest.approx([800.0, 1150.0], abs=14.0)
     assert comparison.only_second == ()
     assert [run.variant for run in comparison.runs] == ["rigid", "bushing"]
+
+
+def test_a_comparison_draws_both_runs_and_what_only_one_shows(runs):
+    comparison = compare(*runs)
+    panel = comparison.plot()
+    curves = {line.get_label(): line.get_xydata().T for line in panel.lines}
+    for run in runs:
+        expected = run.spectra.speed / RPM, run.spectra.level.max(axis=1)
+        np.testing.assert_array_equal(curves[run.variant], expected)
+    peaks = [finding.strongest for finding in comparison.only_first]
+    np.testing.assert_array_equal(curves["only bushing"][1], [peak.level for peak in peaks])
+    assert curves["only rigid"].size == 0
 
 
 @pytest.mark.parametrize("key", ["load_case", "mesh_model", "inertias", "gearbox"])

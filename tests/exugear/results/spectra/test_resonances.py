@@ -11,7 +11,7 @@ from exugear.results.spectra.resonances import (
     match_eigenfrequencies,
     pick_resonances,
 )
-from exugear.results.spectra.waterfall import OrderLine, harmonics, sweep_matched_window, waterfall
+from exugear.results.spectra.waterfall import OrderLine, sweep_matched_window, waterfall
 
 from .run_ups import MESH, RATE, oscillator, run_up
 
@@ -39,7 +39,7 @@ def test_level_of_a_slowly_swept_resonance_is_its_magnification():
 
 def test_two_orders_find_the_same_resonance_and_are_one_group():
     time, speed, angle = run_up(duration=20.0)
-    lines = harmonics("mesh", 60.0, 2)
+    lines = OrderLine("mesh", 60.0), OrderLine("2 × mesh", 120.0)
     force = np.sin(60 * angle) + 0.5 * np.sin(120 * angle)
     response = oscillator(force, 700.0, 0.02) + oscillator(force, 1200.0, 0.02)
     run = waterfall(response, speed, RATE, window_length=0.1, overlap=0.8, reference=1.0)

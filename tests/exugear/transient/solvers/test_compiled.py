@@ -14,7 +14,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.results.run_file import load_run
 from exugear.results.spectra.resonances import order_cut
-from exugear.results.spectra.waterfall import harmonics
+from exugear.results.spectra.waterfall import order_lines
 from exugear.system.build import assemble
 from exugear.system.loads import DriveLaw, Loading, LoadTable
 from exugear.system.signals import signal_layout
@@ -388,8 +388,7 @@ def test_order_cuts_of_the_run_up_stay_at_half_the_step(
         )
         lines = [
             line
-            for name, order in grc.train.mesh_frequencies(2.0 * np.pi).items()
-            for line in harmonics(name, order, 3)
+            for line in order_lines(grc)
             if line.frequency(22.5) < 8e3  # the flat part of the stored band
         ]
         speed = data.input_speed.to_numpy()

@@ -4,8 +4,11 @@ import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
-from fe_ste.pictures.diagrams import plot_load_share, plot_ripple, plot_ste_curves, single_load_case
+from fe_ste.transmission_error.contact_stress import load_along_face
+from fe_ste.transmission_error.diagrams import plot_load_share, plot_ripple, plot_ste_curves, single_load_case
+from fe_ste.transmission_error.table import MeshTable
 
 POSITIONS = np.arange(50) / 50
 
@@ -140,3 +143,38 @@ def test_ripple_over_load_shows_peak_to_peak_values_and_marks_the_design_load():
     np.testing.assert_allclose(mark.get_xydata(), [[150.0, 3.5]])
     with pytest.raises(ValueError, match="no dataset"):
         plot_ripple({})
+
+
+def stored_table():
+    """A table as it is stored: with stiffness, line load and the coordinates of its axes."""
+    dataset = table(missing=(7,))
+    line_load = xr.DataArray(np.arange(12.0) ** 2, dims="axial_position") * dataset["load_share"]
+    stiffness = 1e9 * (1.0 + dataset["ste"])
+    axes = {"centre_distance": [0.1], "misalignment": [0.0], "axial_position": 1e-3 * np.arange(12)}
+    return MeshTable(dataset.assign(line_load=line_load, mesh_stiffness=stiffness).assign_coords(axes))
+
+
+def test_a_table_draws_its_quantities_on_axes_of_the_caller_or_new_ones():
+    stored = stored_table()
+    state = stored.static_state
+    panel = Figure().add_subplot()
+    assert stored.plot(ax=panel) is panel
+    for kind, expected in (("ste", 1e6 * state["ste"]), ("stiffness", 1e-6 * state["mesh_stiffness"])):
+        curve, cross = stored.plot(kind).lines[:2]
+        assert np.isnan(curve.get_ydata()[7]) and cross.get_xdata() == POSITIONS[7]
+        np.testing.assert_array_equal(np.delete(curve.get_ydata()[:-1], 7), np.delete(expected.to_numpy(), 7))
+    shares = [line.get_xydata() for line in plot_load_share(state).axes[0].lines]
+    for line, expected in zip(stored.plot("load_share").lines, shares, strict=True):
+        np.testing.assert_array_equal(line.get_xydata(), expected)
+    along = load_along_face(state)
+    (curve,) = stored.plot("contact").lines
+    np.testing.assert_array_equal(curve.get_xdata(), 1e3 * state["axial_position"])
+    np.testing.assert_array_equal(curve.get_ydata(), 1e-3 * along)
+    assert stored.plot("contact").get_ylabel() == "Line load, mean of the mesh cycle / (N/mm)"
+
+
+def test_a_table_says_which_diagrams_it_has():
+    with pytest.raises(ValueError, match="must be one of ste, stiffness, load_share, contact"):
+        stored_table().plot("share")
+    with pytest.raises(ValueError, match="no variable 'line_load'"):
+        MeshTable(stored_table().dataset.drop_vars("line_load")).plot("contact")

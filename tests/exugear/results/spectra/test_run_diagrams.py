@@ -4,10 +4,19 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
-from exugear.report.pictures.diagrams import plot_waterfalls, pooled_levels
+from exugear.gearbox.reading import GearboxFileError
+from exugear.gearbox.units import RPM
+from exugear.results.folder import keep_case
+from exugear.results.solver_comparison import SolverComparison
+from exugear.results.spectra.diagrams import plot_waterfalls, pooled_levels
 from exugear.results.spectra.resonances import Pick
-from exugear.results.spectra.waterfall import OrderLine, Waterfall, waterfall
+from exugear.results.spectra.run_spectra import run_waterfall
+from exugear.results.spectra.waterfall import OrderLine, Waterfall, order_lines, waterfall
+from exugear.transient.outcome import Run
+
+from .run_ups import write_run
 
 RATE = 2048.0
 MESH, SECOND = OrderLine("mesh", 60.0), OrderLine("2 × mesh", 120.0)
@@ -104,3 +113,34 @@ def test_pooling_leaves_speeds_blank_that_the_run_does_not_reach():
 def test_run_diagrams_are_written(tmp_path):
     plot_waterfalls({"a": run(), "b": run()}, [MESH], tmp_path / "waterfall.png")
     assert (tmp_path / "waterfall.png").stat().st_size > 20_000
+
+
+def test_a_run_draws_the_levels_along_its_orders_and_its_waterfall(tmp_path, grc):
+    path = write_run(tmp_path / "bushing" / "reference-line_of_action-gears" / "run.nc", "bushing", [500.0])
+    finished = Run(path, complete=True, end=8.0, wall=1.0)
+    with pytest.raises(GearboxFileError, match="contains no results"):
+        finished.plot()
+    keep_case(grc, tmp_path)
+    spectra = run_waterfall(path)
+    panel = Figure().add_subplot()
+    assert finished.plot(ax=panel) is panel
+    assert panel.get_xlabel() == "Input speed / rpm"
+    assert panel.get_ylabel() == "Overall transmission error, level / dB re 1 µm"
+    for curve, line in zip(panel.lines, order_lines(grc), strict=True):
+        assert curve.get_label() == line.name
+        np.testing.assert_array_equal(curve.get_xdata(), spectra.speed / RPM)
+        np.testing.assert_array_equal(curve.get_ydata(), spectra.along(line))
+    panel = finished.plot("waterfall", gearbox=grc)
+    expected = pooled_levels(spectra, spectra.frequency[-1], spectra.speed.max())
+    np.testing.assert_array_equal(np.ma.filled(panel.images[0].get_array(), np.nan), expected)
+    assert panel.get_ylabel() == "Frequency / kHz"
+
+
+def test_both_solvers_are_drawn_as_deviations_from_the_mean_of_exudyn():
+    time = np.linspace(0.0, 1.0, 5)
+    compared = SolverComparison(
+        "Exudyn 1.8", "Newmark", 1.0, {"overall_dte": 1e-3}, time, (1e-6 * time**2, 1e-6 * time)
+    )
+    compiled, exudyn = compared.plot().lines
+    np.testing.assert_allclose(compiled.get_xydata().T, [time, time**2 - 0.5], atol=1e-15)
+    np.testing.assert_allclose(exudyn.get_xydata().T, [time, time - 0.5], atol=1e-15)

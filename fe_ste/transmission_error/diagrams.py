@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fe_ste.tools.arrays import Booleans, Floats
-from fe_ste.tools.drawing import COLOURS, WARNING_COLOUR, drawing_style, finish_figure, new_figure
+from fe_ste.tools.drawing import COLOURS, WARNING_COLOUR, axes_or_new, drawing_style, finish_figure, new_figure
+from fe_ste.transmission_error.contact_stress import load_along_face
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -172,7 +173,9 @@ def _cycle(dataset: xr.Dataset, name: str, factor: float) -> _Cycle:
     return _Cycle(dataset["pmc"].to_numpy().astype(np.float64), values, converged.astype(bool))
 
 
-def _draw_cycle(panel: Axes, curve: _Cycle, colour: str, span: float) -> None:
+def _draw_cycle(panel: Axes, curve: _Cycle, colour: str, span: float | None = None) -> None:
+    """Draw a curve with a range of values; without one, the range is 1.15 times its own."""
+    span = span or 1.15 * max(1e-3, curve.peak_to_peak)
     # The first position again at the end: it is the same state one pitch on.
     pmc = np.append(curve.pmc, curve.pmc[0] + 1.0)
     shown = np.where(curve.valid, curve.values, np.nan)
@@ -197,6 +200,74 @@ def mark_not_converged(panel: Axes, pmc: Floats, height: Floats) -> None:
     panel.legend(loc="best")
 
 
+# One quantity of one table on the axes of the caller, for `MeshTable.plot`
+
+KINDS = {
+    "ste": ("ste", "Static transmission error / µm", 1e6),
+    "stiffness": ("mesh_stiffness", "Mesh stiffness / (N/µm)", 1e-6),
+    "load_share": ("load_share", "Load share / %", 100.0),
+    "contact": ("line_load", "Line load, mean of the mesh cycle / (N/mm)", 1e-3),
+}
+"""Variable of each kind of diagram, label of its axis, and factor from SI units."""
+
+
+def draw_table(dataset: xr.Dataset, kind: str, ax: Axes | None = None) -> Axes:
+    """Draw one quantity of a table at one load, see `fe_ste.transmission_error.table.MeshTable.plot`."""
+    if kind not in KINDS:
+        raise ValueError(f"kind = {kind!r}: must be one of {', '.join(KINDS)}")
+    variable, label, factor = KINDS[kind]
+    if variable not in dataset:
+        raise ValueError(f"dataset: no variable {variable!r} among {sorted(map(str, dataset.data_vars))}")
+    cycle = single_load_case(dataset)
+    with axes_or_new(ax) as panel:
+        if kind == "load_share":
+            _draw_shares(panel, _shares(cycle))
+        elif kind == "contact":
+            along = load_along_face(cycle)
+            position = 1e3 * along["axial_position"].to_numpy()
+            panel.plot(position, factor * along.to_numpy(), color=COLOURS[0], marker="o", markersize=2.2)
+            panel.set(xlabel="Position along the face / mm", ylabel=label)
+            panel.set_ylim(bottom=0.0)
+        else:
+            _draw_cycle(panel, _cycle(cycle, variable, factor), COLOURS[0])
+            panel.set(xlabel="Position in mesh cycle", ylabel=label)
+        return panel
+
+
+@dataclass(frozen=True)
+class _Shares:
+    """Shares of the load over the mesh cycle."""
+
+    pmc: Floats
+    teeth: list[int]
+    """Tooth pairs that carry load."""
+    share: Floats
+    """(teeth, n) per cent; NaN where nothing converged."""
+    missing: Floats
+    """Positions without a converged state."""
+
+
+def _shares(cycle: xr.Dataset) -> _Shares:
+    share = 100.0 * cycle["load_share"].transpose("tooth", "pmc").to_numpy().astype(np.float64)
+    teeth = cycle["tooth"].to_numpy() if "tooth" in cycle.coords else np.arange(share.shape[0])
+    total = _cycle(cycle.assign(total=cycle["load_share"].sum("tooth")), "total", 100.0)
+    share[:, ~total.valid] = np.nan
+    carrying = np.nanmax(share, axis=1, initial=0.0) > 0.0
+    return _Shares(total.pmc, teeth[carrying].tolist(), share[carrying], total.pmc[~total.valid])
+
+
+def _draw_shares(panel: Axes, shares: _Shares) -> None:
+    for row in _order_along_way(shares.share):
+        tooth = shares.teeth[row]
+        label = f"tooth pair {tooth:+d}" if tooth else "tooth pair 0"
+        colour = COLOURS[row % len(COLOURS)]
+        panel.plot(shares.pmc, _carried(shares.share[row]), color=colour, marker="o", markersize=2.2, label=label)
+    panel.set(xlim=(0.0, 1.0), ylim=(0.0, 1.12 * float(np.nanmax(shares.share, initial=1.0))))
+    panel.set(xlabel="Position in mesh cycle", ylabel=KINDS["load_share"][1])
+    panel.legend(loc="best")
+    mark_not_converged(panel, shares.missing, np.zeros(shares.missing.size))
+
+
 def plot_load_share(dataset: xr.Dataset, path: str | Path | None = None, title: str = "") -> Figure:
     """Draw the share of the load that each tooth pair carries over the mesh cycle.
 
@@ -219,30 +290,15 @@ def plot_load_share(dataset: xr.Dataset, path: str | Path | None = None, title: 
     """
     if "load_share" not in dataset:
         raise ValueError(f"dataset: no variable 'load_share' among {sorted(map(str, dataset.data_vars))}")
-    cycle = single_load_case(dataset)
-    share = 100.0 * cycle["load_share"].transpose("tooth", "pmc").to_numpy().astype(np.float64)
-    teeth = cycle["tooth"].to_numpy() if "tooth" in cycle.coords else np.arange(share.shape[0])
-    total = _cycle(cycle.assign(total=cycle["load_share"].sum("tooth")), "total", 100.0)
-    share[:, ~total.valid] = np.nan
-    carrying = np.nanmax(share, axis=1, initial=0.0) > 0.0
-    share = share[carrying]
-    teeth = teeth[carrying]
+    shares = _shares(single_load_case(dataset))
     with drawing_style():
         figure = new_figure(7.2, 2.9)
         over_cycle, over_way = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.4))
-        order = _order_along_way(share)
+        _draw_shares(over_cycle, shares)
+        order = _order_along_way(shares.share)
         for step, row in enumerate(order):
-            colour = COLOURS[row % len(COLOURS)]
-            shown = _carried(share[row])
-            label = f"tooth pair {teeth[row]:+d}" if teeth[row] else "tooth pair 0"
-            over_cycle.plot(total.pmc, shown, color=colour, marker="o", markersize=2.2, label=label)
-            over_way.plot(total.pmc + step, shown, color=colour, marker="o", markersize=2.2)
-        highest = 1.12 * float(np.nanmax(share, initial=1.0))
-        over_cycle.set(xlim=(0.0, 1.0), ylim=(0.0, highest), xlabel="Position in mesh cycle")
-        over_cycle.set_ylabel("Load share / %")
-        over_cycle.legend(loc="best")
-        missing = total.pmc[~total.valid]
-        mark_not_converged(over_cycle, missing, np.zeros(missing.size))
+            shown = _carried(shares.share[row])
+            over_way.plot(shares.pmc + step, shown, color=COLOURS[row % len(COLOURS)], marker="o", markersize=2.2)
         over_way.set(xlim=(0.0, max(1, len(order))), xlabel="Way of one tooth pair in mesh cycles")
         figure.suptitle(title, fontsize=9.5)
         return finish_figure(figure, path)
