@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from exugear.gearbox.variant import Variant
     from exugear.life.life import compute_life
     from exugear.project import Project
-    from exugear.report.findings.loudness import resonances
+    from exugear.report.findings.ranking import resonances
     from exugear.report.pictures.diagrams import plot_campbell, plot_response
     from exugear.report.writer import write_report
     from exugear.results.run_file import load_run
@@ -62,7 +62,7 @@ _HOMES = {
     "plot_response": "exugear.report.pictures.diagrams",
     "plot_waterfalls": "exugear.results.spectra.diagrams",
     "read_rexs": "exugear.exchange.rexs.containers",
-    "resonances": "exugear.report.findings.loudness",
+    "resonances": "exugear.report.findings.ranking",
     "run_waterfall": "exugear.results.spectra.run_spectra",
     "simulate": "exugear.transient.runup",
     "static_state": "exugear.system.statics",

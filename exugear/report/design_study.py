@@ -30,7 +30,7 @@ from exugear.report.findings.design_changes import (
     settings_of_study,
     write_design_study,
 )
-from exugear.report.findings.loudness import Resonance, ranking_of
+from exugear.report.findings.ranking import Resonance, ranking_of
 from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from exugear.steady.settings import SteadySettings

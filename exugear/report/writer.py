@@ -26,7 +26,7 @@ from exugear.report.findings.context import (
 )
 from exugear.report.findings.groups import groups_of
 from exugear.report.findings.headline import headline_of
-from exugear.report.findings.verdicts import begin_variations, model_variations
+from exugear.report.findings.parameter_variations import begin_variations, model_variations
 from exugear.report.findings.words import Labels
 from exugear.report.sections.answer import ranking_section, short_section
 from exugear.report.sections.bearings import bearings_section

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from exugear.gearbox.gearbox import Gearbox
     from exugear.project import Project
-    from exugear.report.findings.loudness import Ranking, Resonance
+    from exugear.report.findings.ranking import Ranking, Resonance
     from exugear.steady.peaks import BearingLoadExcursion, Peak, TensileMesh
     from exugear.steady.settings import SteadySettings
     from exugear.system.tooth_mesh.tables import Shuttling
@@ -179,7 +179,7 @@ def _settings(
 def _print_result(project: Project, settings: SteadySettings, data: xr.Dataset, as_json: bool) -> None:
     from exugear.gearbox.load_cases import static_load_in_words
     from exugear.gearbox.units import RPM
-    from exugear.report.findings.loudness import ranking_of
+    from exugear.report.findings.ranking import ranking_of
     from exugear.system.modal_damping import damping_in_words
 
     _warn_of_other_loads(project.gearbox)

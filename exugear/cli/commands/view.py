@@ -116,7 +116,7 @@ def _resonances(assembly: Assembly, modes: xr.Dataset, folder: Path) -> dict[int
     """Return the highest resonances in the operating range at each mode, from a stored steady-state response."""
     from exugear.gearbox.units import RPM
     from exugear.report.findings.headline import Headline
-    from exugear.report.findings.loudness import ranking_of
+    from exugear.report.findings.ranking import ranking_of
     from exugear.steady.steady_file import load_response, settings_of
     from fe_ste.tools.files import FileError
 

@@ -22,7 +22,7 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG
 from exugear.gearbox.sections.gears import ModificationSection
 from exugear.gearbox.units import MM, UM
-from exugear.report.findings.loudness import Resonance
+from exugear.report.findings.ranking import Resonance
 from exugear.steady.mean_system.signals import SIGNALS, quantities_of
 from exugear.steady.settings import SteadySettings, operating_speeds
 from fe_ste.geometry.gears import GearPair

@@ -13,7 +13,7 @@ from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import REFERENCE_VARIANT, Context, choice_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
 from exugear.report.findings.headline import headline_of_group
-from exugear.report.findings.verdicts import GAIN, BestChange, ModelVariations, best_change
+from exugear.report.findings.parameter_variations import GAIN, BestChange, ModelVariations, best_change
 from exugear.report.findings.words import Labels, figure_text
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks

@@ -30,7 +30,7 @@ from exugear.report.findings.context import (
     choice_of,
     run_key,
 )
-from exugear.report.findings.loudness import (
+from exugear.report.findings.ranking import (
     ConstantSpeed,
     Highest,
     Ranking,

@@ -19,7 +19,7 @@ from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import METHOD_LABELS, Context, PairExcitation, StoredResults, excitations
 from exugear.report.findings.groups import RunGroup
-from exugear.report.findings.loudness import Envelope, Ranking, Resonance, envelopes, ranking_of, ranking_of_errors
+from exugear.report.findings.ranking import Envelope, Ranking, Resonance, envelopes, ranking_of, ranking_of_errors
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.run_spectra import report_mode
 from exugear.results.spectra.waterfall import OrderLine, order_lines

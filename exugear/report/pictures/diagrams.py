@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from exugear.gearbox.units import RPM
-from exugear.report.findings.loudness import envelopes, order_amplitudes, ranking_of
+from exugear.report.findings.ranking import envelopes, order_amplitudes, ranking_of
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.system.diagrams import draw_campbell
 from exugear.system.tooth_mesh.tables import TableRequest

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.units import RPM
-from exugear.report.findings.loudness import Envelope, Ranking, Resonance
+from exugear.report.findings.ranking import Envelope, Ranking, Resonance
 from exugear.results.spectra.waterfall import OrderLine
 from fe_ste.tools.arrays import Floats
 

@@ -22,8 +22,8 @@ from exugear.report.findings.headline import (
     changes_of,
     contributions_of,
 )
-from exugear.report.findings.loudness import HOUSING, SHAFTS, Envelope, Resonance
-from exugear.report.findings.verdicts import default_place, track_mode
+from exugear.report.findings.parameter_variations import default_place, track_mode
+from exugear.report.findings.ranking import HOUSING, SHAFTS, Envelope, Resonance
 from exugear.report.findings.words import figure_text, percentages, rounded_text
 from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, Strips, campbell_of, strips_of
 from exugear.report.pictures.still import mode_picture

@@ -16,7 +16,7 @@ from exugear.report.findings.context import MESH_MODEL_LABELS, Context, StoredRe
 from exugear.report.findings.design_changes import DesignStudy
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline
-from exugear.report.findings.verdicts import ModelVariations
+from exugear.report.findings.parameter_variations import ModelVariations
 from exugear.report.findings.words import Labels
 from exugear.report.web.document import ArrayStore
 from exugear.report.web.html import Figure

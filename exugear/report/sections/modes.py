@@ -15,7 +15,7 @@ from exugear.report.findings.context import MESH_MODEL_LABELS, REFERENCE_VARIANT
 from exugear.report.findings.facts import best_words, sensitivities_of, shift_text
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import headline_of_group
-from exugear.report.findings.verdicts import best_change, track_mode
+from exugear.report.findings.parameter_variations import best_change, track_mode
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.sections.material import Axis, Curve, Part, ReportData, model_name
 from exugear.report.web.document import rounded

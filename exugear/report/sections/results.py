@@ -11,7 +11,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.facts import facts_of
 from exugear.report.findings.groups import RankedResonance, RunGroup
-from exugear.report.findings.verdicts import CheckResult, validity_checks
+from exugear.report.findings.result_checks import CheckResult, validity_checks
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.sections.material import Part, ReportData, group_words
 from exugear.report.web.html import Cell, Figure, Table, render

@@ -13,7 +13,7 @@ from exugear.gearbox.units import RPM
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.groups import Channel, RankedResonance, RunGroup, channels_of, dominant_order
 from exugear.report.findings.headline import SAME_FREQUENCY
-from exugear.report.findings.loudness import TOP, ConstantSpeed
+from exugear.report.findings.ranking import TOP, ConstantSpeed
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.sections.material import ReportData, group_words, model_name
 from exugear.report.web.document import rounded

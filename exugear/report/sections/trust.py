@@ -14,7 +14,7 @@ import xarray as xr
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import METHOD_LABELS, choice_of, model_label
-from exugear.report.findings.verdicts import run_figures
+from exugear.report.findings.result_checks import run_figures
 from exugear.report.sections.material import Axis, Curve, Part, ReportData, model_name
 from exugear.report.web.document import libraries, licences
 from exugear.report.web.html import Figure, Table, render

@@ -137,7 +137,10 @@ def test_non_linear_bearings_go_through_modes_run_and_file(case: Path) -> None:
 @pytest.mark.sample
 @pytest.mark.parametrize(
     ("place", "code"),
-    [("exugear.report.findings.verdicts.vary_parameter", 0), ("exugear.report.findings.context.assemble", 2)],
+    [
+        ("exugear.report.findings.parameter_variations.vary_parameter", 0),
+        ("exugear.report.findings.context.assemble", 2),
+    ],
 )
 def test_a_report_leaves_out_what_no_longer_balances(
     case: Path, monkeypatch: pytest.MonkeyPatch, place: str, code: int

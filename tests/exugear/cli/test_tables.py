@@ -23,7 +23,7 @@ from exugear.cli.file_commands import check
 from exugear.gearbox.sections.case import DampingSection
 from exugear.gearbox.variant import Variant
 from exugear.life.rating.sheet import FINITE_ELEMENTS, FlankSheet, RatingSheet
-from exugear.report.findings.loudness import PeakAmplitude, Ranking, Resonance
+from exugear.report.findings.ranking import PeakAmplitude, Ranking, Resonance
 from exugear.report.writer import Report
 from exugear.system.bearings.duty import Ratings
 from tests.exugear.cases.command import exugear

@@ -14,7 +14,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.report.findings.loudness import resonances
+from exugear.report.findings.ranking import resonances
 from exugear.report.writer import write_report
 from exugear.results.spectra.waterfall import order_lines
 from exugear.steady.peaks import peaks

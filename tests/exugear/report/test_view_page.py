@@ -1,4 +1,4 @@
-"""The page of `exugear view` in a browser: numbers of the command line, list beside the picture, views, rest position."""
+"""The page of `exugear view` in a browser: mode numbers, list beside the picture, views and rest position."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.report.findings.loudness import ranking_of
+from exugear.report.findings.ranking import ranking_of
 from exugear.steady.damping_band import damping_limits
 from exugear.steady.mean_system.mean_system import mean_modes, mean_system
 from exugear.steady.mean_system.signals import quantities_of

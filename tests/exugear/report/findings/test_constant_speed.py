@@ -13,7 +13,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings.facts import facts_of_response
 from exugear.report.findings.groups import RankedResonance
-from exugear.report.findings.loudness import constant_speed_of, most_complete_levels
+from exugear.report.findings.ranking import constant_speed_of, most_complete_levels
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.settings import SpeedRange, SteadySettings

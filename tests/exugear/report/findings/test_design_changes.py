@@ -30,7 +30,7 @@ from exugear.report.findings.design_changes import (
     propose_changes,
     read_design_study,
 )
-from exugear.report.findings.loudness import Resonance
+from exugear.report.findings.ranking import Resonance
 from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.system.tooth_mesh import tables
 from fe_ste.tools.files import FileError

@@ -9,7 +9,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.report.findings import facts
 from exugear.report.findings.facts import sensitivities_of
-from exugear.report.findings.verdicts import best_change, track_mode
+from exugear.report.findings.parameter_variations import best_change, track_mode
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.run_spectra import is_among, other_windows, survives
 from exugear.system.modes import modes_of

@@ -11,7 +11,7 @@ from exugear.gearbox.choice import Choice
 from exugear.report.findings.context import Context, StoredResults
 from exugear.report.findings.groups import groups_of
 from exugear.report.findings.headline import changes_of, contributions_of, headline_of
-from exugear.report.findings.loudness import ranking_of_errors
+from exugear.report.findings.ranking import ranking_of_errors
 from exugear.report.findings.words import Labels
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.steady.settings import SpeedRange, SteadySettings

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from exugear.gearbox.units import RPM
-from exugear.report.findings.loudness import Envelope, Limit, PeakAmplitude, Ranking, Resonance
+from exugear.report.findings.ranking import Envelope, Limit, PeakAmplitude, Ranking, Resonance
 from exugear.report.pictures.shapes import BodyShape, Surface
 from exugear.report.pictures.speed_diagrams import TOP, campbell_of, strips_of
 from exugear.report.pictures.still import SIZE, mode_picture

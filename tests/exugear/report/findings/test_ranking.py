@@ -12,7 +12,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.reading import GearboxFileError
 from exugear.gearbox.units import RPM
-from exugear.report.findings.loudness import HOUSING, SHAFTS, envelopes, order_amplitudes, ranking_of, resonances
+from exugear.report.findings.ranking import HOUSING, SHAFTS, envelopes, order_amplitudes, ranking_of, resonances
 from exugear.report.pictures.diagrams import plot_response
 from exugear.steady.mean_system.signals import quantities_of
 from exugear.steady.settings import SpeedRange, SteadySettings
