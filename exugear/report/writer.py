@@ -18,6 +18,7 @@ from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import (
     Context,
+    ReportError,
     StoredResults,
     bytes_of_runs,
     choice_of,
@@ -26,11 +27,13 @@ from exugear.report.findings.context import (
 )
 from exugear.report.findings.groups import groups_of
 from exugear.report.findings.headline import headline_of
+from exugear.report.findings.other_design import read_other_design
 from exugear.report.findings.parameter_variations import begin_variations, model_variations
 from exugear.report.findings.words import Labels
 from exugear.report.sections.answer import ranking_section, short_section
 from exugear.report.sections.bearings import bearings_section
 from exugear.report.sections.changes import changes_section, stored_study
+from exugear.report.sections.comparison import comparison_section
 from exugear.report.sections.contact import contact_section
 from exugear.report.sections.gears import gears_section
 from exugear.report.sections.life import life_section, studies_section
@@ -105,6 +108,7 @@ SECTIONS: Final[tuple[Callable[[ReportData], Part], ...]] = (
     checks_section,
     ranking_section,
     changes_section,
+    comparison_section,
     change_section,
     results_section,
     waterfall_section,
@@ -124,10 +128,6 @@ LIBRARIES: Final = ("uPlot.iife.min.js", "three.min.js")
 """Vendored libraries that the page needs."""
 WORTH_A_PROCESS: Final = 3e7
 """Size of run-ups (bytes) whose analysis takes longer than the start of another process, a second or two."""
-
-
-class ReportError(ValueError):
-    """Error: the folder contains no results for a report."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +152,7 @@ def write_report(
     tell: Callable[[str], None] | None = None,
     allow_dir: Path | None = None,
     executor: Executor | None = None,
+    compare: Path | None = None,
 ) -> Report:
     """Write ``report.html`` from the content of a results folder: tables, runs, modes, steady-state responses.
 
@@ -164,19 +165,22 @@ def write_report(
         A further permitted folder for files that the gearbox file names. Scripts among them never run: their output
         must be stored in the folder.
     executor : runs tasks in parallel where that saves time, such as `fe_ste.tools.threads.Workers`
+    compare : results folder of another design to compare with
 
     Raises
     ------
     GearboxFileError
         The folder holds no results.
     ReportError
-        None of its tables, modes and runs belongs to its gearbox file.
+        None of its tables, modes and runs belongs to its gearbox file, or the other design cannot be compared.
     """
     folder = Path(folder)
     gearbox = read_stored_gearbox(folder, Permissions(below=allow_dir))
     reference = gearbox.case.report.reference_frequency_Hz if target is None else target
     context = Context(folder, gearbox, reference, tell or (lambda what: None))
     material = _material(context, executor)
+    if compare is not None:
+        material = replace(material, other_design=read_other_design(context, material.headline, compare))
     parts = [section(material) for section in SECTIONS]
     missing = tuple(commands_for_missing(context, material.results))
     # The body is made last, because sections add notes that its head shows.

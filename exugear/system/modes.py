@@ -269,9 +269,10 @@ class Modes(ReprMixin):
         top = 1.1 * float(max(self.frequency[seen], default=1.0))
         fastest = top / highest if highest else 1.0
         weights = (shares[seen] / max(float(shares.max(initial=0.0)), 1e-300)) ** 0.5
+        orders = gearbox.mesh_orders()
         with axes_or_new(ax, 7.2, 5.0) as panel:
-            draw_campbell(panel, self.frequency[seen], gearbox.mesh_orders(), fastest, top, weights)
-            if panel.lines:
+            draw_campbell(panel, self.frequency[seen], orders, fastest, top, weights)
+            if orders:
                 panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
             return panel
 

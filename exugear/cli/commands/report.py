@@ -47,6 +47,10 @@ def report(
             "--levers", help="First compute what design changes do to the highest resonance, which takes minutes."
         ),
     ] = False,
+    compare: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Results folder of another design to compare with.", show_default=False),
+    ] = None,
     allow_dir: FilesBelowOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -57,13 +61,17 @@ def report(
     range if there is none. gmsh scripts are not run; their meshes must exist.
     """
     with exit_codes():
-        from exugear.report.writer import ReportError, write_report
+        from exugear.report.findings.context import ReportError
+        from exugear.report.writer import write_report
         from exugear.results.folder import time_noted
 
         check_allow_dir(allow_dir)
         if not folder.is_dir():
             raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
+        if compare is not None and not compare.is_dir():
+            raise BadInputError(f"{compare}: --compare: no such folder; specify the results folder of another design")
         folder = _results_of(folder)
+        other = None if compare is None else _results_of(compare)
         if not stored:
             _compute_missing(folder, allow_dir)
         study = None
@@ -77,7 +85,7 @@ def report(
                     interruption.check()
                     bar.update(task, description=what)
 
-                written = write_report(folder, near, tell, allow_dir, executor)
+                written = write_report(folder, near, tell, allow_dir, executor, other)
         except ReportError as error:
             raise BadInputError(error) from error
         _print_report(folder, written, study, as_json)

@@ -70,6 +70,10 @@ def model_label(choice: Choice) -> str:
     return f"{choice.variant} ({label}), {MESH_MODEL_LABELS[choice.mesh_model]}, inertia set {choice.inertias}"
 
 
+class ReportError(ValueError):
+    """Error: the folder contains no results for a report, or none that can be compared."""
+
+
 @dataclass(frozen=True)
 class Notes:
     """Messages for the top and the end of the page, each list in order of occurrence."""

@@ -16,6 +16,7 @@ from exugear.report.findings.context import MESH_MODEL_LABELS, Context, StoredRe
 from exugear.report.findings.design_changes import DesignStudy
 from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline
+from exugear.report.findings.other_design import OtherDesign
 from exugear.report.findings.parameter_variations import ModelVariations
 from exugear.report.findings.words import Labels
 from exugear.report.web.document import ArrayStore
@@ -66,6 +67,8 @@ class ReportData:
     """Store for the arrays of the page."""
     design_study: DesignStudy | None = None
     """Computed design changes."""
+    other_design: OtherDesign | None = None
+    """Another design that is compared."""
     run_data: Mapping[str, Any] = field(default_factory=dict)
     """Run-ups and steady-state responses as data of the page, from `exugear.report.sections.run_data.run_data`."""
     charts: dict[str, Any] = field(default_factory=dict)

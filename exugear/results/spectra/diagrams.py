@@ -103,7 +103,8 @@ def draw_levels(run: Waterfall, lines: Iterable[OrderLine], ax: Axes | None = No
             colour = COLOURS[number % len(COLOURS)]
             panel.plot(run.speed / RPM, run.along(line), color=colour, label=drawable(line.name))
         panel.set(xlabel="Input speed / rpm", ylabel=_level_label(TRANSMISSION_ERROR, run))
-        panel.legend()
+        if lines:
+            panel.legend()
         return panel
 
 

@@ -17,8 +17,9 @@ import xarray as xr
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.reading import GearboxFileError
+from exugear.report.findings.context import ReportError
 from exugear.report.findings.parameter_variations import begin_variations
-from exugear.report.writer import ReportError, write_report
+from exugear.report.writer import write_report
 from exugear.results.folder import bodies_folder, keep_case, modes_path, note_time, read_stored_gearbox, times_spent
 from exugear.system.modes import eigenmodes
 from exugear.system.signals import energy_residual

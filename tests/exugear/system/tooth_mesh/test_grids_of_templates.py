@@ -65,7 +65,8 @@ def test_states_that_come_to_form_circles_are_solved(
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("positions", [8, pytest.param(50, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("positions", [8, 50])
 def test_the_default_grid_of_a_template_is_solved_whole(positions: int, tmp_path: Path) -> None:
     case = case_of(tmp_path, "pair")
     case.write_text(f"{template('pair')}\n[ste]\npositions = {positions}\n", encoding="utf-8")

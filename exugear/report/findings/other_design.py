@@ -1,0 +1,144 @@
+"""Comparison with the results of another design: amplitudes over the same operating range, and keys that differ."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.units import RPM
+from exugear.report.findings.context import Context, ReportError, model_label, stored_models, with_responses
+from exugear.report.findings.groups import groups_of
+from exugear.report.findings.headline import Headline, headline_of
+from exugear.report.findings.ranking import Envelope
+from exugear.results.folder import read_stored_gearbox
+from exugear.results.spectra.waterfall import OrderLine, order_lines
+from exugear.system.modal_damping import damping_in_words
+
+SAME_RANGE = 1e-3
+"""Relative difference of the ends of two operating ranges that counts as none."""
+DETAILS = ("name", "labels", "report")
+"""Sections of the file that change no result."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Key of the gearbox file with its values in both designs; None where a file does not have it."""
+
+    key: str
+    own: Any
+    other: Any
+
+
+@dataclass(frozen=True)
+class OtherDesign:
+    """Results of another design that are compared with those of the page."""
+
+    name: str
+    """Name of its folder."""
+    headline: Headline
+    lines: Sequence[OrderLine]
+    differences: Sequence[Difference]
+    cautions: Sequence[str]
+    """Differences of model, load or damping, which change the amplitudes as well."""
+
+
+@dataclass(frozen=True)
+class Highest:
+    """Highest amplitude of any order in the operating range."""
+
+    amplitude: float
+    """In the unit of the quantity."""
+    speed: float
+    """Input speed, rad/s."""
+
+
+def read_other_design(context: Context, headline: Headline | None, folder: Path) -> OtherDesign:
+    """Read the results of another design.
+
+    Parameters
+    ----------
+    headline : ranking of the page
+    folder : results folder of the other design
+
+    Raises
+    ------
+    GearboxFileError
+        The folder holds no results.
+    ReportError
+        One of both has no ranked resonances, or the operating ranges differ.
+    """
+    gearbox = read_stored_gearbox(folder, Permissions(below=context.gearbox.permissions.below))
+    found = Context(folder, gearbox, None, context.tell)
+    results = with_responses(found, stored_models(found))
+    other = headline_of(found, results, groups_of(found, results))
+    for place, own in ((context.folder, headline), (folder, other)):
+        if own is None or own.group is None:
+            raise ReportError(f"{place}: no amplitudes to compare; run `exugear steady` with this results folder")
+    assert headline is not None and other is not None
+    own_range, other_range = headline.ranking.speeds, other.ranking.speeds
+    if not np.allclose(own_range, other_range, rtol=SAME_RANGE):
+        ranges = [" to ".join(f"{speed / RPM:.5g}" for speed in ends) for ends in (other_range, own_range)]
+        raise ReportError(
+            f"{folder}: amplitudes are for {ranges[0]} rpm, those of {context.folder} for {ranges[1]} rpm; compute "
+            "both for the same speeds (`[operation] speed_range_rpm`)"
+        )
+    cautions = [
+        f"{what}: {first}; other design: {second}."
+        for what, first, second in (
+            ("Model", model_label(headline.choice), model_label(other.choice)),
+            ("Results", headline.source, other.source),
+            ("Load", headline.load, other.load),
+            ("Damping", *(damping_in_words(one.case.damping) for one in (context.gearbox, gearbox))),
+        )
+        if first != second
+    ]
+    differences = tuple(differing_keys(context.gearbox, gearbox))
+    return OtherDesign(folder.resolve().name, other, order_lines(gearbox), differences, cautions)
+
+
+def differing_keys(own: Gearbox, other: Gearbox) -> Iterator[Difference]:
+    """Yield the keys of two gearbox files that differ and may change results."""
+    first, second = (_flat(gearbox.case.model_dump(mode="json", exclude_defaults=True)) for gearbox in (own, other))
+    for key in sorted(first.keys() | second.keys()):
+        if first.get(key) != second.get(key) and key.split(".")[0] not in DETAILS:
+            yield Difference(key, first.get(key), second.get(key))
+
+
+def _flat(content: Mapping[str, Any], place: str = "") -> dict[str, Any]:
+    """Return all values by dotted key.
+
+    Examples
+    --------
+    >>> _flat({"gears": {"sun": {"teeth": 21}}, "name": "GRC"})
+    {'gears.sun.teeth': 21, 'name': 'GRC'}
+    """
+    found: dict[str, Any] = {}
+    for key, value in content.items():
+        if isinstance(value, Mapping):
+            found |= _flat(value, f"{place}{key}.")
+        else:
+            found[f"{place}{key}"] = value
+    return found
+
+
+def highest_within(curve: Envelope, speeds: tuple[float, float]) -> Highest | None:
+    """Return the highest amplitude of a curve within a range of speeds (rad/s); None if it has no speed there."""
+    inside = (curve.speed >= speeds[0] * (1.0 - SAME_RANGE)) & (curve.speed <= speeds[1] * (1.0 + SAME_RANGE))
+    if not inside.any():
+        return None
+    place = int(np.argmax(np.where(inside, curve.amplitude, -np.inf)))
+    return Highest(float(curve.amplitude[place]), float(curve.speed[place]))
+
+
+def change_in_decibels(own: Highest, other: Highest) -> float:
+    """Return how much higher the amplitude of the other design is, dB; NaN where one is zero."""
+    if own.amplitude <= 0.0 or other.amplitude <= 0.0:
+        return math.nan
+    return 20.0 * math.log10(other.amplitude / own.amplitude)

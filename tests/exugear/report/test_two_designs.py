@@ -1,0 +1,101 @@
+"""Two designs on one page: amplitudes of both, keys that differ, what else differs, refusals."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.report.findings.other_design import Highest, change_in_decibels, differing_keys, highest_within
+from exugear.report.findings.ranking import Envelope
+from exugear.results.folder import keep_case
+from exugear.steady.settings import SpeedRange, SteadySettings
+from exugear.steady.steady_file import load_response, steady_path, stored_or_computed
+from exugear.system.build import assemble
+
+from ..cases.command import exugear
+
+CHOICE = Choice("bushing", "line_of_action", "assemblies")
+SETTINGS = SteadySettings(SpeedRange.from_text("-10:-35:60"), harmonics=3)
+CHANGES = {"housing.factor": 0.5, "name": "stiff <b>housing</b>"}
+RANGE = {"operation.speed_range_rpm": [15.0, 20.0]}
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory: pytest.TempPathFactory, stiffness: dict[str, np.ndarray]) -> Iterator[dict[str, Path]]:
+    """Steady responses of the GRC, of one with a stiffer housing, and of one with another operating range."""
+    gearbox = Gearbox.from_toml("cases/grc750/gearbox.toml")
+    found = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("exugear.report.findings.context.mesh_stiffness", lambda *arguments: stiffness)
+        for name, changes in {"grc": {}, "stiff": CHANGES, "range": RANGE}.items():
+            folder = tmp_path_factory.mktemp(name) / name
+            folder.mkdir()
+            changed = gearbox.varied(changes)
+            keep_case(changed, folder)
+            stored_or_computed(steady_path(folder, CHOICE, SETTINGS), assemble(changed, CHOICE, stiffness), SETTINGS)
+            found[name] = folder
+        yield found
+
+
+def reported(folder: Path, other: Path) -> Any:
+    return exugear("report", folder, "--stored", "--compare", other, "--json")
+
+
+@pytest.mark.validation
+def test_the_highest_amplitudes_are_those_of_both_responses(folders: dict[str, Path]) -> None:
+    outcome = reported(folders["grc"], folders["stiff"])
+    assert outcome.exit_code == 0, outcome.stderr
+    page = (folders["grc"] / "report.html").read_text(encoding="utf-8")
+    assert 'id="two-designs"' in page and "housing.factor" in page and "<b>housing" not in page
+    highest = {}
+    for name in ("grc", "stiff"):
+        data = load_response(steady_path(folders[name], CHOICE, SETTINGS))
+        low, high = json.loads(data.attrs["operating_range"])
+        inside = (np.abs(data["speed"]) >= low) & (np.abs(data["speed"]) <= high)
+        signal = list(data["signal"].to_numpy()).index("overall_dte")
+        highest[name] = float(data["amplitude"][inside.to_numpy(), 1:, signal].max())
+    decibels = 20.0 * math.log10(highest["stiff"] / highest["grc"])
+    line = next(
+        line for line in json.loads(outcome.stdout)["statements"] if line.startswith("Transmission error, highest")
+    )
+    assert f"({decibels:+.1f} dB)" in line
+
+
+@pytest.mark.validation
+def test_other_operating_ranges_and_folders_without_amplitudes_are_refused(folders: dict[str, Path], tmp_path) -> None:
+    before = (folders["grc"] / "report.html").exists()
+    outcome = reported(folders["grc"], folders["range"])
+    assert outcome.exit_code == 2 and "15 to 20 rpm" in outcome.stderr and "speed_range_rpm" in outcome.stderr
+    assert (folders["grc"] / "report.html").exists() == before
+    missing = reported(folders["grc"], tmp_path / "none")
+    assert missing.exit_code == 2 and "no such folder" in missing.stderr
+    empty = reported(folders["grc"], tmp_path)
+    assert empty.exit_code == 2 and str(tmp_path) in "".join(empty.stderr.split("\n"))
+    keep_case(Gearbox.from_toml("cases/grc750/gearbox.toml"), tmp_path)
+    nothing = reported(folders["grc"], tmp_path)
+    assert nothing.exit_code == 2 and "exugear steady" in nothing.stderr
+
+
+def test_differing_keys_are_those_that_change_results(grc: Gearbox) -> None:
+    changed = grc.varied(CHANGES | {"gears.sun.face_width_mm": 221.0})
+    found = {difference.key: (difference.own, difference.other) for difference in differing_keys(grc, changed)}
+    assert found.pop("housing.factor")[1] == 0.5
+    assert found.pop("gears.sun.face_width_mm") == (220.0, 221.0)
+    assert not found
+    assert not list(differing_keys(grc, grc))
+
+
+def test_highest_amplitudes_are_of_the_range_and_zero_has_no_decibels() -> None:
+    curve = Envelope(np.array([1.0, 2.0, 3.0]), np.array([9.0, 4.0, 5.0]))
+    assert highest_within(curve, (1.5, 3.0)) == Highest(5.0, 3.0)
+    assert highest_within(curve, (4.0, 5.0)) is None
+    assert change_in_decibels(Highest(1.0, 1.0), Highest(10.0, 2.0)) == pytest.approx(20.0)
+    assert math.isnan(change_in_decibels(Highest(0.0, 1.0), Highest(1.0, 1.0)))
