@@ -41,7 +41,7 @@ class OtherDesign:
     """Results of another design that are compared with those of the page."""
 
     name: str
-    """Name of its folder."""
+    """Name of its folder, not that of the folder of the page."""
     headline: Headline
     lines: Sequence[OrderLine]
     differences: Sequence[Difference]
@@ -82,9 +82,9 @@ def read_other_design(context: Context, headline: Headline | None, folder: Path)
         if own is None or own.group is None:
             raise ReportError(f"{place}: no amplitudes to compare; run `exugear steady` with this results folder")
     assert headline is not None and other is not None
-    own_range, other_range = headline.ranking.speeds, other.ranking.speeds
-    if not np.allclose(own_range, other_range, rtol=SAME_RANGE):
-        ranges = [" to ".join(f"{speed / RPM:.5g}" for speed in ends) for ends in (other_range, own_range)]
+    both = (other.ranking.speeds, headline.ranking.speeds)
+    if not np.allclose(*both, rtol=SAME_RANGE):
+        ranges = [" to ".join(f"{speed / RPM:.5g}" for speed in ends) for ends in both]
         raise ReportError(
             f"{folder}: amplitudes are for {ranges[0]} rpm, those of {context.folder} for {ranges[1]} rpm; compute "
             "both for the same speeds (`[operation] speed_range_rpm`)"
@@ -100,7 +100,10 @@ def read_other_design(context: Context, headline: Headline | None, folder: Path)
         if first != second
     ]
     differences = tuple(differing_keys(context.gearbox, gearbox))
-    return OtherDesign(folder.resolve().name, other, order_lines(gearbox), differences, cautions)
+    name = folder.resolve().name
+    if name == context.folder.resolve().name:
+        name = f"{name} (other)"
+    return OtherDesign(name, other, order_lines(gearbox), differences, cautions)
 
 
 def differing_keys(own: Gearbox, other: Gearbox) -> Iterator[Difference]:

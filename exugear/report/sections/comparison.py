@@ -6,7 +6,8 @@ import math
 from typing import Any
 
 from exugear.gearbox.units import RPM
-from exugear.report.findings.other_design import Difference, change_in_decibels, highest_within
+from exugear.report.findings.other_design import Difference, Highest, change_in_decibels, highest_within
+from exugear.report.findings.ranking import Envelope
 from exugear.report.findings.words import rounded_text
 from exugear.report.sections.answer import QUANTITIES
 from exugear.report.sections.material import Axis, Curve, Part, ReportData
@@ -22,48 +23,20 @@ def comparison_section(material: ReportData) -> Part:
     headline = material.headline
     if other is None or headline is None:
         return Part()
-    own_curves = headline.envelopes(material.lines)
+    this = material.context.folder.resolve().name
+    curves = headline.envelopes(material.lines)
     other_curves = other.headline.envelopes(other.lines)
     rows: list[dict[str, object]] = []
     figures: list[Figure] = []
-    this = material.context.folder.resolve().name
-    for name, label in QUANTITIES.items():
-        curves = [curves[name] for curves in (own_curves, other_curves) if name in curves]
-        if len(curves) < 2:
+    for name in QUANTITIES:
+        if name not in curves or name not in other_curves:
             continue
-        own, others = (highest_within(curve, headline.ranking.speeds) for curve in curves)
+        own = highest_within(curves[name], headline.ranking.speeds)
+        others = highest_within(other_curves[name], headline.ranking.speeds)
         if own is None or others is None:
             continue
-        change = change_in_decibels(own, others)
-        rows.append(
-            {
-                "quantity": label.title,
-                f"{this} ±": Cell(f"{rounded_text(label.factor * own.amplitude)} {label.unit}", own.amplitude),
-                f"{this} / rpm": _number(own.speed / RPM),
-                f"{other.name} ±": Cell(
-                    f"{rounded_text(label.factor * others.amplitude)} {label.unit}", others.amplitude
-                ),
-                f"{other.name} / rpm": _number(others.speed / RPM),
-                "change / dB": _number(change, "+.1f"),
-            }
-        )
-        material.context.notes.statements.append(
-            f"{label.title}, highest in the range: {this} ±{rounded_text(label.factor * own.amplitude)} {label.unit}, "
-            f"{other.name} ±{rounded_text(label.factor * others.amplitude)} {label.unit} ({change:+.1f} dB)."
-        )
-        figures.append(
-            material.chart(
-                f"compared-{name}",
-                f"{label.title} ± / {label.unit}",
-                "Largest single order over speed.",
-                f"{this} and {other.name}",
-                [
-                    Curve(this, curves[0].speed / RPM, label.factor * curves[0].amplitude, "thin"),
-                    Curve(other.name, curves[1].speed / RPM, label.factor * curves[1].amplitude),
-                ],
-                [Axis(f"{material.input_words} speed / rpm"), Axis(f"± {label.unit}", logarithmic=True)],
-            )
-        )
+        rows.append(_row(material, name, (this, own), (other.name, others)))
+        figures.append(_figure(material, name, (this, curves[name]), (other.name, other_curves[name])))
     first = other.headline.top
     leads = "" if first is None else f"{rounded_text(first.frequency)} Hz at {rounded_text(abs(first.speed) / RPM)} rpm"
     html = render(
@@ -85,6 +58,36 @@ def comparison_section(material: ReportData) -> Part:
     return Part(html, title="Two designs", name="two-designs")
 
 
+def _row(material: ReportData, name: str, own: tuple[str, Highest], other: tuple[str, Highest]) -> dict[str, object]:
+    """Return a row of the table of amplitudes, and note it for the command line."""
+    label = QUANTITIES[name]
+    change = change_in_decibels(own[1], other[1])
+    row: dict[str, object] = {"quantity": label.title}
+    said = []
+    for design, highest in (own, other):
+        text = f"{rounded_text(label.factor * highest.amplitude)} {label.unit}"
+        row[f"{design} ±"] = Cell(text, highest.amplitude)
+        row[f"{design} / rpm"] = _number(highest.speed / RPM)
+        said.append(f"{design} ±{text}")
+    row["change / dB"] = _number(change, "+.1f")
+    statement = f"{label.title}, highest in the range: {', '.join(said)} ({change:+.1f} dB)."
+    material.context.notes.statements.append(statement)
+    return row
+
+
+def _figure(material: ReportData, name: str, own: tuple[str, Envelope], other: tuple[str, Envelope]) -> Figure:
+    label = QUANTITIES[name]
+    curves = [
+        Curve(design, curve.speed / RPM, label.factor * curve.amplitude, style)
+        for (design, curve), style in ((own, "thin"), (other, "line"))
+    ]
+    title = f"{label.title} ± / {label.unit}"
+    axes = [Axis(f"{material.input_words} speed / rpm"), Axis(f"± {label.unit}")]
+    return material.chart(
+        f"compared-{name}", title, "Largest single order over speed.", f"{own[0]} and {other[0]}", curves, axes
+    )
+
+
 def _number(value: float, form: str = "") -> Cell:
     if math.isnan(value):
         return Cell("–", value)
@@ -92,6 +95,5 @@ def _number(value: float, form: str = "") -> Cell:
 
 
 def _key_row(this: str, other: str, difference: Difference) -> dict[str, Any]:
-    names = (this, f"{other} (other)" if other == this else other)
     values = ("–" if value is None else str(value) for value in (difference.own, difference.other))
-    return {"key": difference.key, **dict(zip(names, values, strict=True))}
+    return {"key": difference.key, **dict(zip((this, other), values, strict=True))}
