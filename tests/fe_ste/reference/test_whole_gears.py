@@ -125,6 +125,7 @@ def test_pressure_at_the_nodes_converges_to_that_of_hertz():
 
 
 @pytest.mark.validation
+@pytest.mark.long
 def test_relief_takes_as_much_of_the_load_as_by_the_tables():
     """Tip relief and crowning: their gaps are added to those of the meshes."""
     relief = Relief(12e-6, 0.97 * PINION.tip_radius)

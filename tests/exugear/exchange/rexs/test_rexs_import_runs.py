@@ -50,7 +50,7 @@ def test_torsional_modes_are_those_of_the_shafts_inertias_on_the_mesh_springs(na
     ("name", "variant", "case"),
     [
         ("SEW_3-stage_cylindrical_gearbox_1.0.rexs", "bushing", "nominal"),
-        ("FVA-Industriegetriebe_2_stufig_1-6.rexs", "rigid", "load_case_4"),
+        pytest.param("FVA-Industriegetriebe_2_stufig_1-6.rexs", "rigid", "load_case_4", marks=pytest.mark.long),
         ("FVA_Planetary_stage_-_Minus_gearing_1.1.rexs", "bushing", "nominal"),
     ],
 )

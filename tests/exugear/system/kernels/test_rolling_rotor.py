@@ -114,7 +114,7 @@ def integrated(q, v, steps, connectors, inertia, pull):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("cage_ratio", [0.0, 0.433])
+@pytest.mark.parametrize("cage_ratio", [pytest.param(0.0, marks=pytest.mark.long), 0.433])
 def test_undamped_rotor_keeps_its_energy_over_a_second(cage_ratio: float) -> None:
     """Vibration of some um with clearance at 80 rad/s; what is left is the method's own, w h is up to 0.08."""
     case = rotor(CYLINDRICAL, cage_ratio=cage_ratio)
