@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fe_ste.geometry.gears import GearPair
-from fe_ste.root_stress import hertz_stress
+from fe_ste.root_stress import PATH_MARGIN, hertz_stress
 from fe_ste.tools.arrays import Floats
 from fe_ste.tools.display import ReprMixin
 from fe_ste.tools.drawing import axes_or_new
@@ -35,7 +35,8 @@ class FlankPressure(ReprMixin):
     misalignment: float
     """Rad; positive where it opens the gap at the +z end."""
     path: Floats
-    """(p,) place on the path of contact from gear 1's base point, m; it rises towards the tip of gear 1."""
+    """(p,) place on the path of contact from gear 1's base point, m; it rises towards the tip of gear 1. Both ends of
+    the path, where tip edges touch, are left out as in the rating (`fe_ste.root_stress.PATH_MARGIN`)."""
     axial: Floats
     """(k,) position along the face from its middle, m."""
     pressure: Floats
@@ -125,7 +126,8 @@ def _flank_pressure(pair: GearPair, states: xr.Dataset) -> FlankPressure:
     contact_lines = pair.path_pitch_point + base_pitch * (pmc[:, None] + tooth)
     place = contact_lines[..., None] + math.tan(pair.pinion.base_helix_angle) * axial
     hertz = hertz_stress(pair, loads, place)
-    path = np.linspace(pair.path_start, pair.path_end, ROWS)
+    margin = PATH_MARGIN * (pair.path_end - pair.path_start)
+    path = np.linspace(pair.path_start + margin, pair.path_end - margin, ROWS)
     # Each end of the face meets the same place of the path at another position of the mesh cycle.
     order = np.argsort(contact_lines, axis=None)
     places, stresses = (values.reshape(-1, len(axial))[order] for values in (place, hertz))

@@ -7,7 +7,6 @@ the results, so that a stopped study resumes, and a repeated one reads its resul
 from __future__ import annotations
 
 import math
-import shutil
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, Self
@@ -39,6 +38,7 @@ from exugear.system.gearbox_checks import check_parts, lacking
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError
 from fe_ste.geometry.checks import GeometryError
+from fe_ste.tools.files import write_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -170,7 +170,8 @@ def _project_with(project: ComputedProject, gearbox: Gearbox, name: str) -> Comp
     for path in (project.folder / "tables").glob("*.nc"):
         if not (folder / "tables" / path.name).exists():
             (folder / "tables").mkdir(exist_ok=True)
-            shutil.copy2(path, folder / "tables" / path.name)
+            # A copy that was cut off would count as there.
+            write_file(folder / "tables" / path.name, path.read_bytes())
     return changed
 
 

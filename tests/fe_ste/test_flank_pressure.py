@@ -9,6 +9,7 @@ from fe_ste.contact.kinematics import ContactSettings
 from fe_ste.elasticity.hexmesh import MeshSettings
 from fe_ste.flank_pressure import POSITIONS, FlankPressure, flank_pressures
 from fe_ste.geometry.gears import Gear, GearPair
+from fe_ste.root_stress import PATH_MARGIN, hertz_stress
 from fe_ste.transmission_error.mean_contact import states_of_contact
 from fe_ste.transmission_error.table import TableInput
 
@@ -39,8 +40,8 @@ def flanks(table: TableInput) -> list[FlankPressure]:
 def test_pressure_integrates_to_the_load_on_the_path_of_contact(table: TableInput, flanks) -> None:
     """Hertz: p^2 pi R / E* is the line load; its mean along the face over a base pitch gives the normal force.
 
-    Loaded teeth touch a little before and after the path of contact, there without Hertzian stress: that share of the
-    load is counted apart.
+    The ends of the path, where tip edges touch, are left out: their share of the load is counted apart, to one of 20
+    positions a base pitch, which is 3 % of the path.
     """
     pair = table.pair
     steel = pair.pinion.material
@@ -49,14 +50,14 @@ def test_pressure_integrates_to_the_load_on_the_path_of_contact(table: TableInpu
     pmc, tooth, axial = (states[name].to_numpy() for name in ("pmc", "tooth", "axial_position"))
     twist = np.tan(pair.pinion.base_helix_angle)
     place = pair.path_pitch_point + pair.transverse_base_pitch * (pmc[:, None, None] + tooth[:, None]) + twist * axial
-    on_path = (place > pair.path_start) & (place < pair.path_end)
+    on_path = (place > flanks[0].path[0]) & (place < flanks[0].path[-1])
     loads = np.nan_to_num(states["line_load"].transpose("misalignment", "pmc", "tooth", "axial_position").to_numpy())
     for flank, load in zip(flanks, loads, strict=True):
         other = pair.centre_distance * np.sin(pair.working_pressure_angle) - flank.path
         radius = 1.0 / (np.cos(pair.pinion.base_helix_angle) * (1.0 / flank.path + 1.0 / other))
         line_load = flank.pressure**2 * np.pi * radius[:, None] * give
         normal = np.trapezoid(line_load, flank.path, axis=0).mean() / pair.transverse_base_pitch
-        assert normal == pytest.approx(flank.line_load.mean() * load[on_path].sum() / load.sum(), rel=0.015)
+        assert normal == pytest.approx(flank.line_load.mean() * load[on_path].sum() / load.sum(), rel=0.03)
 
 
 def test_load_is_highest_at_the_end_where_the_gap_is_closed(flanks: list[FlankPressure]) -> None:
@@ -87,3 +88,18 @@ def test_the_diagram_has_the_pressure_over_face_and_path() -> None:
     x, y = np.moveaxis(mesh.get_coordinates(), -1, 0)  # corners of the cells, around the places
     np.testing.assert_allclose(0.5 * (x[0, 1:] + x[0, :-1]), 1e3 * axial)
     np.testing.assert_allclose(0.5 * (y[1:, 0] + y[:-1, 0]), 1e3 * path)
+
+
+def test_the_highest_pressure_is_that_of_the_rating(table: TableInput, flanks: list[FlankPressure]) -> None:
+    """`life` takes its contact stress from the same states, sample by sample; the picture interpolates between them."""
+    pair = table.pair
+    states = states_of_contact(table, FORCE, TILTS, pair.centre_distance, 50)
+    loads = np.nan_to_num(states["line_load"].transpose("misalignment", "pmc", "tooth", "axial_position").to_numpy())
+    pmc, tooth, axial = (states[name].to_numpy() for name in ("pmc", "tooth", "axial_position"))
+    twist = np.tan(pair.pinion.base_helix_angle)
+    place = pair.path_pitch_point + pair.transverse_base_pitch * (pmc[:, None, None] + tooth[:, None]) + twist * axial
+    margin = PATH_MARGIN * (pair.path_end - pair.path_start)
+    inside = (place > pair.path_start + margin) & (place < pair.path_end - margin)
+    for flank, load in zip(flanks, loads, strict=True):
+        rated = np.where(inside, hertz_stress(pair, load, place), 0.0).max()
+        assert flank.highest[0] == pytest.approx(rated, rel=0.03)

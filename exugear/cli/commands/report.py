@@ -72,6 +72,8 @@ def report(
             raise BadInputError(f"{compare}: --compare: no such folder; specify the results folder of another design")
         folder = _results_of(folder)
         other = None if compare is None else _results_of(compare)
+        if other is not None:
+            _check_comparison(folder, other, allow_dir)
         if not stored:
             _compute_missing(folder, allow_dir)
         study = None
@@ -89,6 +91,22 @@ def report(
         except ReportError as error:
             raise BadInputError(error) from error
         _print_report(folder, written, study, as_json)
+
+
+def _check_comparison(folder: Path, other: Path, allow_dir: Path | None) -> None:
+    """Refuse another design that cannot be compared, before anything is computed."""
+    from exugear.gearbox.named_files import Permissions
+    from exugear.report.findings.context import ReportError
+    from exugear.report.findings.other_design import check_ranges
+    from exugear.results.folder import read_stored_gearbox
+
+    permissions = Permissions(below=allow_dir)
+    own = read_stored_gearbox(folder, permissions)
+    others = read_stored_gearbox(other, permissions)
+    try:
+        check_ranges(own, others)
+    except ReportError as error:
+        raise BadInputError(error) from error
 
 
 def _compute_missing(folder: Path, allow_dir: Path | None) -> None:

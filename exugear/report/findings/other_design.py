@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases import operating_range
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.units import RPM
 from exugear.report.findings.context import Context, ReportError, model_label, stored_models, with_responses
@@ -78,9 +79,10 @@ def read_other_design(context: Context, headline: Headline | None, folder: Path)
     found = Context(folder, gearbox, None, context.tell)
     results = with_responses(found, stored_models(found))
     other = headline_of(found, results, groups_of(found, results))
-    for place, own in ((context.folder, headline), (folder, other)):
+    for notes, place, own in ((context.notes, context.folder, headline), (found.notes, folder, other)):
         if own is None or own.group is None:
-            raise ReportError(f"{place}: no amplitudes to compare; run `exugear steady` with this results folder")
+            reason = f"{place}: no amplitudes to compare; run `exugear steady` with this results folder"
+            raise ReportError("\n".join([reason, *notes.left_out]))
     assert headline is not None and other is not None
     both = (other.ranking.speeds, headline.ranking.speeds)
     if not np.allclose(*both, rtol=SAME_RANGE):
@@ -104,6 +106,24 @@ def read_other_design(context: Context, headline: Headline | None, folder: Path)
     if name == context.folder.resolve().name:
         name = f"{name} (other)"
     return OtherDesign(name, other, order_lines(gearbox), differences, cautions)
+
+
+def check_ranges(own: Gearbox, other: Gearbox) -> None:
+    """Refuse designs with different operating ranges, before anything is computed.
+
+    Raises
+    ------
+    ReportError
+        The ranges differ.
+    """
+    ranges = [ends for gearbox in (own, other) if (ends := operating_range(gearbox)) is not None]
+    if len(ranges) < 2 or np.allclose(ranges[0], ranges[1], rtol=SAME_RANGE):
+        return
+    texts = [" to ".join(f"{speed / RPM:.5g}" for speed in ends) for ends in ranges]
+    raise ReportError(
+        f"{other.source}: operating range {texts[1]} rpm; that of {own.source} is {texts[0]} rpm; designs are compared "
+        "in the same range (`[operation] speed_range_rpm`)"
+    )
 
 
 def differing_keys(own: Gearbox, other: Gearbox) -> Iterator[Difference]:

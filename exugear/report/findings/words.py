@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -32,6 +33,25 @@ _HARMONIC = re.compile(r"(?:(\d+) × )?[^ ]+")
 _COPY = re.compile(r"^(.*)_(\d+)$")
 _OF = re.compile(r"(?<= of )\w+")
 _NAME = re.compile(r"\w+(?:-\w+)*")
+
+
+@dataclass(frozen=True)
+class QuantityLabel:
+    """Names of one of the three quantities."""
+
+    title: str
+    column: str
+    unit: str
+    factor: float
+    """From SI units."""
+
+
+QUANTITIES = {
+    "error": QuantityLabel("Transmission error", "transmission error", "µm", 1e6),
+    "force": QuantityLabel("Bearing force", "bearing force", "kN", 1e-3),
+    "acceleration": QuantityLabel("Acceleration at bearings", "acceleration", "m/s²", 1.0),
+}
+"""Labels of the quantities of a ranking."""
 
 
 class Labels:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from dataclasses import dataclass
 
-import matplotlib.image
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 
+from exugear.report.pictures.png import png, png_address
 from exugear.report.pictures.scene import DISPLACEMENT_COLOURS
 from exugear.report.pictures.speed_diagrams import Mark, round_ticks
 from fe_ste.flank_pressure import FlankPressure
@@ -54,9 +52,7 @@ def flank_map(flank: FlankPressure, highest: float, heaviest: float, words: str)
     highest, heaviest : pressure (Pa) of the last colour, and line load (N/m) at the upper edge
     """
     colours = LinearSegmentedColormap.from_list("pressure", DISPLACEMENT_COLOURS)
-    content = io.BytesIO()
     shares = np.clip(flank.pressure / highest, 0.0, 1.0)
-    matplotlib.image.imsave(content, colours(shares)[::-1], format="png")
     half = 0.5 * len(flank.axial) * float(flank.axial[1] - flank.axial[0])
     middle = 0.5 * float(flank.axial[0] + flank.axial[-1])
     low, high = middle - half, middle + half
@@ -73,6 +69,6 @@ def flank_map(flank: FlankPressure, highest: float, heaviest: float, words: str)
     ticks = tuple(Mark(across(1e-3 * value), LOAD[1] + 14.0, f"{value:g}".replace("-", "−")) for value in places)
     heights = round_ticks(0.0, 1e-3 * heaviest, 3)
     loads = tuple(Mark(LEFT - 5.0, upward(1e3 * value) + 3.5, f"{value:g}") for value in heights)
-    address = f"data:image/png;base64,{base64.b64encode(content.getvalue()).decode('ascii')}"
+    address = png_address(png(colours(shares)[::-1]))
     mean = upward(float(flank.line_load.mean()))
     return FlankMap(WIDTH, HEIGHT, LEFT, RIGHT, MAP, LOAD, address, f"M{curve}", mean, ticks, loads, words)

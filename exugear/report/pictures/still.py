@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 
-import matplotlib.image
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 
+from exugear.report.pictures.png import png
 from exugear.report.pictures.scene import DISPLACEMENT_COLOURS, VIEW
 from exugear.report.pictures.shapes import BodyShape, displacement_of
 from fe_ste.tools.arrays import Floats
@@ -59,9 +58,7 @@ def mode_picture(bodies: Sequence[tuple[BodyShape, Floats, Floats | None]]) -> b
     opacity = np.where(np.isfinite(veil_near) & (veil_near > near), VEIL, 0.0)[..., None]
     picture = (1.0 - opacity) * solid + opacity * veil
     picture[..., 3] = np.maximum(solid[..., 3], np.where(np.isfinite(veil_near), VEIL, 0.0))
-    content = io.BytesIO()
-    matplotlib.image.imsave(content, _averaged(picture), format="png")
-    return content.getvalue()
+    return png(_averaged(picture))
 
 
 def _samples(

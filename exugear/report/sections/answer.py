@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,7 +23,8 @@ from exugear.report.findings.headline import (
 )
 from exugear.report.findings.parameter_variations import default_place, track_mode
 from exugear.report.findings.ranking import HOUSING, SHAFTS, Envelope, Resonance
-from exugear.report.findings.words import figure_text, percentages, rounded_text
+from exugear.report.findings.words import QUANTITIES, figure_text, percentages, rounded_text
+from exugear.report.pictures.png import png_address
 from exugear.report.pictures.speed_diagrams import NUMBERED, CampbellDrawing, Strips, campbell_of, strips_of
 from exugear.report.pictures.still import mode_picture
 from exugear.report.sections.changes import CHANGES_NAME, best_changes
@@ -46,25 +46,6 @@ STRIPS = ((690.0, 350.0), (352.0, 440.0))
 """Sizes of the diagrams of amplitude for windows of desktops and phones."""
 CAMPBELL = ((1120.0, 520.0), (352.0, 420.0))
 """Sizes of the Campbell diagrams."""
-
-
-@dataclass(frozen=True)
-class QuantityLabel:
-    """Names of one of the three quantities."""
-
-    title: str
-    column: str
-    unit: str
-    factor: float
-    """From SI units."""
-
-
-QUANTITIES = {
-    "error": QuantityLabel("Transmission error", "transmission error", "µm", 1e6),
-    "force": QuantityLabel("Bearing force", "bearing force", "kN", 1e-3),
-    "acceleration": QuantityLabel("Acceleration at bearings", "acceleration", "m/s²", 1.0),
-}
-"""Labels of the quantities of a ranking."""
 
 
 @dataclass(frozen=True)
@@ -255,7 +236,7 @@ def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode |
     picture = ""
     if bodies:
         shapes = [(body.shape, drawn.motions[n], drawn.fields.get(n)) for n, body in enumerate(bodies)]
-        picture = f"data:image/png;base64,{base64.b64encode(mode_picture(shapes)).decode('ascii')}"
+        picture = png_address(mode_picture(shapes))
     return Box(
         f"Mode {mode.index + 1} at {rounded_text(mode.frequency)} Hz, damping {rounded_text(100.0 * mode.damping)} %.",
         [

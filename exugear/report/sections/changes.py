@@ -16,15 +16,13 @@ from exugear.report.findings.design_changes import (
     settings_of_study,
 )
 from exugear.report.findings.headline import Headline
-from exugear.report.findings.words import rounded_text
+from exugear.report.findings.words import QUANTITIES, rounded_text
 from exugear.report.sections.material import Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 from exugear.results.folder import DESIGN_CHANGES_FILE
 from exugear.steady.mean_system.rotating_frame import SteadyError
 from fe_ste.tools.files import FileError
 
-QUANTITIES = {"error": "transmission error", "force": "bearing force", "acceleration": "acceleration"}
-"""Names of the quantities in headings."""
 CHANGES_NAME = "design-changes"
 """Identifier of the section."""
 
@@ -104,11 +102,11 @@ def _table(material: ReportData, results: Sequence[ChangeResult], caption: str, 
     rows = []
     for result in results:
         row: dict[str, object] = {"change": material.words.labelled(result.change.words)}
-        for quantity, title in QUANTITIES.items():
+        for quantity, label in QUANTITIES.items():
             if any(quantity in own.effects for own in results):
                 effect = result.effects.get(quantity, Effect(None, None))
-                row[f"{title}, this peak / dB"] = _decibels(effect.this_peak)
-                row[f"{title}, highest in range / dB"] = _decibels(effect.highest)
+                row[f"{label.column}, this peak / dB"] = _decibels(effect.this_peak)
+                row[f"{label.column}, highest in range / dB"] = _decibels(effect.highest)
         row["price"] = material.words.labelled(result.price).replace(" -", " −") or "–"
         rows.append(row)
     narrow = ("change", "transmission error", "price")

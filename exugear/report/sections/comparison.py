@@ -8,8 +8,7 @@ from typing import Any
 from exugear.gearbox.units import RPM
 from exugear.report.findings.other_design import Difference, Highest, change_in_decibels, highest_within
 from exugear.report.findings.ranking import Envelope
-from exugear.report.findings.words import rounded_text
-from exugear.report.sections.answer import QUANTITIES
+from exugear.report.findings.words import QUANTITIES, rounded_text
 from exugear.report.sections.material import Axis, Curve, Part, ReportData
 from exugear.report.web.html import Cell, Figure, Table, render
 

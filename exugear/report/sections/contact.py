@@ -43,7 +43,7 @@ def _row(material: ReportData, own: PairContact) -> dict[str, object]:
     factor = own.actual.face_load_factor
     edge = own.actual.edge_pressure
     return {
-        "pair": material.words.of(own.pair.name),
+        "mesh": material.words.of(own.mesh),
         "force / kN": _cell(1e-3 * own.force),
         "transverse contact ratio": _cell(own.pair.transverse_contact_ratio),
         "overlap ratio": Cell(rounded_text(overlap), overlap, tag="mind" if off > OFF_WHOLE else ""),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import json
 import math
@@ -17,6 +16,7 @@ from exugear.life.life_file import draw_life, limits, stored_lives
 from exugear.life.rating.sheet import RATED_AS, FlankKey, balanced, life_results, rated, rated_loads
 from exugear.report.findings.context import choice_of, model_label
 from exugear.report.findings.words import figure_text
+from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 from exugear.results.folder import StoredStudy, stored_studies
@@ -88,17 +88,12 @@ def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:
         "failures": listed("failures"),
         "shortfalls": listed("shortfalls"),
         "reliefs": listed("reliefs"),
-        "picture": _address(content.getvalue()),
+        "picture": png_address(content.getvalue()),
         "words": f"Limiting parts, {name}",
         "gears": Table(_flank_rows(data), caption=f"Gears, {name}", name=f"{label}-gears", sortable=True),
         "bearings": Table(_bearing_rows(data), caption=f"Bearings, {name}", name=f"{label}-bearings", sortable=True),
         "rested": listed("assumptions", "unrated"),
     }
-
-
-def _address(picture: bytes) -> str:
-    """Return a PNG picture as an address that contains it."""
-    return f"data:image/png;base64,{base64.b64encode(picture).decode()}"
 
 
 def _flank_rows(data: xr.Dataset) -> list[dict[str, object]]:
@@ -181,7 +176,7 @@ def _study(study: StoredStudy) -> dict[str, object]:
         "fits": study.fits,
         "words": f"{study.points} points{lost}. {study.description[:1].upper()}{study.description[1:]}",
         "pictures": [
-            (_address(path.read_bytes()), path.stem.replace("_", " "))
+            (png_address(path.read_bytes()), path.stem.replace("_", " "))
             for path in study.pictures
             if path.stat().st_size <= LARGEST_PICTURE
         ],
