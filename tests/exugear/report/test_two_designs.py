@@ -25,6 +25,7 @@ from ..cases.command import exugear
 CHOICE = Choice("bushing", "line_of_action", "assemblies")
 SETTINGS = SteadySettings(SpeedRange.from_text("-10:-35:60"), harmonics=3)
 CHANGES = {"housing.factor": 0.5, "name": "stiff <b>housing</b>"}
+FOLDERS = {"grc": "grc", "stiff": "<img src=x onerror=alert(1)> \x1b[1m [red]", "range": "grc"}
 RANGE = {"operation.speed_range_rpm": [15.0, 20.0]}
 
 
@@ -36,7 +37,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory, stiffness: dict[str, np.nd
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("exugear.report.findings.context.mesh_stiffness", lambda *arguments: stiffness)
         for name, changes in {"grc": {}, "stiff": CHANGES, "range": RANGE}.items():
-            folder = tmp_path_factory.mktemp(name) / name
+            folder = tmp_path_factory.mktemp(name) / FOLDERS[name]
             folder.mkdir()
             changed = gearbox.varied(changes)
             keep_case(changed, folder)
@@ -54,7 +55,8 @@ def test_the_highest_amplitudes_are_those_of_both_responses(folders: dict[str, P
     outcome = reported(folders["grc"], folders["stiff"])
     assert outcome.exit_code == 0, outcome.stderr
     page = (folders["grc"] / "report.html").read_text(encoding="utf-8")
-    assert 'id="two-designs"' in page and "housing.factor" in page and "<b>housing" not in page
+    assert 'id="two-designs"' in page and "housing.factor" in page
+    assert "<b>housing" not in page and "<img src=x" not in page
     highest = {}
     for name in ("grc", "stiff"):
         data = load_response(steady_path(folders[name], CHOICE, SETTINGS))
@@ -82,6 +84,24 @@ def test_other_operating_ranges_and_folders_without_amplitudes_are_refused(folde
     keep_case(Gearbox.from_toml("cases/grc750/gearbox.toml"), tmp_path)
     nothing = reported(folders["grc"], tmp_path)
     assert nothing.exit_code == 2 and "exugear steady" in nothing.stderr
+
+
+@pytest.mark.validation
+def test_a_damaged_response_of_the_other_design_is_the_reason(folders: dict[str, Path], tmp_path: Path) -> None:
+    keep_case(Gearbox.from_toml("cases/grc750/gearbox.toml"), tmp_path)
+    path = steady_path(tmp_path, CHOICE, SETTINGS)
+    path.parent.mkdir(parents=True)
+    path.write_bytes(steady_path(folders["grc"], CHOICE, SETTINGS).read_bytes()[:-100])
+    outcome = reported(folders["grc"], tmp_path)
+    assert outcome.exit_code == 2
+    assert "no amplitudes to compare" in outcome.stderr and path.name in "".join(outcome.stderr.split("\n"))
+
+
+@pytest.mark.validation
+def test_different_ranges_are_refused_before_anything_is_computed(folders: dict[str, Path], monkeypatch) -> None:
+    monkeypatch.setattr("exugear.cli.commands.report._compute_missing", lambda *arguments: pytest.fail("computed"))
+    outcome = exugear("report", folders["grc"], "--levers", "--compare", folders["range"])
+    assert outcome.exit_code == 2 and "15 to 20 rpm" in outcome.stderr
 
 
 def test_differing_keys_are_those_that_change_results(grc: Gearbox) -> None:

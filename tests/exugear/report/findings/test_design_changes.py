@@ -166,6 +166,14 @@ def test_a_study_computes_each_change_once_and_names_what_cannot_be_made(tmp_pat
     again = project.design_changes()
     assert [result.effects for result in again.results] == [result.effects for result in study.results]
     assert [path.stat().st_mtime_ns for path in files] == before
+    # A copy of a table that a full disk ends leaves no file that counts as there.
+    copied = tmp_path / design_study.FOLDER / "housing" / "tables" / "spur.nc"
+    copied.unlink()
+    with monkeypatch.context() as full, pytest.raises(OSError, match="full"):
+        full.setattr("os.replace", lambda *names: (_ for _ in ()).throw(OSError(28, "disk full")))
+        project.design_changes()
+    assert not copied.exists()
+    assert [result.effects for result in project.design_changes().results] == [r.effects for r in study.results]
     # The page lists what the file has, and nothing of another gearbox.
     path = tmp_path / DESIGN_CHANGES_FILE
     assert read_design_study(path) == study
