@@ -61,14 +61,14 @@ def _row(material: ReportData, name: str, own: tuple[str, Highest], other: tuple
     """Return a row of the table of amplitudes, and note it for the command line."""
     label = QUANTITIES[name]
     change = change_in_decibels(own[1], other[1])
-    row: dict[str, object] = {"quantity": label.title}
+    row: dict[str, object] = {"quantity": f"{label.title}, ± / {label.unit}"}
     said = []
     for design, highest in (own, other):
-        text = f"{rounded_text(label.factor * highest.amplitude)} {label.unit}"
-        row[f"{design} ±"] = Cell(text, highest.amplitude)
+        amplitude = label.factor * highest.amplitude
+        row[design] = _number(amplitude)
         row[f"{design} / rpm"] = _number(highest.speed / RPM)
-        said.append(f"{design} ±{text}")
-    row["change / dB"] = _number(change, "+.1f")
+        said.append(f"{design} ±{rounded_text(amplitude)} {label.unit}")
+    row["change / dB"] = _number(round(change, 1) + 0.0, "+.1f")
     statement = f"{label.title}, highest in the range: {', '.join(said)} ({change:+.1f} dB)."
     material.context.notes.statements.append(statement)
     return row
@@ -94,5 +94,11 @@ def _number(value: float, form: str = "") -> Cell:
 
 
 def _key_row(this: str, other: str, difference: Difference) -> dict[str, Any]:
-    values = ("–" if value is None else str(value) for value in (difference.own, difference.other))
+    values = map(_value_text, (difference.own, difference.other))
     return {"key": difference.key, **dict(zip((this, other), values, strict=True))}
+
+
+def _value_text(value: Any) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
