@@ -21,7 +21,7 @@ from exugear.report.findings.design_changes import (
     DesignChange,
     DesignStudy,
     effects_of,
-    exciting_families,
+    multiples_of,
     ordered,
     peaks_of,
     price_of,
@@ -109,9 +109,11 @@ def study_design_changes(
     if not ranking.resonances:
         return None
     resonance = ranking.resonances[0]
-    speed = abs(resonance.speed)
-    before = peaks_of(data, resonance.order, speed, ranking.speeds)
-    changes = _proposed(project, data, resonance)
+    families = {mesh.family for mesh in project.gearbox.meshes}
+    multiples = multiples_of(data, resonance.order, families)
+    before = peaks_of(data, multiples, families, resonance.frequency, ranking.speeds)
+    exciting = {family: count for base, count in multiples.items() for family in base.split(", ")}
+    changes = _proposed(project, exciting, resonance)
     life = _shortest_life(project)
     results = []
     for number, change in enumerate(changes):
@@ -120,7 +122,7 @@ def study_design_changes(
         try:
             changed = _changed_project(project, change)
             response = changed.steady(settings)
-            after = peaks_of(response, resonance.order, speed, ranking.speeds)
+            after = peaks_of(response, multiples, families, resonance.frequency, ranking.speeds)
             price = price_of(project.gearbox, changed.gearbox, (life, _shortest_life(changed)))
             results.append(ChangeResult(change, effects_of(before, after), price))
         except _REFUSALS as error:
@@ -139,7 +141,7 @@ def study_design_changes(
     return study
 
 
-def _proposed(project: ComputedProject, data: xr.Dataset, resonance: Resonance) -> list[DesignChange]:
+def _proposed(project: ComputedProject, exciting: dict[str, int], resonance: Resonance) -> list[DesignChange]:
     deflections = {
         name: float(np.nanmean(np.abs(table.static_state["ste"].to_numpy())))
         for name, table in project.tables_at_work().items()
@@ -150,7 +152,7 @@ def _proposed(project: ComputedProject, data: xr.Dataset, resonance: Resonance) 
     energies = dict(zip(modes.element_names, modes.strain[mode].tolist(), strict=True))
     by_energy = sorted((name for name in energies if name in families), key=lambda name: -energies[name])
     bearings = list(dict.fromkeys(families[name] for name in by_energy))[:BEARINGS]
-    return propose_changes(project.gearbox, resonance, exciting_families(data, resonance), deflections, bearings)
+    return propose_changes(project.gearbox, exciting, deflections, bearings)
 
 
 def _changed_project(project: ComputedProject, change: DesignChange) -> ComputedProject:

@@ -110,7 +110,7 @@ def _check_comparison(folder: Path, other: Path, allow_dir: Path | None) -> None
 
 
 def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
-    """Compute missing modes of all models with runs, and a response of the one with most degrees of freedom.
+    """Compute missing modes of all models with runs or modes, and a response of the one with most degrees of freedom.
 
     Existing files stay as they are, even if they are damaged or belong to other input. What takes long (tables, contact
     loss) or fails is left to the report, which lists it with its command.
@@ -122,6 +122,7 @@ def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
     from exugear.results.folder import read_stored_gearbox
     from exugear.results.run_file import load_run
     from exugear.steady.settings import SteadySettings, operating_speeds
+    from exugear.system.modes import load_modes
     from exugear.system.tooth_mesh.laws.registry import LAWS
     from fe_ste.tools.files import FileError
 
@@ -129,6 +130,9 @@ def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
     for path in sorted(folder.glob("*/*/run.nc")):
         with suppress(FileError, ValueError, KeyError):
             models.append(choice_of(load_run(path, ()).attrs))
+    for path in sorted(folder.glob("*/*/modes.nc")):
+        with suppress(FileError, ValueError, KeyError):
+            models.append(choice_of(load_modes(path).attrs))
     if not models:
         return
     with suppress(BadInputError, FailedError), model_errors():

@@ -9,9 +9,10 @@ changes of the design, but show how much the answer depends on what is not known
 
 from __future__ import annotations
 
+import cmath
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,13 +23,12 @@ from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.sections.connections import CONTACT_ANGLES_DEG
 from exugear.gearbox.sections.gears import ModificationSection
 from exugear.gearbox.units import MM, UM
-from exugear.report.findings.ranking import Resonance
 from exugear.steady.mean_system.signals import SIGNALS, quantities_of
 from exugear.steady.settings import SteadySettings, operating_speeds
 from fe_ste.geometry.gears import GearPair
 from fe_ste.geometry.involute import involute
 from fe_ste.standards.pitting import nominal_contact_stress
-from fe_ste.tools.arrays import Floats
+from fe_ste.tools.arrays import Floats, Integers
 from fe_ste.tools.drawing import COLOURS, axes_or_new, drawable
 from fe_ste.tools.files import FileError, write_file
 
@@ -46,6 +46,10 @@ STEEPER_DEG = 5.0
 PRELOAD_UM = 20.0
 STIFFER = 1.3
 """Changes of a bearing: contact angle, axial preload of a pair, factor of a stated stiffness and of its inverse."""
+SAME_PHASING = 0.1
+"""Difference of the resultant of planet phases, 1 for meshes in phase, below which the phasing counts as the same."""
+LEAST_DB = -60.0
+"""Least change that is told apart: at planets out of phase amplitudes vanish but for round-off."""
 STEEL = 7850.0
 """Density for the mass of wider gears, kg/m3."""
 ASSUMPTION = "assumption"
@@ -69,7 +73,7 @@ class DesignChange:
 
 @dataclass(frozen=True)
 class Effect:
-    """Effect of a change on one quantity, dB; negative: lower."""
+    """Effect of a change on one quantity, dB; negative: lower; at least `LEAST_DB`."""
 
     this_peak: float | None
     highest: float | None
@@ -195,8 +199,7 @@ def _number(value: float | None) -> float | None:
 
 def propose_changes(
     gearbox: Gearbox,
-    resonance: Resonance,
-    families: Sequence[str],
+    multiples: Mapping[str, int],
     deflections: Mapping[str, float],
     bearings: Sequence[str],
 ) -> list[DesignChange]:
@@ -204,15 +207,16 @@ def propose_changes(
 
     Parameters
     ----------
-    families : families of meshes whose order excites it
+    multiples : of the mesh frequency that excite it, by the family of meshes
     deflections : mean static transmission error of each pair, m
     bearings : families of the bearings that have most of its strain energy
     """
-    pairs = {mesh.pair.name: mesh.pair for mesh in gearbox.meshes if mesh.family in families}
+    pairs = {mesh.pair.name: mesh.pair for mesh in gearbox.meshes if mesh.family in multiples}
     found: list[DesignChange] = []
     for name, pair in pairs.items():
         found += _overlap_changes(gearbox, name, pair)
         found += _modification_changes(gearbox, name, pair, deflections.get(name, 0.0))
+    found += _phasing_changes(gearbox, multiples)
     for name in bearings:
         found += _bearing_changes(gearbox, name)
     found += _assumptions(gearbox)
@@ -339,6 +343,58 @@ def _modification_changes(gearbox: Gearbox, name: str, pair: GearPair, deflectio
         yield DesignChange(f"{name}-crowning-{amount:g}", words, "modification", {key: crowned})
 
 
+def _phasing_changes(gearbox: Gearbox, multiples: Mapping[str, int]) -> Iterator[DesignChange]:
+    """One tooth more or fewer on the planets, and on their mates what keeps the centre distances.
+
+    With z teeth on a central gear, a planet at the angle psi meshes z psi / (2 pi) mesh cycles later than one at zero.
+    The forces of a multiple n of the mesh frequency add up in torque if n z psi / (2 pi) are whole numbers, as at all
+    multiples for planets in phase. Otherwise their sum across the axis remains, or none (R. G. Parker, A physical
+    explanation for the effectiveness of planet phasing to suppress planetary gear vibration, Journal of Sound and
+    Vibration 236, 2000, 561-573). Sets with several gears on a planet, with phases in the file, or with mates that mesh
+    with other gears are left out.
+    """
+    sections = gearbox.case.gears
+    if any(section.phase is not None for section in gearbox.case.meshes.values()):
+        return
+    gears_of_pairs = [_gear_names(gearbox, name) for name in gearbox.gear_pairs]
+    for (body, planet), multiple in _planet_gears(gearbox, multiples).items():
+        mates = sorted({gear for both in gears_of_pairs if planet in both for gear in both} - {planet})
+        branches = any(planet not in both and set(both) & set(mates) for both in gears_of_pairs)
+        if branches or len(gearbox.case.bodies[body].gears_z_mm) > 1:
+            continue
+        angles = [math.radians(angle) for angle in gearbox.case.bodies[body].planet_angles_deg]
+        for more in (-1, 1):
+            teeth = {planet: sections[planet].teeth + more}
+            teeth |= {gear: sections[gear].teeth - more * gearbox.gears[gear].outward for gear in mates}
+            now, then = (
+                abs(sum(cmath.exp(1j * multiple * count * angle) for angle in angles)) / len(angles)
+                for count in (sections[mates[0]].teeth, teeth[mates[0]])
+            )
+            if abs(then - now) < SAME_PHASING:
+                continue
+            keys: dict[str, Any] = {f"gears.{gear}.teeth": count for gear, count in teeth.items()}
+            for gear, count in teeth.items():
+                if (tip := sections[gear].tip_diameter_mm) is not None:
+                    module = 2.0 * gearbox.gears[gear].reference_radius / (gearbox.gears[gear].teeth * MM)
+                    keys[f"gears.{gear}.tip_diameter_mm"] = tip + module * (count - sections[gear].teeth)
+            phasing = "in phase" if then > now else "out of phase"
+            counts = ", ".join(f"{gear} {sections[gear].teeth} to {count}" for gear, count in sorted(teeth.items()))
+            words = f"planets mesh {phasing}: teeth of {counts}; same centre distances"
+            yield DesignChange(f"{body}-{teeth[planet]}-teeth", words, "gear", keys)
+
+
+def _planet_gears(gearbox: Gearbox, multiples: Mapping[str, int]) -> dict[tuple[str, str], int]:
+    """Multiples of the mesh frequency by planet section and gear of the planet."""
+    bodies = gearbox.named_bodies
+    return {
+        (bodies[body].family, gear.name): multiples[mesh.family]
+        for mesh in gearbox.meshes
+        if mesh.family in multiples
+        for body, gear in ((mesh.pinion, mesh.pair.pinion), (mesh.gear, mesh.pair.gear))
+        if bodies[body].planet_of is not None
+    }
+
+
 def _bearing_changes(gearbox: Gearbox, family: str) -> Iterator[DesignChange]:
     """Contact angle and preload of a bearing with a catalogue; factors of a stated stiffness."""
     section = gearbox.case.bearings.get(family)
@@ -382,35 +438,58 @@ def _assumptions(gearbox: Gearbox) -> Iterator[DesignChange]:
 # Effects
 
 
-def exciting_families(data: xr.Dataset, resonance: Resonance) -> list[str]:
-    """Families of meshes whose multiples make up the order of a resonance."""
-    orders = data["order"].to_numpy()
-    line = int(np.argmin(np.abs(orders - resonance.order)))
-    multiples = data["index"].to_numpy()[line]
-    return [str(base) for base, count in zip(data["base"].to_numpy(), multiples, strict=True) if count]
+def multiples_of(data: xr.Dataset, order: float, families: Collection[str]) -> dict[str, int]:
+    """Return the multiples of mesh orders that make up an order, without sidebands at the rotation of a carrier.
+
+    Parameters
+    ----------
+    order : periods per revolution of the input
+    families : families of meshes of the gearbox
+
+    Returns
+    -------
+    By the families of meshes that share a mesh order, separated by commas
+    """
+    line = int(np.argmin(np.abs(data["order"].to_numpy() - order)))
+    return {base: int(counts[line]) for base, counts in _mesh_multiples(data, families).items() if counts[line]}
+
+
+def _mesh_multiples(data: xr.Dataset, families: Collection[str]) -> dict[str, Integers]:
+    """Multiples (line,) of each mesh order."""
+    multiples = data["index"].to_numpy()
+    bases = enumerate(str(base) for base in data["base"].to_numpy())
+    return {base: multiples[:, place] for place, base in bases if set(base.split(", ")) <= set(families)}
 
 
 def peaks_of(
-    data: xr.Dataset, order: float, speed: float, inside: tuple[float, float]
+    data: xr.Dataset,
+    multiples: Mapping[str, int],
+    families: Collection[str],
+    frequency: float,
+    inside: tuple[float, float],
 ) -> dict[str, tuple[float, float]]:
-    """Amplitude of an order near a speed, and the highest amplitude of any order in a range of speeds, by quantity.
+    """Amplitude of an order near a frequency, and the highest amplitude of any order in a range of speeds, by quantity.
 
     Parameters
     ----------
     data : as `exugear.steady.steady_file.load_response` reads it
-    order : periods per revolution of the input
-    speed : of the input, rad/s, without sign
+    multiples : of mesh orders, as `multiples_of` returns them; they are the same with other numbers of teeth
+    families : families of meshes of the gearbox
+    frequency : of the resonance, Hz
     inside : lowest and highest speed of the range, rad/s
     """
     speeds = np.abs(data["speed"].to_numpy())
     amplitude: Floats = data["amplitude"].to_numpy()[:, 1:].astype(np.float64)
-    line = int(np.argmin(np.abs(data["order"].to_numpy()[1:] - order)))
-    near = np.abs(speeds - speed) <= NEAR * speed
+    of_order = np.ones(data.sizes["line"], bool)
+    for base, counts in _mesh_multiples(data, families).items():
+        of_order &= counts == multiples.get(base, 0)
+    frequencies = np.outer(speeds, data["order"].to_numpy()) / (2.0 * np.pi)
+    near = (of_order & (np.abs(frequencies - frequency) <= NEAR * frequency))[:, 1:]
     within = (speeds >= inside[0]) & (speeds <= inside[1])
     found = {}
     for quantity in quantities_of([str(name) for name in data["signal"].to_numpy()]):
         sizes = quantity.sizes(amplitude).max(axis=2, initial=0.0)
-        found[quantity.name] = float(sizes[near, line].max(initial=0.0)), float(sizes[within].max(initial=0.0))
+        found[quantity.name] = float(sizes[near].max(initial=0.0)), float(sizes[within].max(initial=0.0))
     return found
 
 
@@ -434,7 +513,7 @@ def effects_of(
 def _decibel(before: float, after: float) -> float | None:
     if before <= 0.0 or after <= 0.0:
         return None
-    return round(20.0 * math.log10(after / before), 4)
+    return max(LEAST_DB, round(20.0 * math.log10(after / before), 4))
 
 
 def price_of(before: Gearbox, after: Gearbox, lives: tuple[float, float]) -> str:
@@ -445,6 +524,8 @@ def price_of(before: Gearbox, after: Gearbox, lives: tuple[float, float]) -> str
     lives : shortest basic rating life of the bearings before and after, million revolutions; infinite if unknown
     """
     costs = []
+    if abs(after.train.ratio / before.train.ratio - 1.0) > 1e-6:
+        costs.append(f"speed ratio {before.train.ratio:.4g} to {after.train.ratio:.4g}")
     mass = _gear_mass(after) - _gear_mass(before)
     if abs(mass) > 0.05:
         costs.append(f"mass {mass:+.3g} kg")

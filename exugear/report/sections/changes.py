@@ -9,6 +9,7 @@ from exugear.gearbox.units import RPM
 from exugear.report.findings.context import OTHER_INPUT, Context, choice_of, model_label
 from exugear.report.findings.design_changes import (
     ASSUMPTION,
+    LEAST_DB,
     ChangeResult,
     DesignStudy,
     Effect,
@@ -70,23 +71,24 @@ def stored_study(context: Context) -> DesignStudy | None:
 
 
 def best_changes(study: DesignStudy | None, headline: Headline, count: int) -> list[tuple[str, str]]:
-    """Return reduction of the transmission error and text of the changes that reduce the resonance of a headline most.
+    """Return what the best changes do to the transmission error at the resonance of a headline, and their texts.
 
-    The list is empty if the study is of another resonance or another model.
+    The best ones reduce this resonance, and most of all the highest amplitude in the operating range. The list is empty
+    if the study is of another resonance or another model.
     """
     top = headline.top
     if study is None or top is None or choice_of(study.model) != headline.choice:
         return []
     if study.line != top.line or abs(study.frequency - top.frequency) > 0.01 * top.frequency:
         return []
-    lowered = sorted(
+    lowered = [
         (effect.this_peak, effect.highest or 0.0, result.change.words)
         for result in study.results
         if result.change.group != ASSUMPTION
         and (effect := result.effects.get("error")) is not None
         and effect.this_peak is not None
         and effect.this_peak < 0.0
-    )
+    ]
     return [
         (_decibels(here).shown + " dB", f"{_beginning(words)}; highest in range {_decibels(highest).shown} dB")
         for here, highest, words in lowered[:count]
@@ -117,5 +119,7 @@ def _table(material: ReportData, results: Sequence[ChangeResult], caption: str, 
 def _decibels(value: float | None) -> Cell:
     if value is None:
         return Cell("–", math.nan)
+    if value <= LEAST_DB:
+        return Cell(f"≤ −{-LEAST_DB:g}", value)
     text = f"{value:+.1f}".replace("-", "−")
     return Cell("0.0" if text in ("+0.0", "−0.0") else text, value)

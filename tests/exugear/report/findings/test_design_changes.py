@@ -14,10 +14,13 @@ import xarray as xr
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.templates.kinds import template
+from exugear.gearbox.units import RPM
 from exugear.project import Project
 from exugear.report import design_study
 from exugear.report.findings.context import OTHER_INPUT
 from exugear.report.findings.design_changes import (
+    LEAST_DB,
     ChangeResult,
     DesignChange,
     DesignStudy,
@@ -30,14 +33,13 @@ from exugear.report.findings.design_changes import (
     propose_changes,
     read_design_study,
 )
-from exugear.report.findings.ranking import Resonance
+from exugear.report.findings.ranking import ranking_of
 from exugear.results.folder import DESIGN_CHANGES_FILE
+from exugear.steady.settings import SpeedRange, SteadySettings
 from exugear.system.tooth_mesh import tables
 from fe_ste.tools.files import FileError
 
 from ...cases.spur import COARSE_INPUT, SPUR_CASE
-
-RESONANCE = Resonance("intermediate", 99.0, 2.4, 184.0, {})
 
 
 @pytest.mark.parametrize(
@@ -54,8 +56,9 @@ def test_another_helix_angle_keeps_centre_distance_and_backlash(grc: Gearbox, pa
         assert after.pinion.reference_radius == pytest.approx(before.pinion.reference_radius, rel=1e-12)
 
 
-def proposals(gearbox: Gearbox, families: list[str]) -> dict[str, DesignChange]:
-    found = propose_changes(gearbox, RESONANCE, families, {"intermediate": 30e-6}, ["hss_bc", "ims_a"])
+def proposals(gearbox: Gearbox, families: list[str], multiple: int = 1) -> dict[str, DesignChange]:
+    multiples = dict.fromkeys(families, multiple)
+    found = propose_changes(gearbox, multiples, {"intermediate": 30e-6}, ["hss_bc", "ims_a"])
     return {change.name: change for change in found}
 
 
@@ -75,9 +78,64 @@ def test_the_overlap_ratio_goes_to_the_next_whole_number(grc: Gearbox) -> None:
         grc.varied(change.keys) if change.name != "intermediate-face-width" else None
 
 
+@pytest.mark.parametrize("mesh", ["sun_planet", "ring_planet"])
+def test_other_phases_of_planets_keep_centre_distances_backlash_and_assembly(grc: Gearbox, mesh: str) -> None:
+    """With 21, 39 and 99 teeth the three planets mesh in phase; a tooth more or fewer puts them out of phase."""
+    found = {name: change for name, change in proposals(grc, [mesh]).items() if name.endswith("-teeth")}
+    counts = [[change.keys[f"gears.{gear}.teeth"] for gear in ("sun", "planet", "ring")] for change in found.values()]
+    assert counts == [[22, 38, 98], [20, 40, 100]]
+    for change in found.values():
+        assert "out of phase" in change.words
+        changed = grc.varied(change.keys)
+        for name, before in grc.gear_pairs.items():
+            after = changed.gear_pairs[name]
+            assert after.centre_distance == before.centre_distance
+            assert after.circumferential_backlash == pytest.approx(before.circumferential_backlash, rel=1e-6)
+        assert "speed ratio" in price_of(grc, changed, (math.inf, math.inf))
+        # Back again, the change is to planets in phase.
+        back = [one for one in proposals(changed, [mesh]).values() if one.name.endswith("39-teeth")]
+        assert len(back) == 1 and "in phase" in back[0].words
+
+
+def test_planet_phases_are_proposed_only_where_they_change_the_sum_of_forces(grc: Gearbox) -> None:
+    """At the third multiple of the mesh frequency three planets are in phase with any number of teeth."""
+    assert not [name for name in proposals(grc, ["sun_planet"], 3) if name.endswith("-teeth")]
+    assert not [name for name in proposals(grc, ["intermediate"]) if name.endswith("-teeth")]
+    stated = grc.varied({"meshes.sun_planet.phase": 0.0})
+    assert not [name for name in proposals(stated, ["sun_planet"]) if name.endswith("-teeth")]
+
+
+@pytest.mark.validation
+def test_planets_out_of_phase_move_forces_from_torsion_to_the_bearings(tmp_path: Path, monkeypatch) -> None:
+    """The overall transmission error vanishes, whose sum the phases cancel, and the carrier's bearings vibrate.
+
+    Parker (Journal of Sound and Vibration 236, 2000, 561-573): planets in phase excite rotation alone; multiples of the
+    mesh frequency that are out of phase by a third excite translation alone.
+    """
+    monkeypatch.setattr(tables, "TableInput", COARSE_INPUT)
+    settings = SteadySettings(SpeedRange(2200.0 * RPM, 2600.0 * RPM, 9))
+    monkeypatch.setattr(design_study, "settings_of_study", lambda gearbox: settings)
+    content = tomllib.loads(template("planetary"))
+    content["ste"] = {"positions": 16}
+    content["operation"] = {"speed_range_rpm": [2200.0, 2600.0]}
+    gearbox = Gearbox.from_dict(content)
+    project = Project(gearbox, tmp_path, Choice("bushing"))
+    data = project.steady(settings)
+    assert ranking_of(data).resonances[0].line == "4 x sun_planet"
+    proposed = propose_changes(gearbox, {"sun_planet": 4, "ring_planet": 4}, {}, [])
+    changes = [change for change in proposed if change.name == "planet-37-teeth"]
+    monkeypatch.setattr(design_study, "propose_changes", lambda *given: changes)
+    study = project.design_changes()
+    assert study is not None
+    (result,) = study.results
+    assert not result.refusal
+    assert result.effects["error"].this_peak == LEAST_DB
+    assert result.effects["force"].this_peak > -20.0
+
+
 def test_spur_gears_have_no_overlap_to_round_up() -> None:
     spur = Gearbox.from_dict(tomllib.loads(SPUR_CASE))
-    found = propose_changes(spur, RESONANCE, ["spur"], {"spur": 10e-6}, ["bearing_1"])
+    found = propose_changes(spur, {"spur": 1}, {"spur": 10e-6}, ["bearing_1"])
     names = {change.name for change in found}
     assert not {name for name in names if "face" in name or "helix" in name}
     assert {"bearing_1-stiffer", "bearing_1-softer", "spur-tip-relief-10"} <= names
@@ -91,18 +149,24 @@ def response(heights: list[list[float]]) -> xr.Dataset:
             "amplitude": (("point", "line", "signal"), np.pad(amplitude, ((0, 0), (1, 0), (0, 0)))),
             "speed": (("point",), np.array([8.0, 10.0, 12.0])),
             "order": (("line",), np.array([0.0, 20.0, 40.0])),
+            "index": (("line", "base"), np.array([[0], [1], [2]])),
         },
-        {"signal": ["overall_dte"]},
+        {"signal": ["overall_dte"], "base": ["spur"]},
     )
 
 
+def peaks(data: xr.Dataset, fastest: float) -> dict[str, tuple[float, float]]:
+    """Peaks of the mesh frequency at 10 rad/s, and in the range from 8 rad/s."""
+    return peaks_of(data, {"spur": 1}, {"spur"}, 20.0 * 10.0 / (2.0 * math.pi), (8.0, fastest))
+
+
 def test_a_peak_that_only_moves_is_lower_here_but_not_in_the_range() -> None:
-    before = peaks_of(response([[1e-6, 0.0], [8e-6, 0.0], [1e-6, 0.0]]), 20.0, 10.0, (8.0, 12.0))
-    after = peaks_of(response([[1e-6, 0.0], [2e-6, 0.0], [9e-6, 0.0]]), 20.0, 10.0, (8.0, 12.0))
+    before = peaks(response([[1e-6, 0.0], [8e-6, 0.0], [1e-6, 0.0]]), 12.0)
+    after = peaks(response([[1e-6, 0.0], [2e-6, 0.0], [9e-6, 0.0]]), 12.0)
     effect = effects_of(before, after)["error"]
     assert effect.this_peak == pytest.approx(20.0 * math.log10(2.0 / 8.0), abs=1e-3)
     assert effect.highest == pytest.approx(20.0 * math.log10(9.0 / 8.0), abs=1e-3)
-    outside = peaks_of(response([[1e-6, 0.0], [8e-6, 0.0], [99e-6, 0.0]]), 20.0, 10.0, (8.0, 11.0))
+    outside = peaks(response([[1e-6, 0.0], [8e-6, 0.0], [99e-6, 0.0]]), 11.0)
     assert outside["error"][1] == 8e-6
 
 
