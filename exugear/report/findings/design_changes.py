@@ -49,7 +49,7 @@ STIFFER = 1.3
 SAME_PHASING = 0.1
 """Difference of the resultant of planet phases, 1 for meshes in phase, below which the phasing counts as the same."""
 LEAST_DB = -60.0
-"""Least change that is told apart: at planets out of phase amplitudes vanish but for round-off."""
+"""Smallest effect that is distinguished: amplitudes may vanish except for round-off if planets mesh out of phase."""
 STEEL = 7850.0
 """Density for the mass of wider gears, kg/m3."""
 ASSUMPTION = "assumption"
@@ -212,15 +212,15 @@ def propose_changes(
     bearings : families of the bearings that have most of its strain energy
     """
     pairs = {mesh.pair.name: mesh.pair for mesh in gearbox.meshes if mesh.family in multiples}
-    found: list[DesignChange] = []
+    changes: list[DesignChange] = []
     for name, pair in pairs.items():
-        found += _overlap_changes(gearbox, name, pair)
-        found += _modification_changes(gearbox, name, pair, deflections.get(name, 0.0))
-    found += _phasing_changes(gearbox, multiples)
+        changes += _overlap_changes(gearbox, name, pair)
+        changes += _modification_changes(gearbox, name, pair, deflections.get(name, 0.0))
+    changes += _phasing_changes(gearbox, multiples)
     for name in bearings:
-        found += _bearing_changes(gearbox, name)
-    found += _assumptions(gearbox)
-    return found
+        changes += _bearing_changes(gearbox, name)
+    changes += _assumptions(gearbox)
+    return changes
 
 
 def _gear_names(gearbox: Gearbox, pair: str) -> tuple[str, str]:
@@ -344,31 +344,31 @@ def _modification_changes(gearbox: Gearbox, name: str, pair: GearPair, deflectio
 
 
 def _phasing_changes(gearbox: Gearbox, multiples: Mapping[str, int]) -> Iterator[DesignChange]:
-    """One tooth more or fewer on the planets, and on their mates what keeps the centre distances.
+    """Add or remove a planet tooth, and change the mating gears so that all centre distances remain.
 
     With z teeth on a central gear, a planet at the angle psi meshes z psi / (2 pi) mesh cycles later than one at zero.
     The forces of a multiple n of the mesh frequency add up in torque if n z psi / (2 pi) are whole numbers, as at all
     multiples for planets in phase. Otherwise their sum across the axis remains, or none (R. G. Parker, A physical
     explanation for the effectiveness of planet phasing to suppress planetary gear vibration, Journal of Sound and
-    Vibration 236, 2000, 561-573). Sets with several gears on a planet, with phases in the file, or with mates that mesh
-    with other gears are left out.
+    Vibration 236, 2000, 561-573). Sets with several gears on a planet, with phases in the file, or with mating gears
+    that have other meshes are left out.
     """
     sections = gearbox.case.gears
     if any(section.phase is not None for section in gearbox.case.meshes.values()):
         return
     gears_of_pairs = [_gear_names(gearbox, name) for name in gearbox.gear_pairs]
     for (body, planet), multiple in _planet_gears(gearbox, multiples).items():
-        mates = sorted({gear for both in gears_of_pairs if planet in both for gear in both} - {planet})
-        branches = any(planet not in both and set(both) & set(mates) for both in gears_of_pairs)
+        mating = sorted({gear for both in gears_of_pairs if planet in both for gear in both} - {planet})
+        branches = any(planet not in both and set(both) & set(mating) for both in gears_of_pairs)
         if branches or len(gearbox.case.bodies[body].gears_z_mm) > 1:
             continue
         angles = [math.radians(angle) for angle in gearbox.case.bodies[body].planet_angles_deg]
         for more in (-1, 1):
             teeth = {planet: sections[planet].teeth + more}
-            teeth |= {gear: sections[gear].teeth - more * gearbox.gears[gear].outward for gear in mates}
+            teeth |= {gear: sections[gear].teeth - more * gearbox.gears[gear].outward for gear in mating}
             now, then = (
                 abs(sum(cmath.exp(1j * multiple * count * angle) for angle in angles)) / len(angles)
-                for count in (sections[mates[0]].teeth, teeth[mates[0]])
+                for count in (sections[mating[0]].teeth, teeth[mating[0]])
             )
             if abs(then - now) < SAME_PHASING:
                 continue
@@ -379,8 +379,8 @@ def _phasing_changes(gearbox: Gearbox, multiples: Mapping[str, int]) -> Iterator
                     keys[f"gears.{gear}.tip_diameter_mm"] = tip + module * (count - sections[gear].teeth)
             phasing = "in phase" if then > now else "out of phase"
             counts = ", ".join(f"{gear} {sections[gear].teeth} to {count}" for gear, count in sorted(teeth.items()))
-            words = f"planets mesh {phasing}: teeth of {counts}; same centre distances"
-            yield DesignChange(f"{body}-{teeth[planet]}-teeth", words, "gear", keys)
+            text = f"planets mesh {phasing}: teeth of {counts}; same centre distances"
+            yield DesignChange(f"{body}-{teeth[planet]}-teeth", text, "gear", keys)
 
 
 def _planet_gears(gearbox: Gearbox, multiples: Mapping[str, int]) -> dict[tuple[str, str], int]:
