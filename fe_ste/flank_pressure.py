@@ -47,6 +47,8 @@ class FlankPressure(ReprMixin):
     """K_Hbeta: maximum over mean line load along the face."""
     edge_pressure: float
     """Highest pressure of contact at tip edges, Pa; zero without any."""
+    edge_place: tuple[float, float] = (math.nan, math.nan)
+    """Place of the highest line load at tip edges: on the path, at one of its ends, and along the face, m."""
 
     def _line(self) -> str:
         return f": {1e-6 * self.pressure.max():.4g} MPa, K_Hbeta {self.face_load_factor:.3g}"
@@ -134,6 +136,9 @@ def _flank_pressure(pair: GearPair, states: xr.Dataset) -> FlankPressure:
     pressure = np.stack(
         [np.interp(path, places[:, k], stresses[:, k], left=0.0, right=0.0) for k in range(len(axial))], axis=1
     )
+    beyond = np.where((place < path[0]) | (place > path[-1]), loads, 0.0)
+    edge = np.unravel_index(int(beyond.argmax()), beyond.shape)
+    edge_place = (float(np.clip(place[edge], path[0], path[-1])), float(axial[edge[-1]]))
     return FlankPressure(
         misalignment=float(states["misalignment"]),
         path=path,
@@ -142,4 +147,5 @@ def _flank_pressure(pair: GearPair, states: xr.Dataset) -> FlankPressure:
         line_load=load_along_face(states).to_numpy(),
         face_load_factor=float(face_load_factor(states)),
         edge_pressure=float(states["edge_pressure"].max()),
+        edge_place=edge_place if beyond.any() else (math.nan, math.nan),
     )

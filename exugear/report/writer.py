@@ -29,6 +29,7 @@ from exugear.report.findings.groups import groups_of
 from exugear.report.findings.headline import headline_of
 from exugear.report.findings.other_design import read_other_design
 from exugear.report.findings.parameter_variations import begin_variations, model_variations
+from exugear.report.findings.ratings import ratings_of
 from exugear.report.findings.words import Labels
 from exugear.report.sections.answer import ranking_section, short_section
 from exugear.report.sections.bearings import bearings_section
@@ -226,6 +227,7 @@ def _material(context: Context, executor: Executor | None) -> ReportData:
     return replace(
         material,
         run_data=drawn,
+        ratings=ratings_of(context),
         design_study=stored_study(context),
         variations=model_variations(context, results.modes, begun),
     )

@@ -68,6 +68,14 @@ def test_load_is_highest_at_the_end_where_the_gap_is_closed(flanks: list[FlankPr
         assert flank.highest[0] > flanks[1].highest[0]
 
 
+def test_tip_edges_touch_at_an_end_of_the_path_and_most_where_the_gap_is_closed(flanks: list[FlankPressure]) -> None:
+    for flank, sign in zip((flanks[0], flanks[2]), (1.0, -1.0), strict=True):
+        path, axial = flank.edge_place
+        assert flank.edge_pressure > 0.0
+        assert path in (flank.path[0], flank.path[-1])
+        assert np.sign(axial) == sign
+
+
 def test_aligned_spur_gears_are_pressed_most_where_one_tooth_pair_carries_all(pair: GearPair, flanks) -> None:
     """At the inner point of single contact the stress is that of ISO 6336-2 with all of the load, evenly along."""
     if pair.pinion.helix_angle != 0.0:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from exugear.gearbox.choice import Choice
+from exugear.gearbox.parts import Mesh
 from exugear.gearbox.variant import Variant
 from exugear.report.findings.context import Context
 from exugear.system.bearings.rolling.rows import BearingError
@@ -26,6 +27,8 @@ class PairContact:
 
     mesh: str
     """Mesh of the pair with the largest misalignment."""
+    family: str
+    """Family of that mesh."""
     pair: GearPair
     force: float
     """On the transverse line of action, N."""
@@ -48,7 +51,7 @@ def flank_contacts(context: Context, choice: Choice) -> list[PairContact]:
         context.notes.left_out.append(f"contact of teeth: {error}")
         return []
     places = contact_places(state.assembly, state.q)
-    chosen: dict[str, tuple[str, int, MeshPlace]] = {}
+    chosen: dict[str, tuple[Mesh, int, MeshPlace]] = {}
     for element in assembly.elements:
         mesh = element.mesh
         place = places.get(mesh.name)
@@ -56,18 +59,18 @@ def flank_contacts(context: Context, choice: Choice) -> list[PairContact]:
             continue
         before = chosen.get(mesh.pair.name)
         if before is None or abs(place.misalignment) > abs(before[2].misalignment):
-            chosen[mesh.pair.name] = (mesh.name, element.flank, place)
+            chosen[mesh.pair.name] = (mesh, element.flank, place)
     context.tell("contact of teeth")
     with one_dense_thread():
         solved = dict(zip(chosen, side_by_side(_solved, [place for _, _, place in chosen.values()]), strict=True))
     found = []
-    for name, (mesh_name, flank, place) in chosen.items():
+    for name, (mesh, flank, place) in chosen.items():
         pressures = solved[name]
         if isinstance(pressures, ContactError):
             context.notes.left_out.append(f"contact of teeth: {pressures}")
             continue
         aligned, actual = (_seen_by(pressure, flank) for pressure in pressures)
-        found.append(PairContact(mesh_name, place.table.pair, place.force, aligned, actual))
+        found.append(PairContact(mesh.name, mesh.family, place.table.pair, place.force, aligned, actual))
     return found
 
 
@@ -90,16 +93,26 @@ def _seen_by(pressure: FlankPressure, flank: int) -> FlankPressure:
         line_load=pressure.line_load[::-1],
         face_load_factor=pressure.face_load_factor,
         edge_pressure=pressure.edge_pressure,
+        edge_place=(pressure.edge_place[0], -pressure.edge_place[1]),
     )
 
 
-def place_on_flank(contact: PairContact, pressure: FlankPressure, labels: Mapping[str, str]) -> str:
-    """Say where on the flank of gear 1 the pressure is highest, such as "tip of sun, −z end"."""
-    _, path, axial = pressure.highest
-    share = (path - pressure.path[0]) / (pressure.path[-1] - pressure.path[0])
-    heights = ("root", "middle of the profile", "tip")
-    ends = ("−z end", "middle of the face", "+z end")
-    height = heights[int(np.clip(3.0 * share, 0, 2))]
-    end = ends[int(np.clip(3.0 * (axial - pressure.axial[0]) / np.ptp(pressure.axial), 0, 2))]
+def place_on_flank(contact: PairContact, path: float, axial: float, labels: Mapping[str, str]) -> str:
+    """Say where a place on the flank of gear 1 is, such as "tip of sun, −z end"; path and axial position in m."""
+    share = (path - contact.actual.path[0]) / (contact.actual.path[-1] - contact.actual.path[0])
+    height = ("root", "middle of the profile", "tip")[int(np.clip(3.0 * share, 0, 2))]
     pinion = contact.pair.pinion.name
-    return f"{height} of {labels.get(pinion, pinion)}, {end}"
+    return f"{height} of {labels.get(pinion, pinion)}, {_end_of_face(contact, axial)}"
+
+
+def edge_in_words(contact: PairContact, labels: Mapping[str, str]) -> str:
+    """Say at which tip the edge pressure is highest, such as "tip of planet, +z end"."""
+    path, axial = contact.actual.edge_place
+    gear = contact.pair.pinion if path == contact.actual.path[-1] else contact.pair.gear
+    return f"tip of {labels.get(gear.name, gear.name)}, {_end_of_face(contact, axial)}"
+
+
+def _end_of_face(contact: PairContact, axial: float) -> str:
+    faces = contact.actual.axial
+    ends = ("−z end", "middle of the face", "+z end")
+    return ends[int(np.clip(3.0 * (axial - faces[0]) / np.ptp(faces), 0, 2))]

@@ -5,69 +5,42 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import xarray as xr
 
-from exugear.gearbox.reading import GearboxFileError
-from exugear.gearbox.variant import VariantError
-from exugear.life.life_file import draw_life, limits, stored_lives
-from exugear.life.rating.sheet import RATED_AS, FlankKey, balanced, life_results, rated, rated_loads
+from exugear.life.life_file import draw_life, limits
 from exugear.report.findings.context import choice_of, model_label
 from exugear.report.findings.words import figure_text
 from exugear.report.pictures.png import png_address
 from exugear.report.sections.material import Part, ReportData
 from exugear.report.web.html import Cell, Table, render
 from exugear.results.folder import StoredStudy, stored_studies
-from exugear.system.bearings.rolling.rows import BearingError
-from exugear.system.statics import BalanceError
-from exugear.system.tooth_mesh.placement import MeshError
 
 LEAST_DAMAGE = 1e-6
 """Damages below this value are shown as "below" it."""
 
 
 def life_section(material: ReportData) -> Part:
-    """List loads, damages and safety factors for each rated variant, and add the rating sheet to the page's data."""
-    context = material.context
-    found: dict[FlankKey, dict[str, float]] = {}
-    if context.gearbox.case.loads is None:
-        return Part(data=_rating(material, found))
-    content = []
-    for stored in stored_lives(context.gearbox, context.folder, context.assembled):
-        if stored.data is None:
-            context.notes.left_out.append(f"{context.name_of(stored.path)}: {stored.reason}")
-        else:
-            content.append(_rated_variant(material, stored.data))
-            found = found or life_results(stored.data)
-            worst = limits(stored.data)
-            if worst:
-                part, kind, damage = worst[0]
-                size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
-                context.notes.statements.append(
-                    f"{model_label(choice_of(stored.data.attrs))}: largest fatigue damage in "
-                    f"{float(stored.data.attrs['life_years']):g} years: "
-                    f"{material.words.labelled(part)}, {size} ({kind})."
-                )
-    data = _rating(material, found)
-    if not content:
+    """List loads, damages and safety factors for each rated variant, and add the rating sheet to the page's data.
+
+    The sheet has the key ``rating`` and is that of ``check --rating --json``.
+    """
+    ratings = material.ratings
+    data = {} if ratings.sheet is None else {"rating": ratings.sheet.summary()}
+    for life in ratings.lives:
+        worst = limits(life)
+        if worst:
+            part, kind, damage = worst[0]
+            size = "infinite" if math.isinf(damage) else f"{damage:.3g}"
+            material.context.notes.statements.append(
+                f"{model_label(choice_of(life.attrs))}: largest fatigue damage in "
+                f"{float(life.attrs['life_years']):g} years: {material.words.labelled(part)}, {size} ({kind})."
+            )
+    if not ratings.lives:
         return Part(data=data)
+    content = [_rated_variant(material, life) for life in ratings.lives]
     return Part(render("life", variants=content), data, "Rating and life", "life")
-
-
-def _rating(material: ReportData, beside: Mapping[FlankKey, Mapping[str, float]]) -> dict[str, Any]:
-    """Return the rating sheet to ISO 6336 under the key ``rating``, as in `check --rating --json`, if available."""
-    context = material.context
-    if context.gearbox.case.rating is None:
-        return {}
-    try:
-        counted = rated_loads(context.gearbox)
-        balance = balanced(context.assembled(RATED_AS.of(context.gearbox)), counted)
-    except (GearboxFileError, BalanceError, VariantError, MeshError, BearingError) as error:
-        context.notes.left_out.append(f"rating to ISO 6336: {error}")
-        return {}
-    return {"rating": rated(context.gearbox, counted, balance, beside).summary()}
 
 
 def _rated_variant(material: ReportData, data: xr.Dataset) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from exugear.report.findings.groups import RunGroup
 from exugear.report.findings.headline import Headline
 from exugear.report.findings.other_design import OtherDesign
 from exugear.report.findings.parameter_variations import ModelVariations
+from exugear.report.findings.ratings import Ratings
 from exugear.report.findings.words import Labels
 from exugear.report.web.document import ArrayStore
 from exugear.report.web.html import Figure
@@ -65,6 +66,8 @@ class ReportData:
     """Ranking that the report leads with; None if nothing is ranked."""
     arrays: ArrayStore
     """Store for the arrays of the page."""
+    ratings: Ratings = field(default_factory=Ratings)
+    """Stored lives and rating sheet."""
     design_study: DesignStudy | None = None
     """Computed design changes."""
     other_design: OtherDesign | None = None

@@ -11,7 +11,9 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from exugear.report.findings.flank_contacts import PairContact, _seen_by, place_on_flank
+from exugear.life.rating.sheet import FlankSheet, RatingSheet
+from exugear.report.findings.flank_contacts import PairContact, _seen_by, edge_in_words, place_on_flank
+from exugear.report.findings.ratings import Ratings
 from exugear.report.pictures.flank_maps import LEFT, LOAD, RIGHT, flank_map
 from fe_ste.flank_pressure import FlankPressure
 from fe_ste.geometry.gears import Gear, GearPair
@@ -31,7 +33,7 @@ def loaded_below() -> FlankPressure:
 
 
 def contact(flank: FlankPressure) -> PairContact:
-    return PairContact("mesh", PAIR, 1e3, flank, flank)
+    return PairContact("mesh", "mesh", PAIR, 1e3, flank, flank)
 
 
 def test_the_other_flank_turns_the_ends_of_the_face(loaded_below: FlankPressure) -> None:
@@ -45,12 +47,39 @@ def test_the_other_flank_turns_the_ends_of_the_face(loaded_below: FlankPressure)
     assert _seen_by(loaded_below, 1) is loaded_below
 
 
+def highest_place(flank: FlankPressure, labels: dict[str, str]) -> str:
+    return place_on_flank(contact(flank), *flank.highest[1:], labels)
+
+
 def test_places_are_named_by_gear_1_and_the_end_of_the_face(loaded_below: FlankPressure) -> None:
-    assert place_on_flank(contact(loaded_below), loaded_below, {"gear": "sun"}) == "root of sun, −z end"
+    assert highest_place(loaded_below, {"gear": "sun"}) == "root of sun, −z end"
     tip = replace(loaded_below, pressure=loaded_below.pressure[::-1, ::-1])
-    assert place_on_flank(contact(tip), tip, {}) == "tip of gear, +z end"
+    assert highest_place(tip, {}) == "tip of gear, +z end"
     middle = replace(loaded_below, pressure=np.pad(np.ones((1, 2)), ((4, 4), (4, 4))))
-    assert place_on_flank(contact(middle), middle, {}) == "middle of the profile of gear, middle of the face"
+    assert highest_place(middle, {}) == "middle of the profile of gear, middle of the face"
+
+
+def test_the_tip_edge_is_of_gear_1_at_the_end_of_the_path_and_of_gear_2_at_its_start(
+    loaded_below: FlankPressure,
+) -> None:
+    other = replace(GEAR, name="wheel")
+    pair = replace(PAIR, gear=other)
+    for path, name in ((PATH[-1], "gear"), (PATH[0], "big wheel")):
+        edge = replace(loaded_below, edge_pressure=3e9, edge_place=(float(path), float(AXIAL[0])))
+        seen = PairContact("mesh", "mesh", pair, 1e3, edge, edge)
+        assert edge_in_words(seen, {"wheel": "big wheel"}) == f"tip of {name}, −z end"
+        turned = _seen_by(edge, -1)
+        seen = PairContact("mesh", "mesh", pair, 1e3, turned, turned)
+        assert edge_in_words(seen, {"wheel": "big wheel"}) == f"tip of {name}, +z end"
+
+
+def test_safety_factors_are_the_smallest_of_both_gears_and_finite_elements_count() -> None:
+    def flank(gear: str, standard: float, finite_elements: dict[str, float]) -> FlankSheet:
+        return FlankSheet(gear, "mesh", "+", 0, {"S_H": standard, "S_F": 2.0 * standard}, finite_elements, {}, ())
+
+    sheet = RatingSheet("edition", "load", (flank("sun", 1.1, {}), flank("planet", 1.2, {"S_H": 0.9})), (), ())
+    assert Ratings((), sheet).safety_factors("mesh") == {"S_H": 0.9, "S_F": 2.2}
+    assert Ratings((), sheet).safety_factors("other") == Ratings().safety_factors("mesh") == {}
 
 
 def test_the_drawing_has_the_root_below_and_the_minus_z_end_left(loaded_below: FlankPressure) -> None:
