@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 
 from exugear.cli.console import note
 from exugear.cli.tables import print_table, print_text, wrapped
-from exugear.life.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet
+from exugear.life.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet, sheet_value
 
 _BLOCKS: Mapping[str, tuple[str, ...]] = {
     "load": ("torque", "load_torque", "F_t", "v", "N_L", "K_A", "K_gamma", "K_v", "F_betax", "K_Hbeta", "K_Halpha"),
@@ -73,8 +73,8 @@ def _rows(flanks: list[FlankSheet], other_edition: str) -> Iterator[dict[str, st
 def _row(
     name: str, words: str, flanks: list[FlankSheet], figures: Callable[[FlankSheet], Mapping[str, float]]
 ) -> dict[str, str]:
-    scale, unit = UNITS.get(name, (1.0, ""))
-    values = {f"{flank.gear} {flank.flank}": scale * figures(flank).get(name, math.nan) for flank in flanks}
+    unit = UNITS.get(name, "")
+    values = {f"{flank.gear} {flank.flank}": sheet_value(name, figures(flank).get(name, math.nan)) for flank in flanks}
     form = ".4g" if name == "N_L" else _DIGITS.get(unit, ".3f")
     return {"factor": f"{words}, {unit}" if unit else words} | {
         "\n".join(wrapped(label, GEAR_COLUMN)): _number(value, form) for label, value in values.items()

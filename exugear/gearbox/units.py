@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Final, NamedTuple
 
 MM: Final = 1e-3
@@ -31,7 +32,7 @@ class Unit(NamedTuple):
 
 _BY_QUANTITY: Final[dict[str, dict[str, float]]] = {
     "number": {"": 1.0, "none": 1.0},
-    "share": {"%": 0.01},
+    "share": {"%": 0.01, "percent": 0.01},
     "length": {"m": 1.0, "mm": MM, "um": UM},
     "angle": {"rad": 1.0, "deg": DEG, "°": DEG},
     "speed": {
@@ -45,14 +46,20 @@ _BY_QUANTITY: Final[dict[str, dict[str, float]]] = {
     },
     "velocity": {"m/s": 1.0, "m/sec": 1.0, "km/h": 1.0 / 3.6},
     "acceleration": {"m/s2": 1.0},
-    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "hr": 3600.0},
+    "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "hr": 3600.0, "hours": 3600.0},
+    "duration": {"years": 365.25 * 86400.0},
     "force": {"N": 1.0, "kN": KN, "MN": 1e6},
     "torque": {"Nm": 1.0, "Nmm": MM, "kNm": KN, "MNm": 1e6},
     "power": {"W": 1.0, "kW": 1e3},
+    "conductance": {"W/K": 1.0},
     "stiffness": {"N/m": 1.0, "N/mm": 1e3, "N/um": 1e6},
     "angular stiffness": {"Nm/rad": 1.0, "Nmm/rad": MM},
+    "stiffness per width": {"N/mmum": 1e9},
+    "damping": {"Ns/m": 1.0},
+    "angular damping": {"Nms/rad": 1.0},
     "stress": {"Pa": 1.0, "MPa": MPA, "GPa": GPA, "N/mm2": MPA},
     "mass": {"kg": 1.0},
+    "mass per width": {"kg/mm": 1e3},
     "density": {"kg/m3": 1.0, "kg/dm3": 1e3},
     "inertia": {"kgm2": 1.0},
     "viscosity": {"mm2/s": 1e-6},
@@ -78,10 +85,23 @@ def unit_of(text: str, any_case: bool = False) -> Unit | None:
     >>> unit_of("KN-M"), unit_of("KN-M", any_case=True).factor, unit_of("mNm", any_case=True)
     (None, 1000.0, None)
     """
-    plain = "".join(text.split()).translate(_PLAIN).replace("mum", "um")
+    plain = re.sub("(?<![a-z])mum", "um", "".join(text.split()).translate(_PLAIN))
     if any_case and not plain.startswith("mN"):
         return _UNIT_IN_ANY_CASE.get(plain.lower())
     return UNITS.get(plain)
+
+
+def unit_suffix(key: str) -> str:
+    """Return the suffix of a key or heading that is a unit; empty if there is none.
+
+    Examples
+    --------
+    >>> unit_suffix("stiffness_N_m_per_rad"), unit_suffix("row_count")
+    ('N_m_per_rad', '')
+    """
+    parts = key.split("_")
+    ends = ("_".join(parts[start:]) for start in range(1, len(parts)))
+    return next((end for end in ends if _without_blanks(end) in UNITS), "")
 
 
 def unit_of_key(key: str) -> Unit | None:
@@ -92,6 +112,9 @@ def unit_of_key(key: str) -> Unit | None:
     >>> unit_of_key("stiffness_N_m_per_rad"), unit_of_key("viscosity_40_mm2_per_s").factor, unit_of_key("row_count")
     (Unit(quantity='angular stiffness', factor=1.0), 1e-06, None)
     """
-    parts = key.replace("_per_", "/").split("_")
-    texts = ("".join(parts[start:]) for start in range(1, len(parts)))
-    return next((UNITS[text] for text in texts if text in UNITS), None)
+    suffix = unit_suffix(key)
+    return UNITS[_without_blanks(suffix)] if suffix else None
+
+
+def _without_blanks(suffix: str) -> str:
+    return suffix.replace("_per_", "/").replace("_", "")

@@ -142,7 +142,11 @@ def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
         for own in ready:
             if not own.modes_path.exists():
                 own.modes()
-        linear = [own for own in ready if not LAWS[own.choice.mesh_model].loses_contact]
+        linear = [
+            own
+            for own in ready
+            if (law := LAWS[own.choice.mesh_model]).needs_tables and not law.loses_contact  # excited, and linear
+        ]
         if linear and not any(folder.glob("*/*/steady-*.nc")):
             richest = max(linear, key=lambda own: list(Variant).index(own.choice.variant))
             richest.steady(SteadySettings(operating_speeds(project.gearbox)))

@@ -14,7 +14,7 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.parts import Mesh
 from exugear.gearbox.sections.loads import RatingSection
-from exugear.gearbox.units import RPM
+from exugear.gearbox.units import MM, RPM, unit_of
 from exugear.gearbox.variant import Variant
 from exugear.life.dynamic_factors import stated_factors
 from exugear.life.gear_life import auxiliary_factor, check_strengths, flank_lives, is_modified
@@ -49,27 +49,35 @@ LEAST_FORCE = 1.0
 """Tangential force, N, below which a mesh counts as unloaded and is not rated."""
 FINITE_ELEMENTS = ("sigma_H", "sigma_F", "K_Hbeta", "S_H", "S_F")
 """Results listed next to the standard's, from finite element contact and root gauges."""
-UNITS: Mapping[str, tuple[float, str]] = {
-    **dict.fromkeys(("sigma_H0", "sigma_H", "sigma_HG", "sigma_F0", "sigma_F", "sigma_FG"), (1e-6, "MPa")),
-    **dict.fromkeys(("sigma_Hlim", "sigma_Flim"), (1e-6, "MPa")),
-    **dict.fromkeys(("c'", "c_gammaalpha"), (1e-9, "N/(mm um)")),
-    "F_t": (1e-3, "kN"),
-    "torque": (1e-3, "kN m"),
-    "load_torque": (1e-3, "kN m"),
-    "m_red": (1e-3, "kg/mm"),
-    "n_E1": (1.0 / RPM, "rpm"),
-    "v": (1.0, "m/s"),
-    "F_betax": (1e6, "um"),
-    "Z_E": (1e-3, "N^0.5/mm"),
+UNITS: Mapping[str, str] = {
+    **dict.fromkeys(("sigma_H0", "sigma_H", "sigma_HG", "sigma_F0", "sigma_F", "sigma_FG"), "MPa"),
+    **dict.fromkeys(("sigma_Hlim", "sigma_Flim"), "MPa"),
+    **dict.fromkeys(("c'", "c_gammaalpha"), "N/(mm um)"),
+    "F_t": "kN",
+    "torque": "kN m",
+    "load_torque": "kN m",
+    "m_red": "kg/mm",
+    "n_E1": "rpm",
+    "v": "m/s",
+    "F_betax": "um",
+    "Z_E": "N^0.5/mm",
 }
-"""Factor from SI to the unit on the sheet, and that unit; other values are dimensionless."""
-_KEY_UNITS = {
-    "N/(mm um)": "N_per_mm_um",
-    "kN m": "kN_m",
-    "m/s": "m_per_s",
-    "kg/mm": "kg_per_mm",
-    "N^0.5/mm": "root_MPa",
-}
+"""Units on the sheet by symbol; other values are dimensionless."""
+
+
+def sheet_value(name: str, value: float) -> float:
+    """Convert a value from SI to its unit on the sheet.
+
+    Examples
+    --------
+    >>> sheet_value("sigma_H", 1.2e9), sheet_value("S_H", 1.1)
+    (1200.0, 1.1)
+    """
+    unit = UNITS.get(name, "")
+    if unit == "N^0.5/mm":  # a root of a stress in MPa
+        return value * MM
+    known = unit_of(unit)
+    return value if known is None else value / known.factor
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,10 +144,11 @@ class RatingSheet(ReprMixin, line=" by {edition}: {flanks!n} flanks"):
 def _plain_values(figures: Mapping[str, float]) -> dict[str, float | str]:
     programs: dict[str, float | str] = {}
     for name, value in figures.items():
-        scale, unit = UNITS.get(name, (1.0, ""))
-        key = f"{name.replace(chr(39), '_single')}" + (f"_{_KEY_UNITS.get(unit, unit)}" if unit else "")
+        unit = UNITS.get(name, "").replace("N^0.5/mm", "root_MPa")
+        suffix = unit.replace("/", "_per_").replace(" ", "_").replace("(", "").replace(")", "")
+        key = f"{name.replace(chr(39), '_single')}_{suffix}".rstrip("_")
         if not math.isnan(value):
-            programs[key] = "infinite" if math.isinf(value) else scale * value
+            programs[key] = "infinite" if math.isinf(value) else sheet_value(name, value)
     return programs
 
 

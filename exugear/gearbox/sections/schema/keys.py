@@ -23,36 +23,10 @@ from pydantic_core import PydanticUndefined
 
 from exugear.gearbox.sections.case import GearboxFile
 from exugear.gearbox.sections.entries import Range
+from exugear.gearbox.units import unit_suffix
 
-UNITS = {
-    "mm": "mm",
-    "um": "µm",
-    "deg": "deg",
-    "GPa": "GPa",
-    "kg": "kg",
-    "kg_m2": "kg m²",
-    "kg_per_m3": "kg/m³",
-    "W_per_K": "W/K",
-    "N": "N",
-    "kN": "kN",
-    "N_m": "N m",
-    "N_per_m": "N/m",
-    "N_s_per_m": "N s/m",
-    "N_m_per_rad": "N m/rad",
-    "N_m_s_per_rad": "N m s/rad",
-    "m_per_s": "m/s",
-    "m_per_s2": "m/s²",
-    "mm2_per_s": "mm²/s",
-    "MPa": "MPa",
-    "C": "°C",
-    "s": "s",
-    "hours": "h",
-    "years": "years",
-    "rpm": "rpm",
-    "Hz": "Hz",
-    "percent": "%",
-}
-"""Units by the suffix of a key."""
+_SIGNS = {"_per_": "/", "_": " ", "m2": "m²", "s2": "s²", "m3": "m³", "um": "µm", "hours": "h", "percent": "%"}
+"""How units in the suffix of a key are written in texts."""
 
 
 @dataclass(frozen=True)
@@ -83,9 +57,10 @@ def unit_of(name: str) -> str:
     >>> unit_of("axial_kg_m2"), unit_of("stiffness_N_m_per_rad"), unit_of("teeth")
     ('kg m²', 'N m/rad', '')
     """
-    parts = name.split("_")
-    ends = ("_".join(parts[start:]) for start in range(1, len(parts)))
-    return next((UNITS[end] for end in ends if end in UNITS), "")
+    unit = unit_suffix(name)
+    for text, sign in _SIGNS.items():
+        unit = unit.replace(text, sign)
+    return "°C" if unit == "C" else unit
 
 
 def tables() -> dict[str, type[BaseModel]]:
