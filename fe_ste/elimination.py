@@ -83,7 +83,8 @@ class Factorisation(ABC):
         if rhs.ndim == 1:
             return self._solve_dense(_dense_columns(rhs.reshape(-1, 1)))[:, 0]
         solution = np.empty(rhs.shape, order="F")
-        for columns in _chunks(rhs.shape[1]):
+        for start in range(0, rhs.shape[1], RIGHT_HAND_SIDES_AT_A_TIME):
+            columns = slice(start, start + RIGHT_HAND_SIDES_AT_A_TIME)
             solution[:, columns] = self._solve_dense(_dense_columns(rhs[:, columns]))
         return solution
 
@@ -277,11 +278,6 @@ def _not_positive_definite(unknowns: int, reason: str) -> FactorisationError:
 def _dense_columns(vectors: Floats | SparseMatrix) -> Floats:
     dense = vectors if isinstance(vectors, np.ndarray) else vectors.toarray(order="F")
     return np.asfortranarray(dense, dtype=np.float64)
-
-
-def _chunks(columns: int) -> list[slice]:
-    step = RIGHT_HAND_SIDES_AT_A_TIME
-    return [slice(start, min(start + step, columns)) for start in range(0, columns, step)]
 
 
 # Dense linear algebra in place, by SciPy's BLAS and LAPACK, on parts of arrays and without Python's lock

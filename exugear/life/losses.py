@@ -235,12 +235,12 @@ def _at_temperature(
         bearings=_bearing_losses(gearbox, duties, speeds, kinematic),
         seals=_seal_losses(gearbox, speeds),
         without_data=tuple(dict.fromkeys(b.family for b in gearbox.bearings if b.name in listed - known)),
-        assumed_roughness=any(_roughness(gearbox, name) is None for name in _gears_in_mesh(gearbox)),
+        assumed_roughness=any(
+            _roughness(gearbox, gear.name) is None
+            for mesh in gearbox.meshes
+            for gear in (mesh.pair.pinion, mesh.pair.gear)
+        ),
     )
-
-
-def _gears_in_mesh(gearbox: Gearbox) -> list[str]:
-    return list(dict.fromkeys(g.name for mesh in gearbox.meshes for g in (mesh.pair.pinion, mesh.pair.gear)))
 
 
 def _roughness(gearbox: Gearbox, gear: str) -> float | None:

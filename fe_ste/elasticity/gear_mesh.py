@@ -341,7 +341,8 @@ def _gear_of_sectors(
         points.append(_turned(mesh.points, placement.angle + number * gear.angular_pitch))
         bricks.append(mesh.hexahedra + first_point[copy])
         held.append(mesh.held_nodes + first_point[copy])
-        flank_faces = _flank_faces(mesh, placement.side)
+        on_flank = np.isin(mesh.hexahedra, mesh.flank_nodes(placement.side))
+        flank_faces = np.argwhere(on_flank[:, HEXAHEDRON_FACES].all(axis=2))
         faces.append(flank_faces + np.array([first_brick[copy], 0]))
         tooth.append(np.full(len(flank_faces), placement.sense * number))
         brick_tooth.append(np.full(len(mesh.hexahedra), placement.sense * number))
@@ -480,8 +481,3 @@ def _cut_face(mesh: SectorMesh, side: int) -> Integers:
     section = mesh.section.plus_cut if side > 0 else mesh.section.minus_cut
     layers = np.arange(len(mesh.axial_positions)) * len(mesh.section.points)
     return np.asarray((layers[:, None] + section).ravel())
-
-
-def _flank_faces(mesh: SectorMesh, side: int) -> Integers:
-    on_flank = np.isin(mesh.hexahedra, mesh.flank_nodes(side))
-    return np.argwhere(on_flank[:, HEXAHEDRON_FACES].all(axis=2))

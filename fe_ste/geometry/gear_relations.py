@@ -429,16 +429,11 @@ def root_fillet(gear: GearInputs, parameter: Floats) -> Floats:
     (n, 2) x, y in m
     """
     if not gear.internal:
-        return _generated_fillet(gear, parameter)
+        start = gear.fillet_start
+        return cartesian(*gear.rack_tip_cut.polar(start + parameter * (1.0 - start)))
     if gear.cutter is not None:
         return cartesian(*gear.cutter_tip_cut.polar(parameter))
     return _internal_fillet(gear, parameter)
-
-
-def _generated_fillet(gear: GearInputs, parameter: Floats) -> Floats:
-    """Curve that the rounded tip of a rack cuts, from the flank (0) to the root circle (1)."""
-    start = gear.fillet_start
-    return cartesian(*gear.rack_tip_cut.polar(start + parameter * (1.0 - start)))
 
 
 def _internal_fillet(gear: GearInputs, parameter: Floats) -> Floats:

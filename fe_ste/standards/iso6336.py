@@ -121,7 +121,8 @@ def mesh_stiffness(
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise ValueError(f"{key} = {value!r} must be a finite number above zero")
     theoretical = _PER_WIDTH / _flexibility(pair)
-    elasticity = _mean_youngs_modulus(pair) / _STEEL
+    moduli = pair.pinion.material.youngs_modulus, pair.gear.material.youngs_modulus
+    elasticity = 2.0 * moduli[0] * moduli[1] / ((moduli[0] + moduli[1]) * _STEEL)
     rack = 0.5 * (_basic_rack_factor(pair.pinion) + _basic_rack_factor(pair.gear))
     factors = _MEASURED_TO_THEORETICAL * blank_factor * rack * elasticity
     single = theoretical * factors * math.cos(pair.pinion.helix_angle)
@@ -171,11 +172,6 @@ def _basic_rack_factor(gear: Gear) -> float:
     """C_B, for a dedendum other than 1.2 and a pressure angle other than 20 deg."""
     depth = 1.0 + 0.5 * (1.2 - gear.dedendum_factor)
     return depth * (1.0 - 0.02 * (20.0 - math.degrees(gear.normal_pressure_angle)))
-
-
-def _mean_youngs_modulus(pair: GearPair) -> float:
-    moduli = pair.pinion.material.youngs_modulus, pair.gear.material.youngs_modulus
-    return 2.0 * moduli[0] * moduli[1] / (moduli[0] + moduli[1])
 
 
 def _outside_validity(pair: GearPair, line_load: float | None) -> tuple[str, ...]:

@@ -113,7 +113,8 @@ def plot_ripple(
         panel = figure.subplots()
         for (name, dataset), colour in zip(datasets.items(), itertools.cycle(COLOURS), strict=False):
             torque = dataset["torque"].to_numpy().astype(np.float64)
-            ripple = np.array([_cycle(_select_load(dataset, t), "ste", 1e6).peak_to_peak for t in range(len(torque))])
+            loads = [single_load_case(dataset.isel(torque=[number])) for number in range(len(torque))]
+            ripple = np.array([_cycle(load, "ste", 1e6).peak_to_peak for load in loads])
             panel.plot(torque, ripple, color=colour, label=name)
             if design and name in design:
                 panel.plot(design[name], np.interp(design[name], torque, ripple), "o", color=colour)
@@ -123,10 +124,6 @@ def plot_ripple(
         panel.set_xlim(left=0.0)
         panel.legend()
         return finish_figure(figure, path)
-
-
-def _select_load(dataset: xr.Dataset, number: int) -> xr.Dataset:
-    return single_load_case(dataset.isel(torque=[number]))
 
 
 @dataclass(frozen=True)

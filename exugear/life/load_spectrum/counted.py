@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from exugear.gearbox.gearbox import Gearbox
-from exugear.gearbox.parts import Mesh
 from exugear.gearbox.units import RPM
 from exugear.life.load_spectrum.counting import DurationDistribution, LoadPoints, equivalent_load
 from exugear.life.load_spectrum.series import COMPONENTS, RANGE_EXPONENTS
@@ -89,7 +88,7 @@ def tooth_exposures(gearbox: Gearbox, body: str) -> tuple[ToothExposure, ...]:
                 member=member,
                 flank=-sign if opposite else sign,
                 meshes=passed,
-                cycles=len(passed) * abs(_relative_revolutions(spins, mesh, holder)),
+                cycles=len(passed) * abs(spins.get(holder, 0.0) - spins.get(mesh.frame, 0.0)),
             )
     return tuple(exposures.values())
 
@@ -117,10 +116,6 @@ def bearing_turns(gearbox: Gearbox, body: str) -> dict[str, float]:
     return {
         bearing.name: abs(spins.get(bearing.body, 0.0) - spins.get(bearing.on, 0.0)) for bearing in gearbox.bearings
     }
-
-
-def _relative_revolutions(spins: Mapping[str, float], mesh: Mesh, holder: str) -> float:
-    return spins.get(holder, 0.0) - spins.get(mesh.frame, 0.0)
 
 
 def _torque_on(gearbox: Gearbox, body: str) -> dict[str, float]:

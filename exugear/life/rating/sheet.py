@@ -229,7 +229,7 @@ def _differs(value: float, other: float) -> bool:
 
 
 def _rules(gearbox: Gearbox, rating: RatingSection, counted: CountedLoads, tooth: ToothExposure) -> FlankRules:
-    family = _family(gearbox, tooth.family)
+    family = [mesh for mesh in gearbox.meshes if mesh.family == tooth.family]
     pair = family[0].pair
     bodies = gearbox.named_bodies
     rolling = gearbox.train.rolling_speeds(counted.body, 1.0)
@@ -254,10 +254,6 @@ def _rules(gearbox: Gearbox, rating: RatingSection, counted: CountedLoads, tooth
         edition=rating.edition,
         f_ZCa=auxiliary_factor(gearbox, rating, pair),
     )
-
-
-def _family(gearbox: Gearbox, name: str) -> list[Mesh]:
-    return [mesh for mesh in gearbox.meshes if mesh.family == name]
 
 
 def _holder(mesh: Mesh, side: int) -> str:

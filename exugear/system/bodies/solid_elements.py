@@ -181,7 +181,10 @@ def second_order(points: Floats, cells: Integers, kind: str) -> Any:
     tetrahedral = kind.startswith("tetra")
     from fe_ste.elasticity.bricks import skfem_mesh
 
-    straight = _linear_tetrahedra(points[used], numbers) if tetrahedral else skfem_mesh(points[used], numbers)
+    if tetrahedral:
+        straight = skfem.MeshTet(np.ascontiguousarray(points[used].T), np.ascontiguousarray(numbers.T))
+    else:
+        straight = skfem_mesh(points[used], numbers)
     mesh = (skfem.MeshTet2 if tetrahedral else skfem.MeshHex2).from_mesh(straight)
     places = np.array(mesh.doflocs)
     node = len(used)  # the first beyond the corners
@@ -205,10 +208,6 @@ def second_order(points: Floats, cells: Integers, kind: str) -> Any:
     if turned.size:
         raise SolidError(f"element {turned[0]} of {len(cells)} is inverted; refine the mesh at curved faces")
     return bent
-
-
-def _linear_tetrahedra(points: Floats, cells: Integers) -> Any:
-    return skfem.MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
 
 
 def entity_numbers(entities: Integers, corners: Integers) -> Integers:

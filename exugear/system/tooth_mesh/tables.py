@@ -79,7 +79,7 @@ def axes_reaching(pair: GearPair, opening: float = 20e-6, change: float = 33e-6)
     """
     end = rounded_up(max(LEAST, REACH * abs(opening)))
     steps = min(MOST_STEPS, max(2, math.ceil(end / STEP)))
-    openings = _axis_to_end(end, steps)
+    openings = tuple(float(f"{end * step / steps:.6g}") for step in range(1, steps + 1))
     farther = rounded_up(max(LEAST, REACH * abs(change)))
     offsets = [0.0]
     for sense in (-1.0, 1.0):
@@ -99,10 +99,6 @@ def rounded_up(value: float) -> float:
     power = 10.0 ** math.floor(math.log10(value) + 1e-9)
     number = next(number for number in ROUND_NUMBERS if number * power >= value * (1.0 - 1e-9))
     return float(f"{number * power:.3g}")
-
-
-def _axis_to_end(end: float, steps: int) -> tuple[float, ...]:
-    return tuple(float(f"{end * step / steps:.6g}") for step in range(1, steps + 1))
 
 
 def _possible(pair: GearPair, sense: float, most: float) -> float:
