@@ -2,7 +2,9 @@
 
 A block that runs begins with ```` ```sh ```` or ```` ```python ````. Indented blocks and blocks of other languages are
 shown only. A comment ``<!-- expect: TEXT -->`` after a block names a text that its output contains, and one
-``<!-- exit: 1 -->`` the exit code. Pages that take longer than some seconds run with the validation tests.
+``<!-- exit: 1 -->`` the exit code; ``<!-- picture: PATH -->`` names a picture that the block writes, which
+``docs/tools/howto_pictures.py`` keeps for the page. Pages that take longer than some seconds run with the validation
+tests.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -21,7 +24,7 @@ GUIDES = ROOT / "docs" / "howto"
 START = "exugear new my/gearbox.toml"
 """First command of the tutorial, which makes the file that all guides start from."""
 BLOCK = re.compile(
-    r"^( *)```(sh|python)\n(.*?)^\1```$((?:\s*<!-- (?:expect|exit): .*? -->)*)", re.MULTILINE | re.DOTALL
+    r"^( *)```(sh|python)\n(.*?)^\1```$((?:\s*<!-- (?:expect|exit|picture): .*? -->)*)", re.MULTILINE | re.DOTALL
 )
 QUICK = ("catalogue_bearings", "damping", "python", "untrusted_files")
 LONG = (
@@ -43,14 +46,28 @@ def pages() -> list[str]:
     return re.findall(r"^([a-z_]+)$", contents[contents.index("```{toctree}") :], re.MULTILINE)
 
 
-def blocks(page: str) -> list[tuple[str, str, str, int]]:
-    """Language, text, expected text and exit code of the blocks of a page that run."""
+@dataclass(frozen=True)
+class Block:
+    """Block of a page that runs."""
+
+    language: str
+    text: str
+    expected: str
+    code: int
+    picture: str
+
+    def pictures(self, place: Path) -> list[Path]:
+        """Pictures that the block has written."""
+        return sorted(place.glob(self.picture)) if self.picture else []
+
+
+def blocks(page: str) -> list[Block]:
     found = []
     for indent, language, text, notes in BLOCK.findall((GUIDES / f"{page}.md").read_text(encoding="utf-8")):
-        expected = re.findall(r"<!-- expect: (.*?) -->", notes)
-        codes = re.findall(r"<!-- exit: (\d+) -->", notes)
+        stated = {name: re.findall(rf"<!-- {name}: (.*?) -->", notes) for name in ("expect", "exit", "picture")}
         block = re.sub(rf"^{indent}", "", text, flags=re.MULTILINE)
-        found.append((language, block, "".join(expected), int("".join(codes) or 0)))
+        code = int("".join(stated["exit"]) or 0)
+        found.append(Block(language, block, "".join(stated["expect"]), code, "".join(stated["picture"])))
     return found
 
 
@@ -59,10 +76,8 @@ def marked(page: str) -> pytest.param:
     return pytest.param(page, marks=marks)
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def prepared(place: Path) -> Path:
     """Folder with the tutorial's file, and with `exugear` and `python` as commands of this interpreter."""
-    place = tmp_path_factory.mktemp("howto")
     commands = place / "bin"
     commands.mkdir()
     called = "import sys; sys.argv[0] = 'exugear'; from exugear.cli.app import main; main()"
@@ -72,6 +87,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         script.chmod(0o755)
     run(place, "sh", START)
     return place
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return prepared(tmp_path_factory.mktemp("howto"))
 
 
 def run(place: Path, language: str, text: str) -> subprocess.CompletedProcess[str]:
@@ -95,7 +115,17 @@ def test_the_tutorial_makes_the_file_that_the_guides_start_from() -> None:
 def test_a_guide_runs_as_pasted(page: str, folder: Path) -> None:
     if page in NEEDS_GMSH and find_spec("gmsh") is None:
         pytest.skip("gmsh is not installed")
-    for language, text, expected, code in blocks(page):
-        outcome = run(folder, language, text)
-        assert outcome.returncode == code, f"{text}\n{outcome.stdout}\n{outcome.stderr}"
-        assert expected in outcome.stdout + outcome.stderr, f"{text}\n{outcome.stdout}\n{outcome.stderr}"
+    for block in blocks(page):
+        outcome = run(folder, block.language, block.text)
+        printed = f"{outcome.stdout}\n{outcome.stderr}"
+        assert outcome.returncode == block.code, f"{block.text}\n{printed}"
+        assert block.expected in printed, f"{block.text}\n{printed}"
+        assert not block.picture or block.pictures(folder) or "no pictures" in printed, block.picture
+
+
+@pytest.mark.parametrize("page", pages())
+def test_a_guide_has_a_picture_and_says_how_much_of_a_change_is_sensible(page: str) -> None:
+    text = (GUIDES / f"{page}.md").read_text(encoding="utf-8")
+    pictures = re.findall(r"!\[.+\]\((.+)\)", text)
+    assert pictures and all((GUIDES / picture).exists() for picture in pictures)
+    assert re.search("sensible|How fine", text)

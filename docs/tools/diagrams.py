@@ -26,6 +26,7 @@ def main() -> None:
             "mesh_frame": mesh_frame,
             "planets": planets,
             "bearing_axes": bearing_axes,
+            "permissions": permissions,
         }.items():
             figure = draw()
             figure.savefig(IMAGES / f"{name}.svg", metadata={"Date": None}, facecolor="white")
@@ -101,6 +102,27 @@ def workflow() -> Figure:
         _arrow(axis, (boxes[start][0] + width + 0.07, boxes[start][1]), (boxes[end][0] - 0.07, boxes[end][1]), GREY)
     axis.text(5.7, -0.55, "exugear study repeats any of these steps for varied inputs", ha="center", fontsize=8.2)
     axis.set(xlim=(-0.15, 11.8), ylim=(-0.75, 3.6))
+    return figure
+
+
+def permissions() -> Figure:
+    """Draw what a gearbox file from elsewhere may read and run."""
+    figure, (axis,) = _figure(8.0, 2.7)
+    boxes = {
+        (0.0, 1.0, "gearbox file\nof somebody else"): GREY,
+        (3.2, 2.0, "files below its folder: read"): GREEN,
+        (3.2, 1.0, "files elsewhere: refused,\nbelow DIR with --allow-dir DIR"): BLUE,
+        (3.2, 0.0, "gmsh scripts: not run,\nexcept with --allow-scripts"): RED,
+    }
+    for (x, y, text), colour in boxes.items():
+        broad = 3.2 if x else 1.9
+        axis.add_patch(
+            FancyBboxPatch((x, y - 0.33), broad, 0.66, boxstyle="round,pad=0.05", fc="white", ec=colour, lw=1.6)
+        )
+        axis.text(x + broad / 2, y, text, ha="center", va="center", fontsize=9.0)
+        if x:
+            _arrow(axis, (1.97, 1.0), (x - 0.07, y), GREY)
+    axis.set(xlim=(-0.15, 6.6), ylim=(-0.5, 2.5))
     return figure
 
 

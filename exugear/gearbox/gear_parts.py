@@ -328,16 +328,16 @@ def _modification(gear: Gear, section: GearSection, find: Callable[[str], Path])
 def _relief(
     gear: Gear, given: ModificationSection, kind: str, from_end: Callable[[Gear, float], float]
 ) -> Relief | None:
+    amount_um = getattr(given, f"{kind}_relief_um")
+    if amount_um == 0.0:
+        return None
     length_mm = getattr(given, f"{kind}_relief_length_mm")
     start_roll_deg = getattr(given, f"{kind}_relief_start_roll_deg")
     if length_mm is not None:
         radius = from_end(gear, MM * length_mm)
-    elif start_roll_deg is not None:
-        radius = gear.base_radius * math.hypot(1.0, math.radians(start_roll_deg))
     else:
-        return None
-    shape = ReliefShape(getattr(given, f"{kind}_relief_shape"))
-    return Relief(UM * getattr(given, f"{kind}_relief_um"), radius, shape)
+        radius = gear.base_radius * math.hypot(1.0, math.radians(start_roll_deg))
+    return Relief(UM * amount_um, radius, ReliefShape(getattr(given, f"{kind}_relief_shape")))
 
 
 def _check_depth(origin: Origin, key: str, amounts: Mapping[str, Any], module_mm: float) -> None:

@@ -99,8 +99,11 @@ class ModificationSection(Section):
     def _starts(self) -> ModificationSection:
         for kind in ("tip", "root"):
             given = (getattr(self, f"{kind}_relief_length_mm"), getattr(self, f"{kind}_relief_start_roll_deg"))
-            wanted = 1 if getattr(self, f"{kind}_relief_um") > 0.0 else 0
-            if sum(value is not None for value in given) != wanted:
+            starts = sum(value is not None for value in given)
+            relieved = getattr(self, f"{kind}_relief_um") > 0.0
+            # A study may vary the amount from zero, which is stated then.
+            stated_zero = not relieved and f"{kind}_relief_um" in self.model_fields_set
+            if starts > 1 or (relieved and not starts) or (starts and not relieved and not stated_zero):
                 raise ValueError(
                     f"a {kind} relief requires {kind}_relief_um and one of {kind}_relief_length_mm and {kind}"
                     "_relief_start_roll_deg"

@@ -201,6 +201,15 @@ def test_modifications_that_make_no_sense_are_refused_with_their_key(
         Gearbox.from_toml(modified(tmp_path, change))
 
 
+def test_a_relief_that_is_stated_as_zero_is_none(tmp_path: Path) -> None:
+    """So that a study may vary its amount from zero."""
+    gearbox = Gearbox.from_toml(modified(tmp_path))
+    without = gearbox.varied({"gears.pinion.modification.tip_relief_um": 0.0})
+    assert gearbox.modifications["pinion"].tip_relief is not None
+    assert without.modifications["pinion"].tip_relief is None
+    assert wanted_table(without, "spur", 8).hash != wanted_table(gearbox, "spur", 8).hash
+
+
 def test_bad_topography_names_file_line_and_value(tmp_path: Path) -> None:
     case = modified(tmp_path)
     (tmp_path / "pinion.csv").write_text(TOPOGRAPHY.replace(" 2.0", " two"), encoding="utf-8")
