@@ -34,7 +34,7 @@ exist at a speed, and another one can be found from rest."""
 
 
 def deflection_shapes(
-    assembly: Assembly, data: xr.Dataset, places: Sequence[tuple[float, float]]
+    assembly: Assembly, data: xr.Dataset, resonances: Sequence[tuple[float, float]]
 ) -> list[Complexes | None]:
     """Return the operating deflection shapes of a steady-state response at some of its orders and speeds.
 
@@ -42,7 +42,7 @@ def deflection_shapes(
     ----------
     assembly : that of the response
     data : as `exugear.steady.steady_file.load_response` reads it
-    places : order, and speed of the overall input (rad/s) of each shape; both as in the response
+    resonances : order, and speed of the overall input (rad/s) of each shape; both as in the response
 
     Returns
     -------
@@ -52,7 +52,7 @@ def deflection_shapes(
     model = harmonic_balance_model(assembly, settings.speeds.values, settings.harmonics, settings.combinations)
     turned = model.system.frame.matrices(0.0)[0]
     shapes: list[Complexes | None] = []
-    for order, speed in places:
+    for order, speed in resonances:
         solver = PointSolver(model, settings.method)
         line = int(np.argmin(np.abs(solver.model.lines.orders - order)))
         point = int(np.argmin(np.abs(data["speed"].to_numpy() - speed)))
@@ -62,8 +62,8 @@ def deflection_shapes(
         except HarmonicBalanceError:
             shapes.append(None)
             continue
-        found = 2.0 * abs(complex(signals(solver.model, response)[line, 0]))
-        if abs(found - stored) > SAME_STATE * stored:
+        amplitude = 2.0 * abs(complex(signals(solver.model, response)[line, 0]))
+        if abs(amplitude - stored) > SAME_STATE * stored:
             shapes.append(None)
             continue
         shape = 2.0 * turned @ response.motion[line]

@@ -98,7 +98,9 @@ def view(
             ranking = ranking_of(response)
             count = len(ranking.resonances)
             if resonance is not None and resonance > count:
-                raise BadInputError(f"--resonance {resonance}: the ranking has {count} resonances; use 1 to {count}")
+                raise BadInputError(
+                    f"--resonance {resonance}: the ranking of exugear steady has {count}; omit it or use less"
+                )
             modes = project.modes()
             headline = Headline(assembly.choice, "", "", ranking, None, response, modes.to_dataset())
             about = ""
@@ -120,19 +122,19 @@ def _stored_response(assembly: Assembly, folder: Path) -> xr.Dataset | None:
     from exugear.steady.steady_file import load_response, settings_of
     from fe_ste.tools.files import FileError
 
-    found = []
+    responses = []
     for path in sorted(folder.glob("steady-*.nc")):
         try:
             data = load_response(path)
             if settings_of(data.attrs).hash_with(assembly) == data.attrs["input_hash"]:
-                found.append(data)
+                responses.append(data)
         except (FileError, ValueError, KeyError):
             continue
-    return most_complete_response(found, Choice(assembly.variant, assembly.mesh_model, assembly.inertias))
+    return most_complete_response(responses, Choice(assembly.variant, assembly.mesh_model, assembly.inertias))
 
 
 def _draw(
-    found: Modes,
+    modes: Modes,
     headline: Headline | None,
     about: str,
     folder: Path,
@@ -145,7 +147,7 @@ def _draw(
     from exugear.report.findings.words import Labels
     from exugear.report.web.mode_page import write_mode_page
 
-    assembly = found.assembly
+    assembly = modes.assembly
     words = Labels(assembly.gearbox)
     ranked: tuple[Resonance, ...] = ()
     resonances: list[ResonanceRow] = []
@@ -155,25 +157,25 @@ def _draw(
         about = f"Steady state at constant speed, {METHOD_LABELS[str(headline.response.attrs['method'])]}."
         if len(resonances) < len(ranked):
             about += " Resonances whose state is not found again from rest are left out."
-    modes = _mode_rows(found, words, headline, ranked)
-    places = [row.number - 1 for row in modes]
+    mode_rows = _mode_rows(modes, words, headline, ranked)
+    places = [row.number - 1 for row in mode_rows]
     shown = places.index(first) if first in places else 0
     if resonance is None:
-        title = f"{found.frequency[places[shown]]:.0f} Hz: {found.names[places[shown]]}"
+        title = f"{modes.frequency[places[shown]]:.0f} Hz: {modes.names[places[shown]]}"
         picture = folder / f"mode_{places[shown] + 1}"
-        shape: Floats | Complexes = found.shapes[:, places[shown]]
+        shape: Floats | Complexes = modes.shapes[:, places[shown]]
     else:
         numbers = [row.number for row in resonances]
         if resonance not in numbers:
             raise FailedError(f"--resonance {resonance}: its steady state is not found again from rest; choose another")
-        shown = len(modes) + numbers.index(resonance)
+        shown = len(mode_rows) + numbers.index(resonance)
         title = resonances[numbers.index(resonance)].title
         picture = folder / f"resonance_{resonance}"
         shape = resonances[numbers.index(resonance)].shape
     page = write_mode_page(
         assembly,
-        found.shapes[:, places],
-        modes,
+        modes.shapes[:, places],
+        mode_rows,
         folder / "modes.html",
         resonances=resonances,
         about_resonances=about,
@@ -184,37 +186,35 @@ def _draw(
     return [page, *_draw_pictures(assembly, shape, title, picture, animation)]
 
 
-def _mode_rows(found: Modes, words: Labels, headline: Headline | None, ranked: Sequence[Resonance]) -> list[ModeRow]:
-    """Return the modes that move a drawn body, with the resonances in operation at each."""
-    from exugear.gearbox.units import RPM
+def _mode_rows(modes: Modes, words: Labels, headline: Headline | None, ranked: Sequence[Resonance]) -> list[ModeRow]:
+    """Return the modes that move a drawn body, with the numbers of the resonances in operation at each."""
     from exugear.report.findings.words import percentages
     from exugear.report.pictures.shapes import bodies_of, motions_of
     from exugear.report.web.mode_page import ModeRow
 
-    assembly = found.assembly
+    assembly = modes.assembly
     resonances: dict[int, list[str]] = {}
     for number, resonance in enumerate(ranked, start=1):
         mode = headline.mode_of(resonance) if headline else None
         if mode is not None:
-            text = f"{number}: {resonance.line}, {abs(resonance.speed) / RPM:.4g} rpm"
-            resonances.setdefault(mode.index, []).append(text)
+            resonances.setdefault(mode.index, []).append(str(number))
     drawn = {body.name for body in bodies_of(assembly.gearbox)}
-    modes = found.to_dataset()
+    data = modes.to_dataset()
     rows = []
-    for place, frequency in enumerate(found.frequency):
-        motions = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(found.shapes[:, place]))
+    for place, frequency in enumerate(modes.frequency):
+        motions = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(modes.shapes[:, place]))
         if frequency > 0.0 and any(motion.any() for body, motion in motions.items() if body in drawn):
             row = ModeRow(
                 place + 1,
                 float(frequency),
-                float(modes["damping_ratio"][place]),
-                words.moves(modes, place),
-                percentages(words.strain_energy(modes, place), SHOWN_ENERGIES, 0.1),
-                "; ".join(resonances.get(place, ())),
+                float(data["damping_ratio"][place]),
+                words.moves(data, place),
+                percentages(words.strain_energy(data, place), SHOWN_ENERGIES, 0.1),
+                ", ".join(resonances.get(place, ())),
             )
             rows.append(row)
     if not rows:
-        raise BadInputError(f"{found.label}: all modes are rigid-body rotations; nothing to show")
+        raise BadInputError(f"{modes.label}: all modes are rigid-body rotations; nothing to show")
     return rows
 
 
@@ -225,7 +225,9 @@ def _resonance_rows(assembly: Assembly, headline: Headline, ranked: Sequence[Res
     from exugear.steady.deflection_shapes import deflection_shapes
 
     assert headline.response is not None
-    shapes = deflection_shapes(assembly, headline.response, [(own.order, own.speed) for own in ranked])
+    shapes = deflection_shapes(
+        assembly, headline.response, [(resonance.order, resonance.speed) for resonance in ranked]
+    )
     rows = []
     for number, (resonance, shape) in enumerate(zip(ranked, shapes, strict=True), start=1):
         if shape is None:
@@ -265,12 +267,12 @@ def _draw_pictures(
     from fe_ste.tools.drawing import RenderingError
 
     bodies = bodies_of(assembly.gearbox)
-    whole = stem.with_name("gearbox.png")
+    gearbox = stem.with_name("gearbox.png")
     still = stem.with_suffix(".png")
     animated = stem.with_suffix(".gif")
     moving = []
     try:
-        draw_gearbox(bodies, whole, title=assembly.gearbox.name)
+        draw_gearbox(bodies, gearbox, title=assembly.gearbox.name)
         if assembly.elastic_bodies and not np.iscomplexobj(shape):
             deformed = elastic_scene(assembly, np.real(shape), title=title)
             draw_elastic_bodies(deformed, still)
@@ -289,4 +291,4 @@ def _draw_pictures(
     except RenderingError as error:
         note(f"Warning: no pictures: {error}", style="yellow")
         return []
-    return [*moving, whole, still]
+    return [*moving, gearbox, still]

@@ -355,10 +355,10 @@ def largest_displacement(vibrations: Sequence[Complexes]) -> complex:
     largest = 0.0j
     for vibration in vibrations:
         sizes = peak_displacement(vibration)
-        place = int(np.argmax(sizes))
-        if sizes[place] > abs(largest):
-            phase = 0.5 * np.angle(np.sum(vibration[place] ** 2))
-            largest = complex(sizes[place] * np.exp(1j * phase))
+        point = int(np.argmax(sizes))
+        if sizes[point] > abs(largest):
+            phase = 0.5 * np.angle(np.sum(vibration[point] ** 2))
+            largest = complex(sizes[point] * np.exp(1j * phase))
     return largest
 
 

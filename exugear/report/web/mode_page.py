@@ -36,7 +36,7 @@ class ModeRow:
     strain: str = ""
     """Parts with most strain energy."""
     resonances: str = ""
-    """Resonances in operation at this mode."""
+    """Numbers of the resonances in operation at this mode."""
 
     def cells(self, choice: str) -> dict[str, object]:
         """Return the row of the table; `choice` is what its button selects in the scripts."""

@@ -1,11 +1,12 @@
 // Marks over the bodies: axes of the gearbox, a scale bar, and names, on a canvas of their own.
 import { pageColour } from "./colours.js";
 
-/** @typedef {{x: number, y: number, width: number}} Tag */
+/** @typedef {{name: string, x: number, y: number, width: number}} Tag */
 const FONT = "12px system-ui, sans-serif";
 const HEIGHT = 18;
 const EDGE = 6;
 const AXIS = 34;
+const MOST_LETTERS = 40;
 /** Largest share of the picture's width that the scale bar takes. */
 const LONGEST = 0.22;
 
@@ -77,28 +78,32 @@ function drawNames(drawing, stage, width, height) {
   const placed = [];
   drawing.textAlign = "left";
   drawing.lineWidth = 1;
+  drawing.strokeStyle = pageColour("--soft");
   for (const { text, x, y } of anchors.sort((a, b) => a.y - b.y)) {
     if (!(x > 0 && x < width && y > 0 && y < height)) continue;
     const name = shortened(drawing, text, 0.45 * width);
-    const tag = freePlace({ x: x + 18, y: y - HEIGHT / 2, width: drawing.measureText(name).width + 10 }, placed, width, height);
+    const wanted = { name, x: x + 18, y: y - HEIGHT / 2, width: drawing.measureText(name).width + 10 };
+    const tag = freePlace(wanted, placed, width, height);
     placed.push(tag);
-    drawing.strokeStyle = pageColour("--soft");
-    drawLine(drawing, [x, y, tag.x > x ? tag.x : Math.min(x, tag.x + tag.width), tag.y + HEIGHT / 2]);
+    drawLine(drawing, [x, y, Math.max(tag.x, Math.min(x, tag.x + tag.width)), tag.y + HEIGHT / 2]);
+  }
+  // All tags stand over all lines.
+  for (const tag of placed) {
     drawing.fillStyle = pageColour("--panel");
     drawing.fillRect(tag.x, tag.y, tag.width, HEIGHT);
     drawing.strokeRect(tag.x, tag.y, tag.width, HEIGHT);
     drawing.fillStyle = pageColour("--ink");
-    drawing.fillText(name, tag.x + 5, tag.y + HEIGHT / 2 + 1);
+    drawing.fillText(tag.name, tag.x + 5, tag.y + HEIGHT / 2 + 1);
   }
-  // Where tags stand, for tests and for who looks into the page.
-  stage.marks.dataset.tags = String(placed.length);
 }
 
 /** @param {CanvasRenderingContext2D} drawing @param {string} text @param {number} most */
 function shortened(drawing, text, most) {
-  let letters = [...text];
-  while (letters.length > 4 && drawing.measureText(`${letters.join("")}…`).width > most) letters = letters.slice(0, -1);
-  return letters.length < [...text].length ? `${letters.join("")}…` : text;
+  const letters = [...text].slice(0, MOST_LETTERS);
+  let count = letters.length;
+  const cut = () => (letters.slice(0, count).join("") === text ? text : `${letters.slice(0, count).join("")}…`);
+  while (count > 4 && drawing.measureText(cut()).width > most) count--;
+  return cut();
 }
 
 /**

@@ -108,7 +108,7 @@ export class Stage {
   lookFrom(direction) {
     if (!this.data) return;
     const [x, y, z] = this.data.centre;
-    const eye = new THREE.Vector3(...direction).setLength(1.45 * this.data.diagonal);
+    const eye = new THREE.Vector3(...direction).setLength(1.6 * this.data.diagonal);
     this.controls.target.set(x, y, z);
     this.camera.position.set(x, y, z).add(eye);
     this.camera.near = 0.01 * this.data.diagonal;
@@ -192,10 +192,15 @@ export class Stage {
     });
   }
 
+  /** Draw bodies and marks; marks stay where they are while bodies move. */
   draw() {
+    this.render();
+    drawMarks(this);
+  }
+
+  render() {
     this.light.position.copy(this.camera.position);
     this.renderer.render(this.scene, this.camera);
-    drawMarks(this);
   }
 
   /** @param {boolean} on */
@@ -219,7 +224,7 @@ export class Stage {
     if (!this.playing || !this.visible) return;
     const began = performance.now();
     this.place((this.angle = ((Math.PI * began) / 1000) * HALF_SPEED));
-    this.draw();
+    this.render();
     // WebGL only queues: reading one pixel waits for the picture. The first frames compile shaders.
     if (++this.frames > FIRST_FRAMES) {
       const gl = this.renderer.getContext();
