@@ -99,7 +99,7 @@ def view(
             count = len(ranking.resonances)
             if resonance is not None and resonance > count:
                 raise BadInputError(
-                    f"--resonance {resonance}: the ranking of exugear steady has {count}; omit it or use less"
+                    f"--resonance {resonance}: the ranking has {count} resonances; choose one or omit it"
                 )
             modes = project.modes()
             headline = Headline(assembly.choice, "", "", ranking, None, response, modes.to_dataset())

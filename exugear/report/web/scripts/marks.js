@@ -14,9 +14,10 @@ const LONGEST = 0.22;
 export function drawMarks(stage) {
   const { marks, data } = stage;
   const drawing = marks.getContext("2d");
-  if (!drawing || !data) return;
-  const ratio = window.devicePixelRatio || 1;
   const { clientWidth: width, clientHeight: height } = stage.canvas;
+  // A picture that is not shown, as on paper, keeps the marks of its pixels.
+  if (!drawing || !data || !width || !height) return;
+  const ratio = window.devicePixelRatio || 1;
   [marks.width, marks.height] = [Math.round(ratio * width), Math.round(ratio * height)];
   drawing.scale(ratio, ratio);
   drawing.font = FONT;

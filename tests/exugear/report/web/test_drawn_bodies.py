@@ -12,7 +12,7 @@ import pytest
 
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
-from exugear.report.pictures.shapes import bodies_of, displacement_of
+from exugear.report.pictures.shapes import bodies_of, displacement_of, vibration_of
 from exugear.report.web.document import ArrayStore
 from exugear.report.web.mode_page import write_mode_page
 from exugear.report.web.stage import drawn_bodies, drawn_mode, stage_data, turn_between
@@ -101,6 +101,21 @@ def test_the_largest_displacement_drawn_is_one(elastic):
         for n, body in enumerate(bodies)
     ]
     assert max(sizes) == pytest.approx(1.0)
+
+
+def test_no_point_is_displaced_further_than_at_the_beginning_of_a_vibration(elastic):
+    """Of complex amplitudes, in which points move along ellipses and not in phase."""
+    bodies = drawn_bodies(elastic)
+    shapes = modes_of(elastic).shapes
+    drawn = drawn_mode(elastic, bodies, np.exp(1j) * (shapes[:, 3] + 0.7j * shapes[:, 5]), with_fields=True)
+    vibrations = [drawn.fields.get(n, vibration_of(body.shape, drawn.motions[n])) for n, body in enumerate(bodies)]
+    largest = [
+        max(np.linalg.norm((np.exp(1j * angle) * vibration).real, axis=1).max() for vibration in vibrations)
+        for angle in np.linspace(0.0, 2.0 * np.pi, 100)
+    ]
+    assert largest[0] == pytest.approx(1.0)
+    assert max(largest) < 1.0 + 1e-9
+    assert min(largest) > 0.1  # a standing wave would pass its rest position
 
 
 def test_fields_are_kept_to_a_127th_of_the_largest_displacement(elastic):
