@@ -155,6 +155,8 @@ def _draw(
         ranked = headline.ranking.resonances[: max(SHOWN_RESONANCES, resonance or 0)]
         resonances = _resonance_rows(assembly, headline, ranked)
         about = f"Steady state at constant speed, {METHOD_LABELS[str(headline.response.attrs['method'])]}."
+        if not ranked:
+            about += " There is no resonance in the ranking."
         if len(resonances) < len(ranked):
             about += " Resonances whose state is not found again from rest are left out."
     mode_rows = _mode_rows(modes, words, headline, ranked)

@@ -295,6 +295,8 @@ def test_view_refuses_a_resonance_that_it_cannot_show(case):
         assert outcome.exit_code == 2
         assert text in " ".join(outcome.stderr.split())
     assert not [file for name in ("*.html", "modes.nc") for file in case.parent.rglob(name)]
+    page = Path(json.loads(iso("view", case, "--variant", "rigid", "--json").stdout)["files"][0])
+    assert "There is no resonance in the ranking." in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", ["absent", "empty"])
