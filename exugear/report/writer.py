@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import static_load_in_words
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.variant import Variant
@@ -66,20 +67,23 @@ def commands_for_missing(context: Context, results: StoredResults) -> list[str]:
         wanted.append(("steady-state response", "steady", richest))
     if not results.runs:
         wanted.append(("run-up", "run", richest))
-    return [f"{what}, {model.variant}: {_command(context, verb, model)}" for what, verb, model in wanted]
+    return [
+        f"{what}, {model.variant}: {command_line(context.gearbox, context.folder, verb, model)}"
+        for what, verb, model in wanted
+    ]
 
 
-def _command(context: Context, verb: str, model: Choice) -> str:
+def command_line(gearbox: Gearbox, folder: Path, verb: str, model: Choice) -> str:
     """Return a command line for model settings, without options that have their default values."""
-    words = ["exugear", verb, _shown(context.gearbox.source), "--variant", str(model.variant)]
+    words = ["exugear", verb, _shown(gearbox.source), "--variant", str(model.variant)]
     usual = Choice(model.variant)
     if model.mesh_model != usual.mesh_model:
         words += ["--mesh-model", model.mesh_model]
-    if model.inertias not in (None, context.gearbox.case.default_inertias):
+    if model.inertias not in (None, gearbox.case.default_inertias):
         words += ["--inertias", str(model.inertias)]
     if verb == "steady" and LAWS[model.mesh_model].loses_contact:
         words += ["--method", "nonlinear"]
-    return shlex.join([*words, "--out", _shown(context.folder)])
+    return shlex.join([*words, "--out", _shown(folder)])
 
 
 def _shown(path: str | Path) -> str:

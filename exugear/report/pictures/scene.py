@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -37,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-# Animated pictures of standing waves: half a period is rendered, and the same pictures are shown in reverse order
+# Animated pictures of a period of a vibration
 
 
 def gif_path(path: str | Path) -> Path:
@@ -54,16 +53,14 @@ def gif_path(path: str | Path) -> Path:
     return target
 
 
-def half_period_images(
-    plotter: pyvista.Plotter, frames: int, move: Callable[[float], None]
-) -> list[tuple[Pixels, float]]:
-    """Render half a period, from one maximum deflection to the other, with one margin around all images.
+def period_images(plotter: pyvista.Plotter, frames: int, move: Callable[[complex], None]) -> list[tuple[Pixels, float]]:
+    """Render a period from the largest deflection on, with one margin around all images.
 
     Parameters
     ----------
     plotter : with all meshes and the camera set
-    frames : pictures per period, an even number
-    move : moves the meshes to a fraction of the maximum deflection, from 1 to -1
+    frames : pictures per period
+    move : moves the meshes by the real part of their complex amplitudes times exp(i w t), which it is given
 
     Returns
     -------
@@ -71,22 +68,19 @@ def half_period_images(
         Pixels, and m per pixel.
     """
     images = []
-    count = frames // 2 + 1
-    for number in range(count):
-        move(math.cos(math.pi * number / (count - 1)))
+    for turn in np.exp(2j * np.pi * np.arange(frames) / frames):
+        move(complex(turn))
         images.append(rendered_image(plotter))
     # The darkest value of all frames at each pixel shows the area that any frame needs.
     rows, columns = drawn_part(np.min([image for image, _ in images], axis=0))
     return [(image[rows, columns], pixel) for image, pixel in images]
 
 
-def write_animation(way_out: Sequence[Figure], target: Path, duration: float) -> Path:
-    """Write a standing wave as an animated picture from images of half a period; `duration` of a period in s."""
+def write_animation(figures: Sequence[Figure], target: Path, duration: float) -> Path:
+    """Write the images of a period as an animated picture; `duration` of a period in s."""
     from PIL import Image
 
-    # The second half of the period shows the pictures of the first half in reverse order.
-    finished = [_set_picture(figure) for figure in way_out]
-    pictures = finished + finished[-2:0:-1]
+    pictures = [_set_picture(figure) for figure in figures]
     # One palette for all frames, otherwise colours flicker.
     palette = pictures[0].quantize(colors=255, method=Image.Quantize.MEDIANCUT)
     # Averaging turns white into light grey, which is set to white again.
@@ -162,7 +156,7 @@ def draw_gearbox(
 
 
 def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[int, int] = (1600, 1200)) -> Figure:
-    """Draw a mode shape at its maximum deflection, coloured by displacement.
+    """Draw a mode or an operating deflection shape at its maximum deflection, coloured by displacement.
 
     Parameters
     ----------
@@ -186,13 +180,13 @@ def draw_mode(scene: ModeScene, path: str | Path | None = None, *, size: tuple[i
 def animate_mode(
     scene: ModeScene, path: str | Path, *, frames: int = 24, duration: float = 1.6, size: tuple[int, int] = (900, 700)
 ) -> Path:
-    """Write one period of a mode as an animated picture that repeats endlessly.
+    """Write one period of a vibration as an animated picture that repeats endlessly.
 
     Parameters
     ----------
     scene : the mode
     path : output file; the suffix must be ``.gif``
-    frames : pictures per period, an even number
+    frames : pictures per period
     duration : length of a period, s
     size : width and height of the rendered image, pixels
 
@@ -208,18 +202,18 @@ def animate_mode(
         meshes = _add_mode(plotter, scene)
         look(plotter)
 
-        def move(part: float) -> None:
+        def move(turn: complex) -> None:
             for mesh, body, motion in zip(meshes, scene.bodies, scene.motions, strict=True):
-                mesh.points = placed(body, part * motion)
+                mesh.points = placed(body, (turn * motion).real)
 
-        images = half_period_images(plotter, frames, move)
+        images = period_images(plotter, frames, move)
     return write_animation([mode_figure(image, pixel, scene.title) for image, pixel in images], target, duration)
 
 
 def _add_mode(plotter: pyvista.Plotter, scene: ModeScene) -> list[pyvista.PolyData]:
     meshes = []
     for body, motion, displacement in zip(scene.bodies, scene.motions, scene.displacement, strict=True):
-        mesh = triangle_mesh(placed(body, motion), body.surface.triangles)
+        mesh = triangle_mesh(placed(body, motion.real), body.surface.triangles)
         mesh.point_data["displacement"] = displacement
         plotter.add_mesh(
             mesh,
@@ -457,7 +451,7 @@ def animate_elastic_bodies(
     Parameters
     ----------
     path : output file; the suffix must be ``.gif``
-    frames : pictures per period, an even number
+    frames : pictures per period
     duration : length of a period, s
     size : width and height of the rendered image, pixels
 
@@ -473,14 +467,15 @@ def animate_elastic_bodies(
         bodies, gears = _add(plotter, scene)
         look(plotter, SIDE)
 
-        def move(part: float) -> None:
+        def move(turn: complex) -> None:
+            part = turn.real
             for mesh, body in zip(bodies, scene.bodies, strict=True):
                 mesh.points = body.points + part * body.displacement
                 mesh.cell_data["energy"] = part**2 * body.energy
             for mesh, gear, motion in zip(gears, scene.gears, scene.motions, strict=True):
                 mesh.points = placed(gear, part * motion)
 
-        images = half_period_images(plotter, frames, move)
+        images = period_images(plotter, frames, move)
     return write_animation([_figure(image, pixel, scene.title) for image, pixel in images], target, duration)
 
 

@@ -20,7 +20,7 @@ from exugear.gearbox.sections.bodies import ShapeSection
 from exugear.gearbox.units import MM
 from fe_ste.geometry.gears import Gear
 from fe_ste.geometry.profile import tooth_profile
-from fe_ste.tools.arrays import Floats, Integers
+from fe_ste.tools.arrays import Complexes, Floats, Integers
 
 # Surfaces of gears, shafts and pins as triangles; z along the axis, lengths in m
 
@@ -325,6 +325,43 @@ def displacement_of(body: BodyShape, motion: ArrayLike) -> Floats:
     return small[:3] + np.cross(small[3:], body.surface.points - body.reference)
 
 
+def vibration_of(body: BodyShape, motion: Complexes) -> Complexes:
+    """Return the complex displacement amplitude (n, 3) of each point of a body from that of its motion (6,)."""
+    return displacement_of(body, motion.real) + 1j * displacement_of(body, motion.imag)
+
+
+def peak_displacement(vibration: Complexes) -> Floats:
+    """Return the largest distance (n,) from rest of points that move along ellipses, as Re(vibration exp(i w t)).
+
+    Parameters
+    ----------
+    vibration : (n, 3)
+
+    Examples
+    --------
+    >>> peak_displacement(np.array([[3.0, 4.0j, 0.0], [3.0, 4.0, 0.0]]))
+    array([4., 5.])
+    """
+    mean_square = np.sum(np.abs(vibration) ** 2, axis=1)
+    return np.asarray(np.sqrt(0.5 * (mean_square + np.abs(np.sum(vibration**2, axis=1)))))
+
+
+def largest_displacement(vibrations: Sequence[Complexes]) -> complex:
+    """Return the largest displacement of any point of several bodies, with the phase at which it is reached.
+
+    Vibrations divided by it have the largest displacement 1 at the time 0. It is 0 if nothing moves, and real and
+    positive for a mode shape, whose points all move in phase.
+    """
+    largest = 0.0j
+    for vibration in vibrations:
+        sizes = peak_displacement(vibration)
+        point = int(np.argmax(sizes))
+        if sizes[point] > abs(largest):
+            phase = 0.5 * np.angle(np.sum(vibration[point] ** 2))
+            largest = complex(sizes[point] * np.exp(1j * phase))
+    return largest
+
+
 def placed(body: BodyShape, motion: ArrayLike) -> Floats:
     """Return the points of a body after a motion that may be large: a finite rotation, then a translation.
 
@@ -372,8 +409,9 @@ class ModeScene:
     """Mode shape on the bodies of a gearbox, ready to draw."""
 
     bodies: tuple[BodyShape, ...]
-    motions: tuple[Floats, ...]
-    """(6,) motion of each body at the drawn amplitude."""
+    motions: tuple[Complexes, ...]
+    """(6,) complex motion of each body at the drawn amplitude; its real part is the motion at the largest deflection.
+    In a mode shape the imaginary part is 0."""
     displacement: tuple[Floats, ...]
     """(n,) displacement of each point over the maximum of all points, 0 to 1."""
     title: str
@@ -388,7 +426,8 @@ def mode_scene(
     ----------
     bodies : shapes
     motions : by body name, (6,)
-        Mode shape in any normalisation, as in `displacement_of`; bodies that are not listed are at rest.
+        Mode shape in any normalisation, as in `displacement_of`, or complex amplitudes of a vibration in operation;
+        bodies that are not listed are at rest.
     title : frequency, damping and name of the mode
     amplitude : largest displacement drawn, over the diagonal of the scene
 
@@ -400,17 +439,17 @@ def mode_scene(
     unknown = sorted(set(motions) - {body.name for body in bodies})
     if unknown:
         raise ValueError(f"mode shape: no body {unknown[0]!r} among {[body.name for body in bodies]}")
-    moving = [np.asarray(motions.get(body.name, np.zeros(6)), dtype=np.float64) for body in bodies]
-    sizes = [np.linalg.norm(displacement_of(body, motion), axis=1) for body, motion in zip(bodies, moving, strict=True)]
-    largest = max(float(size.max()) for size in sizes)
-    if not largest > 0.0:
+    moving = [np.asarray(motions.get(body.name, np.zeros(6)), dtype=np.complex128) for body in bodies]
+    vibrations = [vibration_of(body, motion) for body, motion in zip(bodies, moving, strict=True)]
+    largest = largest_displacement(vibrations)
+    if largest == 0.0:
         raise ValueError("mode shape: no body moves")
     points = np.concatenate([body.surface.points for body in bodies])
     factor = amplitude * float(np.linalg.norm(np.ptp(points, axis=0))) / largest
     return ModeScene(
         bodies=tuple(bodies),
         motions=tuple(factor * motion for motion in moving),
-        displacement=tuple(size / largest for size in sizes),
+        displacement=tuple(peak_displacement(vibration) / abs(largest) for vibration in vibrations),
         title=title,
     )
 

@@ -235,7 +235,8 @@ def _resonance_box(material: ReportData, headline: Headline, mode: MatchedMode |
     drawn = drawn_mode(assembly, bodies, modes["shape"].to_numpy()[:, mode.index], True)
     picture = ""
     if bodies:
-        shapes = [(body.shape, drawn.motions[n], drawn.fields.get(n)) for n, body in enumerate(bodies)]
+        fields = {place: field.real for place, field in drawn.fields.items()}
+        shapes = [(body.shape, drawn.motions[n].real, fields.get(n)) for n, body in enumerate(bodies)]
         picture = png_address(mode_picture(shapes))
     return Box(
         f"Mode {mode.index + 1} at {rounded_text(mode.frequency)} Hz, damping {rounded_text(100.0 * mode.damping)} %.",

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,15 +17,14 @@ from exugear.report.pictures.shapes import (
     Surface,
     blank_discs,
     bodies_of,
-    displacement_of,
     gear_surface,
+    largest_displacement,
     motions_of,
+    vibration_of,
 )
-from exugear.report.web.document import ArrayStore, rounded, rounded_list, whole_page
-from exugear.report.web.html import Cell, Table, render
+from exugear.report.web.document import ArrayStore, rounded, rounded_list
 from exugear.system.system import Assembly
-from fe_ste.tools.arrays import Floats
-from fe_ste.tools.files import write_file
+from fe_ste.tools.arrays import Complexes, Floats
 
 # Bodies of a gearbox for the page: rigid ones with their teeth, flexible ones with gears on their seats
 
@@ -89,22 +87,46 @@ def _written(colour: tuple[float, float, float]) -> str:
 
 @dataclass(frozen=True)
 class DrawnMode:
-    """Mode for drawing in a page; the largest displacement of any point is 1 m."""
+    """Vibration for drawing in a page: complex amplitudes, with the largest displacement 1 m of any point at time 0.
 
-    motions: Floats
+    All imaginary parts of a mode shape are 0.
+    """
+
+    motions: Complexes
     """(bodies, 6) rigid-body motion of each body; zero for a body with a field."""
-    fields: dict[int, Floats]
+    fields: dict[int, Complexes]
     """Mapping of body index to (p, 3) array. Displacement of the points of flexible bodies."""
 
 
-def drawn_mode(assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats, with_fields: bool) -> DrawnMode:
-    """Return the motion of the bodies of an assembly in a mode shape (size,).
+def drawn_mode(
+    assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats | Complexes, with_fields: bool
+) -> DrawnMode:
+    """Return the motion of the bodies of an assembly in a mode shape or an operating deflection shape.
 
     Parameters
     ----------
-    shape : (size,)
+    shape : (size,) real or complex
     with_fields : whether flexible bodies deform; otherwise they move rigidly with their main seats
     """
+    motions = np.zeros((len(bodies), 6), dtype=np.complex128)
+    fields: dict[int, Complexes] = {}
+    parts = [(1.0 + 0.0j, np.real(shape))]
+    if np.imag(shape).any():
+        parts.append((1.0j, np.imag(shape)))
+    for unit, part in parts:
+        own, deformed = _moving(assembly, bodies, part, with_fields)
+        motions += unit * own
+        for place, field in deformed.items():
+            fields[place] = unit * field + fields.get(place, np.complex128(0.0))
+    vibrations = [fields.get(place, vibration_of(b.shape, motions[place])) for place, b in enumerate(bodies)]
+    largest = largest_displacement(vibrations) or 1.0
+    return DrawnMode(motions / largest, {place: field / largest for place, field in fields.items()})
+
+
+def _moving(
+    assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats, with_fields: bool
+) -> tuple[Floats, dict[int, Floats]]:
+    """Return motions (bodies, 6) and fields of the bodies for real coordinates (size,)."""
     moving = motions_of(assembly.bodies, assembly.coordinates, assembly.rigid_part(shape))
     motions = np.zeros((len(bodies), 6))
     fields: dict[int, Floats] = {}
@@ -117,11 +139,7 @@ def drawn_mode(assembly: Assembly, bodies: tuple[DrawnBody, ...], shape: Floats,
         else:
             motions[place] = moving.get(body.owner, np.zeros(6))
             motions[place, :3] += np.cross(motions[place, 3:], body.shape.reference - _reference(assembly, body))
-    largest = _largest(bodies, motions, fields)
-    if largest > 0.0:
-        motions /= largest
-        fields = {place: field / largest for place, field in fields.items()}
-    return DrawnMode(motions, fields)
+    return motions, fields
 
 
 def _reference(assembly: Assembly, body: DrawnBody) -> Floats:
@@ -130,14 +148,6 @@ def _reference(assembly: Assembly, body: DrawnBody) -> Floats:
     if own is None:
         return body.shape.reference
     return np.array([*own.axis, own.centre_of_mass_z])
-
-
-def _largest(bodies: tuple[DrawnBody, ...], motions: Floats, fields: dict[int, Floats]) -> float:
-    sizes = [
-        np.linalg.norm(fields[place] if place in fields else displacement_of(body.shape, motions[place]), axis=1).max()
-        for place, body in enumerate(bodies)
-    ]
-    return float(max(sizes, default=0.0))
 
 
 def turn_between(first: BodyShape, other: BodyShape) -> float | None:
@@ -167,13 +177,17 @@ _U16 = 65535
 
 
 def stage_data(
-    assembly: Assembly, shapes: Floats, labels: Mapping[str, str], arrays: ArrayStore, deformed: Collection[int]
+    assembly: Assembly,
+    shapes: Floats | Complexes,
+    labels: Mapping[str, str],
+    arrays: ArrayStore,
+    deformed: Collection[int],
 ) -> dict[str, Any]:
     """Return the data of a model for the 3-D view.
 
     Parameters
     ----------
-    shapes : (size, modes) mode shapes
+    shapes : (size, modes) mode shapes, or complex operating deflection shapes
     labels : mapping of name to label
         For bodies and gears.
     arrays : store for the points, triangles and motions
@@ -190,10 +204,10 @@ def stage_data(
         "centre": rounded_list(0.5 * (low + high), 6),
         "diagonal": rounded(float(np.linalg.norm(high - low)), 6),
         "amplitude": LARGEST,
-        "motions": arrays.add(np.array([mode.motions for mode in modes], dtype="f4")),
+        "motions": arrays.add(np.array([_parts(mode.motions) for mode in modes], dtype="f4")),
         "deformed": {
             str(n): {
-                str(place): arrays.add(np.round(127.0 * modes[n].fields[place]).astype("i1").T.copy())
+                str(place): arrays.add(np.round(127.0 * _parts(modes[n].fields[place].T)).astype("i1"))
                 for place in fields
             }
             for n in sorted(deformed)
@@ -201,6 +215,11 @@ def stage_data(
         },
         "colours": list(DISPLACEMENT_COLOURS),
     }
+
+
+def _parts(amplitudes: Complexes) -> Floats:
+    """Return real and imaginary parts along a new first axis."""
+    return np.stack([amplitudes.real, amplitudes.imag])
 
 
 def _bodies(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays: ArrayStore) -> list[dict[str, Any]]:
@@ -233,111 +252,3 @@ def _bodies(bodies: tuple[DrawnBody, ...], labels: Mapping[str, str], arrays: Ar
             }
         )
     return listed
-
-
-# Page of one model's modes: selected from a list, animated in 3-D, offline
-
-MODEL = "model"
-"""Name of the only model of the page."""
-MOST_DEFORMED = 60
-"""Maximum number of modes in which flexible bodies deform: the first in the list."""
-
-
-@dataclass(frozen=True)
-class ModeRow:
-    """Mode in the list of the page."""
-
-    number: int
-    """Number of the command line."""
-    frequency: float
-    damping: float
-    """Hz, and ratio to critical damping."""
-    moves: str
-    """Mode shape as text."""
-    strain: str = ""
-    """Parts with most strain energy."""
-    resonances: str = ""
-    """Resonances in operation at this mode."""
-
-
-def write_mode_page(
-    assembly: Assembly,
-    shapes: Floats,
-    rows: Sequence[ModeRow],
-    path: str | Path,
-    *,
-    heading: str = "Mode shapes",
-    first: int = 0,
-    labels: Mapping[str, str] | None = None,
-) -> Path:
-    """Write a web page that shows modes of one gearbox.
-
-    Parameters
-    ----------
-    assembly : vibrating system
-    shapes : (size, modes) modes for selection
-    rows : of the list, one for each mode
-    path : output file
-    heading : gearbox, variant, mesh model and inertia set
-    first : mode that is shown when the page opens
-    labels : mapping of name to label, optional
-        For bodies.
-
-    Raises
-    ------
-    ValueError
-        If there is no mode, or the number of rows differs.
-    """
-    if not rows or shapes.shape[1] != len(rows):
-        raise ValueError(f"mode page: {shapes.shape[1]} modes with {len(rows)} rows; at least one of each is needed")
-    arrays = ArrayStore()
-    near = sorted(range(len(rows)), key=lambda mode: abs(mode - first))[:MOST_DEFORMED]
-    data: dict[str, Any] = {
-        "name": heading,
-        "input": "",
-        "rated": None,
-        "lines": [],
-        "groups": [],
-        "charts": {},
-        "first": first,
-        "models": {
-            MODEL: {
-                "words": heading,
-                "variant": assembly.variant,
-                "stage": stage_data(assembly, shapes, labels or {}, arrays, near if assembly.elastic_bodies else ()),
-                "modes": [
-                    {
-                        "number": row.number,
-                        "frequency": rounded(row.frequency, 6),
-                        "damping": rounded(row.damping, 4),
-                        "words": row.moves,
-                    }
-                    for row in rows
-                ],
-            }
-        },
-    }
-    target = Path(path)
-    shown = [
-        {
-            "No.": Cell(str(row.number), row.number),
-            "frequency / Hz": Cell(f"{row.frequency:.1f}", row.frequency, f"mode:{MODEL}:{place}"),
-            "damping / %": Cell(f"{100.0 * row.damping:.1f}", 100.0 * row.damping),
-            "mode shape": row.moves,
-            "resonances": row.resonances or "–",
-            "strain energy": row.strain or "–",
-        }
-        for place, row in enumerate(rows)
-    ]
-    table = Table(
-        shown,
-        ("mode shape", "strain energy", "resonances"),
-        caption="Modes",
-        name="modes",
-        hidden=("damping / %", "strain energy"),
-        sortable=True,
-    )
-    body = render("mode_page", heading=heading, table=table)
-    page = whole_page(heading, body, "mode_page", data, arrays, ("three.min.js",))
-    write_file(target, page.encode("utf-8", errors="replace"))
-    return target

@@ -285,6 +285,20 @@ def test_view_writes_a_page_where_nothing_can_be_rendered(case, monkeypatch):
     assert "pip install" in outcome.stderr
 
 
+def test_view_refuses_a_resonance_that_it_cannot_show(case):
+    """There is no response; then one without resonances, since the stiffness is constant over the mesh cycle."""
+    both = iso("view", case, "--near", 100, "--resonance", 1)
+    missing = iso("view", case, "--variant", "rigid", "--resonance", 1)
+    assert iso("steady", case, "--variant", "rigid").exit_code == 0
+    beyond = iso("view", case, "--variant", "rigid", "--resonance", 1)
+    for outcome, text in ((both, "omit one"), (missing, "run: exugear steady"), (beyond, "has 0 resonances")):
+        assert outcome.exit_code == 2
+        assert text in " ".join(outcome.stderr.split())
+    assert not [file for name in ("*.html", "modes.nc") for file in case.parent.rglob(name)]
+    page = Path(json.loads(iso("view", case, "--variant", "rigid", "--json").stdout)["files"][0])
+    assert "There is no resonance in the ranking." in page.read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("name", ["absent", "empty"])
 def test_report_of_a_folder_without_results_is_bad_input(tmp_path, name):
     (tmp_path / "empty").mkdir()

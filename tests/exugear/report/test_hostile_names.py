@@ -160,7 +160,7 @@ def test_pieces_of_a_page_escape_whatever_a_file_holds() -> None:
     pieces = [
         render("table", table=table),
         render("waterfall", words=HTML, waterfall=waterfall, cuts=waterfall, modes=False),
-        render("mode_page", heading=HTML, table=table),
+        render("mode_page", heading=HTML, modes=table, operation=table, about_resonances=HTML),
         render("studies", studies=[{"title": HTML, "words": HTML, "fits": True, "pictures": [(HTML, HTML)]}]),
     ]
     found = Page("".join(pieces))
@@ -168,7 +168,7 @@ def test_pieces_of_a_page_escape_whatever_a_file_holds() -> None:
     assert [dict(attributes).get("src") for tag, attributes in found.elements if tag == "img"][-1] == HTML
     assert not [tag for tag, _ in found.elements if tag == "script"]
     assert found.texts["h1"] == found.texts["h3"] == HTML
-    assert found.texts["td"] == 2 * HTML
+    assert found.texts["td"] == 3 * HTML
 
 
 def test_pictures_take_any_name_and_a_formula_in_it_as_text(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-// The page of the verb `view`: modes of one model in motion, chosen from a list.
+// The page of the verb `view`: modes of one model and its vibration in operation, chosen from lists.
 import { find, need } from "./dom.js";
 import { beginModeView, drawMode } from "./mode_view.js";
 import { pageData } from "./page_data.js";
@@ -34,9 +34,14 @@ onChange(() => {
   drawing = drawMode();
 });
 beginTheme(() => void drawMode());
-beginTables();
-beginModeView();
-find("before")?.addEventListener("click", () => step(-1));
-find("next")?.addEventListener("click", () => step(1));
-choose({ model: Object.keys(pageData.models)[0], mode: pageData.first ?? 0 });
-void drawing.finally(() => document.documentElement.setAttribute("data-ready", ""));
+function begin() {
+  beginTables();
+  beginModeView();
+  find("before")?.addEventListener("click", () => step(-1));
+  find("next")?.addEventListener("click", () => step(1));
+  choose({ model: Object.keys(pageData.models)[0], mode: pageData.first ?? 0 });
+  void drawing.finally(() => document.documentElement.setAttribute("data-ready", ""));
+}
+
+// Lists are painted first: they can be read while bodies are drawn.
+requestAnimationFrame(() => setTimeout(begin));

@@ -14,7 +14,7 @@ export function beginModeView() {
   const canvas = /** @type {HTMLCanvasElement | null} */ (find("view-3d"));
   if (!canvas) return;
   try {
-    stage = new Stage(canvas);
+    stage = new Stage(canvas, /** @type {HTMLCanvasElement} */ (need("marks")));
   } catch {
     need("no-gl").hidden = false;
     canvas.hidden = true;
@@ -26,13 +26,18 @@ export function beginModeView() {
   need("amplitude").addEventListener("input", (event) => {
     if (!stage) return;
     stage.amplitude = Number(/** @type {HTMLInputElement} */ (event.target).value);
-    stage.place(stage.phase);
+    stage.place(stage.angle);
     stage.draw();
   });
   need("by-body").addEventListener("change", (event) => {
     if (!stage) return;
     stage.byBody = /** @type {HTMLInputElement} */ (event.target).checked;
     stage.colour();
+    stage.draw();
+  });
+  need("labels").addEventListener("change", (event) => {
+    if (!stage) return;
+    stage.labelled = /** @type {HTMLInputElement} */ (event.target).checked;
     stage.draw();
   });
   need("at-rest").addEventListener("change", (event) => {
@@ -58,9 +63,18 @@ function setPlaying(on) {
 /** Paper shows a picture: what WebGL drew prints cropped. */
 function keepStill() {
   if (!stage) return;
-  stage.place(1);
+  stage.place(0);
   stage.draw();
-  /** @type {HTMLImageElement} */ (need("still")).src = stage.canvas.toDataURL();
+  /** @type {HTMLImageElement} */ (need("still")).src = pictureOf(stage).toDataURL();
+}
+
+/** Bodies with their marks. @param {Stage} current @returns {HTMLCanvasElement} */
+function pictureOf({ canvas, marks }) {
+  const picture = make("canvas");
+  [picture.width, picture.height] = [canvas.width, canvas.height];
+  const drawing = picture.getContext("2d");
+  for (const layer of [canvas, marks]) drawing?.drawImage(layer, 0, 0, picture.width, picture.height);
+  return picture;
 }
 
 /** Show the chosen mode of the chosen model. */
@@ -69,7 +83,7 @@ export async function drawMode() {
   const title = find("mode-title");
   if (!model || !title) return;
   const mode = model.modes[state.mode];
-  title.textContent = mode ? `Mode ${mode.number ?? state.mode + 1} at ${mode.frequency.toFixed(1)} Hz` : "No matching mode";
+  title.textContent = mode ? (mode.title ?? `Mode ${state.mode + 1} at ${mode.frequency.toFixed(1)} Hz`) : "No matching mode";
   if (!stage) return;
   stage.canvas.setAttribute("aria-label", mode ? `Mode at ${figureText(mode.frequency, 5)} Hz: ${mode.words}` : "At rest");
   const current = stage;
@@ -77,7 +91,7 @@ export async function drawMode() {
   drawBodies(current);
   addTools(need("mode-tools"), () => title.textContent ?? "Mode", {
     rows: motionRows,
-    canvas: () => current.canvas,
+    canvas: () => pictureOf(current),
     extra: [make("button", { type: "button", "aria-label": "Reset view", click: () => lookAgain(current) }, "⤢")],
   });
 }
@@ -99,7 +113,7 @@ function drawBodies(current) {
     chip.addEventListener("click", () => {
       if (!current.hidden.delete(data.name)) current.hidden.add(data.name);
       chip.setAttribute("aria-pressed", String(!current.hidden.has(data.name)));
-      current.place(current.phase);
+      current.place(current.angle);
       current.draw();
     });
     return chip;
@@ -107,10 +121,11 @@ function drawBodies(current) {
   place.replaceChildren(...chips);
 }
 
-/** Rows of how bodies move as a whole, the largest displacement of any point 1 m. */
+/** Rows of how bodies move as a whole: the largest displacement of any point is 1 m, and reached at the time 0. */
 function motionRows() {
-  const head = ["body", "x / m", "y / m", "z / m", "about x / rad", "about y / rad", "about z / rad"];
+  const axes = ["x / m", "y / m", "z / m", "about x / rad", "about y / rad", "about z / rad"];
+  const head = ["body", ...axes, ...axes.map((axis) => `imaginary part, ${axis}`)];
   const current = stage;
   if (!current) return [head];
-  return [head, ...current.actors.map((actor, place) => [actor.data.label, ...current.motionOf(place)])];
+  return [head, ...current.actors.map(({ data }, n) => [data.label, ...current.motionOf(n, 0), ...current.motionOf(n, 1)])];
 }

@@ -39,7 +39,7 @@ onChange((changed) => (drawing = redraw(changed)));
 /** Draw all figures anew, in the colours of now. @param {boolean} all also those that were not in view so far */
 function recolour(all) {
   if (hasRuns) void Promise.all([drawWaterfall(), drawCuts()]);
-  void redrawCharts(all);
+  void Promise.all([redrawCharts(all), drawMode()]);
 }
 
 beginTheme(recolour);

@@ -1,5 +1,7 @@
-// The stage: bodies in three dimensions that move in a mode, drawn with three.js.
+// The stage: bodies in three dimensions that move in a mode or in operation, drawn with three.js.
+import { actorOf, deform, ghostOf, linear } from "./actors.js";
 import { channelsOf, ramp } from "./colours.js";
+import { drawMarks } from "./marks.js";
 import { unpack } from "./page_data.js";
 
 const HALF_SPEED = 2.2;
@@ -7,12 +9,14 @@ const HALF_SPEED = 2.2;
 const SLOW = 60;
 const FIRST_FRAMES = 4;
 
-/** @typedef {{data: import("./page_data.js").BodyData, mesh: any, rest: Float32Array, colours: Float32Array, own: any}} Actor */
+/** @typedef {import("./actors.js").Actor} Actor */
 
 export class Stage {
-  /** @param {HTMLCanvasElement} canvas */
-  constructor(canvas) {
+  /** @param {HTMLCanvasElement} canvas of the bodies @param {HTMLCanvasElement} marks over it: axes, scale, names */
+  constructor(canvas, marks) {
     this.canvas = canvas;
+    this.marks = marks;
+    this.labelled = true;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
     this.scene = new THREE.Scene();
@@ -32,7 +36,7 @@ export class Stage {
     this.byBody = false;
     this.playing = false;
     this.resting = false;
-    this.phase = 1;
+    this.angle = 0;
     /** @type {import("./page_data.js").StageData | null} */
     this.data = null;
     /** @type {Float32Array | null} */
@@ -70,7 +74,7 @@ export class Stage {
     if (data !== this.data) this.enter(data, actors);
     Object.assign(this, { motions, fields, mode });
     this.colour();
-    this.place(this.phase);
+    this.place(this.angle);
     this.draw();
     this.play();
   }
@@ -104,7 +108,7 @@ export class Stage {
   lookFrom(direction) {
     if (!this.data) return;
     const [x, y, z] = this.data.centre;
-    const eye = new THREE.Vector3(...direction).setLength(1.45 * this.data.diagonal);
+    const eye = new THREE.Vector3(...direction).setLength(1.6 * this.data.diagonal);
     this.controls.target.set(x, y, z);
     this.camera.position.set(x, y, z).add(eye);
     this.camera.near = 0.01 * this.data.diagonal;
@@ -139,38 +143,48 @@ export class Stage {
     });
   }
 
-  /** @param {Actor} actor @param {number} place @param {number} point @returns {number} displacement over the largest */
+  /** Semi-major axis of the ellipse of a point. @param {Actor} actor @param {number} place @param {number} point */
   sizeAt(actor, place, point) {
-    const field = this.fields[place];
-    const count = actor.rest.length / 3;
-    if (field) return Math.hypot(field[point], field[point + count], field[point + 2 * count]) / 127;
-    const m = this.motionOf(place);
-    const [x, y, z] = [0, 1, 2].map((k) => actor.rest[3 * point + k] - (actor.data.elastic ? actor.data.reference[k] : 0));
-    return Math.hypot(m[0] + m[4] * z - m[5] * y, m[1] + m[5] * x - m[3] * z, m[2] + m[3] * y - m[4] * x);
+    const [a, b] = [0, 1].map((part) => this.displacement(actor, place, point, part));
+    const dot = (/** @type {number[]} */ u, /** @type {number[]} */ v) => u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+    const [aa, bb, ab] = [dot(a, a), dot(b, b), dot(a, b)];
+    return Math.sqrt((aa + bb + Math.hypot(aa - bb, 2 * ab)) / 2);
   }
 
-  /** @param {number} place @returns {Float32Array} */
-  motionOf(place) {
+  /** Displacement over the largest. @param {Actor} actor @param {number} place @param {number} point @param {number} part */
+  displacement(actor, place, point, part) {
+    const field = this.fields[place];
+    const count = actor.rest.length / 3;
+    if (field) return [0, 1, 2].map((k) => field[point + (3 * part + k) * count] / 127);
+    const m = this.motionOf(place, part);
+    const [x, y, z] = [0, 1, 2].map((k) => actor.rest[3 * point + k] - (actor.data.elastic ? actor.data.reference[k] : 0));
+    return [m[0] + m[4] * z - m[5] * y, m[1] + m[5] * x - m[3] * z, m[2] + m[3] * y - m[4] * x];
+  }
+
+  /** @param {number} place @param {number} part 0 for the real, 1 for the imaginary part @returns {Float32Array} */
+  motionOf(place, part) {
     if (!this.motions || this.mode < 0) return new Float32Array(6);
-    const start = 6 * (this.mode * this.actors.length + place);
+    const start = 6 * ((2 * this.mode + part) * this.actors.length + place);
     return this.motions.subarray(start, start + 6);
   }
 
-  /** Put all bodies where they are at a part of the amplitude. @param {number} part -1 to 1 */
-  place(part) {
+  /** Put all bodies where they are at an angle of the vibration: Re(X exp(i angle)). @param {number} angle */
+  place(angle) {
     if (!this.data) return;
-    const factor = part * this.amplitude * this.data.amplitude * this.data.diagonal;
+    const scale = this.amplitude * this.data.amplitude * this.data.diagonal;
+    const [re, im] = [scale * Math.cos(angle), -scale * Math.sin(angle)];
     this.actors.forEach((actor, place) => {
       const field = this.fields[place];
-      if (field) deform(actor, field, factor / 127);
-      else if (actor.data.elastic) deform(actor, null, 0);
-      const m = this.motionOf(place);
-      const turn = new THREE.Vector3(m[3], m[4], m[5]).multiplyScalar(factor);
-      const angle = turn.length();
+      if (field) deform(actor, field, re / 127, im / 127);
+      else if (actor.data.elastic) deform(actor, null, 0, 0);
+      const quarter = this.motionOf(place, 1);
+      const m = this.motionOf(place, 0).map((value, k) => re * value + im * quarter[k]);
+      const turn = new THREE.Vector3(m[3], m[4], m[5]);
+      const size = turn.length();
       const matrix = new THREE.Matrix4();
-      if (angle > 0) matrix.makeRotationAxis(turn.normalize(), angle);
+      if (size > 0) matrix.makeRotationAxis(turn.normalize(), size);
       const reference = new THREE.Vector3(...actor.data.reference);
-      const shift = new THREE.Vector3(m[0], m[1], m[2]).multiplyScalar(factor);
+      const shift = new THREE.Vector3(m[0], m[1], m[2]);
       const centre = reference.clone().applyMatrix4(matrix).negate().add(reference).add(shift);
       actor.mesh.matrix.copy(matrix).setPosition(centre);
       if (!actor.data.elastic) actor.mesh.matrix.multiply(actor.own);
@@ -178,7 +192,13 @@ export class Stage {
     });
   }
 
+  /** Draw bodies and marks; marks stay where they are while bodies move. */
   draw() {
+    this.render();
+    drawMarks(this);
+  }
+
+  render() {
     this.light.position.copy(this.camera.position);
     this.renderer.render(this.scene, this.camera);
   }
@@ -187,7 +207,7 @@ export class Stage {
   setPlaying(on) {
     this.playing = on;
     if (!on) {
-      this.place((this.phase = 1));
+      this.place((this.angle = 0));
       this.draw();
     }
     this.play();
@@ -203,8 +223,8 @@ export class Stage {
     this.waiting = false;
     if (!this.playing || !this.visible) return;
     const began = performance.now();
-    this.place((this.phase = Math.cos((Math.PI * began) / (1000 / HALF_SPEED))));
-    this.draw();
+    this.place((this.angle = ((Math.PI * began) / 1000) * HALF_SPEED));
+    this.render();
     // WebGL only queues: reading one pixel waits for the picture. The first frames compile shaders.
     if (++this.frames > FIRST_FRAMES) {
       const gl = this.renderer.getContext();
@@ -233,67 +253,4 @@ export class Stage {
     this.controls.update();
     this.draw();
   }
-}
-
-/** sRGB to the linear values that lights work on. @param {number} channel 0 to 255 @returns {number} */
-const linear = (channel) => Math.pow(channel / 255, 2.2);
-
-/** @param {import("./page_data.js").BodyData} data @returns {Promise<Actor>} */
-async function actorOf(data) {
-  const packed = await unpack(data.points);
-  const triangles = await unpack(data.triangles);
-  const rest = new Float32Array(packed.length);
-  for (let i = 0; i < packed.length; i++) {
-    const k = i % 3;
-    rest[i] = data.low[k] + (packed[i] / 65535) * data.span[k] + (data.elastic ? data.reference[k] : 0);
-  }
-  const geometry = new THREE.BufferGeometry();
-  const colours = new Float32Array(packed.length);
-  geometry.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(rest), 3));
-  geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
-  geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(triangles), 1));
-  geometry.computeVertexNormals();
-  geometry.computeBoundingSphere();
-  const material = new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide, flatShading: true });
-  if (data.fixed) Object.assign(material, { transparent: true, opacity: 0.16, depthWrite: false });
-  const mesh = new THREE.Mesh(geometry, material);
-  mesh.matrixAutoUpdate = false;
-  mesh.frustumCulled = false;
-  const own = new THREE.Matrix4().makeRotationZ(data.turn).setPosition(new THREE.Vector3(...data.reference));
-  const turned = data.elastic ? rest : turnedPoints(rest, data.turn);
-  return { data, mesh, rest: turned, colours, own };
-}
-
-/** A translucent copy of a body at rest. @param {Actor} actor @returns {any} */
-function ghostOf(actor) {
-  const material = new THREE.MeshLambertMaterial({ color: 0x5b6b7c, side: THREE.DoubleSide, flatShading: true });
-  Object.assign(material, { transparent: true, opacity: 0.22, depthWrite: false });
-  const ghost = new THREE.Mesh(actor.mesh.geometry.clone(), material);
-  ghost.matrixAutoUpdate = false;
-  ghost.frustumCulled = false;
-  if (!actor.data.elastic) ghost.matrix.copy(actor.own);
-  return ghost;
-}
-
-/** Points of a body in the axes of the gearbox, from its reference. @param {Float32Array} rest @param {number} turn */
-function turnedPoints(rest, turn) {
-  const [cosine, sine] = [Math.cos(turn), Math.sin(turn)];
-  const out = Float32Array.from(rest);
-  for (let i = 0; i < rest.length; i += 3) {
-    out[i] = cosine * rest[i] - sine * rest[i + 1];
-    out[i + 1] = sine * rest[i] + cosine * rest[i + 1];
-  }
-  return out;
-}
-
-/** @param {Actor} actor @param {Int8Array | null} field three rows of components @param {number} factor */
-function deform(actor, field, factor) {
-  const position = actor.mesh.geometry.attributes.position;
-  const count = actor.rest.length / 3;
-  for (let point = 0; point < count; point++) {
-    for (let k = 0; k < 3; k++) {
-      position.array[3 * point + k] = actor.rest[3 * point + k] + (field ? factor * field[point + k * count] : 0);
-    }
-  }
-  position.needsUpdate = true;
 }

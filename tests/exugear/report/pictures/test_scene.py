@@ -87,6 +87,19 @@ def test_animation_is_one_period_that_repeats(tmp_path):
     assert tuple(frames[0][0, 0]) == (255, 255, 255)
 
 
+@needs_rendering
+def test_bodies_a_quarter_period_apart_do_not_move_out_and_back(tmp_path):
+    """Wheel 2 is at its largest deflection while wheel 1 passes its rest position."""
+    scene = mode_scene(bodies(), {"wheel_1": [0, 0, 0, 0, 0, 1.0], "wheel_2": [0, 0, 0, 0, 0, 0.5j]})
+    path = animate_mode(scene, tmp_path / "operation.gif", frames=4, size=(300, 240))
+    with Image.open(path) as animation:
+        frames = []
+        for number in range(4):
+            animation.seek(number)
+            frames.append(np.asarray(animation.convert("RGB"), dtype=np.int64))
+    assert np.abs(frames[1] - frames[3]).max() > 50  # 0 for a standing wave
+
+
 def test_animation_of_another_format_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"must be \.gif"):
         animate_mode(mode(), tmp_path / "mode.mp4")
