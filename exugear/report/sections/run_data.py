@@ -17,6 +17,7 @@ from exugear.report.findings.ranking import TOP, ConstantSpeed
 from exugear.report.findings.words import figure_text, percentages
 from exugear.report.sections.material import ReportData, group_words, model_name
 from exugear.report.web.document import rounded
+from exugear.results.spectra.resonances import Pick
 from exugear.results.spectra.run_spectra import VariantRun
 from exugear.results.spectra.waterfall import OrderLine, Waterfall
 from fe_ste.tools.arrays import Floats
@@ -152,16 +153,23 @@ def _variant(material: ReportData, group: RunGroup, run: VariantRun) -> dict[str
 def _first(group: RunGroup, variant: str) -> int:
     """Return the place of the resonance that is chosen first: that of the ranking, or else the highest steady one."""
     ranked = group.ranked[variant]
+    leading = (number for number, own in enumerate(ranked) if _leading_peak(group, own) is not None)
+    steady = (number for number, own in enumerate(ranked) if own.steady)
+    return next(leading, next(steady, 0))
+
+
+def _leading_peak(group: RunGroup, own: RankedResonance) -> Pick | None:
+    """Return the peak of a resonance that leads the ranking in the operating range, if it is one of its peaks."""
     top = next(iter(group.in_operation.resonances), None)
-    if top is not None:
-        for number, own in enumerate(ranked):
-            if any(
-                math.isclose(pick.line.order, top.order, rel_tol=1e-6)
-                and math.isclose(pick.frequency, top.frequency, rel_tol=SAME_FREQUENCY)
-                for pick in own.finding.resonance.picks
-            ):
-                return number
-    return next((number for number, own in enumerate(ranked) if own.steady), 0)
+    if top is None:
+        return None
+    same = (
+        pick
+        for pick in own.finding.resonance.picks
+        if math.isclose(pick.line.order, top.order, rel_tol=1e-6)
+        and math.isclose(pick.frequency, top.frequency, rel_tol=SAME_FREQUENCY)
+    )
+    return next(same, None)
 
 
 def _highest(material: ReportData, spectra: Waterfall) -> int:
@@ -266,27 +274,29 @@ def _loudest(material: ReportData, channel: Channel) -> dict[str, Any] | None:
 
 
 def _resonance(material: ReportData, group: RunGroup, run: VariantRun, own: RankedResonance) -> dict[str, Any]:
-    peak = own.peak
+    # The first resonance of the ranking is shown at its speed, which may not be that of the highest peak at any speed.
+    peak = _leading_peak(group, own) or own.peak
     resonance = own.finding.resonance
     return {
         "frequency": rounded(resonance.frequency, 6),
         "tolerance": rounded(resonance.resolution, 3),
-        "speed": rounded(own.finding.speed, 5),
+        "speed": rounded(peak.speed / RPM, 5),
         "peak": rounded(peak.frequency, 6),
         "line": [line.name for line in material.lines].index(peak.line.name),
         "level": rounded(peak.level, 4),
         "steady": own.steady,
         "mode": own.finding.mode,
-        "facts": _facts(material, group, run, own),
+        "facts": _facts(material, group, run, own, peak),
     }
 
 
-def _facts(material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance) -> list[list[str]]:
-    """Return headings and text on a resonance for the panel next to the waterfall."""
+def _facts(
+    material: ReportData, group: RunGroup, run: VariantRun, resonance: RankedResonance, peak: Pick
+) -> list[list[str]]:
+    """Return headings and text on a peak of a resonance for the panel next to the waterfall."""
     words = material.words
-    peak = resonance.peak
-    others = list(dict.fromkeys(p.line for p in resonance.finding.resonance.picks[1:] if p.line != peak.line))[:ALSO]
-    at = resonance.constant
+    others = list(dict.fromkeys(p.line for p in resonance.finding.resonance.picks if p.line != peak.line))[:ALSO]
+    at = resonance.constant if peak is resonance.peak else None
     at_constant = "" if at is None else f"; at constant speed {figure_text(at.level)} dB at {at.frequency:.1f} Hz"
     facts = [
         [

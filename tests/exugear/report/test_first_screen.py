@@ -99,6 +99,9 @@ class TestInABrowser:
         for shown, (key, factor) in zip(values, factors.items(), strict=True):
             assert float(shown.split()[0].removeprefix("±")) == pytest.approx(factor * first[key], rel=5e-3)
         assert f"Highest resonance: {frequency:.0f} Hz" in " ".join(told["statements"])
+        # The panel next to the waterfall shows it at this speed, not where its mode is excited most at any speed.
+        detail = re.findall(r"([\d.]+) (?:Hz|rpm)", view.page.locator("#detail h3").inner_text())
+        assert [float(detail[0]), float(detail[-1])] == pytest.approx([frequency, speed], rel=5e-3)
 
     def test_the_first_screen_is_seen_without_scrolling(self, view: View) -> None:
         view.page.set_viewport_size({"width": 1440, "height": 900})
