@@ -4,6 +4,7 @@ import { pageColour } from "./colours.js";
 /** @typedef {{name: string, x: number, y: number, width: number}} Tag */
 const FONT = "12px system-ui, sans-serif";
 const HEIGHT = 18;
+const SHIFT = 6;
 const EDGE = 6;
 const AXIS = 34;
 const MOST_LETTERS = 40;
@@ -117,8 +118,8 @@ function shortened(drawing, text, most) {
  */
 function freePlace(wanted, placed, width, height) {
   const x = Math.max(EDGE, Math.min(wanted.x, width - wanted.width - EDGE));
-  for (let step = 0; step < 2 * Math.ceil(height / HEIGHT); step++) {
-    const away = Math.ceil(step / 2) * (HEIGHT + 3) * (step % 2 ? 1 : -1);
+  for (let step = 0; step < 2 * Math.ceil(height / SHIFT); step++) {
+    const away = Math.ceil(step / 2) * SHIFT * (step % 2 ? 1 : -1);
     const tag = { ...wanted, x, y: wanted.y + away };
     const inside = tag.y >= EDGE && tag.y + HEIGHT < height - 40;
     const apart = placed.every(
