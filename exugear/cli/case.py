@@ -53,20 +53,39 @@ def check_allow_dir(folder: Path | None) -> None:
 
 def open_project(
     case: Path,
-    choice: Choice,
     out: Path | None,
     allow_dir: Path | None,
     scripts: bool,
+    variant: Variant | None,
+    mesh_model: str = "line_of_action",
+    inertias: str | None = None,
+    load_case: str | None = None,
 ) -> WatchedProject:
-    """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files."""
+    """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files.
+
+    Without a variant, the usual one of the gearbox is chosen and printed.
+    """
     from exugear.cli.watched import WatchedProject
+    from exugear.gearbox.choice import Choice
     from exugear.project import default_folder
 
     gearbox = read_gearbox(case, allow_dir, scripts)
+    choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
     folder = out or default_folder(case)
     check_choice(gearbox, choice, folder)
     check_results_folder(folder)
     return WatchedProject(gearbox, folder, choice)
+
+
+def _chosen_variant(gearbox: Gearbox) -> Variant:
+    """Return the usual variant of a gearbox, and print which one it is."""
+    from exugear.system.gearbox_checks import lacking, usual_variant
+
+    variant = usual_variant(gearbox)
+    reason = lacking(gearbox, Variant.bushing)
+    why = f"bushing is not available, {reason}" if reason else "select another with --variant"
+    note(f"Variant {variant} ({_DESCRIPTIONS[variant]}): {why}")
+    return variant
 
 
 def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
@@ -218,8 +237,14 @@ def _variant(name: str) -> Variant:
 
 
 VariantOption = Annotated[
-    Variant,
-    typer.Option("--variant", parser=_variant, metavar="NAME", help=f"Variant: {_VARIANTS}."),
+    Variant | None,
+    typer.Option(
+        "--variant",
+        parser=_variant,
+        metavar="NAME",
+        help=f"Variant: {_VARIANTS}. (default: bushing; rigid if the data of the bearings are incomplete)",
+        show_default=False,
+    ),
 ]
 LawOption = Annotated[
     MeshModel, typer.Option("--mesh-model", metavar="NAME", help=f"Mesh force model: {', '.join(LAWS)}.")

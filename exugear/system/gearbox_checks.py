@@ -197,6 +197,19 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     return _misfits(gearbox, chosen) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, chosen)
 
 
+def usual_variant(gearbox: Gearbox) -> Variant:
+    """Return the variant of computations for which the user names none: bushing, or rigid where bearings are missing.
+
+    Examples
+    --------
+    >>> usual_variant(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+    'bushing'
+    """
+    if lacking(gearbox, Variant.bushing):
+        return Variant.rigid
+    return Variant.bushing
+
+
 def _misfits(gearbox: Gearbox, variant: Variant) -> str:
     """Return the first error of `check_parts` about flexible bodies: an impossible body, or a seat off the body."""
     for name in elastic_names(gearbox) if variant.is_elastic else ():

@@ -49,7 +49,7 @@ MESH_PRESSURE = (
 
 def bearings(
     case: CaseArgument,
-    variant: VariantOption = Variant.bushing,
+    variant: VariantOption = None,
     mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     out: OutOption = None,
@@ -63,12 +63,12 @@ def bearings(
     Transmission error tables that are missing or out of date are computed first.
     """
     with exit_codes():
-        from exugear.gearbox.choice import Choice
         from exugear.results.folder import duties_summary
 
+        variant = variant or Variant.bushing
         if not variant.has_bearings:
             raise BadInputError(f"--variant {variant}: has ideal joints instead of bearings; use bushing or flexible")
-        project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
+        project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
         if not any(bearing.catalogue for bearing in project.gearbox.bearings):
             raise BadInputError(f"{case}: no bearing has catalogue data; add a [bearings.NAME.catalogue]")
         project.begin()

@@ -22,7 +22,6 @@ from exugear.cli.case import (
 )
 from exugear.cli.console import FailedError, exit_codes, make_results_folder, note, print_json, say
 from exugear.cli.tables import print_table
-from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -34,7 +33,7 @@ SHOWN_LIMITS = 8
 
 def life(
     case: CaseArgument,
-    variant: VariantOption = Variant.bushing,
+    variant: VariantOption = None,
     mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     out: OutOption = None,
@@ -48,10 +47,9 @@ def life(
     error tables that are missing or out of date are computed first.
     """
     with exit_codes():
-        from exugear.gearbox.choice import Choice
         from exugear.life.life_file import draw_life, summary
 
-        project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
+        project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
         counted = project.checked_loads()
         make_results_folder(project.folder)
         data = project.life(counted=counted)

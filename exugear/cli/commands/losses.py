@@ -70,10 +70,9 @@ def losses(
     Writes no files.
     """
     with exit_codes():
-        from exugear.gearbox.choice import Choice
         from exugear.life.losses import losses_of, operating_speed
 
-        project = open_project(case, Choice(Variant.rigid, "line_of_action"), out, allow_dir, scripts=False)
+        project = open_project(case, out, allow_dir, scripts=False, variant=Variant.rigid)
         if load_case is not None:
             project = project.at_load_case(load_case)
         if speed is not None and not 0.0 < abs(speed) <= FASTEST:

@@ -32,7 +32,7 @@ _STRAIN = "; strain energy: "
 
 def modes(
     case: CaseArgument,
-    variant: VariantOption,
+    variant: VariantOption = None,
     mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     out: OutOption = None,
@@ -46,11 +46,10 @@ def modes(
     first.
     """
     with exit_codes():
-        from exugear.gearbox.choice import Choice
         from exugear.system.modes import unusual_damping
         from exugear.system.statics import meshes_near_unconverged
 
-        project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
+        project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
         project.begin()
         project.prepare()
         found = project.modes()

@@ -157,15 +157,11 @@ def _design_changes(folder: Path, allow_dir: Path | None) -> DesignStudy:
     from exugear.cli.watched import WatchedProject
     from exugear.gearbox.choice import Choice
     from exugear.gearbox.named_files import Permissions
-    from exugear.gearbox.variant import Variant
     from exugear.results.folder import read_stored_gearbox
-    from exugear.system.gearbox_checks import lacking
+    from exugear.system.gearbox_checks import usual_variant
 
     gearbox = read_stored_gearbox(folder, Permissions(below=allow_dir))
-    variant = Variant.bushing
-    if lacking(gearbox, variant):
-        variant = Variant.rigid
-    project = WatchedProject(gearbox, folder, Choice(variant))
+    project = WatchedProject(gearbox, folder, Choice(usual_variant(gearbox)))
     project.prepare()
     study = project.design_changes(lambda done, total, words: note(f"Design change {done + 1} of {total}: {words}"))
     if study is None:

@@ -59,7 +59,7 @@ class MeshRoute(StrEnum):
 def run(
     context: typer.Context,
     case: CaseArgument,
-    variant: VariantOption,
+    variant: VariantOption = None,
     mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     load_case: Annotated[
@@ -118,20 +118,18 @@ def run(
     out of date are computed first.
     """
     with exit_codes():
-        from exugear.gearbox.choice import Choice
         from exugear.gearbox.reading import GearboxFileError
         from exugear.results.folder import time_noted
 
-        choice = Choice(variant.value, mesh_model.value, inertias, load_case)
-        project = open_project(case, choice, out, allow_dir, scripts)
+        project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
         if at_load_case:
             project = project.at_load_case(_load_case(project).name)
         if resume:
             duration = _duration_to_resume(project, duration)
         kept = _kept_band(project, band, resume)
         _check_extent(project, duration, kept["sample_rate"], out or Path("results"))
-        _check_solver(project.gearbox, variant, solver)
-        _check_mesh_route(mesh_route, variant, solver)
+        _check_solver(project.gearbox, project.choice.variant, solver)
+        _check_mesh_route(mesh_route, project.choice.variant, solver)
         if compared is not None and solver is Solver.exudyn:
             raise BadInputError("--compare-exudyn: requires the compiled solver; remove --solver exudyn")
         if compared is not None:
@@ -139,10 +137,10 @@ def run(
                 _check_extent(project, compared, kept["sample_rate"], out or Path("results"))
             except GearboxFileError as error:
                 raise BadInputError(f"--compare-exudyn: {error}") from error
-            _check_solver(project.gearbox, variant, Solver.compiled)
+            _check_solver(project.gearbox, project.choice.variant, Solver.compiled)
         if integrator and solver is Solver.exudyn:
             raise BadInputError(f"--integrator {integrator}: applies to the compiled solver only; remove --integrator")
-        check_friction(project.gearbox, choice.mesh_model)
+        check_friction(project.gearbox, mesh_model)
         if not resume:
             project.begin()
         _check_run_directory(project.run_directory, resume)
@@ -153,7 +151,7 @@ def run(
             finished = _simulate(project, resume, resuming(context), duration=duration, **how)
         comparison = None
         if compared is not None and finished.complete:
-            with time_noted(project.folder, f"comparison with Exudyn, {choice.variant}"):
+            with time_noted(project.folder, f"comparison with Exudyn, {project.choice.variant}"):
                 comparison = _compare(project, compared, kept)
         _print_run_result(case, finished, comparison, resuming(context), as_json)
 

@@ -80,7 +80,7 @@ class Method(StrEnum):
 
 def steady(
     case: CaseArgument,
-    variant: VariantOption,
+    variant: VariantOption = None,
     mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     load_case: Annotated[
@@ -134,10 +134,7 @@ def steady(
     of date are computed first.
     """
     with exit_codes():
-        from exugear.gearbox.choice import Choice
-
-        choice = Choice(variant.value, mesh_model.value, inertias, load_case)
-        project = open_project(case, choice, out, allow_dir, scripts)
+        project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
         if load_case is not None:
             project = project.at_load_case(load_case)
         settings = _settings(project, method, speeds, harmonics, branches)
@@ -145,7 +142,7 @@ def steady(
         with suppress(FailedError):  # such a failure does not apply to the selected mesh model
             if reason := steady_lack(assembled_by_iso(project.gearbox, project.choice.variant), project.choice.variant):
                 raise BadInputError(reason)
-        check_friction(project.gearbox, choice.mesh_model)
+        check_friction(project.gearbox, mesh_model)
         project.begin()
         project.prepare()
         _print_result(project, settings, project.steady(settings), as_json)

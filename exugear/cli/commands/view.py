@@ -21,7 +21,6 @@ from exugear.cli.case import (
     open_project,
 )
 from exugear.cli.console import BadInputError, FailedError, exit_codes, note, print_json, say
-from exugear.gearbox.variant import Variant
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,7 +41,7 @@ SHOWN_RESONANCES = 10
 
 def view(
     case: CaseArgument,
-    variant: VariantOption = Variant.bushing,
+    variant: VariantOption = None,
     mesh_model: LawOption = USUAL_LAW,
     inertias: InertiasOption = None,
     near: Annotated[
@@ -74,14 +73,13 @@ def view(
     exugear steady.
     """
     with exit_codes():
-        from exugear.gearbox.choice import Choice
         from exugear.report.findings.headline import Headline
         from exugear.report.findings.ranking import ranking_of
         from exugear.report.writer import command_line
 
         if near is not None and resonance is not None:
             raise BadInputError(f"--near {near:g} and --resonance {resonance}: only one can be shown first; omit one")
-        project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
+        project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
         project.begin()
         project.prepare()
         folder = project.modes_path.parent

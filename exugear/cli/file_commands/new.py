@@ -50,5 +50,5 @@ def new(
             print_json({"case": str(case), "kind": kind.value})
             return
         say(f"{case}: {KINDS[kind.value]}. Next:")
-        for line in (f"check {case}", f"run {case} --variant bushing", f"report {default_folder(case)}"):
+        for line in (f"check {case}", f"run {case}", f"report {default_folder(case)}"):
             say(f"  exugear {line}")

@@ -51,6 +51,18 @@ def test_a_variant_is_refused_at_once_and_the_one_meant_is_named():
         Variant.offered("jointed")
 
 
+@pytest.mark.parametrize("verb", ["modes", "steady"])
+def test_without_a_variant_the_usual_one_of_the_gearbox_is_computed_and_named(case, verb):
+    on_bearings = iso(verb, case, "--json")
+    assert json.loads(on_bearings.stdout)["variant"] == "bushing", on_bearings.stderr
+    assert "Variant bushing (elastic bearings): select another with --variant" in on_bearings.stderr
+    text = case.read_text(encoding="utf-8")
+    case.write_text(text.replace("radial_N_per_m = 2e7, ", "radial_N_per_m = 0.0, "), encoding="utf-8")
+    on_joints = iso(verb, case, "--json")
+    assert json.loads(on_joints.stdout)["variant"] == "rigid", on_joints.stderr
+    assert "Variant rigid (ideal joints): bushing is not available, " in on_joints.stderr
+
+
 @pytest.mark.sample
 @pytest.mark.parametrize("variant", ["rigid", "bushing"])
 @pytest.mark.parametrize("solver", ["compiled", "exudyn"])
