@@ -1,6 +1,7 @@
 """The command line: the table of its commands, and their common settings.
 
-Libraries that load slowly are imported inside the commands, so that ``--help`` responds immediately.
+The modules of the commands have their options and import what they do, `exugear.cli.tasks`, only when they start, so
+that ``--help`` responds immediately.
 """
 
 from __future__ import annotations

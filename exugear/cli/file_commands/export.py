@@ -7,17 +7,7 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.case import (
-    CaseArgument,
-    DistanceRule,
-    DistancesOption,
-    FilesBelowOption,
-    JsonOption,
-    OutOption,
-    ShiftRule,
-    ShiftsOption,
-    read_gearbox,
-)
+from exugear.cli import options
 from exugear.cli.console import BadInputError, exit_codes, note, print_json, say
 
 SHOWN = 10
@@ -25,7 +15,7 @@ SHOWN = 10
 
 
 def export(
-    case: CaseArgument,
+    case: options.CaseArgument,
     rexs: Annotated[
         Path,
         typer.Argument(
@@ -36,11 +26,11 @@ def export(
         Path | None,
         typer.Option("--to", metavar="FILE", help="File to write. (default: NAME-exugear, same folder as FILE.rexs)"),
     ] = None,
-    out: OutOption = None,
-    allow_dir: FilesBelowOption = None,
-    shifts: ShiftsOption = ShiftRule.file,
-    distances: DistancesOption = DistanceRule.agreeing,
-    as_json: JsonOption = False,
+    out: options.OutOption = None,
+    allow_dir: options.FilesBelowOption = None,
+    shifts: options.ShiftsOption = options.ShiftRule.file,
+    distances: options.DistancesOption = options.DistanceRule.agreeing,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write results into a copy of a REXS file. They are REXS attributes where possible, else custom_exugear ones.
 
@@ -48,6 +38,7 @@ def export(
     --shifts and --distances of the import.
     """
     with exit_codes():
+        from exugear.cli.case import read_gearbox
         from exugear.exchange.rexs.export.export import with_results
         from exugear.exchange.rexs.to_case.notes import Rules
         from exugear.exchange.rexs.tree import RexsError

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from exugear.cli.case import DistanceRule, DistancesOption, JsonOption, ShiftRule, ShiftsOption
+from exugear.cli import options
 from exugear.cli.console import BadInputError, counted, exit_codes, note, print_json, say
 
 if TYPE_CHECKING:
@@ -24,9 +24,9 @@ def import_(
         Path | None,
         typer.Option("--out", metavar="FOLDER", help="Folder for gearbox.toml. (default: file name without extension)"),
     ] = None,
-    shifts: ShiftsOption = ShiftRule.file,
-    distances: DistancesOption = DistanceRule.agreeing,
-    as_json: JsonOption = False,
+    shifts: options.ShiftsOption = options.ShiftRule.file,
+    distances: options.DistancesOption = options.DistanceRule.agreeing,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Convert a REXS file (1.0 to 2.0) to a gearbox file. Each value has its source; assumptions are marked."""
     with exit_codes():

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.case import JsonOption
+from exugear.cli import options
 from exugear.cli.console import BadInputError, exit_codes, print_json, say
 from exugear.gearbox.templates.kinds import KINDS
 
@@ -30,7 +30,7 @@ _KINDS_TOLD = "; ".join(f"{kind}: {words}" for kind, words in KINDS.items())
 def new(
     case: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.", show_default=False)],
     kind: Annotated[Kind, typer.Option(metavar="NAME", help=f"Template. {_KINDS_TOLD}.")] = PARALLEL,
-    as_json: JsonOption = False,
+    as_json: options.JsonOption = False,
 ) -> None:
     """Write a commented gearbox file to start from. It runs without changes."""
     with exit_codes():

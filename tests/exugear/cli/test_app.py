@@ -185,7 +185,7 @@ def test_a_damaged_table_is_computed_again(spur_case, tmp_path):
 def test_another_process_draws_the_same_curves(computed, tmp_path, monkeypatch):
     case, out, _ = computed
     shutil.copytree(out / "tables", tmp_path / "tables")
-    monkeypatch.setattr("exugear.cli.commands.ste.WORTH_A_PROCESS", 0)
+    monkeypatch.setattr("exugear.cli.tasks.ste.WORTH_A_PROCESS", 0)
     outcome = exugear("ste", case, "--positions", 8, "--out", tmp_path)
     assert outcome.exit_code == 0, outcome.stderr
     for name in ("ste.png", "load_share_spur.png"):

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.cli.case import MeshModel
 from exugear.cli.commands.run import Solver
+from exugear.cli.options import MeshModel
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant, VariantError
@@ -289,7 +289,7 @@ def test_view_writes_a_page_where_nothing_can_be_rendered(case, monkeypatch):
     def unable(*arguments, **options):
         raise RenderingError("3-D pictures need pyvista: pip install")
 
-    monkeypatch.setattr("exugear.report.pictures.scene.draw_gearbox", unable)
+    monkeypatch.setattr("exugear.cli.tasks.view.draw_gearbox", unable)
     outcome = iso("view", case, "--variant", "rigid", "--json")
     assert outcome.exit_code == 0, outcome.stderr
     (page,) = json.loads(outcome.stdout)["files"]
