@@ -12,6 +12,8 @@ from exugear.cli.console import BadInputError, FailedError, make_results_folder,
 from exugear.gearbox.reading import GearboxFileError
 from exugear.project import Project
 from exugear.results.folder import time_noted
+from exugear.results.solver_comparison import SolverComparison
+from exugear.steady.settings import SteadySettings
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.elastic_body import ElasticBody
@@ -30,8 +32,6 @@ if TYPE_CHECKING:
 
     from exugear.life.load_spectrum.counted import CountedLoads
     from exugear.life.rating.sheet import RatingSheet
-    from exugear.results.solver_comparison import SolverComparison
-    from exugear.steady.settings import SteadySettings
 
 
 @dataclass(frozen=True, repr=False)
