@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.cli.commands.run import Solver
+from exugear.cli.commands.models import Solver
 from exugear.cli.options import MeshModel
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox

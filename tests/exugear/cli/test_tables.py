@@ -320,3 +320,19 @@ def test_names_are_wrapped_and_numbers_are_not(printed: Printed) -> None:
     tables.print_table("Title", rows, ("c",))
     printed.check(1)
     assert tables.wrapped(LONG, 12) == ["intermediate", "_stage_1xxxx"]
+
+
+def test_a_column_converts_units_and_names_unknown_and_infinite_values(printed: Printed) -> None:
+    columns = (
+        tables.Column("part", "part"),
+        tables.Column("load\nkN", "load_N", ".2f", 1e-3),
+        tables.Column("life\nh", lambda row: row["turns"] / 60.0, ".4g", missing="none"),
+    )
+    rows = [
+        {"part": "a", "load_N": 12345.6, "turns": float("inf")},
+        {"part": "b", "load_N": None, "turns": float("nan")},
+    ]
+    tables.print_rows("Title", rows, columns)
+    assert printed.rows == [
+        [{"part": "a", "load\nkN": "12.35", "life\nh": "inf."}, {"part": "b", "load\nkN": "-", "life\nh": "none"}]
+    ]
