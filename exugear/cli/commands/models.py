@@ -42,8 +42,7 @@ def ste(
         ),
     ] = None,
     grid: Annotated[
-        bool,
-        typer.Option("--grid", help="Also vary load, centre distance and misalignment over the axes of the file."),
+        bool, typer.Option("--grid", help="Also vary load, centre distance and misalignment over the axes of the file.")
     ] = False,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
@@ -156,15 +155,13 @@ def steady(
     harmonics: Annotated[
         int | None,
         typer.Option(
-            help="Harmonics of each mesh frequency. (default: as the mesh stiffness requires)",
-            show_default=False,
+            help="Harmonics of each mesh frequency. (default: as the mesh stiffness requires)", show_default=False
         ),
     ] = None,
     branches: Annotated[
         bool,
         typer.Option(
-            "--continuation",
-            help="Continuation: follow the solution through turning points (method nonlinear).",
+            "--continuation", help="Continuation: follow the solution through turning points (method nonlinear)."
         ),
     ] = False,
     out: options.OutOption = None,
@@ -232,30 +229,22 @@ def run(
     mesh_route: Annotated[
         MeshRoute,
         typer.Option(
-            "--mesh-route",
-            metavar="NAME",
-            help="Mesh forces in Exudyn: element, or loads (slow; bushing only).",
+            "--mesh-route", metavar="NAME", help="Mesh forces in Exudyn: element, or loads (slow; bushing only)."
         ),
     ] = MeshRoute.element,
     duration: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="Simulated time, s. (default: load case, or resumed run)"),
+        float | None, typer.Option(metavar="S", help="Simulated time, s. (default: load case, or resumed run)")
     ] = None,
     band: Annotated[
         float | None,
         typer.Option(
-            metavar="HZ",
-            help="Highest stored frequency, Hz. (default: 6400, or resumed run)",
-            show_default=False,
+            metavar="HZ", help="Highest stored frequency, Hz. (default: 6400, or resumed run)", show_default=False
         ),
     ] = None,
     compared: Annotated[
         float | None,
         typer.Option(
-            "--compare-exudyn",
-            metavar="S",
-            min=0.0,
-            help="Also integrate the first S seconds with Exudyn and compare.",
+            "--compare-exudyn", metavar="S", min=0.0, help="Also integrate the first S seconds with Exudyn and compare."
         ),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Resume an interrupted run.")] = False,
@@ -357,11 +346,7 @@ def losses(
     case: options.CaseArgument,
     speed: Annotated[
         float | None,
-        typer.Option(
-            metavar="RPM",
-            help="Input speed. (default: rated, or of a load case)",
-            show_default=False,
-        ),
+        typer.Option(metavar="RPM", help="Input speed. (default: rated, or of a load case)", show_default=False),
     ] = None,
     load_case: Annotated[
         str | None,
@@ -466,8 +451,7 @@ def report(
         typer.Option(min=1.0, metavar="HZ", help="Target frequency to compare with modes. (default: gearbox file)"),
     ] = None,
     stored: Annotated[
-        bool,
-        typer.Option("--stored", help="Use stored results only: do not compute missing modes and responses."),
+        bool, typer.Option("--stored", help="Use stored results only: do not compute missing modes and responses.")
     ] = False,
     levers: Annotated[
         bool,

@@ -10,16 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from exugear.cli.case import assembled_by_iso, read_gearbox, steady_lack
-from exugear.cli.console import (
-    BadInputError,
-    FailedError,
-    counted,
-    model_errors,
-    note,
-    print_json,
-    say,
-    warn,
-)
+from exugear.cli.console import BadInputError, FailedError, counted, model_errors, note, print_json, say, warn
 from exugear.cli.rating_tables import print_rating
 from exugear.cli.tables import HARD_SPACE, Column, print_rows, print_text, significant
 from exugear.cli.watched import WatchedProject
@@ -364,35 +355,30 @@ LOADS = (
 )
 
 
+def _ends_by_estimate(bearing: Mapping[str, Any]) -> dict[str, list[float]]:
+    """Radial stiffness of a bearing with each estimated input at its limits."""
+    estimates = bearing["estimated"].items()
+    return {key: [end for end in one["radial_stiffness_N_per_m"] if end is not None] for key, one in estimates}
+
+
+def _stiffness_range(bearing: Mapping[str, Any]) -> str:
+    ends = [end for pair in _ends_by_estimate(bearing).values() for end in pair]
+    return " - ".join(significant(1e-9 * end, 3, 5) for end in (min(ends), max(ends))) if ends else ""
+
+
+def _dominant_estimate(bearing: Mapping[str, Any]) -> str:
+    ends = _ends_by_estimate(bearing)
+    key = max(ends, key=lambda key: max(ends[key], default=0.0) - min(ends[key], default=0.0), default="")
+    return re.sub(r"_(mm|um|deg|kN)$", "", key).replace("_", " ")
+
+
 def _radial_load(bearing: Mapping[str, Any]) -> str:
     return significant(bearing["radial_load_kN"]) + "*" * (bearing["reaction_kN"] is not None)
 
 
 def _reaction(bearing: Mapping[str, Any]) -> str:
-    if bearing["reaction_kN"] is None:
-        return significant(bearing["radial_load_kN"])
-    return significant(bearing["reaction_kN"])
-
-
-def _known_ends(bearing: Mapping[str, Any]) -> dict[str, list[float]]:
-    """Radial stiffness with each estimated input of a bearing at its limits."""
-    return {
-        key: [end for end in estimate["radial_stiffness_N_per_m"] if end is not None]
-        for key, estimate in bearing["estimated"].items()
-    }
-
-
-def _stiffness_range(bearing: Mapping[str, Any]) -> str:
-    ends = [end for pair in _known_ends(bearing).values() for end in pair]
-    if not ends:
-        return ""
-    return f"{significant(1e-9 * min(ends), 3, 5)} - {significant(1e-9 * max(ends), 3, 5)}"
-
-
-def _dominant_estimate(bearing: Mapping[str, Any]) -> str:
-    ranges = _known_ends(bearing)
-    key = max(ranges, key=lambda key: max(ranges[key], default=0.0) - min(ranges[key], default=0.0), default="")
-    return re.sub(r"_(mm|um|deg|kN)$", "", key).replace("_", " ")
+    key = "radial_load_kN" if bearing["reaction_kN"] is None else "reaction_kN"
+    return significant(bearing[key])
 
 
 BEARINGS = (
@@ -431,12 +417,11 @@ def print_check(body: str, summary: Mapping[str, Any]) -> None:
         if any(load["reversed_flanks"] for load in loads):
             legend += REVERSED_LEGEND
         print_rows(title, loads, LOADS, legend.strip())
-    if any(bearing["reaction_kN"] is not None for bearing in summary["bearings"]):
-        title = "Bearings under the static load"
-        print_rows(title, summary["bearings"], BEARINGS, BEARING_LEGEND + STATED_LEGEND)
-    elif summary["bearings"]:
-        columns = [column for column in BEARINGS if column.key != _reaction]
-        print_rows("Bearings under the static load", summary["bearings"], columns, BEARING_LEGEND)
+    if summary["bearings"]:
+        stated = any(bearing["reaction_kN"] is not None for bearing in summary["bearings"])
+        columns = [column for column in BEARINGS if stated or column.key != _reaction]
+        legend = BEARING_LEGEND + STATED_LEGEND * stated
+        print_rows("Bearings under the static load", summary["bearings"], columns, legend)
 
 
 def print_availability(summary: Mapping[str, Any]) -> None:

@@ -122,12 +122,7 @@ def summarise(found: Losses) -> dict[str, Any]:
             for bearing in found.bearings
         ],
         "seals": [
-            {
-                "name": seal.name,
-                "diameter_mm": 1e3 * seal.diameter,
-                "speed_rpm": seal.speed / RPM,
-                "loss_W": seal.loss,
-            }
+            {"name": seal.name, "diameter_mm": 1e3 * seal.diameter, "speed_rpm": seal.speed / RPM, "loss_W": seal.loss}
             for seal in found.seals
         ],
     }
