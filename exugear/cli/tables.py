@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from rich.cells import cell_len, set_cell_size
 from rich.text import Text
@@ -20,8 +20,6 @@ HARD_SPACE = "\u00a0"
 """Space in texts at which lines are broken only if necessary; it is printed as a space."""
 SMALLEST_NAME = 10
 """Minimum width of wrapped names and texts; a table without space for it is printed in parts below each other."""
-
-Row = Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -60,6 +58,12 @@ class _Cells:
     cells: tuple[str, ...]
     is_text: bool
 
+    @classmethod
+    def of(cls, column: Column, summaries: Sequence[Any], is_text: bool) -> Self:
+        """Return a column with the texts of all summaries."""
+        heading = "\n".join(plain(line.strip()) for line in column.heading.split("\n"))
+        return cls(heading, tuple(plain(column.cell(summary)) for summary in summaries), is_text)
+
     @property
     def natural(self) -> int:
         """Width without any wrapping."""
@@ -73,27 +77,22 @@ class _Cells:
         return max(_width(self.heading), min(self.natural, SMALLEST_NAME))
 
 
-def print_table(title: str, rows: Sequence[Row], texts: tuple[str, ...] = (), legend: str = "") -> None:
-    """Print rows under the keys of the first one, and a legend below them.
+def print_table(title: str, summaries: Iterable[Any], columns: Sequence[Column], legend: str = "") -> None:
+    """Print a table with one row for each summary, and a legend below it.
 
-    The first column is text, and so are those in `texts`; the others are numbers, which are never wrapped or truncated.
+    The first column is text; numbers are never wrapped or truncated.
     """
     limit = max(NARROWEST, results.width - 1)
     results.print(Text("\n".join(["", *wrapped(plain(title), limit)]), style="bold"), soft_wrap=True)
-    columns = [_column(heading, rows, not place or heading in texts) for place, heading in enumerate(rows[0])]
-    for number, part in enumerate(_parts(columns, limit)):
+    rows = [*summaries]
+    printed = [_Cells.of(column, rows, column.is_text or column is columns[0]) for column in columns]
+    for number, part in enumerate(_parts(printed, limit)):
         if number:
             results.print()
         for line in _lines(part, _widths(part, limit)):
             results.print(Text(line), soft_wrap=True)
     if legend:
         print_text(legend)
-
-
-def print_rows(title: str, summaries: Iterable[Any], columns: Sequence[Column], legend: str = "") -> None:
-    """Print a table with one row for each summary."""
-    rows = [{column.heading: column.cell(summary) for column in columns} for summary in summaries]
-    print_table(title, rows, tuple(column.heading for column in columns if column.is_text), legend)
 
 
 def print_text(text: str, indent: str = "") -> None:
@@ -157,11 +156,6 @@ def _pieces(paragraph: str, width: int) -> Iterator[str]:
                 yield head
                 rest = rest[len(head) :]
             yield rest
-
-
-def _column(heading: str, rows: Sequence[Row], is_text: bool) -> _Cells:
-    shown = "\n".join(plain(line.strip()) for line in heading.split("\n"))
-    return _Cells(shown, tuple(plain(row.get(heading, "")) for row in rows), is_text)
 
 
 def _width(text: str) -> int:

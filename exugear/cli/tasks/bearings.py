@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from exugear.cli.console import BadInputError, note, print_json, say, warn
-from exugear.cli.tables import Column, print_rows, significant
+from exugear.cli.tables import Column, print_table, significant
 from exugear.cli.watched import WatchedProject
 from exugear.results.folder import duties_summary
 
@@ -104,15 +104,15 @@ MESHES = (
 def print_bearings(summary: Mapping[str, Any]) -> None:
     """Print the tables of all bearings and meshes."""
     rows = summary["bearings"]
-    print_rows(f"Bearings under the static load, variant {summary['variant']}", rows, LOADS, LOAD_LEGEND)
+    print_table(f"Bearings under the static load, variant {summary['variant']}", rows, LOADS, LOAD_LEGEND)
     legend = LIFE_LEGEND
     if any(bearing["ratings_estimated"] for bearing in rows):
         legend += ESTIMATED
     if any(bearing["ratings_of_makers"] for bearing in rows):
         legend += CATALOGUES
-    print_rows("Element load, ratings and rating life of the bearings", rows, LIVES, legend)
+    print_table("Element load, ratings and rating life of the bearings", rows, LIVES, legend)
     if summary["meshes"]:
         legend = MESH_LEGEND
         if any(mesh["contact_pressure_MPa"] is not None for mesh in summary["meshes"]):
             legend += MESH_PRESSURE
-        print_rows("Meshes under the static load", summary["meshes"], MESHES, legend)
+        print_table("Meshes under the static load", summary["meshes"], MESHES, legend)

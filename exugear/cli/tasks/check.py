@@ -12,7 +12,7 @@ from typing import Any
 from exugear.cli.case import assembled_by_iso, read_gearbox, steady_lack
 from exugear.cli.console import BadInputError, FailedError, counted, model_errors, note, print_json, say, warn
 from exugear.cli.rating_tables import print_rating
-from exugear.cli.tables import HARD_SPACE, Column, print_rows, print_text, significant
+from exugear.cli.tables import HARD_SPACE, Column, print_table, print_text, significant
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
@@ -398,15 +398,15 @@ def print_check(body: str, summary: Mapping[str, Any]) -> None:
     inverse = f" (i = {1.0 / ratio:.4g})" if ratio else ""
     print_text(f"{summary['name']}: no errors; speed ratio output/input {ratio:.6g}{inverse}")
     if summary["pairs"]:
-        print_rows("Gear pairs", summary["pairs"], PAIRS, PAIR_LEGEND)
-        print_rows("Geometry checks, gear 1 / gear 2", summary["pairs"], MARGINS, MARGIN_LEGEND)
+        print_table("Gear pairs", summary["pairs"], PAIRS, PAIR_LEGEND)
+        print_table("Geometry checks, gear 1 / gear 2", summary["pairs"], MARGINS, MARGIN_LEGEND)
     if summary["tooth_thickness"]:
-        print_rows("Tooth thickness within its allowances", summary["tooth_thickness"], THICKNESSES)
+        print_table("Tooth thickness within its allowances", summary["tooth_thickness"], THICKNESSES)
         for thickness in summary["tooth_thickness"]:
             if thickness["span_doubt"]:
                 note(thickness["span_doubt"], style="yellow")
     if summary["forces"]:
-        print_rows("Constant forces on bodies", summary["forces"], FORCES)
+        print_table("Constant forces on bodies", summary["forces"], FORCES)
     loads = summary["load_cases"]
     if loads:
         band = 1e-3 * loads[0]["band_Hz"]
@@ -416,12 +416,12 @@ def print_check(body: str, summary: Mapping[str, Any]) -> None:
             legend += LOAD_LEGEND
         if any(load["reversed_flanks"] for load in loads):
             legend += REVERSED_LEGEND
-        print_rows(title, loads, LOADS, legend.strip())
+        print_table(title, loads, LOADS, legend.strip())
     if summary["bearings"]:
         stated = any(bearing["reaction_kN"] is not None for bearing in summary["bearings"])
         columns = [column for column in BEARINGS if stated or column.key != _reaction]
         legend = BEARING_LEGEND + STATED_LEGEND * stated
-        print_rows("Bearings under the static load", summary["bearings"], columns, legend)
+        print_table("Bearings under the static load", summary["bearings"], columns, legend)
 
 
 def print_availability(summary: Mapping[str, Any]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from exugear.cli.console import FailedError, make_results_folder, note, print_json, say
-from exugear.cli.tables import Column, print_rows
+from exugear.cli.tables import Column, print_table
 from exugear.cli.watched import WatchedProject
 from exugear.life.life_file import INFINITE, draw_life, summary
 
@@ -99,14 +99,14 @@ def print_life(found: Mapping[str, Any], years: float) -> None:
         say(line)
     if found["flanks"]:
         title = "Tooth flanks: largest contact stress, safety against pitting"
-        print_rows(title, found["flanks"], FLANKS, CONTACT_LEGEND)
-        print_rows("Tooth roots: largest stress, safety against breakage", found["flanks"], ROOTS, ROOT_LEGEND)
+        print_table(title, found["flanks"], FLANKS, CONTACT_LEGEND)
+        print_table("Tooth roots: largest stress, safety against breakage", found["flanks"], ROOTS, ROOT_LEGEND)
     if found["bearings"]:
-        print_rows("Bearings: rating life, static safety", found["bearings"], BEARINGS, BEARING_LEGEND)
+        print_table("Bearings: rating life, static safety", found["bearings"], BEARINGS, BEARING_LEGEND)
     worst = [limit for limit in found["limits"] if limit["damage"] != 0.0][:SHOWN_LIMITS]
     if worst:
         title = f"Parts with the largest fatigue damage in {years:g} years"
-        print_rows(title, worst, LIMITS, "Damage: 1 is failure at the design probability.")
+        print_table(title, worst, LIMITS, "Damage: 1 is failure at the design probability.")
     for key, style in (("assumptions", ""), ("unrated", "yellow"), ("reliefs", "yellow")):
         for line in found[key]:
             note(line, style=style)

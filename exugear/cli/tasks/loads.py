@@ -9,7 +9,7 @@ from typing import Any
 
 from exugear.cli.bars import Bars, files_read
 from exugear.cli.console import check_results_folder, make_results_folder, print_json, say, warn
-from exugear.cli.tables import Column, print_rows, print_table
+from exugear.cli.tables import Column, print_table
 from exugear.gearbox.gearbox import Gearbox
 from exugear.life.load_spectrum.counted import count_loads, draw_duration, write_spectra
 from exugear.project import default_folder
@@ -49,6 +49,11 @@ SOURCES = (
     Column("maximum\nkN m", "largest_torque_kN_m", ".4g"),
     Column("mean\nrpm", "mean_speed_rpm", ".4g"),
 )
+EQUIVALENTS = (
+    Column("S-N exponent", "exponent"),
+    Column("torque\nkN m", "torque", ".4g", missing=""),
+    Column("torque range\nkN m", "range", ".4g", missing=""),
+)
 PARTS = (
     Column("part", "part"),
     Column("mesh", "loaded_by", missing="", is_text=True),
@@ -59,25 +64,20 @@ PARTS = (
 
 def print_loads(summary: Mapping[str, Any], bins: int) -> None:
     """Print the tables of sources, equivalent loads and loaded parts."""
-    print_rows("Load sources", summary["sources"], SOURCES, SOURCE_LEGEND)
+    print_table("Load sources", summary["sources"], SOURCES, SOURCE_LEGEND)
     title = f"Damage-equivalent loads on {summary['body']} over {summary['life_years']:g} years"
-    torques = [
-        {"S-N exponent": m, "torque\nkN m": f"{value:.4g}", "torque range\nkN m": ""}
-        for m, value in summary["equivalent_torque_kN_m"].items()
-    ]
-    ranges = [
-        {"S-N exponent": m, "torque\nkN m": "", "torque range\nkN m": f"{value:.4g}"}
-        for m, value in summary["equivalent_range_1_Hz_kN_m"].items()
-    ]
+    torques = [{"exponent": m, "torque": value} for m, value in summary["equivalent_torque_kN_m"].items()]
+    ranges = [{"exponent": m, "range": value} for m, value in summary["equivalent_range_1_Hz_kN_m"].items()]
     legend = (
         f"Torque: constant torque over the same {summary['revolutions']:.4g} revolutions with the same damage; range: "
         f"one cycle per second. {bins} bins, {summary['hours']:.6g} h."
     )
-    print_table(title, [*torques, *ranges], legend=legend)
+    print_table(title, [*torques, *ranges], EQUIVALENTS, legend)
     hub = [
-        {"load": re.sub("_kN(_m)?$", "", name).replace("_", " "), **{m: f"{value:.4g}" for m, value in by.items()}}
-        for name, by in summary["hub_equivalent_range_1_Hz"].items()
+        {"load": re.sub("_kN(_m)?$", "", name).replace("_", " "), **by_exponent}
+        for name, by_exponent in summary["hub_equivalent_range_1_Hz"].items()
     ]
     if hub:
-        print_table(f"Damage-equivalent rotor loads on {summary['body']}", hub, legend=HUB_LEGEND)
-    print_rows("Loads on rotating parts", summary["parts"], PARTS, "Mesh force: per mesh, at the largest torque.")
+        columns = [Column("load", "load"), *(Column(m, m, ".4g") for m in hub[0] if m != "load")]
+        print_table(f"Damage-equivalent rotor loads on {summary['body']}", hub, columns, HUB_LEGEND)
+    print_table("Loads on rotating parts", summary["parts"], PARTS, "Mesh force: per mesh, at the largest torque.")

@@ -8,7 +8,7 @@ from typing import Any
 
 from exugear.cli.case import assembled_by_iso
 from exugear.cli.console import BadInputError, note, print_json, say, warn
-from exugear.cli.tables import Column, print_rows, print_table, print_text, significant
+from exugear.cli.tables import Column, print_table, print_text, significant
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import static_load_in_words
@@ -169,11 +169,11 @@ def _print(load: str, summary: Mapping[str, Any]) -> None:
     """Print the tables of parts, the efficiency, and what is assumed or not included."""
     bearings = summary["bearings"]
     title = f"Losses at {significant(summary['speed_rpm'])} rpm, {load}: meshes"
-    print_rows(title, summary["meshes"], MESHES, MESH_LEGEND)
+    print_table(title, summary["meshes"], MESHES, MESH_LEGEND)
     if bearings:
-        print_rows("Bearings", bearings, BEARINGS, BEARING_LEGEND)
+        print_table("Bearings", bearings, BEARINGS, BEARING_LEGEND)
     if summary["seals"]:
-        print_rows("Seals", summary["seals"], SEALS)
+        print_table("Seals", summary["seals"], SEALS)
     losses = f"{_kilowatts(summary['losses_W'])} kW"
     if summary["losses_band_W"][0] < summary["losses_band_W"][1]:
         losses += f" (band {_band(summary['losses_band_W'], 4)})"
@@ -196,11 +196,10 @@ def _print(load: str, summary: Mapping[str, Any]) -> None:
             f"Unknown series of the bearings {', '.join(unknown)}: their friction is that of all series of the type; "
             "set catalogue.designation or catalogue.series"
         )
-    rows = {f"{100 * share:g} %": {"torque": f"{100 * share:g} %"} for share in SHARES if summary["map"]}
-    for point in summary["map"]:
-        heading = f"{100 * point['speed_share']:g} %\nspeed"
-        rows[f"{100 * point['torque_share']:g} %"][heading] = f"{100.0 * point['efficiency']:.2f}"
-    if rows:
-        print_table("Efficiency, %", [*rows.values()])
+    if summary["map"]:
+        efficiency = {(point["speed_share"], point["torque_share"]): point["efficiency"] for point in summary["map"]}
+        rows = [{"torque": torque, **{str(speed): efficiency[speed, torque] for speed in SHARES}} for torque in SHARES]
+        columns = [Column(f"{100 * speed:g} %\nspeed", str(speed), ".2f", 100.0) for speed in SHARES]
+        print_table("Efficiency, %", rows, [Column("torque", lambda row: f"{100 * row['torque']:g} %"), *columns])
     if not any(mesh["from_table"] for mesh in summary["meshes"]):
         say("exugear ste computes the tables from which H_V follows.")

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from exugear.cli.console import print_json, refuse_not_converged, say, warn
-from exugear.cli.tables import HARD_SPACE, Column, print_rows, print_text
+from exugear.cli.tables import HARD_SPACE, Column, print_table, print_text
 from exugear.cli.watched import WatchedProject
 from exugear.results.spectra.run_spectra import report_mode
 from exugear.system.modal_damping import damping_in_words
@@ -107,4 +107,4 @@ COLUMNS = (
 def print_modes(summary: dict[str, Any]) -> None:
     """Print the table of modes; damping and TE participation are omitted for rigid-body modes."""
     title = "Modes: variant {variant}, mesh model {mesh_model}, inertia set {inertias}".format_map(summary)
-    print_rows(title, summary["modes"], COLUMNS, LEGEND)
+    print_table(title, summary["modes"], COLUMNS, LEGEND)

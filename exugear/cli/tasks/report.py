@@ -19,7 +19,7 @@ from exugear.cli.console import (
     say,
     warn,
 )
-from exugear.cli.tables import Column, print_rows
+from exugear.cli.tables import Column, print_table
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.named_files import Permissions
@@ -165,7 +165,7 @@ def _print_report(folder: Path, written: Report, study: DesignStudy | None, as_j
         _print_changes(study)
     for line in written.statements:
         say(f"- {line}")
-    print_rows("Run time, last execution of each step", map(vars, spent), TIMES, "Parallel steps overlap.")
+    print_table("Run time, last execution of each step", map(vars, spent), TIMES, "Parallel steps overlap.")
     say(f"Report: {written.path}")
 
 
@@ -190,7 +190,7 @@ def _print_changes(study: DesignStudy) -> None:
             row |= {f"{name}_{key}": value for key, value in vars(effect).items()}
         rows.append(row)
     title = f"Design changes for {study.frequency:.3g} Hz at {abs(study.speed) / RPM:.4g} rpm, {study.line}, dB"
-    print_rows(title, rows, columns, "here: this peak; range: highest amplitude of any order.")
+    print_table(title, rows, columns, "here: this peak; range: highest amplitude of any order.")
 
 
 def _decibels(value: float) -> str:

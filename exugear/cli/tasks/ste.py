@@ -19,7 +19,7 @@ from exugear.cli.console import (
     progress_bar,
     say,
 )
-from exugear.cli.tables import Column, print_rows
+from exugear.cli.tables import Column, print_table
 from exugear.cli.watched import WatchedProject, errors_of_tables
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
@@ -72,7 +72,7 @@ def ste(gearbox: Gearbox, out: Path | None, names: list[str], positions: int | N
     if as_json:
         print_json({"case": gearbox.source, "tables": summaries, "pictures": [str(path) for path in pictures]})
     else:
-        print_rows("Static transmission error", summaries, TABLES, TABLE_LEGEND)
+        print_table("Static transmission error", summaries, TABLES, TABLE_LEGEND)
         say(f"Results: {folder / 'tables'}; pictures: {folder / 'pictures'}")
     if doubts := errors_of_tables(tables):
         raise FailedError("\n".join(["invalid tables:", *doubts]))
@@ -136,7 +136,7 @@ def references(gearbox: Gearbox, out: Path | None, names: list[str], positions: 
         print_json({"case": gearbox.source, "tables": summaries})
     else:
         title = "Static transmission error, nonlinear finite elements"
-        print_rows(title, summaries, REFERENCES, REFERENCE_LEGEND)
+        print_table(title, summaries, REFERENCES, REFERENCE_LEGEND)
         say(f"Results: {folder / 'tables'}")
     failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
     doubts = reference_warnings(summaries)

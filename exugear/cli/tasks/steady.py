@@ -13,7 +13,7 @@ import xarray as xr
 
 from exugear.cli.case import assembled_by_iso, check_friction, steady_lack
 from exugear.cli.console import BadInputError, FailedError, note, print_json, refuse_not_converged, say, warn
-from exugear.cli.tables import HARD_SPACE, Column, print_rows, print_text, significant
+from exugear.cli.tables import HARD_SPACE, Column, print_table, print_text, significant
 from exugear.cli.watched import WatchedProject
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.load_cases import load_in_words, other_load_warning, static_load_in_words, summarise_loads
@@ -313,7 +313,7 @@ def print_ranking(title: str, summary: Mapping[str, Any]) -> None:
     if "force" in quantities:
         owner = {"shafts": "shaft", "housing": "housing"}.get(summary["accelerations_of"], summary["accelerations_of"])
         legend += f"; force: largest dynamic bearing force; accel.: {owner} at the bearing"
-    print_rows(title, resonances, columns, f"{legend}.")
+    print_table(title, resonances, columns, f"{legend}.")
 
 
 ORDER = Column("order", "line")
@@ -341,7 +341,7 @@ def _print_bands(band: tuple[float, float] | None, resonances: list[dict[str, An
         damping = f"{band[0]:g} to {band[1]:g} % of critical damping"
     quantities = [quantity for quantity in QUANTITIES if f"{quantity}_place" in shown[0]]
     columns = [ORDER, SPEED, *(Column(_heading(quantity), partial(_band, quantity)) for quantity in quantities)]
-    print_rows(f"Amplitudes with {damping}", shown, columns, BAND_LEGEND)
+    print_table(f"Amplitudes with {damping}", shown, columns, BAND_LEGEND)
 
 
 def _band(quantity: str, resonance: Mapping[str, Any]) -> str | None:

@@ -22,7 +22,7 @@ from exugear.cli.console import (
     say,
 )
 from exugear.cli.process import let_in_dask
-from exugear.cli.tables import Column, print_rows
+from exugear.cli.tables import Column, print_table
 from exugear.gearbox.named_files import Permissions
 from exugear.gearbox.reading import GearboxFileError
 from exugear.project import default_folder
@@ -180,7 +180,7 @@ def _print(study: Study, folder: Path, swept: StudyResult, summary: dict[str, An
     if SIDE in study.design.shape:
         ranked = sorted(slopes(swept.dataset), key=lambda entry: -abs(entry[2]))
         if ranked:
-            print_rows("Sensitivity of the results, largest first", ranked, SLOPES)
+            print_table("Sensitivity of the results, largest first", ranked, SLOPES)
     if study.file.optimise is not None:
         _print_front(study, swept.dataset)
     say(f"Results: {swept.path}; pictures in the same folder")
@@ -225,7 +225,7 @@ def _print_front(study: Study, dataset: xr.Dataset) -> None:
     points |= {f"point\n{n + 1}": front.isel(evaluation=n) for n in shown if front.sizes["evaluation"]}
     columns = [Column(label, partial(_value, point), ".4g", missing="") for label, point in points.items()]
     names = (*figures, *study.file.parameters)
-    print_rows(f"Pareto front: {front.sizes['evaluation']} points", names, (PARAMETER, *columns))
+    print_table(f"Pareto front: {front.sizes['evaluation']} points", names, (PARAMETER, *columns))
     if study.tolerances is not None:
         for name in figures:
             note(f"{name}: {dataset[name].attrs['long_name']}")

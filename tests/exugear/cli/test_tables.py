@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,7 +17,7 @@ from rich.console import Console
 
 from exugear.cli import rating_tables, tables
 from exugear.cli.app import app
-from exugear.cli.tasks import bearings, check, life, loads, losses, modes, report, ste, steady
+from exugear.cli.tasks import bearings, check, life, loads, modes, report, ste, steady
 from exugear.cli.tasks import study as study_task
 from exugear.life.rating.sheet import FINITE_ELEMENTS, FlankSheet, RatingSheet
 from exugear.report.findings.ranking import PeakAmplitude, Resonance
@@ -69,11 +69,12 @@ def printed(monkeypatch: pytest.MonkeyPatch) -> Iterator[Printed]:
 
     print_table = tables.print_table
 
-    def spy(title: str, rows: Sequence[Any], *more: Any, **named: Any) -> None:
-        found.rows.append(rows)
-        print_table(title, rows, *more, **named)
+    def spy(title: str, summaries: Iterable[Any], columns: Sequence[tables.Column], legend: str = "") -> None:
+        rows = [*summaries]
+        found.rows.append([{column.heading: column.cell(row) for column in columns} for row in rows])
+        print_table(title, rows, columns, legend)
 
-    for module in (tables, rating_tables, loads, losses):
+    for module in (tables, rating_tables, bearings, check, life, loads, modes, report, ste, steady, study_task):
         monkeypatch.setattr(module, "print_table", spy)
     yield found
 
@@ -170,8 +171,8 @@ def test_ste(printed: Printed) -> None:
         }
         for name in NAMES
     ]
-    tables.print_rows("Static transmission error", summaries, ste.TABLES, ste.TABLE_LEGEND)
-    tables.print_rows("Reference", summaries, ste.REFERENCES, ste.REFERENCE_LEGEND)
+    tables.print_table("Static transmission error", summaries, ste.TABLES, ste.TABLE_LEGEND)
+    tables.print_table("Reference", summaries, ste.REFERENCES, ste.REFERENCE_LEGEND)
     printed.check(2)
 
 
@@ -292,7 +293,7 @@ def test_report(printed: Printed, tmp_path: Any) -> None:
 
 
 def test_study(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:
-    tables.print_rows("Sensitivity", [(NAMES[1], LONG, -1.23456)], study_task.SLOPES)
+    tables.print_table("Sensitivity", [(NAMES[1], LONG, -1.23456)], study_task.SLOPES)
     dataset = xr.Dataset(
         {name: ("evaluation", np.full(1300, -1.2345e-123)) for name in NAMES}
         | {"on_front": ("evaluation", np.ones(1300, dtype=int))}
@@ -317,7 +318,7 @@ def test_the_list_of_commands_is_not_cut() -> None:
 
 def test_names_are_wrapped_and_numbers_are_not(printed: Printed) -> None:
     rows = [{"a": LONG, "b\nmm": "1234.5", "c": f"{LONG} and more of {LONG}"}]
-    tables.print_table("Title", rows, ("c",))
+    tables.print_table("Title", rows, [tables.Column(key, key, is_text=key == "c") for key in rows[0]])
     printed.check(1)
     assert tables.wrapped(LONG, 12) == ["intermediate", "_stage_1xxxx"]
 
@@ -332,7 +333,7 @@ def test_a_column_converts_units_and_names_unknown_and_infinite_values(printed: 
         {"part": "a", "load_N": 12345.6, "turns": float("inf")},
         {"part": "b", "load_N": None, "turns": float("nan")},
     ]
-    tables.print_rows("Title", rows, columns)
+    tables.print_table("Title", rows, columns)
     assert printed.rows == [
         [{"part": "a", "load\nkN": "12.35", "life\nh": "inf."}, {"part": "b", "load\nkN": "-", "life\nh": "none"}]
     ]
