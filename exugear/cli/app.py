@@ -1,7 +1,7 @@
 """The command line: the table of its commands, and their common settings.
 
 The commands have their options and import what they do, `exugear.cli.tasks`, only when they start, so that ``--help``
-responds immediately.
+responds immediately. `exugear.cli.console.exit_codes` ends all of them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.console import say, say_what_is_logged
+from exugear.cli.console import exit_codes, say, say_what_is_logged
 from exugear.cli.process import leave_out_dask, standard_streams
 
 COMMANDS = (
@@ -133,4 +133,5 @@ def _program(
 
 for place in COMMANDS:
     module, verb = place.split(".")
-    app.command(verb.rstrip("_"))(getattr(importlib.import_module(f"exugear.cli.commands.{module}"), verb))
+    command = getattr(importlib.import_module(f"exugear.cli.commands.{module}"), verb)
+    app.command(verb.rstrip("_"))(exit_codes()(command))

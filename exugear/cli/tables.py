@@ -16,6 +16,8 @@ from exugear.cli.console import plain, results
 NARROWEST = 79
 """Minimum width of a table in characters, which fits a terminal of 80."""
 GAP = 2
+INFINITE = "infinite"
+"""Text of infinite numbers in summaries, since JSON has none."""
 HARD_SPACE = "\u00a0"
 """Space in texts at which lines are broken only if necessary; it is printed as a space."""
 SMALLEST_NAME = 10
@@ -43,7 +45,7 @@ class Column:
         value = self.key(summary) if callable(self.key) else summary.get(self.key)
         if value is None or value != value:
             return self.missing
-        if value == math.inf:
+        if value in (math.inf, INFINITE):
             return "inf."
         if self.factor != 1.0:
             value *= self.factor

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from exugear.cli import options
-from exugear.cli.console import BadInputError, exit_codes, print_json, say
+from exugear.cli.console import BadInputError, print_json, say
 from exugear.gearbox.renames import MigrationError, migrated
 from exugear.gearbox.templates.kinds import KINDS, template
 from fe_ste.tools.files import write_file
@@ -36,20 +36,19 @@ def new(
     as_json: options.JsonOption = False,
 ) -> None:
     """Write a commented gearbox file to start from. It runs without changes."""
-    with exit_codes():
-        from exugear.project import default_folder
+    from exugear.project import default_folder
 
-        if case.suffix != ".toml":
-            raise BadInputError(f"{case}: specify a file name that ends with .toml")
-        if case.exists() or case.is_symlink():
-            raise BadInputError(f"{case}: exists already and is not overwritten; specify another file")
-        _write(case, template(kind.value))
-        if as_json:
-            print_json({"case": str(case), "kind": kind.value})
-            return
-        say(f"{case}: {KINDS[kind.value]}. Next:")
-        for line in (f"check {case}", f"run {case}", f"report {default_folder(case)}"):
-            say(f"  exugear {line}")
+    if case.suffix != ".toml":
+        raise BadInputError(f"{case}: specify a file name that ends with .toml")
+    if case.exists() or case.is_symlink():
+        raise BadInputError(f"{case}: exists already and is not overwritten; specify another file")
+    _write(case, template(kind.value))
+    if as_json:
+        print_json({"case": str(case), "kind": kind.value})
+        return
+    say(f"{case}: {KINDS[kind.value]}. Next:")
+    for line in (f"check {case}", f"run {case}", f"report {default_folder(case)}"):
+        say(f"  exugear {line}")
 
 
 def _write(path: Path, text: str) -> None:
@@ -70,11 +69,10 @@ def import_(
     as_json: options.JsonOption = False,
 ) -> None:
     """Convert a REXS file (1.0 to 2.0) to a gearbox file. Each value has its source; assumptions are marked."""
-    with exit_codes():
-        from exugear.cli.tasks.rexs import import_rexs
-        from exugear.exchange.rexs.to_case.notes import Rules
+    from exugear.cli.tasks.rexs import import_rexs
+    from exugear.exchange.rexs.to_case.notes import Rules
 
-        import_rexs(file, out, Rules(shifts.value, distances.value), as_json)
+    import_rexs(file, out, Rules(shifts.value, distances.value), as_json)
 
 
 def schema(
@@ -84,16 +82,15 @@ def schema(
     ] = None,
 ) -> None:
     """Describe every key of the gearbox file as a JSON schema. Editors use it to check and complete files."""
-    with exit_codes():
-        from exugear.gearbox.sections.schema.keys import json_schema
-        from exugear.gearbox.sections.schema.keys import page as described
+    from exugear.gearbox.sections.schema.keys import json_schema
+    from exugear.gearbox.sections.schema.keys import page as described
 
-        text = described() if page else json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
-        if out is None:
-            typer.echo(text, nl=False)
-            return
-        _write(out, text)
-        say(f"Written: {out}")
+    text = described() if page else json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
+    if out is None:
+        typer.echo(text, nl=False)
+        return
+    _write(out, text)
+    say(f"Written: {out}")
 
 
 def migrate(
@@ -103,49 +100,44 @@ def migrate(
     ] = None,
 ) -> None:
     """Update the key names of an older file; comments are kept."""
-    with exit_codes():
-        from exugear.gearbox.reading import read_text
+    from exugear.gearbox.reading import read_text
 
-        try:
-            text, changes = migrated(read_text(file))
-        except MigrationError as error:
-            raise BadInputError(f"{file}: {error}") from error
-        target = out or file
-        if changes or target != file:
-            _write(target, text)
-        for change in changes:
-            say(change)
-        if changes:
-            say(f"{len(changes)} names replaced in {target}")
-        else:
-            say(f"{file}: no old names")
-
-
-RatingOption = Annotated[
-    bool,
-    typer.Option(
-        "--rating",
-        help="Rate the gears to ISO 6336-2 and -3 instead: all factors, next to the finite element results of the "
-        "results folder.",
-    ),
-]
+    try:
+        text, changes = migrated(read_text(file))
+    except MigrationError as error:
+        raise BadInputError(f"{file}: {error}") from error
+    target = out or file
+    if changes or target != file:
+        _write(target, text)
+    for change in changes:
+        say(change)
+    if changes:
+        say(f"{len(changes)} names replaced in {target}")
+    else:
+        say(f"{file}: no old names")
 
 
 def check(
     case: options.CaseArgument,
-    rating: RatingOption = False,
+    rating: Annotated[
+        bool,
+        typer.Option(
+            "--rating",
+            help="Rate the gears to ISO 6336-2 and -3 instead: all factors, next to the finite element results of the "
+            "results folder.",
+        ),
+    ] = False,
     out: options.OutOption = None,
     allow_dir: options.FilesBelowOption = None,
     as_json: options.JsonOption = False,
 ) -> None:
     """Check a gearbox file and summarise it. Lists gear pairs, bearings and load cases; writes no files."""
-    with exit_codes():
-        from exugear.cli.tasks import check as task
+    from exugear.cli.tasks import check as task
 
-        if rating:
-            task.rate(case, out, allow_dir, as_json)
-        else:
-            task.check(case, allow_dir, as_json)
+    if rating:
+        task.rate(case, out, allow_dir, as_json)
+    else:
+        task.check(case, allow_dir, as_json)
 
 
 def export(
@@ -171,8 +163,7 @@ def export(
     Geometry and static forces are always written; tables, modes, bearings and runs if the results folder has them. Use
     --shifts and --distances of the import.
     """
-    with exit_codes():
-        from exugear.cli.tasks.rexs import export_rexs
-        from exugear.exchange.rexs.to_case.notes import Rules
+    from exugear.cli.tasks.rexs import export_rexs
+    from exugear.exchange.rexs.to_case.notes import Rules
 
-        export_rexs(case, rexs, to, out, allow_dir, Rules(shifts.value, distances.value), as_json)
+    export_rexs(case, rexs, to, out, allow_dir, Rules(shifts.value, distances.value), as_json)

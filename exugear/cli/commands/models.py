@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -9,8 +10,7 @@ from typing import Annotated
 import typer
 
 from exugear.cli import options
-from exugear.cli.again import resuming
-from exugear.cli.console import BadInputError, exit_codes
+from exugear.cli.console import BadInputError
 from exugear.gearbox.variant import Variant
 
 
@@ -53,17 +53,16 @@ def ste(
     Tables are cached and recomputed when their input changes. Tables of the method nonlinear are for comparison; the
     dynamic models do not use them.
     """
-    with exit_codes():
-        from exugear.cli.case import read_gearbox
-        from exugear.cli.tasks import ste as task
+    from exugear.cli.case import read_gearbox
+    from exugear.cli.tasks import ste as task
 
-        gearbox = read_gearbox(case, allow_dir)
-        if (method or gearbox.ste.method) == TableMethod.nonlinear:
-            if grid:
-                raise BadInputError("--grid: the method nonlinear computes the static load only; remove --grid")
-            task.references(gearbox, out, mesh or [], positions, as_json)
-        else:
-            task.ste(gearbox, out, mesh or [], positions, grid, as_json)
+    gearbox = read_gearbox(case, allow_dir)
+    if (method or gearbox.ste.method) == TableMethod.nonlinear:
+        if grid:
+            raise BadInputError("--grid: the method nonlinear computes the static load only; remove --grid")
+        task.references(gearbox, out, mesh or [], positions, as_json)
+    else:
+        task.ste(gearbox, out, mesh or [], positions, grid, as_json)
 
 
 def bearings(
@@ -81,14 +80,13 @@ def bearings(
     All values are for the static load. Also lists misalignment, load distribution and contact stress of each mesh.
     Transmission error tables that are missing or out of date are computed first.
     """
-    with exit_codes():
-        from exugear.cli.case import open_project
-        from exugear.cli.tasks import bearings as task
+    from exugear.cli.case import open_project
+    from exugear.cli.tasks import bearings as task
 
-        variant = variant or Variant.bushing
-        if not variant.has_bearings:
-            raise BadInputError(f"--variant {variant}: has ideal joints instead of bearings; use bushing or flexible")
-        task.bearings(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
+    variant = variant or Variant.bushing
+    if not variant.has_bearings:
+        raise BadInputError(f"--variant {variant}: has ideal joints instead of bearings; use bushing or flexible")
+    task.bearings(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
 
 
 def modes(
@@ -106,11 +104,10 @@ def modes(
     The variant is linearised at the static load. Transmission error tables that are missing or out of date are computed
     first.
     """
-    with exit_codes():
-        from exugear.cli.case import open_project
-        from exugear.cli.tasks import modes as task
+    from exugear.cli.case import open_project
+    from exugear.cli.tasks import modes as task
 
-        task.modes(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
+    task.modes(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
 
 
 class SteadyMethod(StrEnum):
@@ -174,14 +171,13 @@ def steady(
     Needs no run-up. Speeds are added where mesh orders cross modes. Transmission error tables that are missing or out
     of date are computed first.
     """
-    with exit_codes():
-        from exugear.cli.case import open_project
-        from exugear.cli.tasks import steady as task
+    from exugear.cli.case import open_project
+    from exugear.cli.tasks import steady as task
 
-        project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
-        if load_case is not None:
-            project = project.at_load_case(load_case)
-        task.steady(project, task.settings_of_options(project, method.value, speeds, harmonics, branches), as_json)
+    project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
+    if load_case is not None:
+        project = project.at_load_case(load_case)
+    task.steady(project, task.settings_of_options(project, method.value, speeds, harmonics, branches), as_json)
 
 
 class Solver(StrEnum):
@@ -258,25 +254,44 @@ def run(
     Results are written during the run; Ctrl-C keeps the results so far. Transmission error tables that are missing or
     out of date are computed first.
     """
-    with exit_codes():
-        from exugear.cli.case import open_project
-        from exugear.cli.tasks import run as task
+    from exugear.cli.case import open_project
+    from exugear.cli.tasks import run as task
 
-        project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
-        if at_load_case:
-            project = project.at_load_case(task.load_case_of(project).name)
-        task.run(
-            project,
-            as_json,
-            resuming(context),
-            solver=solver.value,
-            mesh_route=mesh_route.value,
-            integrator=integrator,
-            band=band,
-            duration=duration,
-            compared=compared,
-            resume=resume,
-        )
+    project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias, load_case)
+    if at_load_case:
+        project = project.at_load_case(task.load_case_of(project).name)
+    task.run(
+        project,
+        as_json,
+        _resuming(context),
+        solver=solver.value,
+        mesh_route=mesh_route.value,
+        integrator=integrator,
+        band=band,
+        duration=duration,
+        compared=compared,
+        resume=resume,
+    )
+
+
+def _resuming(context: typer.Context) -> str:
+    """Return the command that resumes interrupted work: the typed command with `--resume`.
+
+    Omitted options remain omitted, so that their default behaviour applies again.
+    """
+    words = ["exugear", str(context.info_name)]
+    for parameter in context.command.params:
+        source = context.get_parameter_source(str(parameter.name))
+        value = context.params.get(str(parameter.name))
+        if source is None or source.name != "COMMANDLINE" or parameter.name == "resume":
+            continue
+        if parameter.param_type_name == "argument":
+            words.append(str(value))
+        elif value is True:
+            words.append(parameter.opts[0])
+        else:
+            words += [parameter.opts[0], str(value)]
+    return shlex.join([*words, "--resume"])
 
 
 class Executor(StrEnum):
@@ -315,12 +330,11 @@ def study(
 
     Finished points are stored; run the same command again to resume. Failed points are reported; the study continues.
     """
-    with exit_codes():
-        from exugear.cli.tasks import study as task
+    from exugear.cli.tasks import study as task
 
-        opens = task.executor_of_options(executor.value, workers, scheduler)
-        part = task.shard_of_options(shard, merge)
-        task.study(task.read_study(file, allow_dir, scripts), out, opens, part, merge, retry, as_json)
+    opens = task.executor_of_options(executor.value, workers, scheduler)
+    part = task.shard_of_options(shard, merge)
+    task.study(task.read_study(file, allow_dir, scripts), out, opens, part, merge, retry, as_json)
 
 
 def loads(
@@ -335,11 +349,10 @@ def loads(
     Reads the load files of section [loads]; needs no transmission error tables. Writes load duration distributions
     (LDD) as CSV, and a picture of them.
     """
-    with exit_codes():
-        from exugear.cli.case import read_gearbox
-        from exugear.cli.tasks import loads as task
+    from exugear.cli.case import read_gearbox
+    from exugear.cli.tasks import loads as task
 
-        task.loads(read_gearbox(case, allow_dir, scripts), out, as_json)
+    task.loads(read_gearbox(case, allow_dir, scripts), out, as_json)
 
 
 def losses(
@@ -369,14 +382,13 @@ def losses(
     Also computes the efficiency and the oil temperature. Uses the line loads of transmission error tables in the
     results folder. Churning and windage are not included. Writes no files.
     """
-    with exit_codes():
-        from exugear.cli.case import open_project
-        from exugear.cli.tasks import losses as task
+    from exugear.cli.case import open_project
+    from exugear.cli.tasks import losses as task
 
-        project = open_project(case, out, allow_dir, scripts=False, variant=Variant.rigid)
-        if load_case is not None:
-            project = project.at_load_case(load_case)
-        task.losses(project, speed, efficiency_map, as_json)
+    project = open_project(case, out, allow_dir, scripts=False, variant=Variant.rigid)
+    if load_case is not None:
+        project = project.at_load_case(load_case)
+    task.losses(project, speed, efficiency_map, as_json)
 
 
 def life(
@@ -394,11 +406,10 @@ def life(
     Lists damage, safety factors, rating lives and the limiting parts for the loads of section [loads]. Transmission
     error tables that are missing or out of date are computed first.
     """
-    with exit_codes():
-        from exugear.cli.case import open_project
-        from exugear.cli.tasks import life as task
+    from exugear.cli.case import open_project
+    from exugear.cli.tasks import life as task
 
-        task.life(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
+    task.life(open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias), as_json)
 
 
 def view(
@@ -434,14 +445,13 @@ def view(
     It is self-contained and three-dimensional. Operating deflection shapes at resonances need a stored steady-state
     response, see exugear steady.
     """
-    with exit_codes():
-        from exugear.cli.case import open_project
-        from exugear.cli.tasks import view as task
+    from exugear.cli.case import open_project
+    from exugear.cli.tasks import view as task
 
-        if near is not None and resonance is not None:
-            raise BadInputError(f"--near {near:g} and --resonance {resonance}: only one can be shown first; omit one")
-        project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
-        task.view(project, near, resonance, animation, as_json)
+    if near is not None and resonance is not None:
+        raise BadInputError(f"--near {near:g} and --resonance {resonance}: only one can be shown first; omit one")
+    project = open_project(case, out, allow_dir, scripts, variant, mesh_model, inertias)
+    task.view(project, near, resonance, animation, as_json)
 
 
 def report(
@@ -472,7 +482,6 @@ def report(
     runs and modes. Missing modes of these models are computed first, and a steady-state response over the operating
     range if there is none. gmsh scripts are not run; their meshes must exist.
     """
-    with exit_codes():
-        from exugear.cli.tasks import report as task
+    from exugear.cli.tasks import report as task
 
-        task.report(folder, near, stored, levers, compare, allow_dir, as_json)
+    task.report(folder, near, stored, levers, compare, allow_dir, as_json)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from exugear.cli.console import FailedError, make_results_folder, note, print_json, say
 from exugear.cli.tables import Column, print_table
 from exugear.cli.watched import WatchedProject
-from exugear.life.life_file import INFINITE, draw_life, summary
+from exugear.life.life_file import draw_life, summary
 
 SHOWN_LIMITS = 8
+_column = partial(Column, missing="")
 CONTACT_LEGEND = (
     "sigma_H: Hertzian stress from the line loads of the finite element contact within the path of contact, with K_v, "
     "gears displaced by each load; nominal: sigma_H0 of ISO 6336-2 at the largest load, without load factors. Outside: "
@@ -43,13 +45,6 @@ def life(project: WatchedProject, as_json: bool) -> None:
         say(f"Results: {path}; CSV tables and a picture in the same folder")
     if lines := [*found["failures"], *found["shortfalls"]]:
         raise FailedError("\n".join(["required life not reached:", *lines, f"Results: {path}"]))
-
-
-def _column(heading: str, key: str, form: str, factor: float = 1.0) -> Column:
-    """Return a column of numbers, of which unknown ones are omitted."""
-    return Column(
-        heading, lambda part: float("inf") if part.get(key) == INFINITE else part.get(key), form, factor, missing=""
-    )
 
 
 def _flank(kind: str) -> Column:
