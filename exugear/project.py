@@ -30,9 +30,12 @@ from exugear.results.folder import (
     write_duties,
 )
 from exugear.results.run_file import FINAL_NAME
+from exugear.results.solver_comparison import EXUDYN_FOLDER, SolverComparison, compare_solvers
+from exugear.steady.settings import SteadySettings, usual_speeds
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.bodies.of_gearbox import reduced_bodies
 from exugear.system.build import assemble
 from exugear.system.modes import Modes, kept_modes, modes_of
 from exugear.system.operating_points import bearing_duties, mesh_duties
@@ -65,8 +68,6 @@ if TYPE_CHECKING:
     from exugear.life.static_balance import StaticBalance
     from exugear.report.findings.design_changes import DesignStudy
     from exugear.report.writer import Report
-    from exugear.results.solver_comparison import SolverComparison
-    from exugear.steady.settings import SteadySettings
 
 Figures = dict[tuple[str, str, str], dict[str, float]]
 """Values of flanks by gear, family of meshes and flank, and then by symbol."""
@@ -279,8 +280,6 @@ class Project(ReprMixin):
         if not self.choice.variant.is_elastic:
             return {}
         inertias = self.choice.inertia_set(self.gearbox)
-        from exugear.system.bodies.of_gearbox import reduced_bodies
-
         return reduced_bodies(self.gearbox, inertias, bodies_folder(self.folder), begin)
 
     def assembly(self) -> Assembly:
@@ -309,8 +308,7 @@ class Project(ReprMixin):
         settings : speeds and method; by default the speed range of the first load case, and `parametric`
         progress : called with the number of finished speeds and the total
         """
-        from exugear.steady.settings import SteadySettings, usual_speeds  # not needed by a run
-        from exugear.steady.steady_file import stored_or_computed
+        from exugear.steady.steady_file import stored_or_computed  # kernels that a run does not need
 
         settings = settings or SteadySettings(usual_speeds(self.gearbox))
         assembly = self.assembly()
@@ -541,9 +539,6 @@ class Project(ReprMixin):
         FileError
             If the folder holds no run of the compiled solver from the same input.
         """
-        from exugear.results.run_file import FINAL_NAME
-        from exugear.results.solver_comparison import EXUDYN_FOLDER, compare_solvers
-
         beside = self.folder / EXUDYN_FOLDER
         given = {"duration": duration, "solver": "exudyn", "bodies": self.bodies(), **options}
         exudyn = simulate(self.gearbox, self.choice, self.stiffness(), beside, **given)

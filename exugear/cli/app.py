@@ -1,6 +1,7 @@
 """The command line: the table of its commands, and their common settings.
 
-Libraries that load slowly are imported inside the commands, so that ``--help`` responds immediately.
+The commands have their options and import what they do, `exugear.cli.tasks`, only when they start, so that ``--help``
+responds immediately. `exugear.cli.console.exit_codes` ends all of them.
 """
 
 from __future__ import annotations
@@ -15,30 +16,30 @@ from typing import Annotated
 
 import typer
 
-from exugear.cli.console import say, say_what_is_logged
+from exugear.cli.console import exit_codes, say, say_what_is_logged
 from exugear.cli.process import leave_out_dask, standard_streams
 
 COMMANDS = (
-    "file_commands.new",
-    "file_commands.import_",
-    "file_commands.schema",
-    "file_commands.migrate",
-    "file_commands.check",
-    "commands.ste",
-    "commands.bearings",
-    "commands.modes",
-    "commands.steady",
-    "commands.run",
-    "commands.study",
-    "commands.loads",
-    "commands.losses",
-    "commands.life",
-    "commands.view",
-    "commands.report",
-    "file_commands.export",
+    "files.new",
+    "files.import_",
+    "files.schema",
+    "files.migrate",
+    "files.check",
+    "models.ste",
+    "models.bearings",
+    "models.modes",
+    "models.steady",
+    "models.run",
+    "models.study",
+    "models.loads",
+    "models.losses",
+    "models.life",
+    "models.view",
+    "models.report",
+    "files.export",
 )
-"""Package and module of each command, in the order of the help. The function has the name of its module; names that
-Python reserves have a trailing underscore, which the command line omits.
+"""Module and function of each command, in the order of the help; names that Python reserves have a trailing underscore,
+which the command line omits.
 """
 
 OBJECTS_OF_A_START = 300_000
@@ -131,5 +132,6 @@ def _program(
 
 
 for place in COMMANDS:
-    verb = place.rpartition(".")[2]
-    app.command(verb.rstrip("_"))(getattr(importlib.import_module(f"exugear.cli.{place}"), verb))
+    module, verb = place.split(".")
+    command = getattr(importlib.import_module(f"exugear.cli.commands.{module}"), verb)
+    app.command(verb.rstrip("_"))(exit_codes()(command))

@@ -1,33 +1,32 @@
-"""Arguments and options that commands share, and checks of a gearbox file before they start."""
+"""The gearbox of a command: reading the file, and the checks that come before anything is computed or written."""
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
 
 from exugear.cli.console import BadInputError, check_results_folder, counted, model_errors, note
-from exugear.gearbox.variant import OFFERED, Variant, VariantError
+from exugear.cli.options import VARIANT_DESCRIPTIONS
+from exugear.cli.watched import WatchedProject
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.reading import GearboxFileError, read_toml
+from exugear.gearbox.variant import Variant
+from exugear.project import default_folder
+from exugear.results.folder import bodies_folder
+from exugear.steady.mean_system.mean_system import unsuitable
+from exugear.system.bearings.stiffness import elastic_names
+from exugear.system.bodies.of_gearbox import check_solids
+from exugear.system.build import assemble
+from exugear.system.gearbox_checks import check_parts, errors_of_bearings, gearbox_warnings, lacking, usual_variant
+from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.laws.registry import LAWS
-
-if TYPE_CHECKING:
-    from exugear.cli.watched import WatchedProject
-    from exugear.gearbox.choice import Choice
-    from exugear.gearbox.gearbox import Gearbox
-    from exugear.system.system import Assembly
-
-# Checks of a gearbox file before a command starts
+from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
+from exugear.system.tooth_mesh.tables import without_table
 
 
 def read_gearbox(case: Path, allow_dir: Path | None = None, scripts: bool = False, *, tell: bool = True) -> Gearbox:
     """Read a gearbox file for a command with the user's permissions, check all its parts, and print warnings."""
-    from exugear.gearbox.gearbox import Gearbox
-    from exugear.gearbox.named_files import Permissions
-    from exugear.gearbox.reading import GearboxFileError, read_toml
-    from exugear.system.gearbox_checks import check_parts, errors_of_bearings, gearbox_warnings
-
     check_allow_dir(allow_dir)
     try:
         content = read_toml(case)
@@ -53,20 +52,33 @@ def check_allow_dir(folder: Path | None) -> None:
 
 def open_project(
     case: Path,
-    choice: Choice,
     out: Path | None,
     allow_dir: Path | None,
     scripts: bool,
+    variant: Variant | None,
+    mesh_model: str = "line_of_action",
+    inertias: str | None = None,
+    load_case: str | None = None,
 ) -> WatchedProject:
-    """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files."""
-    from exugear.cli.watched import WatchedProject
-    from exugear.project import default_folder
+    """Read a gearbox file and raise an error for invalid or unavailable model settings; write no files.
 
+    Without a variant, the usual one of the gearbox is chosen and printed.
+    """
     gearbox = read_gearbox(case, allow_dir, scripts)
+    choice = Choice(variant or _chosen_variant(gearbox), str(mesh_model), inertias, load_case)
     folder = out or default_folder(case)
     check_choice(gearbox, choice, folder)
     check_results_folder(folder)
     return WatchedProject(gearbox, folder, choice)
+
+
+def _chosen_variant(gearbox: Gearbox) -> Variant:
+    """Return the usual variant of a gearbox, and print which one it is."""
+    variant = usual_variant(gearbox)
+    reason = lacking(gearbox, Variant.bushing)
+    why = f"bushing is not available, {reason}" if reason else "select another with --variant"
+    note(f"Variant {variant} ({VARIANT_DESCRIPTIONS[variant]}): {why}")
+    return variant
 
 
 def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
@@ -77,10 +89,6 @@ def assembled_by_iso(gearbox: Gearbox, variant: Variant) -> Assembly:
     FailedError
         The variant has no static equilibrium with this stiffness.
     """
-    from exugear.gearbox.choice import Choice
-    from exugear.system.build import assemble
-    from exugear.system.tooth_mesh.laws.stiffness import mesh_stiffness
-
     law = "iso6336"
     rigid = Variant.bushing if variant.is_elastic else variant
     with model_errors():
@@ -92,20 +100,11 @@ def steady_lack(assembly: Assembly, variant: Variant) -> str:
 
     The possible reasons do not depend on finite elements.
     """
-    from exugear.steady.mean_system.mean_system import unsuitable
-    from exugear.system.bearings.stiffness import elastic_names
-
     return unsuitable(assembly, elastic_names(assembly.gearbox) if variant.is_elastic else ())
 
 
 def check_choice(gearbox: Gearbox, choice: Choice, folder: Path) -> None:
     """Raise an error for invalid or unavailable model settings before files are written into the results folder."""
-    from exugear.results.folder import bodies_folder
-    from exugear.system.bodies.of_gearbox import check_solids
-    from exugear.system.gearbox_checks import lacking
-    from exugear.system.tooth_mesh.laws.registry import LAWS
-    from exugear.system.tooth_mesh.tables import without_table
-
     gearbox.bodies(choice.inertias)
     if choice.load_case is not None and choice.load_case not in gearbox.load_cases:
         known = ", ".join(gearbox.load_cases) or "none"
@@ -144,106 +143,3 @@ def check_friction(gearbox: Gearbox, mesh_model: str) -> None:
                 f"damping.tooth_friction = {friction:g}: requires line loads over the mesh cycle, which are unknown "
                 f"for a stated stiffness; remove pairs.{mesh.pair.name}.stiffness, or remove tooth_friction"
             )
-
-
-# Arguments and options that several commands share
-
-CaseArgument = Annotated[Path, typer.Argument(metavar="GEARBOX.toml", help="Gearbox file.", show_default=False)]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print a summary as a JSON object.")]
-OutOption = Annotated[
-    Path | None,
-    typer.Option("--out", metavar="DIR", help="Results folder. (default: results/NAME)"),
-]
-
-
-class MeshModel(StrEnum):
-    """Mesh force models, see `exugear.system.tooth_mesh.laws.registry`."""
-
-    _ignore_ = ["members", "law"]
-    members = vars()
-    for law in LAWS:
-        members[law] = law
-
-
-class ShiftRule(StrEnum):
-    """Source of profile shifts in an industry file: the file, or the centre distance."""
-
-    file = "file"
-    centre_distance = "centre-distance"
-
-
-class DistanceRule(StrEnum):
-    """Source of centre distances in an industry file: consistent values, the positions of the gears, or the file."""
-
-    agreeing = "agreeing"
-    positions = "positions"
-    file = "file"
-
-
-ShiftsOption = Annotated[
-    ShiftRule,
-    typer.Option(
-        "--shifts",
-        metavar="RULE",
-        help="Source of profile shifts: file (a contradiction to the centre distance is an error), or centre-distance "
-        "(adjusted to it).",
-    ),
-]
-DistancesOption = Annotated[
-    DistanceRule,
-    typer.Option(
-        "--distances",
-        metavar="RULE",
-        help="Source of centre distances that contradict the gear positions: agreeing (whichever agrees with the "
-        "profile shifts), positions, or file.",
-    ),
-]
-
-USUAL_LAW = MeshModel("line_of_action")
-
-
-_DESCRIPTIONS = {
-    Variant.rigid: "ideal joints",
-    Variant.bushing: "elastic bearings",
-    Variant.flexible: "flexible bodies",
-}
-_VARIANTS = ", ".join(f"{name} ({_DESCRIPTIONS[Variant.of(name)]})" for name in OFFERED)
-
-
-def _variant(name: str) -> Variant:
-    try:
-        return Variant.offered(name)
-    except VariantError as error:
-        raise typer.BadParameter(str(error)) from error
-
-
-VariantOption = Annotated[
-    Variant,
-    typer.Option("--variant", parser=_variant, metavar="NAME", help=f"Variant: {_VARIANTS}."),
-]
-LawOption = Annotated[
-    MeshModel, typer.Option("--mesh-model", metavar="NAME", help=f"Mesh force model: {', '.join(LAWS)}.")
-]
-FilesBelowOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--allow-dir",
-        metavar="DIR",
-        envvar="EXUGEAR_ALLOW_DIR",
-        help="Further folder from which the gearbox file may read files.",
-        show_default=False,
-        show_envvar=False,
-    ),
-]
-ScriptsOption = Annotated[
-    bool,
-    typer.Option(
-        "--allow-scripts",
-        envvar="EXUGEAR_ALLOW_SCRIPTS",
-        help="Run gmsh scripts of the gearbox file (full user rights).",
-        show_envvar=False,
-    ),
-]
-InertiasOption = Annotated[
-    str | None, typer.Option("--inertias", metavar="SET", help="Inertia set. (default: gearbox file)")
-]

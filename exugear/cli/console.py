@@ -13,11 +13,11 @@ import signal
 import sys
 import threading
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 from rich.console import Console
 from rich.progress import (
@@ -31,11 +31,6 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 from rich.text import Text
-
-if TYPE_CHECKING:
-    from rich.progress import TaskID
-
-    from fe_ste.transmission_error.table import MeshTable
 
 # Console output: results on standard output, everything else on standard error
 
@@ -111,6 +106,11 @@ def note(message: str, style: str = "") -> None:
     """
     lines = [shortened(plain(line)) for line in counted(message.split("\n"))]
     messages.print(Text("\n".join(lines), style=style), soft_wrap=True)
+
+
+def warn(message: str) -> None:
+    """Print a warning on standard error."""
+    note(f"Warning: {message}", style="yellow")
 
 
 def counted(lines: list[str]) -> list[str]:
@@ -301,84 +301,6 @@ def _user_error(error: Exception) -> Exception | None:
     if isinstance(error, (BalanceError, HarmonicBalanceError)):
         return FailedError(error)
     return None
-
-
-# Progress of long work on standard error: rows with the remaining time, all in one display
-
-
-class Row:
-    """Progress of one kind of work: text, completed amount, remaining time. It is visible from the first call."""
-
-    def __init__(self, bars: Bars) -> None:
-        self._bars = bars
-        self._task: TaskID | None = None
-
-    def __call__(self, words: str, done: float | None = None, total: float | None = None) -> None:
-        """Show a text and, if known, the completed and the total amount; raise KeyboardInterrupt after Ctrl-C."""
-        interruption.check()
-        display = self._bars.display()
-        if self._task is None:
-            self._task = display.add_task(words, total=total)
-        display.update(self._task, description=words, completed=done, total=total)
-
-
-class Bars:
-    """Rows of all current work; nested work adds a row to the existing display."""
-
-    def __init__(self) -> None:
-        self._outermost: ExitStack | None = None
-        self._display: Progress | None = None
-
-    @contextmanager
-    def row(self) -> Iterator[Row]:
-        """Yield a row for work inside the context; tooth contact computed there has its own row."""
-        from fe_ste.transmission_error.mean_contact import contacts_told
-
-        contacts = Row(self)
-
-        def solved(done: int, total: int) -> None:
-            contacts(f"tooth contact at the static load: {done} of {total}", done, total)
-
-        with ExitStack() as own:
-            if self._outermost is None:
-                self._outermost = own
-                own.callback(self._forget)
-            own.enter_context(contacts_told(solved))
-            yield Row(self)
-
-    def display(self) -> Progress:
-        """Return the display of all rows; it closes with the outermost context."""
-        if self._display is None:
-            assert self._outermost is not None, "a row is shown inside its context"
-            self._display = self._outermost.enter_context(progress_bar())
-        return self._display
-
-    def _forget(self) -> None:
-        self._outermost = self._display = None
-
-
-def files_read(row: Row) -> Callable[[int, int], None]:
-    """Return a function that shows the number of load files read and of all; a single file has no row."""
-
-    def show(done: int, total: int) -> None:
-        interruption.check()
-        if total > 1:
-            row("load files", done, total)
-
-    return show
-
-
-# Messages about tables of the transmission error
-
-
-def table_warnings(tables: Mapping[str, MeshTable]) -> list[str]:
-    """Print warnings about missing or truncated values of tables; return the reasons why tables are invalid."""
-    from exugear.system.tooth_mesh.tables import table_notes, table_warnings
-
-    for name, table in tables.items():
-        for remark in table_notes(name, table):
-            note(f"Warning: {remark}", style="yellow")
-    return [doubt for name, table in tables.items() for doubt in table_warnings(name, table)]
 
 
 def refuse_not_converged(meshes: Sequence[str]) -> None:

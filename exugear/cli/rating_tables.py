@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 
 from exugear.cli.console import note
-from exugear.cli.tables import print_table, print_text, wrapped
+from exugear.cli.tables import Column, print_table, print_text, wrapped
 from exugear.life.rating.sheet import FINITE_ELEMENTS, UNITS, FlankSheet, RatingSheet, sheet_value
 
 _BLOCKS: Mapping[str, tuple[str, ...]] = {
@@ -39,7 +39,8 @@ def print_rating(sheet: RatingSheet) -> None:
     """Print a rating sheet with its assumptions and neglected effects."""
     print_text(f"Rating to {sheet.edition}, method B; {sheet.load}")
     for title, flanks in _meshes(sheet):
-        print_table(f"Mesh {title}", [*_rows(flanks, sheet.other_edition)])
+        rows = [*_rows(flanks, sheet.other_edition)]
+        print_table(f"Mesh {title}", rows, [Column(heading, heading) for heading in rows[0]])
         for line in dict.fromkeys(line for flank in flanks for line in _remarks(flank)):
             note(line, style="yellow")
     for line in sheet.assumptions:

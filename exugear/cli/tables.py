@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, Self
 
 from rich.cells import cell_len, set_cell_size
 from rich.text import Text
@@ -15,21 +16,55 @@ from exugear.cli.console import plain, results
 NARROWEST = 79
 """Minimum width of a table in characters, which fits a terminal of 80."""
 GAP = 2
+INFINITE = "infinite"
+"""Text of infinite numbers in summaries, since JSON has none."""
 HARD_SPACE = "\u00a0"
 """Space in texts at which lines are broken only if necessary; it is printed as a space."""
 SMALLEST_NAME = 10
 """Minimum width of wrapped names and texts; a table without space for it is printed in parts below each other."""
 
-Row = Mapping[str, str]
-
 
 @dataclass(frozen=True)
 class Column:
-    """One column: its heading in lines, its cells, and whether they are text that may be wrapped."""
+    """A column of a table of summaries: the heading, the key of the value in a summary, and how the value is shown."""
+
+    heading: str
+    key: str | Callable[[Any], Any]
+    """Key in a summary, or a function that takes the value from it."""
+    form: str | Callable[[Any], str] = ""
+    """Format of a number, or a function that makes its text."""
+    factor: float = 1.0
+    """From the unit of the summary to that of the heading."""
+    missing: str = "-"
+    """Text of an unknown value."""
+    is_text: bool = False
+    """Whether cells are text that may be wrapped."""
+
+    def cell(self, summary: Any) -> str:
+        """Return the text of one summary."""
+        value = self.key(summary) if callable(self.key) else summary.get(self.key)
+        if value is None or value != value:
+            return self.missing
+        if value in (math.inf, INFINITE):
+            return "inf."
+        if self.factor != 1.0:
+            value *= self.factor
+        return self.form(value) if callable(self.form) else format(value, self.form)
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """One column as it is printed: heading in lines, cells, and whether they are text that may be wrapped."""
 
     heading: str
     cells: tuple[str, ...]
     is_text: bool
+
+    @classmethod
+    def of(cls, column: Column, summaries: Sequence[Any], is_text: bool) -> Self:
+        """Return a column with the texts of all summaries."""
+        heading = "\n".join(plain(line.strip()) for line in column.heading.split("\n"))
+        return cls(heading, tuple(plain(column.cell(summary)) for summary in summaries), is_text)
 
     @property
     def natural(self) -> int:
@@ -44,15 +79,16 @@ class Column:
         return max(_width(self.heading), min(self.natural, SMALLEST_NAME))
 
 
-def print_table(title: str, rows: Sequence[Row], texts: tuple[str, ...] = (), legend: str = "") -> None:
-    """Print rows under the keys of the first one, and a legend below them.
+def print_table(title: str, summaries: Iterable[Any], columns: Sequence[Column], legend: str = "") -> None:
+    """Print a table with one row for each summary, and a legend below it.
 
-    The first column is text, and so are those in `texts`; the others are numbers, which are never wrapped or truncated.
+    The first column is text; numbers are never wrapped or truncated.
     """
     limit = max(NARROWEST, results.width - 1)
     results.print(Text("\n".join(["", *wrapped(plain(title), limit)]), style="bold"), soft_wrap=True)
-    columns = [_column(heading, rows, not place or heading in texts) for place, heading in enumerate(rows[0])]
-    for number, part in enumerate(_parts(columns, limit)):
+    rows = [*summaries]
+    printed = [_Cells.of(column, rows, column.is_text or column is columns[0]) for column in columns]
+    for number, part in enumerate(_parts(printed, limit)):
         if number:
             results.print()
         for line in _lines(part, _widths(part, limit)):
@@ -124,16 +160,11 @@ def _pieces(paragraph: str, width: int) -> Iterator[str]:
             yield rest
 
 
-def _column(heading: str, rows: Sequence[Row], is_text: bool) -> Column:
-    shown = "\n".join(plain(line.strip()) for line in heading.split("\n"))
-    return Column(shown, tuple(plain(row.get(heading, "")) for row in rows), is_text)
-
-
 def _width(text: str) -> int:
     return max(cell_len(line) for line in text.split("\n"))
 
 
-def _parts(columns: list[Column], limit: int) -> Iterator[list[Column]]:
+def _parts(columns: list[_Cells], limit: int) -> Iterator[list[_Cells]]:
     """Yield groups of columns that fit in one line; further groups are printed below and repeat the first column."""
     part = columns[:1]
     for column in columns[1:]:
@@ -149,7 +180,7 @@ def _total(widths: Sequence[int]) -> int:
     return 1 + sum(widths) + GAP * (len(widths) - 1)
 
 
-def _widths(columns: Sequence[Column], limit: int) -> list[int]:
+def _widths(columns: Sequence[_Cells], limit: int) -> list[int]:
     """Widths of columns; the widest texts are narrowed first."""
     widths = [column.natural for column in columns]
     while _total(widths) > limit:
@@ -160,7 +191,7 @@ def _widths(columns: Sequence[Column], limit: int) -> list[int]:
     return widths
 
 
-def _lines(columns: Sequence[Column], widths: Sequence[int]) -> Iterator[str]:
+def _lines(columns: Sequence[_Cells], widths: Sequence[int]) -> Iterator[str]:
     """Yield the lines of a table: headings, a rule, rows."""
     yield from _row([column.heading.split("\n") for column in columns], columns, widths, bottom=True)
     yield " " + "─" * (_total(widths) - 1)
@@ -175,7 +206,7 @@ def _lines(columns: Sequence[Column], widths: Sequence[int]) -> Iterator[str]:
 
 
 def _row(
-    cells: Sequence[list[str]], columns: Sequence[Column], widths: Sequence[int], *, bottom: bool = False
+    cells: Sequence[list[str]], columns: Sequence[_Cells], widths: Sequence[int], *, bottom: bool = False
 ) -> Iterator[str]:
     """Yield the lines of one row: texts are left-aligned, numbers right-aligned, headings aligned at the bottom."""
     height = max(map(len, cells))

@@ -1,32 +1,26 @@
-"""A project that shows the progress of long work, for the commands; imported inside them."""
+"""A project that shows the progress of long work, for the commands."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from exugear.cli.console import (
-    BadInputError,
-    Bars,
-    FailedError,
-    Row,
-    files_read,
-    make_results_folder,
-    note,
-    table_warnings,
-)
+from exugear.cli.bars import Bars, Row, files_read
+from exugear.cli.console import BadInputError, FailedError, make_results_folder, note, warn
 from exugear.gearbox.reading import GearboxFileError
 from exugear.project import Project
 from exugear.results.folder import time_noted
+from exugear.results.solver_comparison import SolverComparison
+from exugear.steady.settings import SteadySettings
 from exugear.system.bearings.duty import BearingLoadState
 from exugear.system.bearings.stiffness import elastic_names
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.modes import Modes
 from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.contact_state import MeshLoadState
-from exugear.system.tooth_mesh.tables import TableRequest
+from exugear.system.tooth_mesh.tables import TableRequest, table_notes, table_warnings
 from exugear.transient.outcome import Progress, Run
 from fe_ste.elimination import FactorisationError
 from fe_ste.geometry.checks import GeometryError
@@ -38,8 +32,6 @@ if TYPE_CHECKING:
 
     from exugear.life.load_spectrum.counted import CountedLoads
     from exugear.life.rating.sheet import RatingSheet
-    from exugear.results.solver_comparison import SolverComparison
-    from exugear.steady.settings import SteadySettings
 
 
 @dataclass(frozen=True, repr=False)
@@ -62,8 +54,8 @@ class WatchedProject(Project):
         with time_noted(self.folder, "tables, computed before dynamics") if requests else nullcontext():
             self.computed(requests)
         # Mesh models themselves refuse tables that they cannot use.
-        for doubt in table_warnings(self.tables_at_work()):
-            note(f"Warning: {doubt}", style="yellow")
+        for doubt in errors_of_tables(self.tables_at_work()):
+            warn(doubt)
 
     def computed(
         self, requests: Sequence[TableRequest], progress: Callable[[int, int], None] | None = None
@@ -173,6 +165,14 @@ def _life_progress(row: Row) -> tuple[Callable[[str], None], Callable[[int, int]
         lambda pair: row(f"{pair}: root stress by finite elements"),
         lambda done, total: row("static balance", done, total),
     )
+
+
+def errors_of_tables(tables: Mapping[str, MeshTable]) -> list[str]:
+    """Print warnings about missing or truncated values of tables; return the reasons why tables are invalid."""
+    for name, table in tables.items():
+        for remark in table_notes(name, table):
+            warn(remark)
+    return [doubt for name, table in tables.items() for doubt in table_warnings(name, table)]
 
 
 def _computed(request: TableRequest, row: Row, before: int, total: int) -> MeshTable:

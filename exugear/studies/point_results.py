@@ -18,13 +18,18 @@ from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.units import UM
 from exugear.life.dynamic_factors import factors, source_hash
+from exugear.life.gear_life import pair_stresses
 from exugear.life.life import UNTRUSTED_REACH, check_reach, checked_loads, compute_life, life_hash, rating_of
 from exugear.life.life_file import to_dataset
 from exugear.life.load_spectrum.counted import CountedLoads
 from exugear.life.static_balance import KeptAngles, stress_requests
+from exugear.results.folder import run_directory
+from exugear.results.run_file import load_run
 from exugear.steady.settings import SteadySettings, usual_speeds
 from exugear.steady.steady_file import steady_path, stored_or_computed
+from exugear.steady.steady_response import response_of
 from exugear.system.bodies.elastic_body import ElasticBody
+from exugear.system.bodies.of_gearbox import reduced_bodies
 from exugear.system.build import assemble
 from exugear.system.modes import Modes, modes_of
 from exugear.system.statics import StaticState, static_state
@@ -32,15 +37,17 @@ from exugear.system.system import Assembly
 from exugear.system.tooth_mesh.element import MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS, law_of
 from exugear.system.tooth_mesh.tables import TableRequest, requested_tables, table_warnings, wanted_table
+from exugear.transient.runup import Solver, simulate
+from exugear.transient.start import refuse_to_resume
 from fe_ste.root_stress import MeshCycleStress
 from fe_ste.tools.stores import Store
 from fe_ste.tools.threads import stop_if_asked
 from fe_ste.transmission_error.table import MeshTable, TableError, TableInput, prepared_compliance
+from fe_ste.transmission_error.transmission_error import static_transmission_error
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from exugear.transient.runup import Solver
 
 # Tables, stresses and reductions shared by the points of a study: computed once under a lock, by the first to need them
 
@@ -114,8 +121,6 @@ class Shared:
         SharedTableError
             The table failed a validity check.
         """
-        from exugear.life.gear_life import pair_stresses
-
         folder = self.folder / "stress" / request.wanted.hash[:32]
         if request.stored is None:
             path = folder / f"{request.name}.states.nc"
@@ -129,8 +134,6 @@ class Shared:
 
     def bodies(self, gearbox: Gearbox, inertias: str) -> dict[str, ElasticBody]:
         """Return the reduced flexible bodies; computed once, under a lock."""
-        from exugear.system.bodies.of_gearbox import reduced_bodies
-
         own = {key: value for key, value in gearbox.content.items() if key not in UNRELATED}
         key = hashlib.sha256(json.dumps(own, sort_keys=True).encode()).hexdigest()
         folder = self.folder / "bodies"
@@ -326,7 +329,6 @@ class PointResults:
         if self.settings.steady is None:
             raise PointError("results of the steady-state response require a section [steady] with speeds")
         from exugear.steady.steady_file import to_dataset
-        from exugear.steady.steady_response import response_of
 
         return to_dataset(response_of(self.assembly, self.settings.steady, progress=_ignore_progress))
 
@@ -341,16 +343,10 @@ class PointResults:
         KeyboardInterrupt
             The user stopped it.
         """
-        from exugear.results.run_file import load_run
-
         return load_run(self._simulated(self.choice))
 
     def _simulated(self, choice: Choice) -> Path:
         """Return the file of a run; warnings about its validity are stored."""
-        from exugear.results.folder import run_directory
-        from exugear.transient.runup import simulate
-        from exugear.transient.start import refuse_to_resume
-
         resume = not refuse_to_resume(run_directory(self.folder, choice))
         run = simulate(
             self.gearbox,
@@ -381,8 +377,6 @@ class PointResults:
         BalanceError
             A static state without equilibrium.
         """
-        from exugear.life.life import rating_of
-
         rating = rating_of(self.gearbox)
         if rating.dynamic_factor_run is not None:
             self._simulated(replace(self.choice, load_case=rating.dynamic_factor_run))
@@ -408,8 +402,6 @@ class PointResults:
     def _computed_states(
         self, pair: str, positions: int, torque_factors: tuple[float, ...], misalignment_um: tuple[float, ...]
     ) -> xr.Dataset:
-        from fe_ste.transmission_error.transmission_error import static_transmission_error
-
         if pair not in self.gearbox.pairs:
             raise PointError(f"no gear pair {pair!r}; pairs are {', '.join(self.gearbox.pairs)}")
         wanted = wanted_table(self.gearbox, pair, positions)

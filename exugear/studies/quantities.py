@@ -17,6 +17,7 @@ import numpy as np
 
 from exugear.gearbox.renames import STUDY_RENAMES, renamed_hint
 from exugear.gearbox.units import RPM
+from exugear.life.life_file import limits
 from exugear.steady.peaks import line_name, peaks
 from exugear.studies.point_results import PointError, PointResults
 from exugear.system.modes import FREE_ROTATION, Modes
@@ -483,8 +484,6 @@ def static_safety(results: PointResults, *, bearing: str = "") -> float:
 
 def life_hours(results: PointResults) -> float:
     """Hours of operation until the first Miner's sum of a gear or a bearing reaches one."""
-    from exugear.life.life_file import limits
-
     largest = max((damage for _, _, damage in limits(results.life)), default=math.nan)
     hours = float(results.life["hours"].sum())
     if largest > 0.0:

@@ -21,6 +21,7 @@ from exugear.system.bearings.rolling.catalogue import catalogue_rows
 from exugear.system.bearings.rolling.friction import friction_series
 from exugear.system.bearings.rolling.rows import BearingError
 from exugear.system.bearings.stiffness import elastic_names, linear_law, misplaced_factor, mounts_at_work, unsupported
+from exugear.system.bodies.of_gearbox import check_elastic_body, narrowed_seats
 from exugear.system.kernels.coordinates import BODY_SIZE, SPIN
 from exugear.system.part_warnings import pair_warnings, part_warnings
 from exugear.system.tooth_mesh.placement import MeshError, line_of_action_row, loaded_flanks, tooth_places
@@ -197,6 +198,19 @@ def lacking(gearbox: Gearbox, variant: str) -> str:
     return _misfits(gearbox, chosen) or free_motion(gearbox, variant) or _misplaced_factors(gearbox, chosen)
 
 
+def usual_variant(gearbox: Gearbox) -> Variant:
+    """Return the variant of computations for which the user names none: bushing, or rigid where bearings are missing.
+
+    Examples
+    --------
+    >>> usual_variant(Gearbox.from_toml("cases/grc750/gearbox.toml"))
+    'bushing'
+    """
+    if lacking(gearbox, Variant.bushing):
+        return Variant.rigid
+    return Variant.bushing
+
+
 def _misfits(gearbox: Gearbox, variant: Variant) -> str:
     """Return the first error of `check_parts` about flexible bodies: an impossible body, or a seat off the body."""
     for name in elastic_names(gearbox) if variant.is_elastic else ():
@@ -237,8 +251,6 @@ def gearbox_warnings(gearbox: Gearbox) -> tuple[str, ...]:
 
 
 def _narrowed_seats(gearbox: Gearbox) -> Iterator[str]:
-    from exugear.system.bodies.of_gearbox import narrowed_seats
-
     for name in elastic_names(gearbox):
         if gearbox.case.bodies[gearbox.body(name).family].solid is None:
             yield from narrowed_seats(gearbox, name)
@@ -279,6 +291,4 @@ def _pairs_with_axes(gearbox: Gearbox) -> list[str]:
 
 
 def _build_elastic_body(gearbox: Gearbox, name: str) -> None:
-    from exugear.system.bodies.of_gearbox import check_elastic_body
-
     check_elastic_body(gearbox, name)

@@ -22,6 +22,7 @@ from exugear.gearbox.versions import MODES
 from exugear.system.bodies.elastic_body import ElasticBody
 from exugear.system.bodies.reduction import TILT_X, TILT_Y, UX, UY, UZ, ReducedBody
 from exugear.system.build import assemble
+from exugear.system.diagrams import draw_campbell, draw_energies
 from exugear.system.kernels.coordinates import SPIN
 from exugear.system.kernels.meshes import STIFFNESS, TILT_COLUMNS, TILT_STIFFNESS
 from exugear.system.statics import RIGID_BODY_LIMIT, Linearised, linearise, meshes_near_unconverged, static_state
@@ -30,6 +31,7 @@ from exugear.system.tooth_mesh.element import Angles, MeshData
 from exugear.system.tooth_mesh.laws.registry import LAWS
 from fe_ste.tools.arrays import Booleans, Floats
 from fe_ste.tools.display import ReprMixin, TitledRows
+from fe_ste.tools.drawing import axes_or_new
 from fe_ste.tools.stores import Layout, Store, load_dataset, write_dataset
 
 if TYPE_CHECKING:
@@ -255,9 +257,6 @@ class Modes(ReprMixin):
         >>> ax.get_xlabel(), ax.get_ylabel()
         ('Input speed / rpm', 'Frequency / kHz')
         """
-        from exugear.system.diagrams import draw_campbell, draw_energies  # for drawing only
-        from fe_ste.tools.drawing import axes_or_new
-
         if kind == "energies":
             return draw_energies(self.energies(), ax)
         if kind != "campbell":

@@ -18,6 +18,7 @@ import numpy as np
 import scipy.linalg
 
 from exugear.system.bodies.turning_frame import TurningBody
+from exugear.system.diagrams import draw_misalignment
 from exugear.system.kernels.connectors import add_connector_tangents
 from exugear.system.kernels.coordinates import SpringArrays, add_spring_forces
 from exugear.system.kernels.meshes import FORCE, OUTSIDE, MeshArrays
@@ -399,8 +400,6 @@ class StaticState(ReprMixin):
         >>> [label.get_text() for label in ax.get_yticklabels()], ax.get_xlabel()
         (['stage_1', 'stage_2'], 'Misalignment / mrad')
         """
-        from exugear.system.diagrams import draw_misalignment  # for drawing only
-
         return draw_misalignment(self.assembly.mesh_names, self.misalignment, ax)
 
     def _line(self) -> str:

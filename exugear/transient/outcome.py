@@ -21,6 +21,8 @@ import numpy as np
 
 from exugear.gearbox.load_cases import BURSTING_RIM_SPEED, LoadSummary, rim_radii
 from exugear.results.folder import read_stored_gearbox
+from exugear.results.spectra.diagrams import draw_levels, draw_waterfall
+from exugear.results.spectra.waterfall import order_lines
 from exugear.system.signals import BALANCE_TERMS, MESH_TIMES
 from exugear.system.system import Assembly
 from fe_ste.tools.arrays import Floats
@@ -140,9 +142,7 @@ class Run(ReprMixin):
         Traceback (most recent call last):
         ValueError: kind = 'shape': must be one of orders, waterfall
         """
-        from exugear.results.spectra.diagrams import draw_levels, draw_waterfall  # for drawing only
         from exugear.results.spectra.run_spectra import run_waterfall
-        from exugear.results.spectra.waterfall import order_lines
 
         if kind not in ("orders", "waterfall"):
             raise ValueError(f"kind = {kind!r}: must be one of orders, waterfall")

@@ -30,6 +30,7 @@ from fe_ste.tools.stores import Layout, load_dataset, write_dataset
 from fe_ste.tools.threads import Workers
 from fe_ste.tools.versions import TABLE
 from fe_ste.transmission_error.compliance import PairCompliance, pair_compliance
+from fe_ste.transmission_error.diagrams import draw_table
 from fe_ste.transmission_error.grid import Checkpoint, Submits, solve_grid
 from fe_ste.transmission_error.search import unloaded_states
 from fe_ste.transmission_error.states import CUT_OFF, RESULTS, STATE_AXES, StateAxes, cut_off_variable
@@ -247,8 +248,6 @@ class MeshTable(ReprMixin):
         >>> table.plot("stiffness").get_ylabel()
         'Mesh stiffness / (N/µm)'
         """
-        from fe_ste.transmission_error.diagrams import draw_table  # for drawing only
-
         return draw_table(self.static_state, kind, ax)
 
     @property

@@ -1,1 +1,1 @@
-"""The commands of the command line, one module each."""
+"""The commands: their options, and the tasks that they start."""

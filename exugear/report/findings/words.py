@@ -41,15 +41,17 @@ class QuantityLabel:
 
     title: str
     column: str
+    short: str
+    """Column heading of a narrow table."""
     unit: str
     factor: float
     """From SI units."""
 
 
 QUANTITIES = {
-    "error": QuantityLabel("Transmission error", "transmission error", "µm", 1e6),
-    "force": QuantityLabel("Bearing force", "bearing force", "kN", 1e-3),
-    "acceleration": QuantityLabel("Acceleration at bearings", "acceleration", "m/s²", 1.0),
+    "error": QuantityLabel("Transmission error", "transmission error", "TE", "µm", 1e6),
+    "force": QuantityLabel("Bearing force", "bearing force", "force", "kN", 1e-3),
+    "acceleration": QuantityLabel("Acceleration at bearings", "acceleration", "accel.", "m/s²", 1.0),
 }
 """Labels of the quantities of a ranking."""
 

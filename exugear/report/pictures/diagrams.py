@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from exugear.gearbox.units import RPM
 from exugear.report.findings.ranking import envelopes, order_amplitudes, ranking_of
+from exugear.report.findings.words import QUANTITIES
 from exugear.results.spectra.waterfall import OrderLine
 from exugear.system.diagrams import draw_campbell
 from exugear.system.tooth_mesh.tables import TableRequest
@@ -72,12 +73,6 @@ def plot_campbell(
 
 # Steady-state responses over speed
 
-QUANTITIES = {
-    "error": ("Overall transmission error / µm", 1e6),
-    "force": ("Bearing force / kN", 1e-3),
-    "acceleration": ("Acceleration at bearings / (m/s²)", 1.0),
-}
-"""Axis labels of the three quantities, and factors from SI units."""
 SHOWN_RESONANCES = 10
 """Maximum number of resonances with a circle, whose orders have a curve."""
 SHOWN_RANGE = 1e-4
@@ -113,13 +108,14 @@ def plot_response(
     >>> settings = SteadySettings(SpeedRange.from_text("15:25:11"))
     >>> ax = plot_response(steady_response(gearbox, Choice("rigid"), stiffness, settings=settings))
     >>> ax.get_xlabel(), ax.get_ylabel()
-    ('Input speed / rpm', 'Overall transmission error / µm')
+    ('Input speed / rpm', 'Transmission error, ± µm')
     """
     curves = envelopes(data)
     if quantity not in curves:
         raise ValueError(f"quantity = {quantity!r}: must be one of {', '.join(curves)}")
     amplitude = order_amplitudes(data)[quantity]
-    label, factor = QUANTITIES[quantity]
+    label = QUANTITIES[quantity]
+    factor = label.factor
     speed = curves[quantity].speed / RPM
     orders = data["order"].to_numpy()[1:]
     ranking = ranking_of(data)
@@ -142,7 +138,7 @@ def plot_response(
         highest = factor * float(amplitude.max(initial=0.0))
         if highest > 0.0:
             panel.set(yscale="log", ylim=(SHOWN_RANGE * highest, 2.0 * highest))
-        panel.set(xlabel="Input speed / rpm", ylabel=label)
+        panel.set(xlabel="Input speed / rpm", ylabel=f"{label.title}, ± {label.unit}")
         panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
         return panel
 

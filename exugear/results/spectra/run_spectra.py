@@ -15,6 +15,7 @@ import xarray as xr
 
 from exugear.gearbox.units import RPM
 from exugear.results.run_file import read_run as read_arrays
+from exugear.results.spectra.diagrams import draw_highest_levels
 from exugear.results.spectra.resonances import (
     Pick,
     Resonance,
@@ -399,8 +400,6 @@ class Comparison(ReprMixin):
         ----------
         ax : matplotlib axes; by default new ones, whose ``ax.figure`` can be shown and saved
         """
-        from exugear.results.spectra.diagrams import draw_highest_levels  # for drawing only
-
         only = {self.first.variant: self.only_first, self.second.variant: self.only_second}
         marks = {name: [finding.strongest for finding in findings] for name, findings in only.items()}
         return draw_highest_levels({run.variant: run.spectra for run in self.runs}, marks, ax)

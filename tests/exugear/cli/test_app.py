@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import gc
+import inspect
 import json
 import shutil
 import signal
@@ -18,8 +19,8 @@ import numpy as np
 import pytest
 import xarray
 
-from exugear.cli import commands, file_commands
 from exugear.cli.app import COMMANDS, OBJECTS_OF_A_START, app, garbage_seldom_looked_for
+from exugear.cli.commands import files, models
 from exugear.cli.console import BadInputError, FailedError, exit_codes, interruption
 from exugear.gearbox.gearbox import Gearbox
 from exugear.system.tooth_mesh.tables import requested_tables
@@ -102,16 +103,16 @@ def test_exit_codes(error, code, said, capsys):
     assert said in capsys.readouterr().err
 
 
-def test_every_file_of_a_verb_is_offered_as_one():
-    rooms = (file_commands, commands)
-    files = {
-        f"{room.__name__.rpartition('.')[2]}.{path.stem}"
-        for room in rooms
-        for path in Path(room.__file__).parent.glob("*.py")
+def test_every_command_is_offered_once():
+    written = {
+        f"{module.__name__.rpartition('.')[2]}.{name}"
+        for module in (files, models)
+        for name, value in vars(module).items()
+        if inspect.isfunction(value) and value.__module__ == module.__name__ and not name.startswith("_")
     }
-    assert set(COMMANDS) == {file for file in files if not file.endswith(".__init__")}
+    assert set(COMMANDS) == written
     assert [command.callback.__name__ for command in app.registered_commands] == [
-        verb.partition(".")[2] for verb in COMMANDS
+        place.partition(".")[2] for place in COMMANDS
     ]
 
 
@@ -185,7 +186,7 @@ def test_a_damaged_table_is_computed_again(spur_case, tmp_path):
 def test_another_process_draws_the_same_curves(computed, tmp_path, monkeypatch):
     case, out, _ = computed
     shutil.copytree(out / "tables", tmp_path / "tables")
-    monkeypatch.setattr("exugear.cli.commands.ste.WORTH_A_PROCESS", 0)
+    monkeypatch.setattr("exugear.cli.tasks.ste.WORTH_A_PROCESS", 0)
     outcome = exugear("ste", case, "--positions", 8, "--out", tmp_path)
     assert outcome.exit_code == 0, outcome.stderr
     for name in ("ste.png", "load_share_spur.png"):

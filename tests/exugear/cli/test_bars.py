@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from exugear.cli.console import BadInputError, Bars, FailedError, exit_codes, files_read, model_errors
+from exugear.cli.bars import Bars, files_read
+from exugear.cli.console import BadInputError, FailedError, exit_codes, model_errors
 from exugear.gearbox.reading import GearboxFileError
 from exugear.system.statics import BalanceError
 from exugear.system.tooth_mesh.placement import MeshError

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from exugear.cli.case import MeshModel
-from exugear.cli.commands.run import Solver
+from exugear.cli.commands.models import Solver
+from exugear.cli.options import MeshModel
 from exugear.gearbox.choice import Choice
 from exugear.gearbox.gearbox import Gearbox
 from exugear.gearbox.variant import Variant, VariantError
@@ -49,6 +49,18 @@ def test_a_variant_is_refused_at_once_and_the_one_meant_is_named():
             Choice(name)
     with pytest.raises(VariantError, match="is for internal comparisons only; variants are"):
         Variant.offered("jointed")
+
+
+@pytest.mark.parametrize("verb", ["modes", "steady"])
+def test_without_a_variant_the_usual_one_of_the_gearbox_is_computed_and_named(case, verb):
+    on_bearings = iso(verb, case, "--json")
+    assert json.loads(on_bearings.stdout)["variant"] == "bushing", on_bearings.stderr
+    assert "Variant bushing (elastic bearings): select another with --variant" in on_bearings.stderr
+    text = case.read_text(encoding="utf-8")
+    case.write_text(text.replace("radial_N_per_m = 2e7, ", "radial_N_per_m = 0.0, "), encoding="utf-8")
+    on_joints = iso(verb, case, "--json")
+    assert json.loads(on_joints.stdout)["variant"] == "rigid", on_joints.stderr
+    assert "Variant rigid (ideal joints): bushing is not available, " in on_joints.stderr
 
 
 @pytest.mark.sample
@@ -277,7 +289,7 @@ def test_view_writes_a_page_where_nothing_can_be_rendered(case, monkeypatch):
     def unable(*arguments, **options):
         raise RenderingError("3-D pictures need pyvista: pip install")
 
-    monkeypatch.setattr("exugear.report.pictures.scene.draw_gearbox", unable)
+    monkeypatch.setattr("exugear.cli.tasks.view.draw_gearbox", unable)
     outcome = iso("view", case, "--variant", "rigid", "--json")
     assert outcome.exit_code == 0, outcome.stderr
     (page,) = json.loads(outcome.stdout)["files"]

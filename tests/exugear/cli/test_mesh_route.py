@@ -12,7 +12,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from exugear.cli.commands.run import MeshRoute
+from exugear.cli.commands.models import MeshRoute
 from exugear.gearbox.choice import Choice
 from exugear.project import Project
 from exugear.results.run_file import load_run

@@ -10,7 +10,7 @@ import xarray as xr
 from pandas import NA
 
 from exugear import resonances
-from exugear.cli.commands.steady import Method
+from exugear.cli.commands.models import SteadyMethod
 from exugear.steady.settings import METHODS
 from exugear.steady.steady_file import load_response
 from fe_ste.transmission_error.table import MeshTable
@@ -26,7 +26,7 @@ def steady(case, *more):
 
 
 def test_the_methods_offered_are_those_of_the_library():
-    assert tuple(method.value for method in Method) == METHODS
+    assert tuple(method.value for method in SteadyMethod) == METHODS
 
 
 @pytest.mark.validation

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,15 +17,11 @@ from rich.console import Console
 
 from exugear.cli import rating_tables, tables
 from exugear.cli.app import app
-from exugear.cli.commands import bearings, life, loads, modes, report, ste, steady
-from exugear.cli.commands import study as study_command
-from exugear.cli.file_commands import check
-from exugear.gearbox.sections.case import DampingSection
-from exugear.gearbox.variant import Variant
+from exugear.cli.tasks import bearings, check, life, loads, modes, report, ste, steady
+from exugear.cli.tasks import study as study_task
 from exugear.life.rating.sheet import FINITE_ELEMENTS, FlankSheet, RatingSheet
-from exugear.report.findings.ranking import PeakAmplitude, Ranking, Resonance
+from exugear.report.findings.ranking import PeakAmplitude, Resonance
 from exugear.report.writer import Report
-from exugear.system.bearings.duty import Ratings
 from tests.exugear.cases.command import exugear
 
 COLUMNS = 79
@@ -33,7 +29,6 @@ LINES = 40
 NAMES = [f"{stem}{n}".ljust(24, "x") for n, stem in enumerate(9 * ["intermediate_stage_"], start=1)]
 """Nine names of 24 characters."""
 LONG = NAMES[0]
-MODULES = (check, rating_tables, bearings, life, loads, modes, report, ste, steady, study_command)
 WHOLE = re.compile(r"^\d[\d.]*$")
 
 
@@ -72,19 +67,21 @@ def printed(monkeypatch: pytest.MonkeyPatch) -> Iterator[Printed]:
     monkeypatch.setattr(tables, "results", console)
     monkeypatch.setattr("exugear.cli.console.results", console)
 
-    def spy(title: str, rows: Sequence[Any], *more: Any, **named: Any) -> None:
-        found.rows.append(rows)
-        tables.print_table(title, rows, *more, **named)
+    print_table = tables.print_table
 
-    for module in MODULES:
+    def spy(title: str, summaries: Iterable[Any], columns: Sequence[tables.Column], legend: str = "") -> None:
+        rows = [*summaries]
+        found.rows.append([{column.heading: column.cell(row) for column in columns} for row in rows])
+        print_table(title, rows, columns, legend)
+
+    for module in (tables, rating_tables, bearings, check, life, loads, modes, report, ste, steady, study_task):
         monkeypatch.setattr(module, "print_table", spy)
     yield found
 
 
 def test_check(printed: Printed) -> None:
-    force = SimpleNamespace(name=LONG, body=NAMES[1], position=(0.0, 0.0, -1.23456), wrench=6 * [-123456.789])
-    case = SimpleNamespace(overall=SimpleNamespace(input=LONG))
-    gearbox: Any = SimpleNamespace(name=LONG, train=SimpleNamespace(ratio=-0.00123456), forces=[force], case=case)
+    large = 3 * [-123456.789]
+    force = {"force": LONG, "body": NAMES[1], "z_mm": -1234.56, "force_N": large, "moment_N_m": large}
     pairs = [
         {
             "pair": name,
@@ -136,9 +133,10 @@ def test_check(printed: Printed) -> None:
         }
         for name in NAMES
     ]
-    check._print_check(gearbox, pairs, thicknesses, cases, supports)
+    summary = {"name": LONG, "ratio": -0.00123456, "pairs": pairs, "tooth_thickness": thicknesses, "forces": [force]}
+    check.print_check(LONG, {**summary, "load_cases": cases, "bearings": supports})
     printed.check(6)
-    check._print_availability({"flexible": " ".join(NAMES)}, {}, {"life": []})
+    check.print_availability({"variants": {"flexible": " ".join(NAMES)}, "steady": {}, "life": {"life": []}})
     assert max(map(len, printed.lines)) <= COLUMNS
 
 
@@ -173,41 +171,39 @@ def test_ste(printed: Printed) -> None:
         }
         for name in NAMES
     ]
-    ste.print_table("Static transmission error", [*map(ste._ste_row, summaries)], legend=ste.TABLE_LEGEND)
-    ste.print_table("Reference", [*map(ste._reference_row, summaries)], legend=ste.REFERENCE_LEGEND)
+    tables.print_table("Static transmission error", summaries, ste.TABLES, ste.TABLE_LEGEND)
+    tables.print_table("Reference", summaries, ste.REFERENCES, ste.REFERENCE_LEGEND)
     printed.check(2)
 
 
 def test_bearings(printed: Printed) -> None:
-    duties: list[Any] = [
-        SimpleNamespace(
-            name=name,
-            radial_load=12345678.9,
-            axial_load=-12345678.9,
-            radial_stiffness=12.34e9,
-            stiffness=1e9 * np.eye(6),
-            misalignment=12.3456e-3,
-            element_load=1234567.8,
-            pressure=12345e6,
-            ratings=Ratings(12345678.0, 12345678.0, True, ("A", "B")),
-            basic_life=1.2345e11,
-            reference_life=1.2345e-11,
-        )
-        for name in NAMES
-    ]
-    meshes: list[Any] = [
-        SimpleNamespace(
-            name=name,
-            force=-12345678.9,
-            misalignment=-12.3456e-3,
-            opening=-1234.5e-6,
-            load_centroid=-123.4e-3,
-            face_load_factor=12.34,
-            pressure=12345e6,
-        )
-        for name in NAMES
-    ]
-    bearings._print_bearings(duties, meshes, Variant.bushing)
+    duty: dict[str, Any] = {
+        "radial_load_kN": 12345.6789,
+        "axial_load_kN": -12345.6789,
+        "radial_stiffness_N_per_m": 12.34e9,
+        "axial_stiffness_N_per_m": 1e9,
+        "tilt_stiffness_N_m_per_rad": 1e9,
+        "misalignment_mrad": 12.3456,
+        "most_loaded_element_kN": 1234.5678,
+        "contact_pressure_MPa": 12345.0,
+        "dynamic_rating_kN": 12345.678,
+        "static_rating_kN": 12345.678,
+        "ratings_estimated": True,
+        "ratings_of_makers": ["A", "B"],
+        "L10_Mrev": 1.2345e11,
+        "L10r_Mrev": 1.2345e-11,
+    }
+    mesh = {
+        "force_kN": -12345.6789,
+        "misalignment_mrad": -12.3456,
+        "opening_um": -1234.5,
+        "load_centroid_mm": -123.4,
+        "K_Hbeta": 12.34,
+        "contact_pressure_MPa": 12345.0,
+    }
+    duties = [{**duty, "bearing": name} for name in NAMES]
+    meshes = [{**mesh, "mesh": name} for name in NAMES]
+    bearings.print_bearings({"variant": "bushing", "bearings": duties, "meshes": meshes})
     printed.check(3)
 
 
@@ -218,9 +214,8 @@ def test_steady(printed: Printed) -> None:
         "acceleration": PeakAmplitude(1234.5, NAMES[1], 3456),
     }
     lines = [f"12 x {name} - 3 x {NAMES[0]} + 2 x {NAMES[1]}" for name in NAMES]
-    resonances = tuple(Resonance(line, 123.456, -1234.5678, 12345.678, loudness) for line in lines)
-    ranking = Ranking(resonances, (0.1, 300.0), True, "shafts and housing")
-    steady.print_table("Resonances", [*map(steady._row, resonances)], ("bearing",), steady._legend(ranking))
+    resonances = [Resonance(line, 123.456, -1234.5678, 12345.678, loudness).summary() for line in lines]
+    steady.print_ranking("Resonances", {"resonances": resonances, "accelerations_of": "shafts and housing"})
     printed.check(1)
     assert "(3456)" in "\n".join(printed.lines)
 
@@ -245,37 +240,28 @@ def test_modes(printed: Printed) -> None:
             "name": "rigid-body rotation",
         },
     ]
-    assembly = SimpleNamespace(variant="bushing", mesh_model="line_of_action", inertias=LONG, housing_factor=0.5)
-    assembly.gearbox = SimpleNamespace(case=SimpleNamespace(damping=DampingSection()))
-    found: Any = SimpleNamespace(assembly=assembly)
-    modes._print_modes(found, rows)
+    modes.print_modes({"variant": "bushing", "mesh_model": "line_of_action", "inertias": LONG, "modes": rows})
     printed.check(1)
 
 
 def test_life(printed: Printed) -> None:
     flanks = [f"{NAMES[0]} + {name}" for name in NAMES]
-    keys = [
-        *("contact_stress", "nominal_contact", "outside", "face_load", "contact_damage", "contact_safety"),
-        *("standard_contact_safety", "root_stress", "nominal_root", "compression", "root_damage", "root_safety"),
-        *("standard_root_safety", "contact_static", "root_static"),
-    ]
-    variables: dict[str, Any] = {f"flank_{key}": ("flank", np.full(9, 123.456)) for key in keys}
-    for key in ("contact_stress", "nominal_contact", "root_stress", "nominal_root", "compression"):
-        variables[f"flank_{key}"] = ("flank", np.full(9, -1234e6))
-    for key in ("contact_damage", "root_damage"):
-        variables[f"flank_{key}"] = ("flank", np.full(9, 1.234e-131))
-    for key in ("contact_holder", "root_holder"):
-        variables[f"flank_{key}"] = ("flank", np.array(NAMES, dtype=object))
-    for key in ("largest_load", "equivalent"):
-        variables[f"bearing_{key}"] = ("bearing", np.full(9, 12345678.9))
-    for key in ("basic_hours", "reference_hours", "modified_hours"):
-        variables[f"bearing_{key}"] = ("bearing", np.full(9, 1.234e12))
-    for key, value in {"viscosity_ratio": 1.23, "pressure": 12345e6, "static_safety": 1234.56}.items():
-        variables[f"bearing_{key}"] = ("bearing", np.full(9, value))
-    variables |= {"bearing_damage": ("bearing", np.full(9, 2.0)), "bearing_reference_damage": ("bearing", np.ones(9))}
-    lists = dict.fromkeys(("failures", "assumptions", "unrated", "reliefs"), json.dumps([]))
-    data = xr.Dataset(variables, {"flank": flanks, "bearing": NAMES}, lists | {"life_years": 20.0})
-    life._print_result(data)
+    flank = dict.fromkeys(("outside", "face_load", "contact_safety", "root_safety"), 123.456)
+    flank |= dict.fromkeys(("standard_contact_safety", "standard_root_safety"), 123.456)
+    flank |= dict.fromkeys(("contact_static", "root_static"), 123.456)
+    flank |= dict.fromkeys(("contact_stress", "nominal_contact", "root_stress", "nominal_root", "compression"), -1234e6)
+    flank |= dict.fromkeys(("contact_damage", "root_damage"), 1.234e-131)
+    bearing: dict[str, Any] = dict.fromkeys(("largest_load", "equivalent"), 12345678.9)
+    bearing |= dict.fromkeys(("basic_hours", "reference_hours"), 1.234e12) | {"modified_hours": "infinite"}
+    bearing |= {"viscosity_ratio": 1.23, "pressure": 12345e6, "static_safety": 1234.56}
+    summary = {
+        "flanks": [{**flank, "flank": label, "contact_holder": LONG, "root_holder": LONG} for label in flanks],
+        "bearings": [{**bearing, "bearing": name} for name in NAMES],
+        "limits": [{"part": name, "by": "L10r", "damage": 2.0} for name in NAMES],
+        **dict.fromkeys(("failures", "assumptions", "unrated", "reliefs"), ()),
+    }
+    life.print_life(summary, 20.0)
+    assert "inf." in "\n".join(printed.lines)
     printed.check(4)
 
 
@@ -292,18 +278,10 @@ def test_loads(printed: Printed) -> None:
         "mean_speed_rpm": -1234.5,
     }
     parts = [{"part": f"{LONG}, flank +", "loaded_by": name, "cycles": 1.234e12, "force_kN": 1234.5} for name in NAMES]
-    slopes = dict.fromkeys(np.linspace(3.0, 12.0, 12).tolist(), 123456.7)
-    counted: Any = SimpleNamespace(
-        body=LONG,
-        equivalents=lambda: slopes,
-        equivalent_ranges={"torque": slopes, "moment_around_the_y_axis": slopes},
-        distribution=SimpleNamespace(hours=np.ones(1234), revolutions=1e9 * np.ones(1234)),
-        part_rows=lambda: parts,
-    )
-    loads.print_table("Load sources", [loads._source_row(source)], ("kind",))
-    loads.print_table("Equivalent", loads._equivalent_rows(counted), legend=loads._equivalent_legend(counted))
-    loads.print_table("Hub", [loads._hub_row(*item) for item in counted.equivalent_ranges.items()])
-    loads.print_table("Parts", loads._part_rows(counted), ("mesh",))
+    slopes = {f"{m:.4g}": 123.4567 for m in np.linspace(3.0, 12.0, 12)}
+    summary = {"body": LONG, "life_years": 20.0, "hours": 175320.0, "revolutions": 1.234e12, "sources": [source]}
+    summary |= {"equivalent_torque_kN_m": slopes, "equivalent_range_1_Hz_kN_m": slopes}
+    loads.print_loads({**summary, "hub_equivalent_range_1_Hz": {"moment_y_kN_m": slopes}, "parts": parts}, 1234)
     printed.check(4)
 
 
@@ -315,15 +293,14 @@ def test_report(printed: Printed, tmp_path: Any) -> None:
 
 
 def test_study(printed: Printed, monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = [{"parameter": LONG, "result": NAMES[1], "change per\nstep %": "-123.456"}]
-    study_command.print_table("Sensitivity", rows, ("result",))
+    tables.print_table("Sensitivity", [(NAMES[1], LONG, -1.23456)], study_task.SLOPES)
     dataset = xr.Dataset(
         {name: ("evaluation", np.full(1300, -1.2345e-123)) for name in NAMES}
         | {"on_front": ("evaluation", np.ones(1300, dtype=int))}
     )
     study: Any = SimpleNamespace(file=SimpleNamespace(parameters=NAMES[2:]), tolerances=None)
-    monkeypatch.setattr(study_command, "_judged", lambda _: NAMES[:2])
-    study_command._print_front(study, dataset)
+    monkeypatch.setattr(study_task, "_judged", lambda _: NAMES[:2])
+    study_task._print_front(study, dataset)
     printed.check(2)
 
 
@@ -341,7 +318,22 @@ def test_the_list_of_commands_is_not_cut() -> None:
 
 def test_names_are_wrapped_and_numbers_are_not(printed: Printed) -> None:
     rows = [{"a": LONG, "b\nmm": "1234.5", "c": f"{LONG} and more of {LONG}"}]
-    tables.print_table("Title", rows, ("c",))
-    printed.rows.append(rows)
+    tables.print_table("Title", rows, [tables.Column(key, key, is_text=key == "c") for key in rows[0]])
     printed.check(1)
     assert tables.wrapped(LONG, 12) == ["intermediate", "_stage_1xxxx"]
+
+
+def test_a_column_converts_units_and_names_unknown_and_infinite_values(printed: Printed) -> None:
+    columns = (
+        tables.Column("part", "part"),
+        tables.Column("load\nkN", "load_N", ".2f", 1e-3),
+        tables.Column("life\nh", lambda row: row["turns"] / 60.0, ".4g", missing="none"),
+    )
+    rows = [
+        {"part": "a", "load_N": 12345.6, "turns": float("inf")},
+        {"part": "b", "load_N": None, "turns": float("nan")},
+    ]
+    tables.print_table("Title", rows, columns)
+    assert printed.rows == [
+        [{"part": "a", "load\nkN": "12.35", "life\nh": "inf."}, {"part": "b", "load\nkN": "-", "life\nh": "none"}]
+    ]

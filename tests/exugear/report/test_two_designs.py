@@ -99,7 +99,7 @@ def test_a_damaged_response_of_the_other_design_is_the_reason(folders: dict[str,
 
 @pytest.mark.validation
 def test_different_ranges_are_refused_before_anything_is_computed(folders: dict[str, Path], monkeypatch) -> None:
-    monkeypatch.setattr("exugear.cli.commands.report._compute_missing", lambda *arguments: pytest.fail("computed"))
+    monkeypatch.setattr("exugear.cli.tasks.report._compute_missing", lambda *arguments: pytest.fail("computed"))
     outcome = exugear("report", folders["grc"], "--levers", "--compare", folders["range"])
     assert outcome.exit_code == 2 and "15 to 20 rpm" in outcome.stderr
 

@@ -4,35 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
-import typer
+import numpy as np
+import xarray as xr
 
-from exugear.cli.case import (
-    USUAL_LAW,
-    CaseArgument,
-    FilesBelowOption,
-    InertiasOption,
-    JsonOption,
-    LawOption,
-    OutOption,
-    ScriptsOption,
-    VariantOption,
-    open_project,
+from exugear.cli.console import BadInputError, FailedError, note, print_json, say
+from exugear.cli.watched import WatchedProject
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.units import RPM
+from exugear.report.findings.context import METHOD_LABELS, model_label
+from exugear.report.findings.headline import Headline
+from exugear.report.findings.ranking import Resonance, most_complete_response, ranking_of
+from exugear.report.findings.words import Labels, percentages
+from exugear.report.pictures.scene import (
+    animate_elastic_bodies,
+    animate_mode,
+    draw_elastic_bodies,
+    draw_gearbox,
+    draw_mode,
+    elastic_scene,
 )
-from exugear.cli.console import BadInputError, FailedError, exit_codes, note, print_json, say
-from exugear.gearbox.variant import Variant
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from exugear.report.findings.headline import Headline
-    from exugear.report.findings.ranking import Resonance
-    from exugear.report.findings.words import Labels
-    from exugear.report.web.mode_page import ModeRow, ResonanceRow
-    from exugear.system.modes import Modes
-    from exugear.system.system import Assembly
-    from fe_ste.tools.arrays import Complexes, Floats
+from exugear.report.pictures.shapes import bodies_of, mode_scene, motions_of
+from exugear.report.web.mode_page import ModeRow, ResonanceRow, write_mode_page
+from exugear.report.writer import command_line
+from exugear.steady.deflection_shapes import deflection_shapes
+from exugear.steady.steady_file import load_response, settings_of
+from exugear.system.modes import Modes
+from exugear.system.system import Assembly
+from fe_ste.tools.arrays import Complexes, Floats
+from fe_ste.tools.drawing import RenderingError
+from fe_ste.tools.files import FileError
 
 SHOWN_ENERGIES = 3
 """Number of listed fractions of the strain energy."""
@@ -40,88 +41,41 @@ SHOWN_RESONANCES = 10
 """Number of listed resonances of the ranking."""
 
 
-def view(
-    case: CaseArgument,
-    variant: VariantOption = Variant.bushing,
-    mesh_model: LawOption = USUAL_LAW,
-    inertias: InertiasOption = None,
-    near: Annotated[
-        float | None,
-        typer.Option(
-            min=0.0, metavar="HZ", help="Show the mode nearest to this frequency first. (default: gearbox file)"
-        ),
-    ] = None,
-    resonance: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            metavar="N",
-            help="Show the vibration in operation at this resonance of the ranking of exugear steady first.",
-            show_default=False,
-        ),
-    ] = None,
-    animation: Annotated[
-        bool, typer.Option("--gif", help="Also write an animated GIF of the mode or resonance shown first.")
-    ] = False,
-    out: OutOption = None,
-    allow_dir: FilesBelowOption = None,
-    scripts: ScriptsOption = False,
-    as_json: JsonOption = False,
-) -> None:
-    """Write a web page of the gearbox: mode shapes, and operating deflection shapes at resonances.
-
-    It is self-contained and three-dimensional. Operating deflection shapes need a stored steady-state response, see
-    exugear steady.
-    """
-    with exit_codes():
-        from exugear.gearbox.choice import Choice
-        from exugear.report.findings.headline import Headline
-        from exugear.report.findings.ranking import ranking_of
-        from exugear.report.writer import command_line
-
-        if near is not None and resonance is not None:
-            raise BadInputError(f"--near {near:g} and --resonance {resonance}: only one can be shown first; omit one")
-        project = open_project(case, Choice(variant.value, mesh_model.value, inertias), out, allow_dir, scripts)
-        project.begin()
-        project.prepare()
-        folder = project.modes_path.parent
-        assembly = project.assembly()
-        response = _stored_response(assembly, folder)
-        if response is None:
-            command = command_line(project.gearbox, project.folder, "steady", project.choice)
-            if resonance is not None:
-                raise BadInputError(f"--resonance {resonance}: no steady-state response; run: {command}")
-            modes = project.modes()
-            headline = None
-            about = f"Vibration at resonances in operation needs a steady-state response: {command}"
-        else:
-            ranking = ranking_of(response)
-            count = len(ranking.resonances)
-            if resonance is not None and resonance > count:
-                raise BadInputError(
-                    f"--resonance {resonance}: the ranking has {count} resonances; choose one or omit it"
-                )
-            modes = project.modes()
-            headline = Headline(assembly.choice, "", "", ranking, None, response, modes.to_dataset())
-            about = ""
-        wanted = project.gearbox.case.report.reference_frequency_Hz if near is None else near
-        first = int(modes.overall.argmax()) if wanted is None else modes.nearest(wanted)
-        written = _draw(modes, headline, about, folder, first, resonance, animation)
-        if as_json:
-            shown = {"mode": first + 1} if resonance is None else {"resonance": resonance}
-            print_json({"case": str(case), **shown, "files": [str(file) for file in written]})
-            return
-        for file in written:
-            say(str(file))
+def view(project: WatchedProject, near: float | None, resonance: int | None, animation: bool, as_json: bool) -> None:
+    """Write the page of a project."""
+    project.begin()
+    project.prepare()
+    folder = project.modes_path.parent
+    assembly = project.assembly()
+    response = _stored_response(assembly, folder)
+    if response is None:
+        command = command_line(project.gearbox, project.folder, "steady", project.choice)
+        if resonance is not None:
+            raise BadInputError(f"--resonance {resonance}: no steady-state response; run: {command}")
+        modes = project.modes()
+        headline = None
+        about = f"Vibration at resonances in operation needs a steady-state response: {command}"
+    else:
+        ranking = ranking_of(response)
+        count = len(ranking.resonances)
+        if resonance is not None and resonance > count:
+            raise BadInputError(f"--resonance {resonance}: the ranking has {count} resonances; choose one or omit it")
+        modes = project.modes()
+        headline = Headline(assembly.choice, "", "", ranking, None, response, modes.to_dataset())
+        about = ""
+    wanted = project.gearbox.case.report.reference_frequency_Hz if near is None else near
+    first = int(modes.overall.argmax()) if wanted is None else modes.nearest(wanted)
+    written = _draw(modes, headline, about, folder, first, resonance, animation)
+    if as_json:
+        shown = {"mode": first + 1} if resonance is None else {"resonance": resonance}
+        print_json({"case": project.gearbox.source, **shown, "files": [str(file) for file in written]})
+        return
+    for file in written:
+        say(str(file))
 
 
 def _stored_response(assembly: Assembly, folder: Path) -> xr.Dataset | None:
     """Return the stored steady-state response with the most complete method that belongs to the gearbox file."""
-    from exugear.gearbox.choice import Choice
-    from exugear.report.findings.ranking import most_complete_response
-    from exugear.steady.steady_file import load_response, settings_of
-    from fe_ste.tools.files import FileError
-
     responses = []
     for path in sorted(folder.glob("steady-*.nc")):
         try:
@@ -143,10 +97,6 @@ def _draw(
     animation: bool,
 ) -> list[Path]:
     """Write the page of all elastic modes and resonances, and pictures of what it shows first."""
-    from exugear.report.findings.context import METHOD_LABELS, model_label
-    from exugear.report.findings.words import Labels
-    from exugear.report.web.mode_page import write_mode_page
-
     assembly = modes.assembly
     words = Labels(assembly.gearbox)
     ranked: tuple[Resonance, ...] = ()
@@ -190,10 +140,6 @@ def _draw(
 
 def _mode_rows(modes: Modes, words: Labels, headline: Headline | None, ranked: Sequence[Resonance]) -> list[ModeRow]:
     """Return the modes that move a drawn body, with the numbers of the resonances in operation at each."""
-    from exugear.report.findings.words import percentages
-    from exugear.report.pictures.shapes import bodies_of, motions_of
-    from exugear.report.web.mode_page import ModeRow
-
     assembly = modes.assembly
     resonances: dict[int, list[str]] = {}
     for number, resonance in enumerate(ranked, start=1):
@@ -222,10 +168,6 @@ def _mode_rows(modes: Modes, words: Labels, headline: Headline | None, ranked: S
 
 def _resonance_rows(assembly: Assembly, headline: Headline, ranked: Sequence[Resonance]) -> list[ResonanceRow]:
     """Return the resonances with their operating deflection shapes, without those that are not found again."""
-    from exugear.gearbox.units import RPM
-    from exugear.report.web.mode_page import ResonanceRow
-    from exugear.steady.deflection_shapes import deflection_shapes
-
     assert headline.response is not None
     shapes = deflection_shapes(
         assembly, headline.response, [(resonance.order, resonance.speed) for resonance in ranked]
@@ -255,19 +197,6 @@ def _draw_pictures(
 
     Flexible bodies are drawn by their strain energy in a mode; in operation, all bodies by their displacement.
     """
-    import numpy as np
-
-    from exugear.report.pictures.scene import (
-        animate_elastic_bodies,
-        animate_mode,
-        draw_elastic_bodies,
-        draw_gearbox,
-        draw_mode,
-        elastic_scene,
-    )
-    from exugear.report.pictures.shapes import bodies_of, mode_scene, motions_of
-    from fe_ste.tools.drawing import RenderingError
-
     bodies = bodies_of(assembly.gearbox)
     gearbox = stem.with_name("gearbox.png")
     still = stem.with_suffix(".png")

@@ -1,0 +1,169 @@
+"""Commands for gearbox files: templates, industry files, description of the keys, old files and checks."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from exugear.cli import options
+from exugear.cli.console import BadInputError, print_json, say
+from exugear.gearbox.renames import MigrationError, migrated
+from exugear.gearbox.templates.kinds import KINDS, template
+from fe_ste.tools.files import write_file
+
+
+class Kind(StrEnum):
+    """Kinds of gearboxes for which a template exists."""
+
+    _ignore_ = ["members", "kind"]
+    members = vars()
+    for kind in KINDS:
+        members[kind] = kind
+
+
+PARALLEL = Kind("parallel")
+"""Template without an option, which the tutorial uses."""
+_KINDS_TOLD = "; ".join(f"{kind}: {words}" for kind, words in KINDS.items())
+
+
+def new(
+    case: Annotated[Path, typer.Argument(metavar="FILE.toml", help="File to write.", show_default=False)],
+    kind: Annotated[Kind, typer.Option(metavar="NAME", help=f"Template. {_KINDS_TOLD}.")] = PARALLEL,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Write a commented gearbox file to start from. It runs without changes."""
+    from exugear.project import default_folder
+
+    if case.suffix != ".toml":
+        raise BadInputError(f"{case}: specify a file name that ends with .toml")
+    if case.exists() or case.is_symlink():
+        raise BadInputError(f"{case}: exists already and is not overwritten; specify another file")
+    _write(case, template(kind.value))
+    if as_json:
+        print_json({"case": str(case), "kind": kind.value})
+        return
+    say(f"{case}: {KINDS[kind.value]}. Next:")
+    for line in (f"check {case}", f"run {case}", f"report {default_folder(case)}"):
+        say(f"  exugear {line}")
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        write_file(path, text.encode())
+    except OSError as error:
+        raise BadInputError(f"{path}: cannot be written ({error.strerror}); specify another file") from error
+
+
+def import_(
+    file: Annotated[Path, typer.Argument(metavar="FILE.rexs", help="REXS file: XML, JSON or zip.", show_default=False)],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FOLDER", help="Folder for gearbox.toml. (default: file name without extension)"),
+    ] = None,
+    shifts: options.ShiftsOption = options.ShiftRule.file,
+    distances: options.DistancesOption = options.DistanceRule.agreeing,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Convert a REXS file (1.0 to 2.0) to a gearbox file. Each value has its source; assumptions are marked."""
+    from exugear.cli.tasks.rexs import import_rexs
+    from exugear.exchange.rexs.to_case.notes import Rules
+
+    import_rexs(file, out, Rules(shifts.value, distances.value), as_json)
+
+
+def schema(
+    page: Annotated[bool, typer.Option("--page", help="Write a human-readable Markdown page instead.")] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="File to write. (default: standard output)")
+    ] = None,
+) -> None:
+    """Describe every key of the gearbox file as a JSON schema. Editors use it to check and complete files."""
+    from exugear.gearbox.sections.schema.keys import json_schema
+    from exugear.gearbox.sections.schema.keys import page as described
+
+    text = described() if page else json.dumps(json_schema(), indent=1, ensure_ascii=False) + "\n"
+    if out is None:
+        typer.echo(text, nl=False)
+        return
+    _write(out, text)
+    say(f"Written: {out}")
+
+
+def migrate(
+    file: Annotated[Path, typer.Argument(metavar="FILE.toml", help="Gearbox or study file.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="File to write. (default: the same file)")
+    ] = None,
+) -> None:
+    """Update the key names of an older file; comments are kept."""
+    from exugear.gearbox.reading import read_text
+
+    try:
+        text, changes = migrated(read_text(file))
+    except MigrationError as error:
+        raise BadInputError(f"{file}: {error}") from error
+    target = out or file
+    if changes or target != file:
+        _write(target, text)
+    for change in changes:
+        say(change)
+    if changes:
+        say(f"{len(changes)} names replaced in {target}")
+    else:
+        say(f"{file}: no old names")
+
+
+def check(
+    case: options.CaseArgument,
+    rating: Annotated[
+        bool,
+        typer.Option(
+            "--rating",
+            help="Rate the gears to ISO 6336-2 and -3 instead: all factors, next to the finite element results of the "
+            "results folder.",
+        ),
+    ] = False,
+    out: options.OutOption = None,
+    allow_dir: options.FilesBelowOption = None,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Check a gearbox file and summarise it. Lists gear pairs, bearings and load cases; writes no files."""
+    from exugear.cli.tasks import check as task
+
+    if rating:
+        task.rate(case, out, allow_dir, as_json)
+    else:
+        task.check(case, allow_dir, as_json)
+
+
+def export(
+    case: options.CaseArgument,
+    rexs: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE.rexs", help="REXS file that the gearbox file was imported from.", show_default=False
+        ),
+    ],
+    to: Annotated[
+        Path | None,
+        typer.Option("--to", metavar="FILE", help="File to write. (default: NAME-exugear, same folder as FILE.rexs)"),
+    ] = None,
+    out: options.OutOption = None,
+    allow_dir: options.FilesBelowOption = None,
+    shifts: options.ShiftsOption = options.ShiftRule.file,
+    distances: options.DistancesOption = options.DistanceRule.agreeing,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Write results into a copy of a REXS file. They are REXS attributes where possible, else custom_exugear ones.
+
+    Geometry and static forces are always written; tables, modes, bearings and runs if the results folder has them. Use
+    --shifts and --distances of the import.
+    """
+    from exugear.cli.tasks.rexs import export_rexs
+    from exugear.exchange.rexs.to_case.notes import Rules
+
+    export_rexs(case, rexs, to, out, allow_dir, Rules(shifts.value, distances.value), as_json)

@@ -1,0 +1,205 @@
+"""The command `losses`: friction of teeth and bearings at an operating point, efficiency, and oil temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from exugear.cli.case import assembled_by_iso
+from exugear.cli.console import BadInputError, note, print_json, say, warn
+from exugear.cli.tables import Column, print_table, print_text, significant
+from exugear.cli.watched import WatchedProject
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.load_cases import static_load_in_words
+from exugear.gearbox.units import RPM
+from exugear.gearbox.variant import Variant
+from exugear.life.losses import Losses, losses_of, operating_speed
+from exugear.project import Project
+from exugear.system.gearbox_checks import lacking
+from exugear.system.operating_points import bearing_duties
+from fe_ste.transmission_error.table import MeshTable
+
+MESH_LEGEND = (
+    "H_V: gear loss factor, from the line loads of the table (*) or in closed form. mu_m: mean coefficient of friction "
+    "by Schlenk. Band: also by Niemann and Winter and, with a table, by Xu and Kahraman."
+)
+BEARING_LEGEND = (
+    "P: equivalent dynamic load; C: basic dynamic load rating; series: the one whose constants SKF's frictional moment "
+    "takes, otherwise the mean and the band of all series of the type."
+)
+SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
+"""Shares of speed and of torque of the efficiency map."""
+FASTEST = 1e6
+"""Highest speed, rpm."""
+
+
+def losses(project: WatchedProject, speed: float | None, efficiency_map: bool, as_json: bool) -> None:
+    """Compute and print the losses of a project."""
+    gearbox = project.gearbox
+    if speed is not None and not 0.0 < abs(speed) <= FASTEST:
+        raise BadInputError(f"--speed {speed:g}: must be a number of rpm up to {FASTEST:g}, not 0")
+    chosen = operating_speed(gearbox, speed)
+    tables = project.tables_at_work()
+    found = losses_of(gearbox, _duties(gearbox), tables, chosen)
+    summary = {"case": gearbox.source, **summarise(found), "map": []}
+    if efficiency_map:
+        summary["map"] = _mapped(project, tables, chosen)
+    if as_json:
+        print_json(summary)
+    else:
+        _print(static_load_in_words(gearbox), summary)
+
+
+def _duties(gearbox: Gearbox) -> Any:
+    """Return the loads of catalogue bearings, with the tooth stiffness of ISO 6336-1; none without bearings."""
+    if not gearbox.bearings or lacking(gearbox, Variant.bushing):
+        return ()
+    return bearing_duties(assembled_by_iso(gearbox, Variant.bushing))
+
+
+def _mapped(project: Project, tables: dict[str, MeshTable], speed: float) -> list[dict[str, float]]:
+    """Efficiency and losses over shares of the speed and of the torques."""
+    torques = project.gearbox.case.static_load.torques_N_m
+    rows = []
+    for torque in SHARES:
+        scaled = {body: torque * value for body, value in torques.items()}
+        gearbox = project.gearbox.varied({"static_load.torques_N_m": scaled})
+        duties = _duties(gearbox)
+        for share in SHARES:
+            own = losses_of(gearbox, duties, tables, share * speed)
+            rows.append(
+                {
+                    "torque_share": torque,
+                    "speed_share": share,
+                    "input_power_W": own.input_power,
+                    "losses_W": own.total,
+                    "efficiency": own.efficiency,
+                    "oil_temperature_C": own.oil_temperature,
+                }
+            )
+    return rows
+
+
+def summarise(found: Losses) -> dict[str, Any]:
+    """Summarise losses, with units in the keys."""
+    return {
+        "speed_rpm": found.speed / RPM,
+        "input_power_W": found.input_power,
+        "output_power_W": found.output_power,
+        "losses_W": found.total,
+        "losses_band_W": list(found.band),
+        "efficiency": found.efficiency,
+        "oil_temperature_C": found.oil_temperature,
+        "viscosity_mm2_per_s": 1e6 * found.viscosity,
+        "assumed_roughness": found.assumed_roughness,
+        "bearings_without_data": list(found.without_data),
+        "meshes": [
+            {
+                "family": mesh.family,
+                "count": mesh.count,
+                "power_W": mesh.power,
+                "loss_factor": mesh.loss_factor,
+                "from_table": mesh.from_table,
+                "friction": mesh.friction,
+                **{f"friction_{method}": value for method, value in mesh.other_friction.items()},
+                "loss_W": mesh.loss,
+                "loss_band_W": list(mesh.band),
+            }
+            for mesh in found.meshes
+        ],
+        "bearings": [
+            {
+                "family": bearing.family,
+                "count": bearing.count,
+                "equivalent_load_N": bearing.load,
+                "load_ratio": bearing.load_ratio,
+                "speed_rpm": bearing.speed / RPM,
+                "series": bearing.series,
+                "loss_W": bearing.loss,
+                "loss_band_W": list(bearing.band),
+            }
+            for bearing in found.bearings
+        ],
+        "seals": [
+            {"name": seal.name, "diameter_mm": 1e3 * seal.diameter, "speed_rpm": seal.speed / RPM, "loss_W": seal.loss}
+            for seal in found.seals
+        ],
+    }
+
+
+def _kilowatts(power: float) -> str:
+    return significant(1e-3 * power, 4, 4)
+
+
+def _band(band: Sequence[float], digits: int = 2) -> str:
+    """Return the band of powers (W) in kW; a dash where one method alone is known."""
+    low, high = band
+    if low == high:
+        return "–"
+    return f"{significant(1e-3 * low, digits, 4)}–{significant(1e-3 * high, digits, 4)}"
+
+
+def _families(part: Mapping[str, Any]) -> str:
+    """Name of a family of equal parts, with their number."""
+    return f"{part['count']} x {part['family']}".removeprefix("1 x ")
+
+
+LOSS = (Column("loss\nkW", "loss_W", _kilowatts), Column("band\nkW", "loss_band_W", _band))
+SPEED = Column("speed\nrpm", "speed_rpm", significant)
+MESHES = (
+    Column("meshes", _families),
+    Column("power\nkW", "power_W", _kilowatts),
+    Column("H_V", lambda mesh: f"{mesh['loss_factor']:.4f}" + "*" * mesh["from_table"]),
+    Column("mu_m", "friction", ".4f"),
+    *LOSS,
+)
+BEARINGS = (
+    Column("bearings", _families),
+    Column("P\nkN", "equivalent_load_N", partial(significant, digits=3), 1e-3),
+    Column("P/C", "load_ratio", ".2g"),
+    SPEED,
+    Column("series", lambda bearing: bearing["series"] or "–"),
+    *LOSS,
+)
+SEALS = (Column("seals", "name"), Column("diameter\nmm", "diameter_mm", significant), SPEED, LOSS[0])
+
+
+def _print(load: str, summary: Mapping[str, Any]) -> None:
+    """Print the tables of parts, the efficiency, and what is assumed or not included."""
+    bearings = summary["bearings"]
+    title = f"Losses at {significant(summary['speed_rpm'])} rpm, {load}: meshes"
+    print_table(title, summary["meshes"], MESHES, MESH_LEGEND)
+    if bearings:
+        print_table("Bearings", bearings, BEARINGS, BEARING_LEGEND)
+    if summary["seals"]:
+        print_table("Seals", summary["seals"], SEALS)
+    losses = f"{_kilowatts(summary['losses_W'])} kW"
+    if summary["losses_band_W"][0] < summary["losses_band_W"][1]:
+        losses += f" (band {_band(summary['losses_band_W'], 4)})"
+    print_text(
+        f"Input {_kilowatts(summary['input_power_W'])} kW, losses {losses}, output "
+        f"{_kilowatts(summary['output_power_W'])} kW: efficiency {100.0 * summary['efficiency']:.2f} %. Oil "
+        f"{summary['oil_temperature_C']:.3g} °C, {significant(summary['viscosity_mm2_per_s'], 3)} mm²/s."
+    )
+    print_text(
+        "Not included: churning, windage, pumps, and seals without a table [seals.NAME]. They matter most at low "
+        "torque and high speed, where the efficiency is overestimated."
+    )
+    if summary["assumed_roughness"]:
+        note("Roughness Ra 0.5 µm is assumed for gears without roughness_Ra_um or roughness_Rz_um in [rating.gears]")
+    if summary["bearings_without_data"]:
+        warn(f"no friction of bearings without a catalogue: {', '.join(summary['bearings_without_data'])}")
+    unknown = [bearing["family"] for bearing in bearings if not bearing["series"]]
+    if unknown:
+        note(
+            f"Unknown series of the bearings {', '.join(unknown)}: their friction is that of all series of the type; "
+            "set catalogue.designation or catalogue.series"
+        )
+    if summary["map"]:
+        efficiency = {(point["speed_share"], point["torque_share"]): point["efficiency"] for point in summary["map"]}
+        rows = [{"torque": torque, **{str(speed): efficiency[speed, torque] for speed in SHARES}} for torque in SHARES]
+        columns = [Column(f"{100 * speed:g} %\nspeed", str(speed), ".2f", 100.0) for speed in SHARES]
+        print_table("Efficiency, %", rows, [Column("torque", lambda row: f"{100 * row['torque']:g} %"), *columns])
+    if not any(mesh["from_table"] for mesh in summary["meshes"]):
+        say("exugear ste computes the tables from which H_V follows.")

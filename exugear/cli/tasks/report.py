@@ -1,0 +1,198 @@
+"""The command `report`: a web page on a results folder."""
+
+from __future__ import annotations
+
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from exugear.cli.case import check_allow_dir
+from exugear.cli.console import (
+    BadInputError,
+    FailedError,
+    interruption,
+    model_errors,
+    note,
+    print_json,
+    progress_bar,
+    say,
+    warn,
+)
+from exugear.cli.tables import Column, print_table
+from exugear.cli.watched import WatchedProject
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.units import RPM
+from exugear.gearbox.variant import Variant
+from exugear.project import default_folder
+from exugear.report.findings.context import ReportError, choice_of
+from exugear.report.findings.design_changes import DesignStudy
+from exugear.report.findings.other_design import check_ranges
+from exugear.report.findings.words import QUANTITIES
+from exugear.report.writer import Report, write_report
+from exugear.results.folder import CASE_FILE, read_stored_gearbox, time_noted, times_spent
+from exugear.results.run_file import load_run
+from exugear.steady.settings import SteadySettings, operating_speeds
+from exugear.system.gearbox_checks import usual_variant
+from exugear.system.modes import load_modes
+from exugear.system.tooth_mesh.laws.registry import LAWS
+from fe_ste.tools.files import FileError
+from fe_ste.tools.threads import Workers, available_cores
+
+
+def report(
+    folder: Path,
+    near: float | None,
+    stored: bool,
+    levers: bool,
+    compare: Path | None,
+    allow_dir: Path | None,
+    as_json: bool,
+) -> None:
+    """Write the report of a results folder and print its statements."""
+    check_allow_dir(allow_dir)
+    if not folder.is_dir():
+        raise BadInputError(f"{folder}: no such folder; specify the results folder of `exugear run`")
+    if compare is not None and not compare.is_dir():
+        raise BadInputError(f"{compare}: --compare: no such folder; specify the results folder of another design")
+    folder = _results_of(folder)
+    other = None if compare is None else _results_of(compare)
+    if other is not None:
+        _check_comparison(folder, other, allow_dir)
+    if not stored:
+        _compute_missing(folder, allow_dir)
+    study = None
+    if levers:
+        study = _design_changes(folder, allow_dir)
+    try:
+        with time_noted(folder, "report"), progress_bar() as bar, _parallel_worker() as executor:
+            task = bar.add_task("report", total=None)
+
+            def tell(what: str) -> None:
+                interruption.check()
+                bar.update(task, description=what)
+
+            written = write_report(folder, near, tell, allow_dir, executor, other)
+    except ReportError as error:
+        raise BadInputError(error) from error
+    _print_report(folder, written, study, as_json)
+
+
+def _check_comparison(folder: Path, other: Path, allow_dir: Path | None) -> None:
+    """Refuse another design that cannot be compared, before anything is computed."""
+    permissions = Permissions(below=allow_dir)
+    own = read_stored_gearbox(folder, permissions)
+    others = read_stored_gearbox(other, permissions)
+    try:
+        check_ranges(own, others)
+    except ReportError as error:
+        raise BadInputError(error) from error
+
+
+def _compute_missing(folder: Path, allow_dir: Path | None) -> None:
+    """Compute missing modes of all models with runs or modes, and a response of the one with most degrees of freedom.
+
+    Existing files stay as they are, even if they are damaged or belong to other input. What takes long (tables, contact
+    loss) or fails is left to the report, which lists it with its command.
+    """
+    models = []
+    for path in sorted(folder.glob("*/*/run.nc")):
+        with suppress(FileError, ValueError, KeyError):
+            models.append(choice_of(load_run(path, ()).attrs))
+    for path in sorted(folder.glob("*/*/modes.nc")):
+        with suppress(FileError, ValueError, KeyError):
+            models.append(choice_of(load_modes(path).attrs))
+    if not models:
+        return
+    with suppress(BadInputError, FailedError), model_errors():
+        project = WatchedProject(read_stored_gearbox(folder, Permissions(below=allow_dir)), folder)
+        chosen = [replace(project, choice=model) for model in dict.fromkeys(models)]
+        ready = [own for own in chosen if LAWS[own.choice.mesh_model].has_force and not own.missing_tables()]
+        for own in ready:
+            if not own.modes_path.exists():
+                own.modes()
+        linear = [
+            own
+            for own in ready
+            if (law := LAWS[own.choice.mesh_model]).needs_tables and not law.loses_contact  # excited, and linear
+        ]
+        if linear and not any(folder.glob("*/*/steady-*.nc")):
+            richest = max(linear, key=lambda own: list(Variant).index(own.choice.variant))
+            richest.steady(SteadySettings(operating_speeds(project.gearbox)))
+
+
+def _design_changes(folder: Path, allow_dir: Path | None) -> DesignStudy:
+    """Compute the design changes of the variant with most degrees of freedom that the file allows."""
+    gearbox = read_stored_gearbox(folder, Permissions(below=allow_dir))
+    project = WatchedProject(gearbox, folder, Choice(usual_variant(gearbox)))
+    project.prepare()
+    study = project.design_changes(lambda done, total, words: note(f"Design change {done + 1} of {total}: {words}"))
+    if study is None:
+        raise BadInputError(f"{folder}: --levers: no resonance in the operating range; nothing to reduce")
+    return study
+
+
+def _results_of(folder: Path) -> Path:
+    """Return the default results folder of the gearbox file in a folder, if only that one contains results."""
+    below = default_folder(folder / "gearbox.toml")
+    if (folder / CASE_FILE).is_file() or not (below / CASE_FILE).is_file() or not any(folder.glob("*.toml")):
+        return folder
+    note(f"Note: {folder} contains the gearbox file; its results are in {below}")
+    return below
+
+
+def _parallel_worker() -> AbstractContextManager[Executor | None]:
+    """Return a second worker process if a core is available for it; the process starts with its first task."""
+    if available_cores() > 1:
+        return Workers(1)
+    return nullcontext()
+
+
+def _print_report(folder: Path, written: Report, study: DesignStudy | None, as_json: bool) -> None:
+    spent = times_spent(folder)
+    for line in written.left_out:
+        warn(f"skipped: {line}")
+    for line in written.missing:
+        note(f"Not computed: {line}")
+    if as_json:
+        times = {entry.step: entry.seconds for entry in spent}
+        lists = {name: list(getattr(written, name)) for name in ("statements", "resonances", "missing", "left_out")}
+        changes = [asdict(result) for result in (study.results if study else ())]
+        print_json({"report": str(written.path), **lists, "design_changes": changes, "seconds": times})
+        return
+    if study is not None:
+        _print_changes(study)
+    for line in written.statements:
+        say(f"- {line}")
+    print_table("Run time, last execution of each step", map(vars, spent), TIMES, "Parallel steps overlap.")
+    say(f"Report: {written.path}")
+
+
+TIMES = (
+    Column("step", "step"),
+    Column("wall\ntime s", "seconds", ".1f"),
+    Column("memory\npeak MB", "memory", ".0f", 1e-6),
+)
+
+
+def _print_changes(study: DesignStudy) -> None:
+    """Print the effects of the design changes: on this peak, and on the highest amplitude in the operating range."""
+    columns = [Column("change", "change", is_text=True)]
+    for name, label in QUANTITIES.items():
+        columns.append(Column(f"{label.short}\nhere", f"{name}_this_peak", _decibels, missing="–"))
+        columns.append(Column(f"{label.short}\nrange", f"{name}_highest", _decibels, missing="–"))
+    columns.append(Column("price", "price", is_text=True))
+    rows = []
+    for result in study.results:
+        row = {"change": result.change.words, "price": result.refusal or result.price}
+        for name, effect in result.effects.items():
+            row |= {f"{name}_{key}": value for key, value in vars(effect).items()}
+        rows.append(row)
+    title = f"Design changes for {study.frequency:.3g} Hz at {abs(study.speed) / RPM:.4g} rpm, {study.line}, dB"
+    print_table(title, rows, columns, "here: this peak; range: highest amplitude of any order.")
+
+
+def _decibels(value: float) -> str:
+    text = f"{value:+.1f}"
+    return "0.0" if text in ("+0.0", "-0.0") else text

@@ -1,0 +1,235 @@
+"""The command `ste`: tables of the static transmission error, with pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Future
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.progress import Progress, TaskID
+
+from exugear.cli.console import (
+    BadInputError,
+    FailedError,
+    interruption,
+    make_results_folder,
+    note,
+    print_json,
+    progress_bar,
+    say,
+)
+from exugear.cli.tables import Column, print_table
+from exugear.cli.watched import WatchedProject, errors_of_tables
+from exugear.gearbox.choice import Choice
+from exugear.gearbox.gearbox import Gearbox
+from exugear.gearbox.variant import Variant
+from exugear.project import default_folder
+from exugear.report.pictures.diagrams import contact_picture, draw_contact, draw_curves
+from exugear.results.folder import keep_case, time_noted
+from exugear.system.bearings.rolling.rows import BearingError
+from exugear.system.bearings.stiffness import unsupported
+from exugear.system.statics import BalanceError, static_state
+from exugear.system.tooth_mesh.placement import MeshError
+from exugear.system.tooth_mesh.reference_tables import (
+    ReferenceRequest,
+    reference_warnings,
+    requested_references,
+    summarise_reference,
+)
+from exugear.system.tooth_mesh.tables import TableRequest, missing_tables, stored_tables, summarise, without_table
+from fe_ste.contact.kinematics import ContactError
+from fe_ste.geometry.checks import GeometryError
+from fe_ste.reference.newton import Iteration
+from fe_ste.reference.table import NonlinearTable
+from fe_ste.tools.drawing import RenderingError
+from fe_ste.tools.threads import Workers, available_cores
+from fe_ste.transmission_error.table import MeshTable
+
+#: Minimum number of positions, with which the mesh cycle resolves the harmonics needed by the dynamics.
+LEAST_TABLE_POSITIONS = 8
+
+#: Minimum number of tooth pictures, at about a second each, that justifies the start of another process.
+WORTH_A_PROCESS = 3
+
+
+def ste(gearbox: Gearbox, out: Path | None, names: list[str], positions: int | None, grid: bool, as_json: bool) -> None:
+    """Compute, store and print the tables of the pairs of a gearbox."""
+    if positions is not None and positions < LEAST_TABLE_POSITIONS:
+        raise BadInputError(f"--positions {positions}: a table for dynamics requires at least {LEAST_TABLE_POSITIONS}")
+    project = WatchedProject(gearbox, out or default_folder(gearbox.source), Choice(Variant.bushing))
+    folder = project.folder
+    requests = _requested_tables(project, names, positions, grid)
+    with time_noted(folder, "tables of transmission error"):
+        tables = project.computed(requests)
+    with time_noted(folder, "pictures of the tables"):
+        beside = stored_tables(gearbox, folder, positions)
+        with _curves_beside({**beside, **tables}, folder, requests) as curves:
+            contacts = _draw_contacts(requests, tables, folder)
+        pictures = curves.result() + contacts
+    _print_misalignment(project)
+    summaries = [summarise(request, tables[request.name]) for request in requests]
+    if as_json:
+        print_json({"case": gearbox.source, "tables": summaries, "pictures": [str(path) for path in pictures]})
+    else:
+        print_table("Static transmission error", summaries, TABLES, TABLE_LEGEND)
+        say(f"Results: {folder / 'tables'}; pictures: {folder / 'pictures'}")
+    if doubts := errors_of_tables(tables):
+        raise FailedError("\n".join(["invalid tables:", *doubts]))
+
+
+def _print_misalignment(project: WatchedProject) -> None:
+    """Print the misalignment of the gears, which static tables neglect; nothing if bearing data are unknown."""
+    if unsupported(project.gearbox, project.choice.variant) or missing_tables(project.gearbox, project.folder):
+        return
+    try:
+        with project.bars.row():
+            state = static_state(project.assembly())
+    except (BalanceError, BearingError, MeshError):  # reported by the commands that need the state
+        return
+    largest: dict[str, float] = {}
+    for element, misalignment in zip(state.assembly.elements, state.misalignment, strict=True):
+        pair = element.mesh.pair
+        largest[pair.name] = max(largest.get(pair.name, 0.0), abs(float(misalignment)) * pair.face_width)
+    words = ", ".join(f"{name} {1e6 * opening:.1f} µm" for name, opening in largest.items())
+    note(f"Misalignment under the static load, gap over the face width: {words} (details: exugear bearings)")
+
+
+def _requested_tables(
+    project: WatchedProject, names: list[str], positions: int | None, grid: bool
+) -> list[TableRequest]:
+    gearbox = project.gearbox
+    requests = project.requested_tables(names, positions, grid=grid)
+    if not requests:
+        why = (
+            without_table(gearbox, gearbox.pairs)
+            or "pairs: no pair has table = true; set it for a pair, or use --mesh NAME"
+        )
+        raise BadInputError(gearbox.error(why))
+    make_results_folder(project.folder)
+    project.keep_case()
+    for request in requests:
+        if request.stored:
+            note(f"{request.name}: cached table of the same input: {request.path}")
+            continue
+        if request.replaces:
+            note(request.replaces)
+        if len(request.wanted.misalignment) > 1:
+            ranges = request.wanted.axes().ranges()
+            note(f"{request.name}: grid over {', '.join(f'{axis} {values}' for axis, values in ranges.items())}")
+    return requests
+
+
+def references(gearbox: Gearbox, out: Path | None, names: list[str], positions: int | None, as_json: bool) -> None:
+    """Run the reference analysis of the pairs and print results; each position is stored when it is complete."""
+    folder = out or default_folder(gearbox.source)
+    requests = requested_references(gearbox, folder, names, positions)
+    make_results_folder(folder)
+    keep_case(gearbox, folder)
+    tables = {}
+    with time_noted(folder, "reference analysis"), progress_bar() as bar:
+        task = bar.add_task("", total=sum(request.wanted.positions for request in requests))
+        for request in requests:
+            tables[request.name] = _compute_reference(request, bar, task)
+    summaries = [summarise_reference(request, tables[request.name]) for request in requests]
+    if as_json:
+        print_json({"case": gearbox.source, "tables": summaries})
+    else:
+        title = "Static transmission error, nonlinear finite elements"
+        print_table(title, summaries, REFERENCES, REFERENCE_LEGEND)
+        say(f"Results: {folder / 'tables'}")
+    failures = [f"{name}: {line}" for name, table in tables.items() for line in table.failures]
+    doubts = reference_warnings(summaries)
+    errors = []
+    if failures:
+        errors += ["positions not converged:", *failures]
+    if doubts:
+        errors += ["the methods differ by more than the limit:", *doubts]
+    if errors:
+        raise FailedError("\n".join(errors))
+
+
+def _compute_reference(request: ReferenceRequest, bar: Progress, task: TaskID) -> NonlinearTable:
+    before = bar.tasks[task].completed
+
+    def report_iteration(done: int, of: int, iteration: Iteration | None) -> None:
+        interruption.check()
+        text = f"{request.name}: {done} of {of} positions"
+        if iteration is not None:
+            text += f", {100 * iteration.load:.3g} % of the load, iteration {iteration.number}"
+        bar.update(task, completed=before + done, description=text)
+
+    try:
+        return request.compute(report_iteration)
+    except GeometryError as error:
+        raise BadInputError(f"pairs.{request.name}: {error}") from error
+
+
+@contextmanager
+def _curves_beside(
+    tables: dict[str, MeshTable], folder: Path, requests: list[TableRequest]
+) -> Iterator[Future[list[Path]]]:
+    """Plot the curves of all tables, in another process if this one has enough tooth pictures to draw meanwhile."""
+    new = sum(not (request.stored and contact_picture(request.name, folder).exists()) for request in requests)
+    if new >= WORTH_A_PROCESS and available_cores() > 1:
+        with Workers(1) as executor:
+            yield executor.submit(draw_curves, tables, folder)
+        return
+    drawn: Future[list[Path]] = Future()
+    drawn.set_result(draw_curves(tables, folder))
+    yield drawn
+
+
+def _draw_contacts(requests: list[TableRequest], tables: dict[str, MeshTable], folder: Path) -> list[Path]:
+    """Draw the teeth in contact if the picture is missing or the table is new; return all such pictures."""
+    pictures: list[Path] = []
+    with progress_bar() as bar:
+        for request in bar.track(requests, description="pictures of the teeth"):
+            path = contact_picture(request.name, folder)
+            try:
+                if not (request.stored and path.exists()):
+                    draw_contact(request, tables[request.name], folder)
+            except ContactError as error:
+                note(f"No picture of the teeth of {request.name}: {error}", style="yellow")
+                continue
+            except RenderingError as error:
+                note(f"No pictures of the teeth: {error}", style="yellow")
+                break
+            pictures.append(path)
+    return pictures
+
+
+TABLE_LEGEND = (
+    "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p) over the mesh cycle. Stiffness: mean mesh "
+    "stiffness. Stress: maximum contact stress of the mesh cycle without tip-edge contact; at the pitch point: Hertz, "
+    "even load distribution. Aligned gears, no load factors. States conv.: converged of all states of the table."
+)
+REFERENCE_LEGEND = (
+    "Torque: of gear 1. TE: transmission error, mean and peak-to-peak (p-p), by the nonlinear reference analysis; "
+    "table: by the method of the tables, which the dynamic models use. σ_H: contact stress of the most loaded tooth "
+    "pair, mean along its contact line, maximum over the positions."
+)
+
+
+PAIR = (Column("pair", "pair"), Column("torque\nN m", "torque_gear_1_N_m", ".1f"))
+TABLES = (
+    *PAIR,
+    Column("TE mean\nµm", "ste_mean_um", ".2f"),
+    Column("TE p-p\nµm", "ste_peak_to_peak_um", ".3f"),
+    Column("stiffn.\nMN/m", "mesh_stiffness_mean_N_per_m", ".4g", 1e-6),
+    Column("stress\nMPa", "max_pressure_MPa", ".0f"),
+    Column("at pitch\npoint MPa", "pitch_point_pressure_MPa", ".0f"),
+    Column("states\nconv.", lambda table: f"{table['states'] - table['not_converged']}/{table['states']}"),
+)
+REFERENCES = (
+    *PAIR,
+    Column("TE mean\nµm", "ste_mean_um", ".2f"),
+    Column("table\nmean µm", "superelement_mean_um", ".2f"),
+    Column("diff.\n%", "difference_of_means_percent", "+.1f"),
+    Column("TE p-p\nµm", "ste_peak_to_peak_um", ".3f"),
+    Column("table\np-p µm", "superelement_peak_to_peak_um", ".3f"),
+    Column("σ_H\nMPa", "contact_stress_MPa", ".0f"),
+    Column("table\nσ_H MPa", "superelement_contact_stress_MPa", ".0f"),
+    Column("posit.\nconv.", TABLES[-1].key),
+)
+"""Mean and peak-to-peak values by the reference analysis and by the method of the tables."""

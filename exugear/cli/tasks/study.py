@@ -1,0 +1,231 @@
+"""The command `study`: many variations of one gearbox, combined in one dataset."""
+
+from __future__ import annotations
+
+from functools import partial
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from exugear.cli.case import check_allow_dir, check_choice
+from exugear.cli.console import (
+    BadInputError,
+    FailedError,
+    interruption,
+    make_results_folder,
+    note,
+    print_json,
+    progress_bar,
+    say,
+)
+from exugear.cli.process import let_in_dask
+from exugear.cli.tables import Column, print_table
+from exugear.gearbox.named_files import Permissions
+from exugear.gearbox.reading import GearboxFileError
+from exugear.project import default_folder
+from exugear.results.folder import STUDIES
+from exugear.studies.dataset import EVALUATION, Criteria, judged_name, slopes
+from exugear.studies.executors import ExecutorError, Opens, dask_cluster, processes
+from exugear.studies.pictures import draw_study
+from exugear.studies.runner import WHOLE, OptimisationError, Shard, StudyResult, optimise, run_study
+from exugear.studies.sampling import SIDE
+from exugear.studies.sections import LimitSection, StudyError
+from exugear.studies.study import Study
+from exugear.system.gearbox_checks import check_parts
+from exugear.system.tooth_mesh.laws.registry import LAWS
+
+SHOWN_FAILURES = 5
+SHOWN_OF_FRONT = 5
+SLOPES = (
+    Column("parameter", itemgetter(1)),
+    Column("result", itemgetter(0), is_text=True),
+    Column("change per\nstep %", itemgetter(2), "+.3f", 100.0),
+)
+
+
+def study(
+    read: Study, folder: Path | None, opens: Opens, shard: Shard, merge: bool, retry: bool, as_json: bool
+) -> None:
+    """Compute the points of a study, and print its results."""
+    if read.file.optimise is not None and (merge or retry or shard != WHOLE):
+        raise BadInputError(
+            f"{read.source}: the points of an optimisation depend on each other; "
+            "remove --shard, --merge and --retry-failed"
+        )
+    stem = Path(read.source).name.removesuffix(".toml").removesuffix(".study") or "study"
+    folder = folder or default_folder(read.gearbox.source) / STUDIES / stem
+    check_choice(read.gearbox, read.choice, folder)
+    make_results_folder(folder)
+    try:
+        result = _run(read, folder, opens, shard, merge, retry)
+    except (ExecutorError, OptimisationError) as error:
+        raise FailedError(error) from error
+    summary = summarise(read, result, _draw(read, folder, result))
+    if as_json:
+        print_json(summary)
+    else:
+        _print(read, folder, result, summary)
+    _fail_if_beyond(read, result)
+    if summary["failed"]:
+        line = f"{summary['failed']} of {summary['points']} points failed; errors: {folder}; use --retry-failed to "
+        errors = [f"- {error}" for error in summary["errors"]]
+        raise FailedError("\n".join([f"{line}recompute them:", *errors]))
+    if summary["missing"] and result.path is not None:
+        raise FailedError(
+            f"{summary['missing']} of {summary['points']} points are missing; run the study, or the unfinished shards"
+        )
+
+
+def shard_of_options(text: str | None, merge: bool) -> Shard:
+    """Return the points to compute; raise an error for an invalid part."""
+    if text is None:
+        return WHOLE
+    if merge:
+        raise BadInputError("--merge merges all parts and computes none; remove --shard")
+    try:
+        return Shard.from_text(text)
+    except ValueError as error:
+        raise BadInputError(f"--shard: {error}") from error
+
+
+def executor_of_options(executor: str, workers: int | None, scheduler: str | None) -> Opens:
+    """Return what opens the executor of the points; raise an error for options that exclude each other."""
+    if executor == "dask":
+        if scheduler is None:
+            raise BadInputError("--executor dask requires --scheduler ADDRESS, such as tcp://10.0.0.1:8786")
+        if workers is not None:
+            raise BadInputError("--workers: the Dask cluster determines the number of workers; remove --workers")
+        let_in_dask()
+        return dask_cluster(scheduler)
+    if scheduler is not None:
+        raise BadInputError("--scheduler applies to a Dask cluster; add --executor dask")
+    return processes(workers)
+
+
+def read_study(path: Path, allow_dir: Path | None, scripts: bool) -> Study:
+    """Read a study file and check its gearbox."""
+    check_allow_dir(allow_dir)
+    try:
+        study = Study.from_toml(path, Permissions(scripts, allow_dir))
+        check_parts(study.gearbox)
+    except (StudyError, GearboxFileError) as error:
+        raise BadInputError(error) from error
+    law = study.choice.mesh_model
+    if law not in LAWS:
+        raise BadInputError(f"{path}: choice.mesh_model = {law!r}: unknown mesh model; choose one of {', '.join(LAWS)}")
+    return study
+
+
+def _run(study: Study, folder: Path, opens: Opens, shard: Shard, merge: bool, retry: bool) -> StudyResult:
+    """Run the study with a progress bar."""
+    with progress_bar() as bar:
+        task = bar.add_task("points", total=None)
+        first: list[int] = []
+
+        def show(done: int, failed: int, total: int) -> None:
+            interruption.check()
+            first.append(done)  # points from earlier runs do not indicate the remaining time
+            failures = f", {failed} failed" if failed else ""
+            text = f"point {done} of {total}{failures}"
+            bar.update(task, completed=done - first[0], total=total - first[0], description=text)
+
+        if study.file.optimise is not None:
+            return optimise(study, folder, opens, progress=show)
+        return run_study(study, folder, opens, shard=shard, merge=merge, retry=retry, progress=show)
+
+
+def _draw(study: Study, folder: Path, swept: StudyResult) -> list[Path]:
+    """Plot the combined results."""
+    if swept.dataset is None:
+        return []
+    search = study.file.optimise
+    minimised: tuple[str, ...] = ()
+    if search is not None:
+        minimised = tuple(_judged(study)[: len(search.minimise)])
+    return draw_study(swept.dataset, folder, minimised)
+
+
+def summarise(study: Study, swept: StudyResult, pictures: list[Path]) -> dict[str, Any]:
+    """Summarise a study: how many points are computed, failed and missing, and the files."""
+    searched = study.file.optimise is not None
+    total = len(swept.records if searched else study.design.points)
+    failed = swept.failed
+    return {
+        "study": study.source,
+        "name": study.file.name,
+        "points": total,
+        "computed": swept.computed,
+        "finished": len(swept.records) - len(failed),
+        "failed": len(failed),
+        "missing": total - len(swept.records),
+        "seconds_of_points": round(sum(record.seconds for record in swept.records.values()), 3),
+        "errors": [record.error for record in failed[:SHOWN_FAILURES]],
+        "file": None if swept.path is None else str(swept.path),
+        "pictures": [str(picture) for picture in pictures],
+    }
+
+
+def _print(study: Study, folder: Path, swept: StudyResult, summary: dict[str, Any]) -> None:
+    say(
+        f"{study.file.name}: {summary['finished']} of {summary['points']} points finished, "
+        f"{summary['computed']} computed now, {summary['seconds_of_points']:.1f} s worker time in total"
+    )
+    if swept.dataset is None or swept.path is None:
+        note(f"{summary['missing']} points belong to other shards; the last shard, or --merge, writes the dataset")
+        say(f"Points: {folder}")
+        return
+    if SIDE in study.design.shape:
+        ranked = sorted(slopes(swept.dataset), key=lambda entry: -abs(entry[2]))
+        if ranked:
+            print_table("Sensitivity of the results, largest first", ranked, SLOPES)
+    if study.file.optimise is not None:
+        _print_front(study, swept.dataset)
+    say(f"Results: {swept.path}; pictures in the same folder")
+
+
+def _judged(study: Study) -> list[str]:
+    """Variables that rate the points of an optimisation: outputs, or their percentiles over tolerances."""
+    return [judged_name(study, name, side) for name, side in Criteria.of(study.file).sides]
+
+
+def _fail_if_beyond(study: Study, swept: StudyResult) -> None:
+    """End with code 1 if no point of an optimisation is within its limits."""
+    data = swept.dataset
+    if data is None or "meets_limits" not in data or data["meets_limits"].any():
+        return
+    assert study.file.optimise is not None
+    limits = (f"{name} {_limit_text(limit)}" for name, limit in study.file.optimise.limits.items())
+    raise FailedError(
+        f"none of the {data.sizes[EVALUATION]} evaluated points meets the limits {', '.join(limits)}; widen the limits "
+        f"or parameter ranges, or set more generations. All points: {swept.path}"
+    )
+
+
+def _limit_text(limit: LimitSection) -> str:
+    bounds = (("min", limit.min), ("max", limit.max))
+    return " ".join(f"{word} {value:g}" for word, value in bounds if value is not None)
+
+
+PARAMETER = Column("result or\nparameter", str)
+
+
+def _value(point: xr.Dataset, name: str) -> float:
+    return float(point[name])
+
+
+def _print_front(study: Study, dataset: xr.Dataset) -> None:
+    """Print the start point of an optimisation, and some points of the Pareto front, spread over the front."""
+    figures = _judged(study)
+    front = dataset.isel(evaluation=dataset["on_front"].to_numpy() == 1).sortby(figures[0])
+    shown = sorted({round(n) for n in np.linspace(0, front.sizes["evaluation"] - 1, SHOWN_OF_FRONT)})
+    points = {"start\npoint": dataset.isel(evaluation=0)}
+    points |= {f"point\n{n + 1}": front.isel(evaluation=n) for n in shown if front.sizes["evaluation"]}
+    columns = [Column(label, partial(_value, point), ".4g", missing="") for label, point in points.items()]
+    names = (*figures, *study.file.parameters)
+    print_table(f"Pareto front: {front.sizes['evaluation']} points", names, (PARAMETER, *columns))
+    if study.tolerances is not None:
+        for name in figures:
+            note(f"{name}: {dataset[name].attrs['long_name']}")
